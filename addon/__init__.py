@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Patina: image-space rendering of point clouds in Blender. This file registers, nothing else."""
+
+bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
+    "name": "Patina",
+    "author": "The Patina authors",
+    "version": (0, 1, 0),
+    "blender": (3, 4, 0),
+    "location": "Render Properties > Render Engine > Patina; File > Import > Point Cloud",
+    "description": "Image-space rendering of point clouds",
+    "category": "Render",
+}
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import engine, operators, properties, render, ui
+from .sync import clouds
+
+_MODULES = (properties, engine, operators, ui)
+
+
+@persistent
+def _forget(*_) -> None:
+    """Another file: its data may carry the names of the last one's."""
+    clouds.CACHE.clear()
+
+
+def register() -> None:
+    for module in _MODULES:
+        module.register()
+    bpy.app.handlers.load_pre.append(_forget)
+
+
+def unregister() -> None:
+    bpy.app.handlers.load_pre.remove(_forget)
+    for module in reversed(_MODULES):
+        module.unregister()
+    clouds.CACHE.clear()
+    render.forget_device()

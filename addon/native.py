@@ -1,0 +1,442 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The binding of patina.h: the only file that knows ctypes.
+
+Structures and enumerations follow native/include/patina/patina.h field by field; every call that fails raises
+`PatinaError` with the library's own sentence. Calls release the GIL. A handle may be used from any thread, one
+call at a time; `Frame.cancel`, `Frame.progress`, `Progress.cancel` and `Progress.value` at any time.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import sys
+import threading
+import weakref
+from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_double, c_float, c_int
+from ctypes import c_size_t, c_uint32, c_uint64, c_void_p, sizeof
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+VERSION = (0, 1)  # of the header that this file follows; the patch number may differ
+
+CANCELLED = -7  # PATINA_ERROR_CANCELLED
+INTERNAL = -10  # PATINA_ERROR_INTERNAL
+
+# patina_pass: plane name → (number, channels)
+PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1)}
+
+# patina_type by numpy type
+_TYPES = {"float32": 1, "float64": 2, "uint8": 3, "uint16": 4, "uint32": 5, "int8": 6, "int16": 7, "int32": 8}
+
+
+class PatinaError(Exception):
+    """A call that failed: `code` from the header's list, the library's sentence as text."""
+
+    def __init__(self, message: str, code: int = INTERNAL) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class PatinaCancelled(PatinaError):
+    """A call that was cancelled on request."""
+
+
+# ---- structures ----------------------------------------------------------------------------------------------
+
+
+class _Descriptor(Structure):
+    """A structure whose first field is its size; zero everywhere else means "default"."""
+
+    def __init__(self, **fields: Any) -> None:
+        super().__init__(struct_size=sizeof(self))
+        types = dict(self._fields_)
+        for name, value in fields.items():
+            kind = types[name]
+            setattr(self, name, kind(*value) if issubclass(kind, ctypes.Array) else value)
+
+
+class _Array(Structure):
+    _fields_ = [("data", c_void_p), ("type", c_uint32), ("components", c_uint32), ("stride", c_uint64)]
+
+
+class _DeviceDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("name", c_char_p), ("threads", c_uint32), ("batch", c_uint32),
+                ("memory_cap", c_uint64)]
+
+
+class _DeviceInfo(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("name", c_char * 32), ("description", c_char * 192),
+                ("threads", c_uint32), ("hardware", c_uint32), ("key64", c_uint32)]
+
+
+class _CloudDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", _Array), ("normal", _Array),
+                ("color", _Array), ("origin", c_double * 3), ("threads", c_uint32)]
+
+
+class _CloudInfo(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("drawn", c_uint64), ("chunks", c_uint64),
+                ("bytes", c_uint64), ("box_min", c_double * 3), ("box_max", c_double * 3), ("spacing", c_double),
+                ("spacing_min", c_double), ("spacing_max", c_double), ("invalid_positions", c_uint64),
+                ("invalid_normals", c_uint64), ("invalid_colors", c_uint64), ("has_normals", c_uint32),
+                ("has_colors", c_uint32), ("origin", c_double * 3)]
+
+
+class _FileInfo(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
+                ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32),
+                ("origin", c_double * 3), ("box_min", c_double * 3), ("box_max", c_double * 3),
+                ("invalid_positions", c_uint64)]
+
+
+class _FileAttribute(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("type", c_uint32)]
+
+
+class _CloudStyle(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
+                ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
+                ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32)]
+
+
+class _LightDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("type", c_uint32), ("color", c_float * 3), ("power", c_float),
+                ("position", c_double * 3), ("direction", c_double * 3)]
+
+
+class _Camera(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("orthographic", c_uint32), ("world_from_camera", c_double * 16),
+                ("left", c_double), ("right", c_double), ("bottom", c_double), ("top", c_double),
+                ("near_clip", c_double), ("far_clip", c_double)]
+
+
+class _Settings(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
+                ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
+                ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
+                ("background_only_camera", c_uint32)]
+
+
+class _FrameStats(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("points", c_uint64),
+                ("points_scattered", c_uint64), ("chunks", c_uint64), ("chunks_culled", c_uint64),
+                ("ms", c_double), ("plane_bytes", c_uint64)]
+
+
+# ---- the library ---------------------------------------------------------------------------------------------
+
+_OUT = POINTER(c_void_p)
+
+# name → argument types; everything returns int except what _RESULTS names
+_CALLS = {
+    "patina_version": (),
+    "patina_message": (c_void_p, c_char_p, c_size_t),
+    "patina_log_next": (c_char_p, c_size_t, POINTER(c_int)),
+    "patina_progress_create": (_OUT,),
+    "patina_progress_destroy": (c_void_p,),
+    "patina_progress_cancel": (c_void_p,),
+    "patina_progress_value": (c_void_p,),
+    "patina_device_create": (POINTER(_DeviceDesc), _OUT),
+    "patina_device_destroy": (c_void_p,),
+    "patina_device_get_info": (c_void_p, POINTER(_DeviceInfo)),
+    "patina_cloud_create": (POINTER(_CloudDesc), c_void_p, _OUT),
+    "patina_cloud_destroy": (c_void_p,),
+    "patina_cloud_get_info": (c_void_p, POINTER(_CloudInfo)),
+    "patina_file_open": (c_char_p, c_void_p, _OUT),
+    "patina_file_destroy": (c_void_p,),
+    "patina_file_get_info": (c_void_p, POINTER(_FileInfo)),
+    "patina_file_get_attribute": (c_void_p, c_uint32, POINTER(_FileAttribute)),
+    "patina_file_read_positions": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
+    "patina_scene_create": (_OUT,),
+    "patina_scene_destroy": (c_void_p,),
+    "patina_scene_add_cloud": (c_void_p, c_void_p, POINTER(_CloudStyle)),
+    "patina_scene_add_light": (c_void_p, POINTER(_LightDesc)),
+    "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
+    "patina_scene_set_settings": (c_void_p, POINTER(_Settings)),
+    "patina_frame_create": (c_void_p, _OUT),
+    "patina_frame_destroy": (c_void_p,),
+    "patina_frame_render": (c_void_p, c_void_p),
+    "patina_frame_cancel": (c_void_p,),
+    "patina_frame_progress": (c_void_p,),
+    "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
+    "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
+    "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
+}
+_RESULTS = {
+    "patina_version": c_char_p, "patina_message": c_size_t, "patina_log_next": c_size_t,
+    "patina_progress_destroy": None, "patina_progress_cancel": None, "patina_progress_value": c_float,
+    "patina_device_destroy": None, "patina_cloud_destroy": None, "patina_file_destroy": None,
+    "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
+    "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t,
+}
+
+_loaded: ctypes.CDLL | None = None
+_loading = threading.Lock()
+
+
+def library_path() -> Path:
+    """Where the library is looked for: $PATINA_LIBRARY, else lib/ in this package."""
+    override = os.environ.get("PATINA_LIBRARY")
+    if override:
+        return Path(override)
+    name = {"win32": "patina.dll", "darwin": "libpatina.dylib"}.get(sys.platform, "libpatina.so")
+    return Path(__file__).parent / "lib" / name
+
+
+def library() -> ctypes.CDLL:
+    """Loads the library at the first call. PatinaError when it is missing or of another version."""
+    global _loaded
+    with _loading:
+        if _loaded is None:
+            _loaded = _load(library_path())
+        return _loaded
+
+
+def forget_library() -> None:
+    """The next call of library() looks for the file again. Handles that live on keep the old one."""
+    global _loaded
+    with _loading:
+        _loaded = None
+
+
+def _load(path: Path) -> ctypes.CDLL:
+    if not path.is_file():
+        raise PatinaError(f"Patina's library is missing: there is no {path}. Install the add-on's zip for this "
+                          "platform, or let the environment variable PATINA_LIBRARY name the file")
+    try:
+        lib = ctypes.CDLL(str(path))
+        for name, arguments in _CALLS.items():
+            call = getattr(lib, name)
+            call.argtypes = arguments
+            call.restype = _RESULTS.get(name, c_int)
+    except (OSError, AttributeError) as error:
+        raise PatinaError(f"Patina's library {path} cannot be loaded: {error}") from None
+    version = lib.patina_version().decode()
+    if tuple(int(part) for part in version.split(".")[:2]) != VERSION:
+        wanted = ".".join(str(part) for part in VERSION)
+        raise PatinaError(f"Patina's library {path} is version {version}, the add-on needs {wanted}: "
+                          "restart Blender after an update")
+    return lib
+
+
+def _message(handle: c_void_p | None) -> str:
+    buffer = ctypes.create_string_buffer(2048)
+    library().patina_message(handle, buffer, len(buffer))
+    return buffer.value.decode("utf-8", "replace")
+
+
+def _check(code: int, *handles: c_void_p | None) -> None:
+    """Raises for a negative code with the first message found at the handles, else at the thread."""
+    if code >= 0:
+        return
+    text = next(filter(None, map(_message, (*handles, None))), f"the library failed with code {code}")
+    raise (PatinaCancelled if code == CANCELLED else PatinaError)(text, code)
+
+
+def log_lines() -> list[tuple[int, str]]:
+    """Takes the unread log lines: (level, text), level 0 error, 1 warning, 2 information."""
+    lines = []
+    buffer, level = ctypes.create_string_buffer(1024), c_int()
+    while library().patina_log_next(buffer, len(buffer), byref(level)):
+        lines.append((level.value, buffer.value.decode("utf-8", "replace")))
+    return lines
+
+
+# ---- handles -------------------------------------------------------------------------------------------------
+
+
+class _Handle:
+    """Owns a native handle until close(), the end of a `with`, or the last reference."""
+
+    _kind = ""
+
+    def __init__(self, *arguments: Any, blame: tuple[c_void_p, ...] = (), create: str = "") -> None:
+        lib = library()
+        handle = c_void_p()
+        _check(getattr(lib, create or f"patina_{self._kind}_create")(*arguments, byref(handle)), *blame)
+        self._handle = handle
+        self._finalizer = weakref.finalize(self, getattr(lib, f"patina_{self._kind}_destroy"), handle)
+
+    def close(self) -> None:
+        self._finalizer()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        if not self._finalizer.alive:
+            raise PatinaError(f"this {self._kind} is closed")
+        _check(getattr(library(), f"patina_{self._kind}_{name}")(self._handle, *arguments), self._handle)
+
+
+class Progress(_Handle):
+    """Of a long call that has no frame; value() and cancel() may be called while it runs."""
+
+    _kind = "progress"
+
+    def cancel(self) -> None:
+        library().patina_progress_cancel(self._handle)
+
+    def value(self) -> float:
+        return library().patina_progress_value(self._handle)
+
+
+def _handle_of(progress: Progress | None) -> c_void_p | None:
+    return progress._handle if progress else None
+
+
+class Device(_Handle):
+    _kind = "device"
+
+    def __init__(self, name: str = "auto", threads: int = 0) -> None:
+        super().__init__(byref(_DeviceDesc(name=name.encode(), threads=threads)))
+        info = _DeviceInfo()
+        self._call("get_info", byref(info))
+        self.name = info.name.decode()
+        self.description = info.description.decode("utf-8", "replace")
+
+
+def _view(array: np.ndarray | None, count: int) -> _Array:
+    """The library's view of a (count, components) array, which must stay alive during the call."""
+    if array is None:
+        return _Array()
+    if array.ndim != 2 or len(array) != count or not array.flags.c_contiguous:
+        raise PatinaError(f"an array of shape {array.shape} cannot hold {count} points")
+    return _Array(data=array.ctypes.data, type=_TYPES[array.dtype.name], components=array.shape[1])
+
+
+class Cloud(_Handle):
+    """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None."""
+
+    _kind = "cloud"
+
+    def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
+                 progress: Progress | None = None, threads: int = 0) -> None:
+        count = len(positions)
+        desc = _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
+                          color=_view(colors, count), threads=threads)
+        super().__init__(byref(desc), _handle_of(progress))
+        info = _CloudInfo()
+        self._call("get_info", byref(info))
+        self.count, self.drawn, self.bytes = info.count, info.drawn, info.bytes
+        self.invalid_positions = info.invalid_positions
+        self.has_normals = bool(info.has_normals)
+
+
+class File(_Handle):
+    """An opened point file. Arrays are float32, 8-bit colours uint8 RGBA (sRGB), other colours float32 (linear)."""
+
+    _kind = "file"
+
+    def __init__(self, path: str, progress: Progress | None = None) -> None:
+        super().__init__(os.fsencode(path), _handle_of(progress), create="patina_file_open")
+        info = _FileInfo()
+        self._call("get_info", byref(info))
+        self.format = info.format.decode()
+        self.count = info.count
+        self.origin = tuple(info.origin)
+        self.invalid_positions = info.invalid_positions
+        self.attributes = [self._attribute(index) for index in range(info.attributes)]
+        self._info = info
+
+    def _attribute(self, index: int) -> str:
+        attribute = _FileAttribute()
+        self._call("get_attribute", index, byref(attribute))
+        return attribute.name.decode("utf-8", "replace")
+
+    def _column(self, call: str, shape: tuple[int, ...], *index: int, dtype: type = np.float32) -> np.ndarray:
+        column = np.empty(shape, dtype)
+        self._call(call, *index, column.ctypes.data, column.nbytes)
+        return column
+
+    def positions(self) -> np.ndarray:
+        return self._column("read_positions", (self.count, 3))
+
+    def normals(self) -> np.ndarray | None:
+        return self._column("read_normals", (self.count, 3)) if self._info.has_normals else None
+
+    def colors(self) -> np.ndarray | None:
+        if not self._info.color_type:
+            return None
+        if self._info.color_type == _TYPES["uint8"]:
+            return self._column("read_colors_u8", (self.count, 4), dtype=np.uint8)
+        return self._column("read_colors_f32", (self.count, 4))
+
+    def attribute(self, index: int) -> np.ndarray:
+        return self._column("read_attribute", (self.count,), index)
+
+
+class Scene(_Handle):
+    """Clouds, lights, a camera and settings; keyword arguments are the fields of the header's descriptors."""
+
+    _kind = "scene"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._clouds: list[Cloud] = []  # the native scene points to them
+
+    def add_cloud(self, cloud: Cloud, **style: Any) -> None:
+        self._call("add_cloud", cloud._handle, byref(_CloudStyle(**style)))
+        self._clouds.append(cloud)
+
+    def add_light(self, **light: Any) -> None:
+        self._call("add_light", byref(_LightDesc(**light)))
+
+    def set_camera(self, **camera: Any) -> None:
+        self._call("set_camera", byref(_Camera(**camera)))
+
+    def set_settings(self, **settings: Any) -> None:
+        self._call("set_settings", byref(_Settings(**settings)))
+
+
+class Frame(_Handle):
+    """Renders scenes on a device and keeps the planes; closes before its device."""
+
+    _kind = "frame"
+
+    def __init__(self, device: Device) -> None:
+        super().__init__(device._handle, blame=(device._handle,))
+        self._device = device
+
+    def render(self, scene: Scene) -> None:
+        if not self._finalizer.alive:
+            raise PatinaError("this frame is closed")
+        _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
+               self._device._handle)
+
+    def cancel(self) -> None:
+        library().patina_frame_cancel(self._handle)
+
+    def progress(self) -> float:
+        return library().patina_frame_progress(self._handle)
+
+    def read(self, plane: str) -> np.ndarray:
+        """A plane of the last picture, (height, width, channels) float32, row 0 at the bottom."""
+        number, channels = PLANES[plane]
+        stats = self.stats()
+        pixels = np.empty((stats["height"], stats["width"], channels), np.float32)
+        self._call("read", number, pixels.ctypes.data, pixels.nbytes)
+        return pixels
+
+    def stats(self) -> dict[str, Any]:
+        stats = _FrameStats()
+        self._call("get_stats", byref(stats))
+        return {name: getattr(stats, name) for name, _ in _FrameStats._fields_[1:]}
+
+    def pass_stats(self) -> dict[str, Any]:
+        """Milliseconds by pass, and why each other pass was left out."""
+        size = library().patina_frame_stats_json(self._handle, None, 0) + 1
+        buffer = ctypes.create_string_buffer(size)
+        library().patina_frame_stats_json(self._handle, buffer, size)
+        return json.loads(buffer.value or b"{}")

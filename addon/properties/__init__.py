@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the artist sets: on the scene, on objects, on view layers.
+
+Enum items are numbered as the library's enumerations, and so keep their meaning in old files.
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+from bpy.props import PointerProperty, StringProperty
+from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
+
+_OVERRIDE = {'LIBRARY_OVERRIDABLE'}
+
+
+def enum_number(group: PropertyGroup, name: str) -> int:
+    """The number of the chosen item, which is the library's."""
+    return group.bl_rna.properties[name].enum_items[getattr(group, name)].value
+
+
+class PatinaSceneProperties(PropertyGroup):
+    quality: EnumProperty(
+        name="Quality", override=_OVERRIDE, default='REFINED',
+        description="How filled pixels get their depth and normal",
+        items=(
+            ('REFINED', "Refined", "Filled pixels lie on the tangent plane of the point that fills them", 0),
+            ('PAPER', "As in the Paper", "Filled pixels take depth and normal of the point that fills them", 1)))
+    fill: EnumProperty(
+        name="Hole Filling", override=_OVERRIDE, default='CLOSED',
+        description="How gaps between points close",
+        items=(
+            ('CLOSED', "Closed", "Gaps close, outlines do not grow", 0),
+            ('PAPER', "As in the Paper", "A fixed number of fills; outlines grow a little", 1),
+            ('OFF', "Off", "Only measured points", 2)))
+    fill_iterations: IntProperty(
+        name="Iterations", override=_OVERRIDE, default=0, min=0, max=64,
+        description="Rounds of hole filling; 0 follows the spacing of the points on screen")
+    smooth: EnumProperty(
+        name="Smoothing", override=_OVERRIDE, default='ALLEVIATED',
+        description="Smooths colours between neighbouring pixels of one surface",
+        items=(
+            ('ALLEVIATED', "Alleviated Gaussian", "Weights 16, 2 and 1: takes the noise, keeps the detail", 0),
+            ('GAUSSIAN', "Gaussian", "3 × 3 Gaussian", 1),
+            ('BOX', "Box", "Mean of 3 × 3 pixels", 2),
+            ('OFF', "Off", "Colours as they are", 3)))
+    antialias: EnumProperty(
+        name="Anti-Aliasing", override=_OVERRIDE, default='LAYERS',
+        description="Which edges are blended",
+        items=(
+            ('LAYERS', "All Edges", "Edges before the background and between layers", 0),
+            ('BACKGROUND', "Background Edges", "Edges before the background only", 1),
+            ('OFF', "Off", "Hard edges", 2)))
+    device: EnumProperty(
+        name="Device", override=_OVERRIDE, default='AUTO',
+        description="What computes the picture",
+        items=(
+            ('AUTO', "Automatic", "The GPU where there is one, else the processor", 0),
+            ('CPU', "Processor", "The same pixels on every machine", 1),
+            ('CPU_SCALAR', "Processor, Plain", "Without vector instructions: slow, for comparison", 2),
+            ('GL', "OpenGL", "OpenGL 4.3 compute shaders", 3),
+            ('GL_SOFTWARE', "OpenGL in Software", "OpenGL on the processor: slow, for comparison", 4)))
+    threads: IntProperty(
+        name="Threads", override=_OVERRIDE, default=0, min=0, max=1024,
+        description="Processor threads; 0 follows Blender's own setting. Never changes the picture")
+
+
+class PatinaObjectProperties(PropertyGroup):
+    lighting: EnumProperty(
+        name="Lighting", override=_OVERRIDE, default='AUTO',
+        description="Whether the scene's lights shade the points",
+        items=(
+            ('AUTO', "Automatic", "Points with colours are unlit (a scan's colours hold the light of its day), "
+                                  "others lit", 0),
+            ('UNLIT', "Unlit", "Colours as they are", 1),
+            ('LIT', "Lit", "Shaded by lights and world", 2)))
+    cull_back: BoolProperty(
+        name="Backface Culling", override=_OVERRIDE, default=False,
+        description="Leave out points that face away; only where the points have normals")
+    d_min: FloatProperty(
+        name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
+        unit='LENGTH', precision=4,
+        description="Least distance between two surfaces that are told apart; 0 follows the spacing of the points")
+    color: FloatVectorProperty(
+        name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
+        description="Colour of points that have none")
+    color_attribute: StringProperty(
+        name="Colors", override=_OVERRIDE,
+        description="Point attribute to take colours from; empty: the active colour attribute, or a usual name")
+    normal_attribute: StringProperty(
+        name="Normals", override=_OVERRIDE,
+        description="Point attribute to take normals from; empty: the first of normal, Normal, nor, N")
+    ambient: FloatProperty(
+        name="Ambient", override=_OVERRIDE, default=1.0, min=0.0, soft_max=1.0, subtype='FACTOR',
+        description="Share of the world's light")
+    diffuse: FloatProperty(
+        name="Diffuse", override=_OVERRIDE, default=1.0, min=0.0, soft_max=1.0, subtype='FACTOR',
+        description="Share of matt reflection")
+    specular: FloatProperty(
+        name="Specular", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='FACTOR',
+        description="Share of shiny reflection")
+    shininess: IntProperty(
+        name="Shininess", override=_OVERRIDE, default=32, min=1, soft_max=256,
+        description="Phong exponent: the higher, the smaller the highlight")
+
+
+def _update_passes(_group: PropertyGroup, context: Context) -> None:
+    context.view_layer.update_render_passes()
+
+
+class PatinaViewLayerProperties(PropertyGroup):
+    use_pass_source: BoolProperty(
+        name="Source", default=False, update=_update_passes, override=_OVERRIDE,
+        description="What is scan and what is invention: 0 nothing, 1 measured, 1 + distance filled from a "
+                    "neighbour that many pixels away, negative where anti-aliasing mixed")
+
+
+_CLASSES = (PatinaSceneProperties, PatinaObjectProperties, PatinaViewLayerProperties)
+_OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties))
+
+
+def register() -> None:
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    for owner, group in _OWNERS:
+        owner.patina = PointerProperty(type=group, name="Patina", override=_OVERRIDE)
+
+
+def unregister() -> None:
+    for owner, _ in _OWNERS:
+        del owner.patina
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

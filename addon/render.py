@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Described scene in, planes out. Final render and viewport share this; nothing here knows Blender."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from . import jobs, native
+from .sync import DeviceChoice, SceneDescription
+
+
+@dataclass(frozen=True)
+class Picture:
+    planes: dict[str, np.ndarray]  # (height, width, channels) by plane name, row 0 at the bottom
+    stats: dict[str, Any]
+    device: str
+
+
+# The device outlives frames: starting threads or a GL context costs more than many a picture.
+_device: tuple[DeviceChoice, native.Device] | None = None
+_device_lock = threading.Lock()
+
+
+def device_for(choice: DeviceChoice) -> native.Device:
+    global _device
+    with _device_lock:
+        if _device is None or _device[0] != choice:
+            _device = (choice, native.Device(choice.name, choice.threads))
+        return _device[1]
+
+
+def forget_device() -> None:
+    """Lets go of the device; frames that still use it keep it alive."""
+    global _device
+    with _device_lock:
+        _device = None
+
+
+def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool]) -> Picture:
+    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel."""
+    wanted = list(planes)
+    device = jobs.run(lambda: device_for(description.device), lambda: None, lambda: poll(0.0))
+    # The frame is made and closed on this thread, so that poll never meets a dead handle.
+    with native.Scene() as scene, native.Frame(device) as frame:
+        _describe(scene, description)
+
+        def work() -> Picture:
+            frame.render(scene)
+            return Picture({name: frame.read(name) for name in wanted}, frame.stats(), device.name)
+
+        return jobs.run(work, frame.cancel, lambda: poll(frame.progress()))
+
+
+def _describe(scene: native.Scene, description: SceneDescription) -> None:
+    scene.set_settings(**asdict(description.settings))
+    scene.set_camera(**asdict(description.camera))
+    for light in description.lights:
+        scene.add_light(**asdict(light))
+    for item in description.clouds:
+        scene.add_cloud(item.cloud, **asdict(item.style))

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Point attributes of meshes and point clouds → numpy arrays in the layouts that the library takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+
+# Names looked for, in this order, when the artist names none.
+NORMAL_NAMES = ("normal", "Normal", "normals", "Normals", "nor", "N")
+COLOR_NAMES = ("Col", "Color", "color", "Cd", "rgb", "RGB")
+
+# data_type → property of an element, components
+_LAYOUTS = {'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4), 'BYTE_COLOR': ("color_srgb", 4)}
+
+
+def positions(data: bpy.types.ID, count: int) -> np.ndarray | None:
+    """(count, 3) float32. Blender before 3.5 has no position attribute on meshes."""
+    attribute = _find(data, "position", {'FLOAT_VECTOR'})
+    if attribute:
+        return _values(attribute, count)
+    if not isinstance(data, bpy.types.Mesh):
+        return None
+    values = np.empty(count * 3, np.float32)
+    data.vertices.foreach_get("co", values)
+    return values.reshape(count, 3)
+
+
+def normals(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
+    """(count, 3) float32 of the named attribute, or of the first usual name."""
+    for candidate in (name,) if name else NORMAL_NAMES:
+        attribute = _find(data, candidate, {'FLOAT_VECTOR'})
+        if attribute:
+            return _values(attribute, count)
+    return None
+
+
+def colors(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
+    """Of the named attribute, or of the one Blender would render, or of a usual name.
+
+    Byte colours stay 8-bit sRGB (uint8); float colours are linear. A plain vector counts only when named.
+    """
+    if name:
+        attribute = _find(data, name, set(_LAYOUTS))
+    else:
+        attribute = next(_color_candidates(data), None)
+    if attribute is None:
+        return None
+    values = _values(attribute, count)
+    if values is not None and attribute.data_type == 'BYTE_COLOR':
+        return np.rint(values * np.float32(255)).astype(np.uint8)  # exact: Blender hands out byte / 255
+    return values
+
+
+def _color_candidates(data: bpy.types.ID) -> Iterator[bpy.types.Attribute]:
+    group = data.color_attributes
+    for index in (getattr(group, "render_color_index", -1), getattr(group, "active_color_index", -1)):
+        if 0 <= index < len(group) and group[index].domain == 'POINT':
+            yield group[index]
+    for name in (*COLOR_NAMES, *(attribute.name for attribute in group)):
+        attribute = _find(data, name, {'FLOAT_COLOR', 'BYTE_COLOR'})
+        if attribute:
+            yield attribute
+
+
+def _find(data: bpy.types.ID, name: str, types: set[str]) -> bpy.types.Attribute | None:
+    attribute = data.attributes.get(name)
+    if attribute and attribute.domain == 'POINT' and attribute.data_type in types:
+        return attribute
+    return None
+
+
+def _values(attribute: bpy.types.Attribute, count: int) -> np.ndarray | None:
+    """(count, components) float32; None when the attribute does not fit the points."""
+    key, components = _LAYOUTS[attribute.data_type]
+    length = len(attribute.data)
+    if length != count and length != 1:  # Blender 5.2 may store one value for all points
+        return None
+    values = np.empty(length * components, np.float32)
+    attribute.data.foreach_get(key, values)
+    values = values.reshape(length, components)
+    return values if length == count else np.repeat(values, count, axis=0)

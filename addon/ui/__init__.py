@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels, and Blender's own panels shown for our engine."""
+
+from __future__ import annotations
+
+from . import panels, standard
+
+_MODULES = (panels, standard)
+
+
+def register() -> None:
+    for module in _MODULES:
+        module.register()
+
+
+def unregister() -> None:
+    for module in reversed(_MODULES):
+        module.unregister()

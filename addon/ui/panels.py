@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Patina's own panels: they show properties and decide nothing."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.types import Context, Panel
+
+from ..engine import PatinaRenderEngine
+
+
+class _PatinaPanel:
+    bl_space_type = 'PROPERTIES'
+    bl_region_type = 'WINDOW'
+    COMPAT_ENGINES = {PatinaRenderEngine.bl_idname}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.engine in cls.COMPAT_ENGINES
+
+
+class _PatinaObjectPanel(_PatinaPanel):
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and context.object and context.object.type in {'MESH', 'POINTCLOUD'}
+
+
+class PATINA_PT_surface(_PatinaPanel, Panel):
+    bl_label = "Surface"
+    bl_context = "render"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        patina = context.scene.patina
+        layout.prop(patina, "quality")
+        column = layout.column()
+        column.prop(patina, "fill")
+        row = column.row()
+        row.active = patina.fill != 'OFF'
+        row.prop(patina, "fill_iterations")
+        layout.prop(patina, "smooth")
+        layout.prop(patina, "antialias")
+
+
+class PATINA_PT_film(_PatinaPanel, Panel):
+    bl_label = "Film"
+    bl_context = "render"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.prop(context.scene.render, "film_transparent", text="Transparent")
+
+
+class PATINA_PT_performance(_PatinaPanel, Panel):
+    bl_label = "Performance"
+    bl_context = "render"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(context.scene.patina, "device")
+        layout.prop(context.scene.patina, "threads")
+
+
+class PATINA_PT_passes(_PatinaPanel, Panel):
+    bl_label = "Passes"
+    bl_context = "view_layer"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layer = context.view_layer
+        column = layout.column(heading="Include")
+        column.prop(layer, "use_pass_z", text="Depth")
+        column.prop(layer, "use_pass_normal")
+        column.prop(layer.patina, "use_pass_source")
+
+
+class PATINA_PT_points(_PatinaObjectPanel, Panel):
+    bl_label = "Points"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        patina, data = context.object.patina, context.object.data
+        layout.prop(patina, "lighting")
+        layout.prop(patina, "cull_back")
+        layout.prop(patina, "d_min")
+        column = layout.column()
+        column.prop_search(patina, "color_attribute", data, "attributes")
+        column.prop_search(patina, "normal_attribute", data, "attributes")
+        column.prop(patina, "color")
+
+
+class PATINA_PT_shading(_PatinaObjectPanel, Panel):
+    bl_label = "Shading"
+    bl_parent_id = "PATINA_PT_points"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        patina = context.object.patina
+        layout.active = patina.lighting != 'UNLIT'
+        layout.prop(patina, "ambient")
+        layout.prop(patina, "diffuse")
+        layout.prop(patina, "specular")
+        row = layout.row()
+        row.active = patina.specular > 0.0
+        row.prop(patina, "shininess")
+
+
+class PATINA_PT_light(_PatinaPanel, Panel):
+    bl_label = "Light"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and context.light is not None
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        light = context.light
+        layout.row().prop(light, "type", expand=True)
+        layout.use_property_split = True
+        if light.type not in {'SUN', 'POINT'}:
+            layout.label(text="Patina draws sun and point lights", icon='INFO')
+            return
+        layout.prop(light, "color")
+        layout.prop(light, "energy", text="Strength" if light.type == 'SUN' else "Power")
+
+
+_CLASSES = (PATINA_PT_surface, PATINA_PT_film, PATINA_PT_performance, PATINA_PT_passes, PATINA_PT_points,
+            PATINA_PT_shading, PATINA_PT_light)
+
+
+def register() -> None:
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# tests/FOLDER/test_NAME.c -> target FOLDER_test_NAME, program tests/FOLDER/test_NAME in the binary folder.
+# `all_tests` builds them all; build/test runs them.
+add_custom_target(all_tests)
+find_library(CMOCKA cmocka)
+if(NOT CMOCKA)
+    message(STATUS "cmocka not found: no C tests")
+    return()
+endif()
+
+set(TESTS ${ROOT}/tests)
+set(TEST_WARNINGS ${WARNINGS})
+file(GLOB SUPPORT_SOURCES CONFIGURE_DEPENDS
+    ${TESTS}/*.c ${TESTS}/reference/*.c ${TESTS}/kernels/*.c ${TESTS}/unit/*.c ${TESTS}/scenes/*.c ${TESTS}/hard/*.c)
+list(FILTER SUPPORT_SOURCES EXCLUDE REGEX "/test_[^/]*\\.c$")
+list(FILTER SUPPORT_SOURCES EXCLUDE REGEX "/fuzz/")
+
+add_library(patina_test INTERFACE)
+target_include_directories(patina_test INTERFACE ${TESTS} ${TESTS}/kernels ${TESTS}/reference)
+target_compile_options(patina_test INTERFACE ${TEST_WARNINGS})
+target_compile_definitions(patina_test INTERFACE PT_TEST_ROOT="${ROOT}")
+target_link_libraries(patina_test INTERFACE patina_static ${CMOCKA} m)
+if(SUPPORT_SOURCES)
+    add_library(patina_test_support STATIC EXCLUDE_FROM_ALL ${SUPPORT_SOURCES})
+    target_link_libraries(patina_test_support PRIVATE patina_test)
+endif()
+
+foreach(folder kernels unit scenes hard)
+    file(GLOB sources CONFIGURE_DEPENDS ${TESTS}/${folder}/test_*.c)
+    foreach(source IN LISTS sources)
+        get_filename_component(name ${source} NAME_WE)
+        set(target ${folder}_${name})
+        add_executable(${target} EXCLUDE_FROM_ALL ${source})
+        set_target_properties(${target} PROPERTIES
+            OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests/${folder})
+        if(name STREQUAL test_example) # the public header and the shared library alone, as a stranger's program
+            target_compile_options(${target} PRIVATE ${TEST_WARNINGS} -Wpedantic -U_GNU_SOURCE)
+            target_link_libraries(${target} PRIVATE patina_shared)
+        else()
+            target_include_directories(${target} PRIVATE ${TESTS}/${folder})
+            if(SUPPORT_SOURCES)
+                target_link_libraries(${target} PRIVATE patina_test_support)
+            endif()
+            target_link_libraries(${target} PRIVATE patina_test)
+        endif()
+        add_dependencies(all_tests ${target})
+    endforeach()
+endforeach()
+
+# tests/fuzz/fuzz_NAME.c: libFuzzer targets; without PATINA_FUZZ they only replay a corpus.
+file(GLOB sources CONFIGURE_DEPENDS ${TESTS}/fuzz/fuzz_*.c)
+if(CMAKE_C_COMPILER_ID MATCHES "Clang" AND PATINA_SANITIZE)
+    foreach(source IN LISTS sources)
+        get_filename_component(name ${source} NAME_WE)
+        add_executable(${name} EXCLUDE_FROM_ALL ${source})
+        set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests/fuzz)
+        target_compile_options(${name} PRIVATE -Wno-missing-prototypes)
+        target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+        target_link_libraries(${name} PRIVATE patina_test)
+        add_dependencies(all_tests ${name})
+    endforeach()
+endif()

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a device is: buffers, run(kernel, arguments), read back. Devices know kernels and no pipeline; arguments were
+// checked above (api.c, plan.c), kernels trust them.
+#ifndef PT_DEVICE_H
+#define PT_DEVICE_H
+
+#include "error.h"
+#include "kernel_args.h"
+
+#include <stdatomic.h>
+
+enum pt_kernel {
+#define PT_KERNEL(name, kind, buffers) PT_KERNEL_##name,
+#include "kernels.def"
+#undef PT_KERNEL
+    PT_KERNEL_COUNT
+};
+
+extern const char *const pt_kernel_names[PT_KERNEL_COUNT];
+
+// Device memory. CPU: data points to it. Owned by the device that made it.
+struct pt_buffer {
+    size_t size;      // bytes
+    void *data;       // CPU device: the memory. GL device: NULL
+    uint32_t name;    // GL device: buffer object
+    uint32_t wrapped; // CPU device: data belongs to somebody else
+};
+
+struct pt_device_ops {
+    void (*destroy)(struct patina_device *device);
+    // Uninitialised memory, or a copy of source when not NULL. A CPU device may keep the pointer instead of a copy when
+    // `borrow` is set: source must then stay alive and unchanged as long as the buffer.
+    int (*buffer_create)(struct patina_device *device, size_t size, const void *source, int borrow,
+                         struct pt_buffer *out);
+    void (*buffer_destroy)(struct patina_device *device, struct pt_buffer *buffer);
+    int (*buffer_write)(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source,
+                        size_t size);
+    int (*buffer_read)(struct patina_device *device, const struct pt_buffer *buffer, size_t offset, void *target,
+                       size_t size);
+    // Repeats a pattern of 4 or 8 bytes (low word first) over the whole buffer.
+    int (*buffer_fill)(struct patina_device *device, struct pt_buffer *buffer, uint64_t pattern, uint32_t bytes);
+    // Runs a kernel; arguments are copied, buffers as kernels.def lists them. When it returns, later calls see its effect.
+    // cancel (may be NULL) is polled by long kernels; a cancelled run leaves undefined planes and returns
+    // PATINA_ERROR_CANCELLED.
+    int (*run)(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,
+               struct pt_buffer *const *buffers, uint32_t buffer_count, const atomic_int *cancel);
+    // Waits for all work (so that a clock means something).
+    int (*finish)(struct patina_device *device);
+};
+
+struct patina_device {
+    struct pt_handle handle;
+    const struct pt_device_ops *ops;
+    patina_device_info info;
+};
+
+// Constructors; each returns PATINA_ERROR_UNSUPPORTED with the reason at the thread when it cannot be had.
+int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out);
+int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out);
+
+#endif

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a CPU kernel gets: its arguments, its buffers as pointers, the pool, scratch.
+#ifndef PT_CPU_H
+#define PT_CPU_H
+
+#include "device.h"
+#include "pool.h"
+
+// Planes may be read this many bytes past their end (never written): vector loads at a row's end need no tail case.
+enum { PT_SLACK = 256 };
+
+struct pt_cpu_scratch {
+    void *memory; // pages
+    size_t size;
+};
+
+struct pt_cpu_call {
+    const void *arguments;
+    struct pt_buffer *const *buffers;
+    uint32_t buffer_count;
+    struct pt_pool *pool;
+    const atomic_int *cancel;  // may be NULL
+    uint64_t memory_cap;       // for private planes
+    struct pt_cpu_scratch *scratch; // [PT_CPU_SCRATCHES], kept between calls
+};
+
+enum { PT_CPU_SCRATCHES = 4 };
+
+// Scratch memory of at least `size` bytes, contents undefined, grown if need be. NULL when memory lacks.
+void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size);
+
+static inline int pt_cpu_cancelled(const struct pt_cpu_call *call)
+{
+    return call->cancel && atomic_load_explicit(call->cancel, memory_order_relaxed);
+}
+
+// The memory of the n-th buffer of kernels.def.
+static inline void *pt_cpu_data(const struct pt_cpu_call *call, uint32_t n) { return call->buffers[n]->data; }
+
+// A kernel returns PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
+typedef int pt_cpu_kernel(const struct pt_cpu_call *call);
+
+// Every kernel once per level; the levels that a build leaves out are declared and never called.
+#define PT_KERNEL(name, kind, buffers)     \
+    pt_cpu_kernel pt_kernel_##name##_scalar; \
+    pt_cpu_kernel pt_kernel_##name##_sse42;  \
+    pt_cpu_kernel pt_kernel_##name##_avx2;   \
+    pt_cpu_kernel pt_kernel_##name##_avx512;
+#include "kernels.def"
+#undef PT_KERNEL
+
+#endif

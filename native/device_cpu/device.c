@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The CPU device: buffers are memory, kernels are functions of the best level that the processor has.
+#include "cpu.h"
+#include "memory.h"
+#include "srgb.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct cpu_device {
+    struct patina_device base;
+    pt_cpu_kernel *const *kernels; // [PT_KERNEL_COUNT]
+    struct pt_pool *pool;
+    uint64_t memory_cap;
+    struct pt_cpu_scratch scratch[PT_CPU_SCRATCHES];
+};
+
+#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_scalar,
+static pt_cpu_kernel *const kernels_scalar[] = {
+#include "kernels.def"
+};
+#undef PT_KERNEL
+
+#if !defined(PT_ONLY_SCALAR)
+#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_sse42,
+static pt_cpu_kernel *const kernels_sse42[] = {
+#include "kernels.def"
+};
+#undef PT_KERNEL
+#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_avx2,
+static pt_cpu_kernel *const kernels_avx2[] = {
+#include "kernels.def"
+};
+#undef PT_KERNEL
+#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_avx512,
+static pt_cpu_kernel *const kernels_avx512[] = {
+#include "kernels.def"
+};
+#undef PT_KERNEL
+#endif
+
+struct level {
+    const char *name;
+    pt_cpu_kernel *const *kernels;
+};
+
+// The best level first that this processor has; ends with the scalar one.
+static uint32_t available_levels(struct level levels[4])
+{
+    uint32_t count = 0;
+#if !defined(PT_ONLY_SCALAR)
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("bmi2"))
+        levels[count++] = (struct level){ "cpu-avx512", kernels_avx512 };
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2"))
+        levels[count++] = (struct level){ "cpu-avx2", kernels_avx2 };
+    if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"))
+        levels[count++] = (struct level){ "cpu-sse42", kernels_sse42 };
+#endif
+    levels[count++] = (struct level){ "cpu-scalar", kernels_scalar };
+    return count;
+}
+
+// ---- sRGB ------------------------------------------------------------------------------------------------------------
+
+float pt_srgb_table[256];
+
+static void fill_srgb_table(void)
+{
+    for (int i = 0; i < 256; i++) {
+        double c = i / 255.0;
+        pt_srgb_table[i] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+    }
+}
+
+// ---- buffers ---------------------------------------------------------------------------------------------------------
+
+static int cpu_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow,
+                             struct pt_buffer *out)
+{
+    *out = (struct pt_buffer){ .size = size, .wrapped = source && borrow };
+    if (out->wrapped) {
+        out->data = (void *)source;
+        return PATINA_OK;
+    }
+    out->data = pt_pages_alloc(size + PT_SLACK);
+    if (!out->data)
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "%s: out of memory for a buffer of %zu bytes",
+                       device->info.name, size);
+    if (source)
+        memcpy(out->data, source, size);
+    return PATINA_OK;
+}
+
+static void cpu_buffer_destroy(struct patina_device *device, struct pt_buffer *buffer)
+{
+    (void)device;
+    if (!buffer->wrapped && buffer->data)
+        pt_pages_free(buffer->data, buffer->size + PT_SLACK);
+    *buffer = (struct pt_buffer){ 0 };
+}
+
+static int cpu_buffer_write(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source,
+                            size_t size)
+{
+    (void)device;
+    memcpy((char *)buffer->data + offset, source, size);
+    return PATINA_OK;
+}
+
+static int cpu_buffer_read(struct patina_device *device, const struct pt_buffer *buffer, size_t offset, void *target,
+                           size_t size)
+{
+    (void)device;
+    memcpy(target, (const char *)buffer->data + offset, size);
+    return PATINA_OK;
+}
+
+struct fill_job {
+    uint64_t *words;
+    uint64_t pattern;
+    size_t count;
+};
+
+enum { FILL_BLOCK = 1 << 13 }; // words: 64 KiB
+
+static void fill_words(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct fill_job *job = context;
+    size_t last = (size_t)end * FILL_BLOCK < job->count ? (size_t)end * FILL_BLOCK : job->count;
+    (void)thread;
+    for (size_t i = (size_t)begin * FILL_BLOCK; i < last; i++)
+        job->words[i] = job->pattern;
+}
+
+static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, uint64_t pattern, uint32_t bytes)
+{
+    struct cpu_device *cpu = (struct cpu_device *)device;
+    if (bytes == 4)
+        pattern = (pattern & 0xFFFFFFFFu) | pattern << 32;
+    struct fill_job job = { buffer->data, pattern, buffer->size / 8 };
+    pt_parallel(cpu->pool, (uint32_t)((job.count + FILL_BLOCK - 1) / FILL_BLOCK), 4, fill_words, &job);
+    if (buffer->size % 8)
+        memcpy((char *)buffer->data + buffer->size / 8 * 8, &pattern, buffer->size % 8);
+    return PATINA_OK;
+}
+
+// ---- kernels ---------------------------------------------------------------------------------------------------------
+
+void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size)
+{
+    struct pt_cpu_scratch *scratch = &call->scratch[index];
+    if (scratch->size >= size && scratch->memory)
+        return scratch->memory;
+    pt_pages_free(scratch->memory, scratch->size);
+    scratch->memory = pt_pages_alloc(size + PT_SLACK);
+    scratch->size = scratch->memory ? size + PT_SLACK : 0;
+    return scratch->memory;
+}
+
+static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,
+                   struct pt_buffer *const *buffers, uint32_t buffer_count, const atomic_int *cancel)
+{
+    struct cpu_device *cpu = (struct cpu_device *)device;
+    const struct pt_cpu_call call = { .arguments = arguments,
+                                      .buffers = buffers,
+                                      .buffer_count = buffer_count,
+                                      .pool = cpu->pool,
+                                      .cancel = cancel,
+                                      .memory_cap = cpu->memory_cap,
+                                      .scratch = cpu->scratch };
+    (void)argument_size;
+    int error = cpu->kernels[kernel](&call);
+    if (error == PATINA_ERROR_MEMORY)
+        return pt_fail(&device->handle, error, "%s: out of memory for the scratch of kernel %s", device->info.name,
+                       pt_kernel_names[kernel]);
+    return error;
+}
+
+static int cpu_finish(struct patina_device *device)
+{
+    (void)device;
+    return PATINA_OK;
+}
+
+static void cpu_destroy(struct patina_device *device)
+{
+    struct cpu_device *cpu = (struct cpu_device *)device;
+    for (int i = 0; i < PT_CPU_SCRATCHES; i++)
+        pt_pages_free(cpu->scratch[i].memory, cpu->scratch[i].size);
+    pt_pool_destroy(cpu->pool);
+    pt_handle_destroy(&device->handle);
+    free(cpu);
+}
+
+static const struct pt_device_ops cpu_ops = {
+    .destroy = cpu_destroy,
+    .buffer_create = cpu_buffer_create,
+    .buffer_destroy = cpu_buffer_destroy,
+    .buffer_write = cpu_buffer_write,
+    .buffer_read = cpu_buffer_read,
+    .buffer_fill = cpu_buffer_fill,
+    .run = cpu_run,
+    .finish = cpu_finish,
+};
+
+static void describe_processor(char *text, size_t size)
+{
+    char line[256];
+    FILE *file = fopen("/proc/cpuinfo", "r");
+    snprintf(text, size, "processor");
+    while (file && fgets(line, sizeof line, file))
+        if (!strncmp(line, "model name", 10)) {
+            const char *value = strchr(line, ':');
+            if (value)
+                snprintf(text, size, "%.*s", (int)strcspn(value + 1, "\n"), value + 1 + strspn(value + 1, " "));
+            text[strcspn(text, "\n")] = 0;
+            break;
+        }
+    if (file)
+        fclose(file);
+}
+
+int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    struct level levels[4];
+    uint32_t count = available_levels(levels), chosen = 0;
+    pthread_once(&once, fill_srgb_table);
+    while (chosen < count && strcmp(level, "cpu") != 0 && strcmp(level, levels[chosen].name) != 0)
+        chosen++;
+    if (chosen == count)
+        return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "device %s: this processor or build has no such level", level);
+
+    struct cpu_device *cpu = calloc(1, sizeof *cpu);
+    struct pt_pool *pool = pt_pool_create(desc->threads, desc->batch);
+    if (!cpu || !pool) {
+        free(cpu);
+        pt_pool_destroy(pool);
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "device %s: no memory or threads for %u workers", level, desc->threads);
+    }
+    pt_handle_init(&cpu->base.handle);
+    cpu->base.ops = &cpu_ops;
+    cpu->kernels = levels[chosen].kernels;
+    cpu->pool = pool;
+    cpu->memory_cap = desc->memory_cap ? desc->memory_cap : 2ull << 30;
+    cpu->base.info = (patina_device_info){ .struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool) };
+    snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", levels[chosen].name);
+    describe_processor(cpu->base.info.description, sizeof cpu->base.info.description);
+    *out = &cpu->base;
+    return PATINA_OK;
+}

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// scatter: points -> least key a pixel. [D 3.1]; twin of shaders/kernels/scatter.comp
+//
+// A gathered depth test comes before any store: only nearer points go on to the scalar part. Each thread but the first
+// has a private key plane, merged afterwards; the minimum commutes, so neither threads nor batches show.
+#include "device_cpu/cpu.h"
+#include "device_cpu/simd.h"
+
+#define KEY_EMPTY ((uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID)
+
+struct scatter {
+    const struct pt_cpu_call *call;
+    const struct scatter_args *args;
+    uint64_t *keys;     // the shared plane
+    uint64_t *private;  // thread t > 0 owns plane t - 1; NULL: all threads share
+    size_t plane;       // keys in a plane
+    const uint32_t *begins; // begins[i]: first chunk of instance i in the list of all chunks
+    int atomic;         // shared by several threads
+};
+
+struct target {
+    uint64_t *keys;
+    int atomic;
+};
+
+static inline void store_least(struct target target, uint32_t pixel, uint64_t key)
+{
+    uint64_t *at = target.keys + pixel;
+    if (!target.atomic) {
+        if (key < *at)
+            *at = key;
+        return;
+    }
+    uint64_t seen = __atomic_load_n(at, __ATOMIC_RELAXED);
+    while (key < seen && !__atomic_compare_exchange_n(at, &seen, key, 1, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+        ;
+}
+
+static int faces_away(const struct chunk_view *chunk, const float *positions, uint32_t i, uint32_t word)
+{
+    float n[3];
+    if ((word & PT_NORMAL_BITS) == PT_NORMAL_NONE)
+        return 0;
+    pt_decode_normal(word, n);
+    float x = chunk->eye[0] - chunk->eye[3] * positions[i];
+    float y = chunk->eye[1] - chunk->eye[3] * positions[chunk->padded + i];
+    float z = chunk->eye[2] - chunk->eye[3] * positions[2 * chunk->padded + i];
+    return (n[0] * x + n[1] * y) + n[2] * z <= 0.0f;
+}
+
+static inline vf transform(const struct chunk_view *chunk, int row, vf x, vf y, vf z)
+{
+    const float *r = chunk->row + 3 * row;
+    return (((vf_set(chunk->lo[row]) + vf_set(r[0]) * x) + vf_set(r[1]) * y) + vf_set(r[2]) * z) +
+           vf_set(chunk->hi[row]);
+}
+
+static void scatter_chunk(const struct view_args *view, const struct chunk_view *chunk, const float *all_positions,
+                          const uint32_t *all_ids, const uint32_t *surface, struct target target)
+{
+    const float *positions = all_positions + 3 * (size_t)chunk->first;
+    const uint32_t *ids = all_ids + chunk->first;
+    const vf z_near = vf_set(view->z_near), z_far = vf_set(view->z_far);
+    const vf left = vf_set((float)view->origin_x), right = vf_set((float)(view->origin_x + (int32_t)view->width));
+    const vf bottom = vf_set((float)view->origin_y), top = vf_set((float)(view->origin_y + (int32_t)view->height));
+    const vi origin_x = vi_set((uint32_t)view->origin_x), origin_y = vi_set((uint32_t)view->origin_y);
+    const vi width = vi_set(view->width);
+
+    for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
+        // 1. project
+        vf px = vf_load(positions + i), py = vf_load(positions + chunk->padded + i);
+        vf pz = vf_load(positions + 2 * (size_t)chunk->padded + i);
+        vf z = transform(chunk, 2, px, py, pz);
+        vf x = transform(chunk, 0, px, py, pz), y = transform(chunk, 1, px, py, pz);
+        if (view->perspective) {
+            vf r = vf_rcp(z);
+            x = x * r;
+            y = y * r;
+        }
+        // 2. clip: NaN fails every comparison
+        vm inside = vm_and(vm_and(vf_le(z_near, z), vf_le(z, z_far)),
+                           vm_and(vm_and(vf_le(left, x), vf_lt(x, right)), vm_and(vf_le(bottom, y), vf_lt(y, top))));
+        if (!vm_bits(inside))
+            continue;
+        // 3. early depth test; the sign bit of -0 is dropped
+        vi pixel = vi_add(vi_mul(vi_sub(vf_int(y), origin_y), width), vi_sub(vf_int(x), origin_x));
+        vi z_bits = vi_and(vf_bits(z), vi_set(0x7FFFFFFFu));
+        vi stored = vi_gather_z(target.keys, pixel, inside);
+        uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z_bits))));
+        if (!nearer)
+            continue;
+        // 4. back faces, then the least key
+        uint32_t pixels[PT_LANES], zs[PT_LANES];
+        vi_store(pixels, pixel, vm_first(PT_LANES));
+        vi_store(zs, z_bits, vm_first(PT_LANES));
+        for (; nearer; nearer &= nearer - 1) {
+            uint32_t k = (uint32_t)__builtin_ctz(nearer), id = ids[i + k];
+            if (chunk->cull && faces_away(chunk, positions, i + k, surface[id]))
+                continue;
+            store_least(target, pixels[k], (uint64_t)zs[k] << 32 | (uint32_t)(chunk->id_base + id));
+        }
+    }
+}
+
+static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct scatter *scatter = context;
+    const struct pt_cpu_call *call = scatter->call;
+    struct target target = { scatter->keys, scatter->atomic };
+    if (scatter->private && thread)
+        target.keys = scatter->private + (thread - 1) * scatter->plane;
+    uint32_t instance = 0;
+    for (uint32_t c = begin; c < end && !pt_cpu_cancelled(call); c++) {
+        while (c >= scatter->begins[instance + 1])
+            instance++;
+        const struct chunk_view *chunks = pt_cpu_data(call, 1 + 4 * instance);
+        scatter_chunk(&scatter->args->view, &chunks[c - scatter->begins[instance]], pt_cpu_data(call, 2 + 4 * instance),
+                      pt_cpu_data(call, 3 + 4 * instance), pt_cpu_data(call, 4 + 4 * instance), target);
+    }
+}
+
+// Merges the private planes into the shared one, and leaves them empty for the next run.
+static void merge_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct scatter *scatter = context;
+    size_t width = scatter->args->view.width;
+    (void)thread;
+    for (uint32_t t = 1; t < pt_pool_threads(scatter->call->pool); t++) {
+        uint64_t *private = scatter->private + (t - 1) * scatter->plane;
+        for (size_t i = begin * width; i < end * width; i++)
+            if (private[i] != KEY_EMPTY) {
+                if (private[i] < scatter->keys[i])
+                    scatter->keys[i] = private[i];
+                private[i] = KEY_EMPTY;
+            }
+    }
+}
+
+static void clear_keys(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    uint64_t *keys = context;
+    (void)thread;
+    for (size_t i = (size_t)begin << 12; i < (size_t)end << 12; i++)
+        keys[i] = KEY_EMPTY;
+}
+
+int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
+{
+    const struct scatter_args *args = call->arguments;
+    struct scatter scatter = { .call = call, .args = args, .keys = pt_cpu_data(call, 0) };
+    scatter.plane = (size_t)args->view.width * args->view.height;
+    uint32_t *begins = pt_cpu_scratch(call, 1, (args->instances + 1) * sizeof *begins);
+    if (!begins)
+        return PATINA_ERROR_MEMORY;
+    begins[0] = 0;
+    for (uint32_t i = 0; i < args->instances; i++)
+        begins[i + 1] = begins[i] + (uint32_t)(call->buffers[1 + 4 * i]->size / sizeof(struct chunk_view));
+    scatter.begins = begins;
+
+    uint32_t threads = pt_pool_threads(call->pool), chunks = begins[args->instances];
+    size_t rounded = (scatter.plane + 4095) >> 12 << 12, bytes = (threads - 1) * rounded * 8;
+    scatter.plane = rounded;
+    if (threads > 1) {
+        struct pt_cpu_scratch *scratch = &call->scratch[0]; // stays empty between runs: cleared only when it grew
+        size_t before = scratch->size;
+        scatter.private = bytes <= call->memory_cap ? pt_cpu_scratch(call, 0, bytes) : NULL;
+        scatter.atomic = !scatter.private;
+        if (scatter.private && scratch->size != before)
+            pt_parallel(call->pool, (uint32_t)(scratch->size >> 15), 64, clear_keys, scratch->memory);
+    }
+    pt_parallel(call->pool, chunks, 4, scatter_chunks, &scatter);
+    if (scatter.private)
+        pt_parallel(call->pool, args->view.height, 16, merge_rows, &scatter);
+    return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
+}

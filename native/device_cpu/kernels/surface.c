@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of shaders/kernels/surface.comp
+#include "device_cpu/cpu.h"
+#include "device_cpu/rows.h"
+#include "device_cpu/simd.h"
+
+static void surface_pixels(const struct surface_args *args, const struct pt_cpu_call *call, uint32_t x, uint32_t y,
+                           uint32_t lanes)
+{
+    const struct view_args *view = &args->view;
+    const struct instance_args *instance = &args->instance;
+    const uint64_t *keys = pt_cpu_data(call, 0);
+    float *normals = pt_cpu_data(call, 2), *deff = pt_cpu_data(call, 3);
+    uint32_t *from = pt_cpu_data(call, 4);
+    size_t at = (size_t)y * view->width + x;
+
+    // 1. the point
+    vi id = vi_sub(vi_load_id(keys + at), vi_set(instance->id_base)), z_bits = vi_load_z(keys + at);
+    vm ours = vm_and(vm_first(lanes), vm_and(vi_lt_unsigned(id, vi_set(instance->id_count)),
+                                             vm_not(vi_eq(z_bits, vi_set(PT_KEY_EMPTY_Z)))));
+    if (!vm_bits(ours))
+        return;
+    vf z = vi_float(z_bits), ray[2], n[3];
+    vf_ray(view, x, y, ray);
+    vi word = vi_gather(pt_cpu_data(call, 1), id, ours);
+    vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), ours);
+    // 2. its normal, in view space: the cloud's, or the estimate that the normal plane holds
+    vm none = vm_not(ours);
+    if (instance->has_normals) {
+        vf object[3];
+        const float *m = instance->normal_matrix;
+        vf_decode_normal(word, object);
+        for (int k = 0; k < 3; k++)
+            n[k] = (vf_set(m[3 * k]) * object[0] + vf_set(m[3 * k + 1]) * object[1]) + vf_set(m[3 * k + 2]) * object[2];
+        none = vm_or(none, vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE)));
+    } else {
+        vf_load4(normals + 4 * at, n);
+    }
+    vf square = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
+    none = vm_or(none, vm_not(vf_le(vf_set(1e-30f), square)));
+    vf scale = vf_rsqrt(square);
+    // 3. without one: towards the viewer
+    vf towards[3] = { vf_zero(), vf_zero(), vf_set(1.0f) };
+    if (view->perspective) {
+        vf r = vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f));
+        towards[0] = (vf_zero() - ray[0]) * r;
+        towards[1] = (vf_zero() - ray[1]) * r;
+        towards[2] = r;
+    }
+    for (int k = 0; k < 3; k++)
+        n[k] = vf_select(none, towards[k], n[k] * scale);
+    // 4. cosine and layer distance
+    vf inverse = vf_rcp(vf_max(vf_cosine(view, n, ray), vf_set(PT_COSINE_FLOOR)));
+    inverse = vf_select(none, vf_set(1.0f), inverse);
+    vf_store4(normals + 4 * at, n[0], n[1], n[2], inverse, vm_bits(ours));
+    vf_store(deff + at, vf_layer_distance(view, instance->d_min, spacing, z, inverse), ours);
+    vi_store(from + at, vi_add(vi_set((uint32_t)at), vi_lanes()), ours);
+}
+
+static void surface_row(void *context, uint32_t y)
+{
+    const struct pt_cpu_call *call = context;
+    const struct surface_args *args = call->arguments;
+    for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x += PT_LANES)
+        surface_pixels(args, call, x, y, pt_lanes_left(x, args->view.rect[2]));
+}
+
+int PT_KERNEL_ENTRY(surface)(const struct pt_cpu_call *call)
+{
+    const struct surface_args *args = call->arguments;
+    return pt_rows(call, &args->view, surface_row);
+}

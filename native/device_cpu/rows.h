@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Filters walk the rows of view.rect in parallel, PT_LANES pixels at a time.
+#ifndef PT_ROWS_H
+#define PT_ROWS_H
+
+#include "cpu.h"
+#include "simd.h"
+
+#include <stdlib.h>
+
+typedef void pt_row_work(void *context, uint32_t y);
+
+struct pt_rows_job {
+    const struct pt_cpu_call *call;
+    uint32_t first;
+    pt_row_work *work;
+};
+
+static void pt_rows_range(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct pt_rows_job *job = context;
+    (void)thread;
+    for (uint32_t y = begin; y < end && !pt_cpu_cancelled(job->call); y++)
+        job->work((void *)job->call, job->first + y);
+}
+
+// Calls work(call, y) for every row of the rectangle. Eight rows a batch: 32 KiB of keys at 1024 pixels.
+static inline int pt_rows(const struct pt_cpu_call *call, const struct view_args *view, pt_row_work *work)
+{
+    struct pt_rows_job job = { call, view->rect[1], work };
+    if (view->rect[3] > view->rect[1] && view->rect[2] > view->rect[0])
+        pt_parallel(call->pool, view->rect[3] - view->rect[1], 8, pt_rows_range, &job);
+    return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
+}
+
+static inline uint32_t pt_lanes_left(uint32_t x, uint32_t end) { return end - x < PT_LANES ? end - x : PT_LANES; }
+
+// xyz of PT_LANES float4 pixels.
+static inline void vf_load4(const float *pixels, vf out[3])
+{
+    float column[3][PT_LANES];
+    for (int i = 0; i < PT_LANES; i++)
+        for (int k = 0; k < 3; k++)
+            column[k][i] = pixels[4 * i + k];
+    for (int k = 0; k < 3; k++)
+        out[k] = vf_load(column[k]);
+}
+
+// Stores float4 pixels; bit i of lanes: pixel i is written.
+static inline void vf_store4(float *pixels, vf x, vf y, vf z, vf w, uint32_t lanes)
+{
+    float column[4][PT_LANES];
+    vf_store(column[0], x, vm_first(PT_LANES));
+    vf_store(column[1], y, vm_first(PT_LANES));
+    vf_store(column[2], z, vm_first(PT_LANES));
+    vf_store(column[3], w, vm_first(PT_LANES));
+    for (; lanes; lanes &= lanes - 1) {
+        int i = __builtin_ctz(lanes);
+        for (int k = 0; k < 4; k++)
+            pixels[4 * i + k] = column[k][i];
+    }
+}
+
+#endif

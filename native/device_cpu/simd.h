@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One vector vocabulary for every CPU level. Compilers do not vectorise a gather-test-scatter by themselves, so kernels are
+// written with these types; PT_LANES is 16, 8, 4 or 1. vf: floats, vi: 32-bit integers, vm: a mask of lanes.
+// Every operation gives the same bits at every width; there is no fused multiply-add and no reciprocal estimate.
+#ifndef PT_SIMD_H
+#define PT_SIMD_H
+
+#include "math.h"
+
+#if !defined(PT_ISA_SCALAR)
+#include <immintrin.h>
+#endif
+
+#define PT_CONCAT_(a, b) a##b
+#define PT_CONCAT(a, b) PT_CONCAT_(a, b)
+// The name of this level's variant of a kernel's entry: pt_kernel_scatter_avx2.
+#define PT_KERNEL_ENTRY(name) PT_CONCAT(pt_kernel_##name##_, PT_ISA)
+
+#if defined(PT_ISA_AVX512)
+
+#define PT_LANES 16
+typedef __m512 vf;
+typedef __m512i vi;
+typedef __mmask16 vm;
+static inline vf vf_load(const float *p) { return _mm512_loadu_ps(p); }
+static inline vf vf_set(float x) { return _mm512_set1_ps(x); }
+static inline vf vf_max(vf a, vf b) { return _mm512_max_ps(a, b); }
+static inline vf vf_min(vf a, vf b) { return _mm512_min_ps(a, b); }
+static inline vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
+static inline vm vf_le(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LE_OQ); }
+static inline vf vf_select(vm m, vf a, vf b) { return _mm512_mask_blend_ps(m, b, a); }
+static inline vi vf_bits(vf a) { return _mm512_castps_si512(a); }
+static inline vf vi_float(vi a) { return _mm512_castsi512_ps(a); }
+static inline vi vf_int(vf a) { return _mm512_cvttps_epi32(a); }
+static inline vf vi_convert(vi a) { return _mm512_cvtepi32_ps(a); }
+static inline vi vi_load(const void *p) { return _mm512_loadu_si512(p); }
+static inline vi vi_set(uint32_t x) { return _mm512_set1_epi32((int)x); }
+static inline vi vi_lanes(void) { return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
+static inline vi vi_add(vi a, vi b) { return _mm512_add_epi32(a, b); }
+static inline vi vi_sub(vi a, vi b) { return _mm512_sub_epi32(a, b); }
+static inline vi vi_mul(vi a, vi b) { return _mm512_mullo_epi32(a, b); }
+static inline vi vi_and(vi a, vi b) { return _mm512_and_si512(a, b); }
+static inline vi vi_or(vi a, vi b) { return _mm512_or_si512(a, b); }
+static inline vi vi_shr(vi a, int n) { return _mm512_srl_epi32(a, _mm_cvtsi32_si128(n)); }
+static inline vm vi_eq(vi a, vi b) { return _mm512_cmpeq_epi32_mask(a, b); }
+static inline vm vi_lt_unsigned(vi a, vi b) { return _mm512_cmplt_epu32_mask(a, b); }
+static inline vi vi_gather(const void *base, vi i, vm m)
+{
+    return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, base, 4);
+}
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) // upper words of keys
+{
+    return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, (const char *)keys + 4, 8);
+}
+static inline vi vi_load_z(const uint64_t *keys)
+{
+    const vi odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+    return _mm512_permutex2var_epi32(vi_load(keys), odd, vi_load(keys + 8));
+}
+static inline vi vi_load_id(const uint64_t *keys)
+{
+    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    return _mm512_permutex2var_epi32(vi_load(keys), even, vi_load(keys + 8));
+}
+static inline uint32_t vm_bits(vm m) { return m; }
+static inline vm vm_first(uint32_t n) { return (vm)((1u << n) - 1u); }
+static inline vm vm_and(vm a, vm b) { return a & b; }
+static inline vm vm_or(vm a, vm b) { return a | b; }
+static inline vm vm_not(vm a) { return (vm)~a; }
+static inline void vf_store(float *p, vf a, vm m) { _mm512_mask_storeu_ps(p, m, a); }
+static inline void vi_store(void *p, vi a, vm m) { _mm512_mask_storeu_epi32(p, m, a); }
+
+#elif defined(PT_ISA_AVX2)
+
+#define PT_LANES 8
+typedef __m256 vf;
+typedef __m256i vi;
+typedef __m256i vm;
+static inline vf vf_load(const float *p) { return _mm256_loadu_ps(p); }
+static inline vf vf_set(float x) { return _mm256_set1_ps(x); }
+static inline vf vf_max(vf a, vf b) { return _mm256_max_ps(a, b); }
+static inline vf vf_min(vf a, vf b) { return _mm256_min_ps(a, b); }
+static inline vm vf_lt(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
+static inline vm vf_le(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LE_OQ)); }
+static inline vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
+static inline vi vf_bits(vf a) { return _mm256_castps_si256(a); }
+static inline vf vi_float(vi a) { return _mm256_castsi256_ps(a); }
+static inline vi vf_int(vf a) { return _mm256_cvttps_epi32(a); }
+static inline vf vi_convert(vi a) { return _mm256_cvtepi32_ps(a); }
+static inline vi vi_load(const void *p) { return _mm256_loadu_si256(p); }
+static inline vi vi_set(uint32_t x) { return _mm256_set1_epi32((int)x); }
+static inline vi vi_lanes(void) { return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7); }
+static inline vi vi_add(vi a, vi b) { return _mm256_add_epi32(a, b); }
+static inline vi vi_sub(vi a, vi b) { return _mm256_sub_epi32(a, b); }
+static inline vi vi_mul(vi a, vi b) { return _mm256_mullo_epi32(a, b); }
+static inline vi vi_and(vi a, vi b) { return _mm256_and_si256(a, b); }
+static inline vi vi_or(vi a, vi b) { return _mm256_or_si256(a, b); }
+static inline vi vi_shr(vi a, int n) { return _mm256_srl_epi32(a, _mm_cvtsi32_si128(n)); }
+static inline vm vi_eq(vi a, vi b) { return _mm256_cmpeq_epi32(a, b); }
+static inline vm vi_lt_unsigned(vi a, vi b)
+{
+    const vi flip = _mm256_set1_epi32(INT32_MIN);
+    return _mm256_cmpgt_epi32(_mm256_xor_si256(b, flip), _mm256_xor_si256(a, flip));
+}
+static inline vi vi_gather(const void *base, vi i, vm m)
+{
+    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), base, i, m, 4);
+}
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m)
+{
+    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), (const int *)keys + 1, i, m, 8);
+}
+static inline vi avx2_words(const uint64_t *keys, int select)
+{
+    __m256 a = _mm256_castsi256_ps(vi_load(keys)), b = _mm256_castsi256_ps(vi_load(keys + 4));
+    __m256 mixed = select ? _mm256_shuffle_ps(a, b, 0xDD) : _mm256_shuffle_ps(a, b, 0x88);
+    return _mm256_permute4x64_epi64(_mm256_castps_si256(mixed), 0xD8);
+}
+static inline vi vi_load_z(const uint64_t *keys) { return avx2_words(keys, 1); }
+static inline vi vi_load_id(const uint64_t *keys) { return avx2_words(keys, 0); }
+static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
+static inline vm vm_first(uint32_t n) { return _mm256_cmpgt_epi32(_mm256_set1_epi32((int)n), vi_lanes()); }
+static inline vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
+static inline vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
+static inline vm vm_not(vm a) { return _mm256_xor_si256(a, _mm256_set1_epi32(-1)); }
+static inline void vf_store(float *p, vf a, vm m) { _mm256_maskstore_ps(p, m, a); }
+static inline void vi_store(void *p, vi a, vm m) { _mm256_maskstore_epi32(p, m, a); }
+
+#elif defined(PT_ISA_SSE42)
+
+#define PT_LANES 4
+typedef __m128 vf;
+typedef __m128i vi;
+typedef __m128i vm;
+static inline vf vf_load(const float *p) { return _mm_loadu_ps(p); }
+static inline vf vf_set(float x) { return _mm_set1_ps(x); }
+static inline vf vf_max(vf a, vf b) { return _mm_max_ps(a, b); }
+static inline vf vf_min(vf a, vf b) { return _mm_min_ps(a, b); }
+static inline vm vf_lt(vf a, vf b) { return _mm_castps_si128(_mm_cmplt_ps(a, b)); }
+static inline vm vf_le(vf a, vf b) { return _mm_castps_si128(_mm_cmple_ps(a, b)); }
+static inline vf vf_select(vm m, vf a, vf b) { return _mm_blendv_ps(b, a, _mm_castsi128_ps(m)); }
+static inline vi vf_bits(vf a) { return _mm_castps_si128(a); }
+static inline vf vi_float(vi a) { return _mm_castsi128_ps(a); }
+static inline vi vf_int(vf a) { return _mm_cvttps_epi32(a); }
+static inline vf vi_convert(vi a) { return _mm_cvtepi32_ps(a); }
+static inline vi vi_load(const void *p) { return _mm_loadu_si128(p); }
+static inline vi vi_set(uint32_t x) { return _mm_set1_epi32((int)x); }
+static inline vi vi_lanes(void) { return _mm_setr_epi32(0, 1, 2, 3); }
+static inline vi vi_add(vi a, vi b) { return _mm_add_epi32(a, b); }
+static inline vi vi_sub(vi a, vi b) { return _mm_sub_epi32(a, b); }
+static inline vi vi_mul(vi a, vi b) { return _mm_mullo_epi32(a, b); }
+static inline vi vi_and(vi a, vi b) { return _mm_and_si128(a, b); }
+static inline vi vi_or(vi a, vi b) { return _mm_or_si128(a, b); }
+static inline vi vi_shr(vi a, int n) { return _mm_srl_epi32(a, _mm_cvtsi32_si128(n)); }
+static inline vm vi_eq(vi a, vi b) { return _mm_cmpeq_epi32(a, b); }
+static inline vm vi_lt_unsigned(vi a, vi b)
+{
+    const vi flip = _mm_set1_epi32(INT32_MIN);
+    return _mm_cmplt_epi32(_mm_xor_si128(a, flip), _mm_xor_si128(b, flip));
+}
+static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm_movemask_ps(_mm_castsi128_ps(m)); }
+static inline vi sse_gather(const char *base, vi i, vm m, int scale)
+{
+    uint32_t index[4], value[4] = { 0, 0, 0, 0 }, lanes = vm_bits(m);
+    _mm_storeu_si128((__m128i *)index, i);
+    for (int k = 0; k < 4; k++)
+        if (lanes >> k & 1u)
+            memcpy(&value[k], base + (size_t)index[k] * (size_t)scale, 4);
+    return vi_load(value);
+}
+static inline vi vi_gather(const void *base, vi i, vm m) { return sse_gather(base, i, m, 4); }
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return sse_gather((const char *)keys + 4, i, m, 8); }
+static inline vi vi_load_z(const uint64_t *keys)
+{
+    __m128 a = _mm_castsi128_ps(vi_load(keys)), b = _mm_castsi128_ps(vi_load(keys + 2));
+    return _mm_castps_si128(_mm_shuffle_ps(a, b, 0xDD));
+}
+static inline vi vi_load_id(const uint64_t *keys)
+{
+    __m128 a = _mm_castsi128_ps(vi_load(keys)), b = _mm_castsi128_ps(vi_load(keys + 2));
+    return _mm_castps_si128(_mm_shuffle_ps(a, b, 0x88));
+}
+static inline vm vm_first(uint32_t n) { return _mm_cmpgt_epi32(_mm_set1_epi32((int)n), vi_lanes()); }
+static inline vm vm_and(vm a, vm b) { return _mm_and_si128(a, b); }
+static inline vm vm_or(vm a, vm b) { return _mm_or_si128(a, b); }
+static inline vm vm_not(vm a) { return _mm_xor_si128(a, _mm_set1_epi32(-1)); }
+static inline void vi_store(void *p, vi a, vm m)
+{
+    uint32_t lanes = vm_bits(m), value[4];
+    if (lanes == 15u) {
+        _mm_storeu_si128(p, a);
+        return;
+    }
+    _mm_storeu_si128((__m128i *)value, a);
+    for (int k = 0; k < 4; k++)
+        if (lanes >> k & 1u)
+            memcpy((char *)p + 4 * k, &value[k], 4);
+}
+static inline void vf_store(float *p, vf a, vm m) { vi_store(p, vf_bits(a), m); }
+
+#else // scalar: the same kernels, a lane at a time
+
+#define PT_LANES 1
+typedef float vf;
+typedef uint32_t vi;
+typedef uint32_t vm;
+static inline vf vf_load(const float *p) { return *p; }
+static inline vf vf_set(float x) { return x; }
+static inline vf vf_max(vf a, vf b) { return pt_max(a, b); }
+static inline vf vf_min(vf a, vf b) { return pt_min(a, b); }
+static inline vm vf_lt(vf a, vf b) { return a < b; }
+static inline vm vf_le(vf a, vf b) { return a <= b; }
+static inline vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
+static inline vi vf_bits(vf a) { return pt_bits(a); }
+static inline vf vi_float(vi a) { return pt_float(a); }
+static inline vi vf_int(vf a) { return a >= -2147483648.0f && a < 2147483648.0f ? (uint32_t)(int32_t)a : 0x80000000u; }
+static inline vf vi_convert(vi a) { return (float)(int32_t)a; }
+static inline vi vi_load(const void *p)
+{
+    vi x;
+    memcpy(&x, p, 4);
+    return x;
+}
+static inline vi vi_set(uint32_t x) { return x; }
+static inline vi vi_lanes(void) { return 0; }
+static inline vi vi_add(vi a, vi b) { return a + b; }
+static inline vi vi_sub(vi a, vi b) { return a - b; }
+static inline vi vi_mul(vi a, vi b) { return a * b; }
+static inline vi vi_and(vi a, vi b) { return a & b; }
+static inline vi vi_or(vi a, vi b) { return a | b; }
+static inline vi vi_shr(vi a, int n) { return a >> n; }
+static inline vm vi_eq(vi a, vi b) { return a == b; }
+static inline vm vi_lt_unsigned(vi a, vi b) { return a < b; }
+static inline vi vi_gather(const void *base, vi i, vm m) { return m ? vi_load((const char *)base + (size_t)i * 4) : 0; }
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return m ? (uint32_t)(keys[i] >> 32) : 0; }
+static inline vi vi_load_z(const uint64_t *keys) { return (uint32_t)(*keys >> 32); }
+static inline vi vi_load_id(const uint64_t *keys) { return (uint32_t)*keys; }
+static inline uint32_t vm_bits(vm m) { return m; }
+static inline vm vm_first(uint32_t n) { return n > 0; }
+static inline vm vm_and(vm a, vm b) { return a & b; }
+static inline vm vm_or(vm a, vm b) { return a | b; }
+static inline vm vm_not(vm a) { return !a; }
+static inline void vf_store(float *p, vf a, vm m)
+{
+    if (m)
+        *p = a;
+}
+static inline void vi_store(void *p, vi a, vm m)
+{
+    if (m)
+        memcpy(p, &a, 4);
+}
+
+#endif
+
+// ---- the rest is the same for every level ---------------------------------------------------------------------------
+
+static inline vf vf_gather(const float *base, vi i, vm m) { return vi_float(vi_gather(base, i, m)); }
+static inline vf vf_abs(vf a) { return vi_float(vi_and(vf_bits(a), vi_set(0x7FFFFFFFu))); }
+static inline vf vf_zero(void) { return vf_set(0.0f); }
+
+// Twins of math.h; the order of operations is the same.
+static inline vf vf_rcp(vf x)
+{
+    const vf two = vf_set(2.0f);
+    vf r = vi_float(vi_sub(vi_set(0x7EF311C7u), vf_bits(x)));
+    r = r * (two - x * r);
+    r = r * (two - x * r);
+    return r * (two - x * r);
+}
+
+static inline vf vf_rsqrt(vf x)
+{
+    const vf c = vf_set(1.5f);
+    vf h = vf_set(0.5f) * x;
+    vf r = vi_float(vi_sub(vi_set(0x5F375A86u), vi_shr(vf_bits(x), 1)));
+    r = r * (c - (h * r) * r);
+    r = r * (c - (h * r) * r);
+    return r * (c - (h * r) * r);
+}
+
+static inline vf vf_ulp4(vf z) { return vi_float(vi_and(vf_bits(z), vi_set(0x7F800000u))) * vf_set(0x1p-21f); }
+
+static inline void vf_decode_normal(vi word, vf n[3])
+{
+    const vi mask = vi_set(0x1FFFu), middle = vi_set(4095u);
+    const vf step = vf_set(1.0f / 4095.0f), zero = vf_zero();
+    vf x = vi_convert(vi_sub(vi_and(word, mask), middle)) * step;
+    vf y = vi_convert(vi_sub(vi_and(vi_shr(word, 13), mask), middle)) * step;
+    vf z = (vf_set(1.0f) - vf_abs(x)) - vf_abs(y);
+    vf fold = vf_max(zero - z, zero);
+    n[0] = vf_select(vf_le(zero, x), x - fold, x + fold);
+    n[1] = vf_select(vf_le(zero, y), y - fold, y + fold);
+    n[2] = z;
+}
+
+// Rays of PT_LANES pixels from (x, y) on.
+static inline void vf_ray(const struct view_args *view, uint32_t x, uint32_t y, vf ray[2])
+{
+    const vf half = vf_set(0.5f), scale = vf_set((float)(1u << view->level));
+    vi first = vi_set((uint32_t)((view->origin_x >> view->level) + (int32_t)x));
+    vf px = (vi_convert(vi_add(first, vi_lanes())) + half) * scale;
+    vf py = (vf_set((float)((view->origin_y >> view->level) + (int32_t)y)) + half) * scale;
+    ray[0] = vf_set(view->ray_x0) + vf_set(view->ray_xs) * px;
+    ray[1] = vf_set(view->ray_y0) + vf_set(view->ray_ys) * py;
+}
+
+static inline vf vf_cosine(const struct view_args *view, const vf n[3], const vf ray[2])
+{
+    if (!view->perspective)
+        return vf_abs(n[2]);
+    vf dot = (n[0] * ray[0] + n[1] * ray[1]) - n[2];
+    return vf_abs(dot) * vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f));
+}
+
+static inline vf vf_footprint(const struct view_args *view, vf z)
+{
+    vf width = vf_set(view->footprint * (float)(1u << view->level));
+    if (view->perspective)
+        width = width * z;
+    return width;
+}
+
+static inline vf vf_layer_distance(const struct view_args *view, float d_min, vf spacing, vf z, vf inverse)
+{
+    vf d = vf_max(vf_set(d_min), vf_set(PT_SPACING_FACTOR) * spacing);
+    d = vf_max(d, vf_footprint(view, z));
+    d = vf_max(d, vf_ulp4(z));
+    return d * inverse;
+}
+
+#endif

@@ -1,0 +1,393 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "device_gl.h"
+
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+// A call on its way to the GL thread; lives on the caller's stack until done.
+struct pt_gl_call {
+    int (*run)(struct pt_gl_device *d, void *context);
+    void *context;
+    int cleanup; // runs on a lost context too
+    int result, done;
+    char message[512];
+};
+
+enum { STACK_SIZE = 16 << 20 }; // drivers compile shaders on our stack
+
+// ---- errors ----------------------------------------------------------------------------------------------------
+
+int pt_gl_fail(struct pt_gl_device *d, int code, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    vsnprintf(d->message, sizeof d->message, format, args);
+    va_end(args);
+    return code;
+}
+
+int pt_gl_check(struct pt_gl_device *d, const char *doing)
+{
+    const GladGLContext *gl = &d->gl;
+    GLenum reset = GL_NO_ERROR;
+    if (gl->KHR_robustness && gl->GetGraphicsResetStatus)
+        reset = gl->GetGraphicsResetStatus();
+    else if (gl->ARB_robustness && gl->GetGraphicsResetStatusARB)
+        reset = gl->GetGraphicsResetStatusARB();
+    GLenum first = gl->GetError(), error = first;
+    for (int i = 0; i < 16 && error != GL_NO_ERROR && error != GL_CONTEXT_LOST; i++)
+        error = gl->GetError();
+    if (reset != GL_NO_ERROR || first == GL_CONTEXT_LOST || error == GL_CONTEXT_LOST) {
+        d->lost = 1;
+        return pt_gl_fail(d, PATINA_ERROR_DEVICE, "the OpenGL context was lost while %s", doing);
+    }
+    if (first == GL_NO_ERROR)
+        return PATINA_OK;
+    if (first == GL_OUT_OF_MEMORY)
+        return pt_gl_fail(d, PATINA_ERROR_MEMORY, "OpenGL ran out of memory while %s", doing);
+    return pt_gl_fail(d, PATINA_ERROR_DEVICE, "OpenGL error 0x%04X while %s", first, doing);
+}
+
+// ---- the thread ------------------------------------------------------------------------------------------------
+
+// Runs in the GL thread and returns its result and message. The caller's thread has no part in it but waiting.
+static int marshal(struct patina_device *device, int (*run)(struct pt_gl_device *, void *), void *context, int cleanup)
+{
+    struct pt_gl_device *d = (struct pt_gl_device *)device;
+    struct pt_gl_call c = {.run = run, .context = context, .cleanup = cleanup};
+    pthread_mutex_lock(&d->lock);
+    while (d->call) // another thread's
+        pthread_cond_wait(&d->changed, &d->lock);
+    d->call = &c;
+    pthread_cond_broadcast(&d->changed);
+    while (!c.done)
+        pthread_cond_wait(&d->changed, &d->lock);
+    pthread_mutex_unlock(&d->lock);
+    if (c.result == PATINA_OK)
+        return PATINA_OK;
+    return pt_fail(&device->handle, c.result, "%s: %s", device->info.name, c.message);
+}
+
+static int call(struct patina_device *device, int (*run)(struct pt_gl_device *, void *), void *context)
+{
+    return marshal(device, run, context, 0);
+}
+
+static int close_context(struct pt_gl_device *d, void *unused)
+{
+    (void)unused;
+    if (!d->context)
+        return PATINA_OK;
+    if (!d->lost && d->gl.DeleteProgram) {
+        for (int k = 0; k < PT_KERNEL_COUNT; k++)
+            for (int v = 0; v < PT_GL_VARIANTS; v++)
+                d->gl.DeleteProgram(d->programs[k][v]);
+        for (int i = 0; i < PT_GL_SCRATCH_COUNT; i++)
+            d->gl.DeleteBuffers(1, &d->scratch[i].name);
+        d->gl.DeleteBuffers(1, &d->arguments);
+        d->gl.Finish();
+    }
+    d->context_ops->destroy(d->context);
+    d->context = NULL;
+    return PATINA_OK;
+}
+
+static void *thread_main(void *argument)
+{
+    struct pt_gl_device *d = argument;
+    for (int quit = 0; !quit;) {
+        pthread_mutex_lock(&d->lock);
+        while (!d->call || d->call->done)
+            pthread_cond_wait(&d->changed, &d->lock);
+        struct pt_gl_call *c = d->call;
+        pthread_mutex_unlock(&d->lock);
+
+        quit = c->run == close_context;
+        c->result = d->lost && !c->cleanup ? PATINA_ERROR_DEVICE : c->run(d, c->context);
+        memcpy(c->message, d->message, sizeof c->message);
+
+        pthread_mutex_lock(&d->lock);
+        c->done = 1;
+        d->call = NULL;
+        pthread_cond_broadcast(&d->changed);
+        pthread_mutex_unlock(&d->lock);
+    }
+    return NULL;
+}
+
+// The thread takes no signals: they belong to the host program.
+static int start_thread(struct pt_gl_device *d)
+{
+    pthread_attr_t attributes;
+    sigset_t all, before;
+    sigfillset(&all);
+    if (pthread_attr_init(&attributes))
+        return -1;
+    pthread_attr_setstacksize(&attributes, STACK_SIZE);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    int failed = pthread_create(&d->thread, &attributes, thread_main, d);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    pthread_attr_destroy(&attributes);
+    return failed ? -1 : 0;
+}
+
+// ---- opening ---------------------------------------------------------------------------------------------------
+
+static GLADapiproc load_function(void *user, const char *name)
+{
+    struct pt_gl_device *d = user;
+    return (GLADapiproc)d->context_ops->function(d->context, name);
+}
+
+// Software renderers by the names they go by.
+static int is_software(const char *renderer)
+{
+    static const char *const names[] = {"llvmpipe", "softpipe", "swrast", "SWR", "Software Rasterizer", "SwiftShader"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strstr(renderer, names[i]))
+            return 1;
+    return 0;
+}
+
+static int open_context(struct pt_gl_device *d, void *unused)
+{
+    (void)unused;
+    patina_device_info *info = &d->base.info;
+    char why[256] = "";
+    d->context = d->context_ops->create(why, sizeof why);
+    if (!d->context)
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "%s", why);
+    int version = gladLoadGLContextUserPtr(&d->gl, load_function, d);
+    if (version < GLAD_MAKE_VERSION(4, 3))
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "OpenGL 4.3 is needed, the driver has %d.%d",
+                          GLAD_VERSION_MAJOR(version), GLAD_VERSION_MINOR(version));
+    const char *renderer = (const char *)d->gl.GetString(GL_RENDERER);
+    const char *text = (const char *)d->gl.GetString(GL_VERSION);
+    snprintf(info->description, sizeof info->description, "%s, OpenGL %s", renderer ? renderer : "unknown renderer",
+             text ? text : "");
+    info->hardware = !is_software(info->description);
+
+    GLint64 block = 0;
+    GLint blocks = 0, alignment = 0;
+    d->gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &block);
+    d->gl.GetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
+    d->gl.GetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
+    int result = pt_gl_check(d, "reading the driver's limits");
+    if (result != PATINA_OK)
+        return result;
+    if (blocks < PT_GL_BINDINGS)
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "%s offers %d storage blocks to a shader, %d are needed",
+                          info->description, blocks, PT_GL_BINDINGS);
+    d->block_size = (uint64_t)block > SIZE_MAX ? SIZE_MAX : (size_t)block;
+    d->alignment = alignment > 4 ? (size_t)alignment : 4;
+    d->gl.GenBuffers(1, &d->arguments);
+    info->key64 = (uint32_t)pt_gl_key64_works(d);
+    return pt_gl_check(d, "opening the device");
+}
+
+// ---- operations ------------------------------------------------------------------------------------------------
+
+struct buffer_call {
+    struct pt_buffer *buffer;
+    size_t offset, size;
+    const void *source;
+    void *target;
+    uint64_t pattern;
+    uint32_t bytes;
+};
+
+static int create_buffer(struct pt_gl_device *d, void *context)
+{
+    const struct buffer_call *b = context;
+    const GladGLContext *gl = &d->gl;
+    size_t padded = (b->size + 15) & ~(size_t)15; // shaders read whole words and vectors
+    GLuint name = 0;
+    gl->GenBuffers(1, &name);
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
+    gl->BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)(padded ? padded : 16), NULL, GL_DYNAMIC_COPY);
+    int result = pt_gl_check(d, "making a buffer");
+    if (result == PATINA_OK && b->source && b->size) {
+        gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)b->size, b->source);
+        result = pt_gl_check(d, "filling a buffer");
+    }
+    if (result != PATINA_OK) {
+        if (result == PATINA_ERROR_MEMORY)
+            pt_gl_fail(d, result, "OpenGL has no memory for a buffer of %zu bytes", b->size);
+        gl->DeleteBuffers(1, &name);
+        return result;
+    }
+    *b->buffer = (struct pt_buffer){.size = b->size, .name = name};
+    return PATINA_OK;
+}
+
+static int destroy_buffer(struct pt_gl_device *d, void *context)
+{
+    const struct buffer_call *b = context;
+    if (!d->lost) // a lost context has taken its buffers along
+        d->gl.DeleteBuffers(1, &b->buffer->name);
+    return PATINA_OK;
+}
+
+static int write_buffer(struct pt_gl_device *d, void *context)
+{
+    const struct buffer_call *b = context;
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);
+    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)b->offset, (GLsizeiptr)b->size, b->source);
+    return pt_gl_check(d, "writing a buffer");
+}
+
+static int read_buffer(struct pt_gl_device *d, void *context)
+{
+    const struct buffer_call *b = context;
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    d->gl.BindBuffer(GL_COPY_READ_BUFFER, b->buffer->name);
+    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, (GLintptr)b->offset, (GLsizeiptr)b->size, b->target);
+    return pt_gl_check(d, "reading a buffer back");
+}
+
+static int fill_buffer(struct pt_gl_device *d, void *context)
+{
+    const struct buffer_call *b = context;
+    uint32_t words[2] = {(uint32_t)b->pattern, (uint32_t)(b->pattern >> 32)};
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, b->bytes == 8 ? GL_RG32UI : GL_R32UI, 0,
+                             (GLsizeiptr)(b->buffer->size & ~(size_t)(b->bytes - 1)),
+                             b->bytes == 8 ? GL_RG_INTEGER : GL_RED_INTEGER, GL_UNSIGNED_INT, words);
+    return pt_gl_check(d, "clearing a buffer");
+}
+
+struct run_call {
+    enum pt_kernel kernel;
+    const void *arguments;
+    size_t argument_size;
+    struct pt_buffer *const *buffers;
+    uint32_t count;
+    const atomic_int *cancel;
+};
+
+static int run_kernel(struct pt_gl_device *d, void *context)
+{
+    const struct run_call *r = context;
+    return pt_gl_run(d, r->kernel, r->arguments, r->argument_size, r->buffers, r->count, r->cancel);
+}
+
+static int finish_work(struct pt_gl_device *d, void *unused)
+{
+    (void)unused;
+    d->gl.Finish();
+    return pt_gl_check(d, "waiting for the device");
+}
+
+static int op_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow,
+                            struct pt_buffer *out)
+{
+    (void)borrow; // the device has its own memory
+    memset(out, 0, sizeof *out);
+    return call(device, create_buffer, &(struct buffer_call){.buffer = out, .size = size, .source = source});
+}
+
+static void op_buffer_destroy(struct patina_device *device, struct pt_buffer *buffer)
+{
+    if (buffer->name)
+        marshal(device, destroy_buffer, &(struct buffer_call){.buffer = buffer}, 1);
+    memset(buffer, 0, sizeof *buffer);
+}
+
+static int op_buffer_write(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source,
+                           size_t size)
+{
+    return call(device, write_buffer,
+                &(struct buffer_call){.buffer = buffer, .offset = offset, .size = size, .source = source});
+}
+
+static int op_buffer_read(struct patina_device *device, const struct pt_buffer *buffer, size_t offset, void *target,
+                          size_t size)
+{
+    struct pt_buffer copy = *buffer;
+    return call(device, read_buffer,
+                &(struct buffer_call){.buffer = &copy, .offset = offset, .size = size, .target = target});
+}
+
+static int op_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, uint64_t pattern, uint32_t bytes)
+{
+    return call(device, fill_buffer, &(struct buffer_call){.buffer = buffer, .pattern = pattern, .bytes = bytes});
+}
+
+static int op_run(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,
+                  struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
+{
+    return call(device, run_kernel,
+                &(struct run_call){.kernel = kernel,
+                                   .arguments = arguments,
+                                   .argument_size = argument_size,
+                                   .buffers = buffers,
+                                   .count = count,
+                                   .cancel = cancel});
+}
+
+static int op_finish(struct patina_device *device) { return call(device, finish_work, NULL); }
+
+static void op_destroy(struct patina_device *device)
+{
+    struct pt_gl_device *d = (struct pt_gl_device *)device;
+    marshal(device, close_context, NULL, 1);
+    pthread_join(d->thread, NULL);
+    pthread_cond_destroy(&d->changed);
+    pthread_mutex_destroy(&d->lock);
+    pt_handle_destroy(&device->handle);
+    free(d);
+}
+
+static const struct pt_device_ops ops = {
+    .destroy = op_destroy,
+    .buffer_create = op_buffer_create,
+    .buffer_destroy = op_buffer_destroy,
+    .buffer_write = op_buffer_write,
+    .buffer_read = op_buffer_read,
+    .buffer_fill = op_buffer_fill,
+    .run = op_run,
+    .finish = op_finish,
+};
+
+int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out)
+{
+    static const struct pt_gl_context_ops *const kinds[] = {&pt_gl_context_egl, &pt_gl_context_osmesa,
+                                                            &pt_gl_context_wgl};
+    (void)desc; // threads and batch are the driver's matter
+    *out = NULL;
+    const struct pt_gl_context_ops *kind = NULL;
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (context && (!strcmp(context, kinds[i]->name) || !strcmp(context, kinds[i]->name + 3)))
+            kind = kinds[i];
+    if (!kind)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "there is no OpenGL context called \"%s\"", context ? context : "");
+
+    struct pt_gl_device *d = calloc(1, sizeof *d);
+    if (!d)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "out of memory");
+    pt_handle_init(&d->base.handle);
+    pthread_mutex_init(&d->lock, NULL);
+    pthread_cond_init(&d->changed, NULL);
+    d->base.ops = &ops;
+    d->context_ops = kind;
+    d->base.info.struct_size = sizeof d->base.info;
+    d->base.info.threads = 1;
+    snprintf(d->base.info.name, sizeof d->base.info.name, "%s", kind->name);
+    if (start_thread(d) < 0) {
+        pthread_cond_destroy(&d->changed);
+        pthread_mutex_destroy(&d->lock);
+        pt_handle_destroy(&d->base.handle);
+        free(d);
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "the thread for OpenGL cannot be started");
+    }
+    int result = call(&d->base, open_context, NULL); // its sentence stays at this thread
+    if (result != PATINA_OK) {
+        op_destroy(&d->base);
+        return result;
+    }
+    *out = &d->base;
+    return PATINA_OK;
+}

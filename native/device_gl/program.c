@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Shader text to program: finds the embedded text (or the file under PATINA_SHADER_DIR, for live editing), resolves
+// #include "..." relative to shaders/, each file once, and tells errors by file and line.
+#include "device_gl.h"
+#include "shaders.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_FILES = 16, MAX_NAME = 64, LOG_SIZE = 4096 };
+
+struct source {
+    char *text;
+    size_t length, capacity;
+    char files[MAX_FILES][MAX_NAME]; // number in #line = index
+    unsigned file_count;
+};
+
+static int append(struct source *s, const char *text, size_t length)
+{
+    if (s->length + length + 1 > s->capacity) {
+        size_t capacity = 2 * s->capacity + length + 4096;
+        char *grown = realloc(s->text, capacity);
+        if (!grown)
+            return PATINA_ERROR_MEMORY;
+        s->text = grown;
+        s->capacity = capacity;
+    }
+    memcpy(s->text + s->length, text, length);
+    s->length += length;
+    s->text[s->length] = 0;
+    return PATINA_OK;
+}
+
+static int append_line_number(struct source *s, unsigned line, unsigned file)
+{
+    char text[48];
+    int length = snprintf(text, sizeof text, "#line %u %u\n", line, file);
+    return append(s, text, (size_t)length);
+}
+
+// The text of a shader file; to be freed.
+static char *find_text(const char *name)
+{
+    const char *folder = getenv("PATINA_SHADER_DIR");
+    if (folder && *folder) {
+        char path[4096];
+        int length = snprintf(path, sizeof path, "%s/%s", folder, name);
+        FILE *file = length > 0 && (size_t)length < sizeof path ? fopen(path, "rb") : NULL;
+        if (file) {
+            char *text = calloc(1, 1 << 20);
+            size_t size = text ? fread(text, 1, (1 << 20) - 1, file) : 0;
+            fclose(file);
+            if (text)
+                text[size] = 0;
+            return text;
+        }
+    }
+    for (const struct pt_embedded_shader *s = pt_embedded_shaders; s->name; s++)
+        if (!strcmp(s->name, name))
+            return strdup(s->text);
+    return NULL;
+}
+
+// `struct NAME member;` is C; GLSL wants `NAME member;`. Only the definition, `struct NAME {`, keeps the word.
+static const char *without_struct(const char *line, const char *end)
+{
+    const char *at = line;
+    while (at < end && isspace((unsigned char)*at))
+        at++;
+    if (end - at < 7 || strncmp(at, "struct ", 7) || memchr(at, '{', (size_t)(end - at)))
+        return line;
+    return at + 7;
+}
+
+static int add_file(struct pt_gl_device *d, struct source *s, const char *name, const char *definitions);
+
+// #include "lib/math.glsl": once. #include <...> is C's and stands in a part that GLSL skips: left out.
+static int include(struct pt_gl_device *d, struct source *s, const char *line, const char *end)
+{
+    char name[MAX_NAME];
+    const char *open = memchr(line, '"', (size_t)(end - line));
+    const char *close = open ? memchr(open + 1, '"', (size_t)(end - open - 1)) : NULL;
+    if (!close || close - open - 1 >= MAX_NAME)
+        return PATINA_OK;
+    snprintf(name, sizeof name, "%.*s", (int)(close - open - 1), open + 1);
+    for (unsigned i = 0; i < s->file_count; i++)
+        if (!strcmp(s->files[i], name))
+            return PATINA_OK;
+    return add_file(d, s, name, NULL);
+}
+
+// definitions: put behind the #version line of the kernel itself.
+static int add_file(struct pt_gl_device *d, struct source *s, const char *name, const char *definitions)
+{
+    if (s->file_count == MAX_FILES || strlen(name) >= MAX_NAME)
+        return pt_gl_fail(d, PATINA_ERROR_INTERNAL, "shader %s: too many files", name);
+    char *text = find_text(name);
+    if (!text)
+        return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shader %s is missing", name);
+    unsigned file = s->file_count++, number = 1;
+    snprintf(s->files[file], MAX_NAME, "%s", name);
+    int result = definitions ? PATINA_OK : append_line_number(s, 1, file);
+    for (const char *line = text, *end; *line && result == PATINA_OK; line = *end ? end + 1 : end, number++) {
+        end = strchr(line, '\n');
+        if (!end)
+            end = line + strlen(line);
+        if (!strncmp(line, "#include", 8)) {
+            result = include(d, s, line, end);
+            if (result == PATINA_OK)
+                result = append_line_number(s, number + 1, file);
+            continue;
+        }
+        const char *from = without_struct(line, end);
+        result = append(s, from, (size_t)(end - from));
+        if (result == PATINA_OK)
+            result = append(s, "\n", 1);
+        if (result == PATINA_OK && definitions && !strncmp(line, "#version", 8)) {
+            result = append(s, definitions, strlen(definitions));
+            if (result == PATINA_OK)
+                result = append_line_number(s, number + 1, file);
+        }
+    }
+    free(text);
+    if (result == PATINA_ERROR_MEMORY)
+        pt_gl_fail(d, result, "out of memory");
+    return result;
+}
+
+// Drivers write "0:12(3): error: ..." (Mesa, Intel), "0(12) : error ..." (NVIDIA) or "ERROR: 0:12: ..." (AMD).
+static int fail_with_log(struct pt_gl_device *d, const struct source *s, char *log)
+{
+    unsigned file, line;
+    int after = 0;
+    char *text = strstr(log, "error"); // warnings may come first
+    text = text ? text : strstr(log, "ERROR");
+    text = text ? text : log;
+    while (text > log && text[-1] != '\n')
+        text--;
+    text[strcspn(text, "\n")] = 0;
+    text += strncmp(text, "ERROR: ", 7) ? 0 : 7;
+    if ((sscanf(text, "%u:%u%n", &file, &line, &after) == 2 || sscanf(text, "%u(%u%n", &file, &line, &after) == 2) &&
+        file < s->file_count)
+        return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shaders/%s:%u: %s", s->files[file], line,
+                          text + after + strspn(text + after, "():0123456789 "));
+    return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shader %s: %s", s->files[0], *text ? text : "the driver gives no reason");
+}
+
+static int compile(struct pt_gl_device *d, const struct source *s, GLuint *program)
+{
+    const GladGLContext *gl = &d->gl;
+    char log[LOG_SIZE] = "";
+    GLint ok = 0, length = (GLint)s->length;
+    const GLchar *text = s->text;
+    GLuint shader = gl->CreateShader(GL_COMPUTE_SHADER);
+    gl->ShaderSource(shader, 1, &text, &length);
+    gl->CompileShader(shader);
+    gl->GetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+    if (!ok) {
+        gl->GetShaderInfoLog(shader, sizeof log, NULL, log);
+        gl->DeleteShader(shader);
+        int lost = pt_gl_check(d, "compiling a shader");
+        return d->lost ? lost : fail_with_log(d, s, log);
+    }
+    GLuint p = gl->CreateProgram();
+    gl->AttachShader(p, shader);
+    gl->LinkProgram(p);
+    gl->DetachShader(p, shader);
+    gl->DeleteShader(shader);
+    gl->GetProgramiv(p, GL_LINK_STATUS, &ok);
+    if (!ok) {
+        gl->GetProgramInfoLog(p, sizeof log, NULL, log);
+        gl->DeleteProgram(p);
+        int lost = pt_gl_check(d, "linking a shader");
+        return d->lost ? lost : fail_with_log(d, s, log);
+    }
+    *program = p;
+    return pt_gl_check(d, "compiling a shader");
+}
+
+int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definitions, GLuint *program)
+{
+    struct source s = {0};
+    int result = add_file(d, &s, name, definitions);
+    if (result == PATINA_OK)
+        result = compile(d, &s, program);
+    free(s.text);
+    return result;
+}

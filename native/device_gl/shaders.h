@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The shaders as the build embedded them (build/embed_shaders), named relative to shaders/: "kernels/fill.comp".
+#ifndef PT_SHADERS_H
+#define PT_SHADERS_H
+
+struct pt_embedded_shader {
+    const char *name, *text;
+};
+
+extern const struct pt_embedded_shader pt_embedded_shaders[]; // ends with {NULL, NULL}
+extern const unsigned pt_embedded_shader_count;
+
+#endif

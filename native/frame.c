@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A frame walks its plan: planes and buffers are bound, kernels run, the picture is kept for reading.
+#include "frame.h"
+
+#include "residency.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static const uint32_t plane_bytes[PT_PLANE_COUNT] = {
+#define PT_X(name, bytes, levels) bytes,
+    PT_PLANES(PT_X)
+#undef PT_X
+};
+
+static const char *const plane_names[PT_PLANE_COUNT] = {
+#define PT_X(name, bytes, levels) #name,
+    PT_PLANES(PT_X)
+#undef PT_X
+};
+
+static double milliseconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
+}
+
+// ---- planes ------------------------------------------------------------------------------------------------------------
+
+static int ensure_plane(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which, uint32_t level)
+{
+    struct pt_buffer *plane = &frame->planes[which][level];
+    uint32_t size[2];
+    pt_plan_plane_size(plan, which, level, size);
+    size_t bytes = (size_t)size[0] * size[1] * plane_bytes[which];
+    if (plane->size == bytes && (plane->data || plane->name))
+        return PATINA_OK;
+    frame->device->ops->buffer_destroy(frame->device, plane);
+    int error = frame->device->ops->buffer_create(frame->device, bytes, NULL, 0, plane);
+    if (error)
+        return pt_fail_again(&frame->handle, error);
+    return PATINA_OK;
+}
+
+static void destroy_planes(struct patina_frame *frame)
+{
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int level = 0; level < PT_LEVELS; level++)
+            frame->device->ops->buffer_destroy(frame->device, &frame->planes[p][level]);
+}
+
+// ---- rendering -----------------------------------------------------------------------------------------------------------
+
+struct render {
+    struct patina_frame *frame;
+    const struct pt_plan *plan;
+    struct pt_resident **clouds; // per instance
+    struct pt_buffer *chunks;    // per instance, of this render
+    struct pt_buffer **bound;    // scratch for one pass
+};
+
+static int upload(struct render *render)
+{
+    const struct pt_plan *plan = render->plan;
+    struct patina_device *device = render->frame->device;
+    uint32_t most = 16;
+    for (uint32_t i = 0; i < plan->pass_count; i++)
+        most = plan->passes[i].ref_count > most ? plan->passes[i].ref_count : most;
+    render->clouds = calloc(plan->instance_count + 1, sizeof *render->clouds);
+    render->chunks = calloc(plan->instance_count + 1, sizeof *render->chunks);
+    render->bound = calloc(most, sizeof *render->bound);
+    if (!render->clouds || !render->chunks || !render->bound)
+        return pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        const struct pt_plan_instance *instance = &plan->instances[i];
+        if (!instance->chunk_count)
+            continue;
+        int error = pt_residency_take(&render->frame->residency, device, instance->instance->cloud, &render->clouds[i]);
+        if (!error)
+            error = device->ops->buffer_create(device, instance->chunk_count * sizeof *instance->chunks,
+                                               instance->chunks, 1, &render->chunks[i]);
+        if (error)
+            return pt_fail_again(&render->frame->handle, error);
+    }
+    return PATINA_OK;
+}
+
+static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *ref)
+{
+    if (!ref->of_instance)
+        return &render->frame->planes[ref->which][ref->index];
+    return ref->which == PT_CHUNKS ? &render->chunks[ref->index] : &render->clouds[ref->index]->buffers[ref->which];
+}
+
+static int clear_keys(struct patina_frame *frame)
+{
+    return frame->device->ops->buffer_fill(frame->device, &frame->planes[PT_PLANE_KEYS][0],
+                                           (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+}
+
+static void note_time(struct patina_frame *frame, const char *name, double ms)
+{
+    uint32_t i = 0;
+    while (i < frame->timing_count && strcmp(frame->timings[i].name, name) != 0)
+        i++;
+    if (i == PT_TIMINGS)
+        return;
+    if (i == frame->timing_count)
+        frame->timings[frame->timing_count++] = (struct pt_timing){ .name = name };
+    frame->timings[i].ms += ms;
+}
+
+static int run_pass(struct render *render, const struct pt_pass *pass)
+{
+    struct patina_frame *frame = render->frame;
+    int output = pass->kernel == PT_KERNEL_compose || pass->kernel == PT_KERNEL_extract;
+    for (uint32_t i = 0; i < pass->ref_count; i++) {
+        const struct pt_ref *ref = &pass->refs[i];
+        if (!ref->of_instance) {
+            int error = ensure_plane(frame, render->plan, ref->which, ref->index);
+            if (error)
+                return error;
+        }
+        render->bound[i] = buffer_of(render, ref);
+    }
+    // the picture is written last and at one go: a cancelled or failed frame leaves the one before it
+    int error = frame->device->ops->run(frame->device, pass->kernel, pass->arguments, pass->argument_size, render->bound,
+                                        pass->ref_count, output ? NULL : &frame->cancel);
+    if (!error)
+        error = frame->device->ops->finish(frame->device);
+    return error;
+}
+
+static int run_plan(struct render *render)
+{
+    struct patina_frame *frame = render->frame;
+    const struct pt_plan *plan = render->plan;
+    double before = milliseconds();
+    int error = ensure_plane(frame, plan, PT_PLANE_KEYS, 0);
+    frame->keys_valid = 0;
+    if (error || (error = clear_keys(frame)))
+        return error;
+    for (uint32_t i = 0; i < plan->pass_count; i++) {
+        if (atomic_load(&frame->cancel))
+            return PATINA_ERROR_CANCELLED;
+        if ((error = run_pass(render, &plan->passes[i])))
+            return error;
+        double now = milliseconds();
+        note_time(frame, plan->passes[i].name, now - before);
+        before = now;
+        atomic_store(&frame->progress, (float)(i + 1) / (float)plan->pass_count);
+    }
+    return PATINA_OK;
+}
+
+static void keep_statistics(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan,
+                            double ms)
+{
+    frame->stats = (patina_frame_stats){ .struct_size = sizeof frame->stats,
+                                         .width = plan->crop[2],
+                                         .height = plan->crop[3],
+                                         .points = plan->points,
+                                         .points_scattered = plan->points_scattered,
+                                         .chunks = plan->chunks,
+                                         .chunks_culled = plan->chunks_culled,
+                                         .ms = ms };
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int level = 0; level < PT_LEVELS; level++)
+            frame->stats.plane_bytes += frame->planes[p][level].size;
+    memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
+    frame->skipped_count = plan->skipped_count;
+    frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
+    memcpy(frame->crop, plan->crop, sizeof frame->crop);
+    frame->plane_width = plan->view.width;
+    frame->keys_valid = 1;
+    frame->picture_valid = 1;
+}
+
+int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    struct pt_plan plan;
+    struct render render = { .frame = frame, .plan = &plan };
+    double start = milliseconds();
+    atomic_store(&frame->progress, 0.0f);
+    frame->timing_count = 0;
+    int error = pt_plan_create(scene, &plan);
+    if (error)
+        return pt_fail_again(&frame->handle, error);
+    note_time(frame, "plan", milliseconds() - start);
+    error = upload(&render);
+    if (!error)
+        error = run_plan(&render);
+    if (!error)
+        keep_statistics(frame, scene, &plan, milliseconds() - start);
+    for (uint32_t i = 0; i < plan.instance_count && render.chunks; i++)
+        frame->device->ops->buffer_destroy(frame->device, &render.chunks[i]);
+    free(render.clouds);
+    free(render.chunks);
+    free(render.bound);
+    pt_plan_destroy(&plan);
+    atomic_store(&frame->cancel, 0);
+    if (error == PATINA_ERROR_CANCELLED)
+        return pt_fail(&frame->handle, error, "rendering was cancelled");
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+// ---- reading -------------------------------------------------------------------------------------------------------------
+
+static const struct {
+    enum pt_plane plane;
+    uint32_t channels;
+    const char *name;
+} pass_table[PATINA_PASS_COUNT] = {
+    [PATINA_PASS_COMBINED] = { PT_PLANE_COMBINED, 4, "COMBINED" },
+    [PATINA_PASS_DEPTH] = { PT_PLANE_DEPTH, 1, "DEPTH" },
+    [PATINA_PASS_NORMAL] = { PT_PLANE_NORMALS, 3, "NORMAL" },
+    [PATINA_PASS_SOURCE] = { PT_PLANE_SOURCE, 1, "SOURCE" },
+};
+
+int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
+{
+    if (pass >= PATINA_PASS_COUNT)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: no pass %u", pass);
+    if (!frame->picture_valid || !(frame->passes >> pass & 1u))
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read: no %s pass was rendered",
+                       pass_table[pass].name);
+    size_t expected = (size_t)frame->stats.width * frame->stats.height * pass_table[pass].channels * sizeof *pixels;
+    if (size != expected)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
+                       pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, expected,
+                       size);
+    return frame->device->ops->buffer_read(frame->device, &frame->planes[pass_table[pass].plane][0], 0, pixels, size);
+}
+
+int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
+{
+    if (!frame->keys_valid)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: no finished render");
+    if (size != (size_t)frame->crop[2] * frame->crop[3] * sizeof *keys)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_keys: %u x %u keys; got %zu bytes",
+                       frame->crop[2], frame->crop[3], size);
+    size_t row = (size_t)frame->crop[2] * sizeof *keys;
+    for (uint32_t y = 0; y < frame->crop[3]; y++) {
+        size_t offset = ((size_t)(frame->crop[1] + y) * frame->plane_width + frame->crop[0]) * sizeof *keys;
+        int error = frame->device->ops->buffer_read(frame->device, &frame->planes[PT_PLANE_KEYS][0], offset,
+                                                    (char *)keys + y * row, row);
+        if (error)
+            return pt_fail_again(&frame->handle, error);
+    }
+    return PATINA_OK;
+}
+
+size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size)
+{
+    size_t length = 0;
+#define PUT(...)                                                                                                  \
+    length += (size_t)snprintf(buffer && length < size ? buffer + length : NULL, buffer && length < size ? size - length : 0, \
+                               __VA_ARGS__)
+    PUT("{\"passes\":{");
+    for (uint32_t i = 0; i < frame->timing_count; i++)
+        PUT("%s\"%s\":%.4f", i ? "," : "", frame->timings[i].name, frame->timings[i].ms);
+    PUT("},\"skipped\":{");
+    for (uint32_t i = 0; i < frame->skipped_count; i++) // reasons are our own words: no quotes, no backslashes
+        PUT("%s\"%s\":\"%s\"", i ? "," : "", frame->skipped[i].name, frame->skipped[i].reason);
+    PUT("}}");
+#undef PUT
+    return length;
+}
+
+int pt_frame_dump(const struct patina_frame *frame, const char *folder)
+{
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int level = 0; level < PT_LEVELS; level++) {
+            const struct pt_buffer *plane = &frame->planes[p][level];
+            char path[4096];
+            if (!plane->size)
+                continue;
+            void *copy = malloc(plane->size);
+            if (!copy)
+                return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "dumping planes: out of memory");
+            int error = frame->device->ops->buffer_read(frame->device, plane, 0, copy, plane->size);
+            snprintf(path, sizeof path, "%s/%s_%d.raw", folder, plane_names[p], level);
+            FILE *file = error ? NULL : fopen(path, "wb");
+            size_t written = file ? fwrite(copy, 1, plane->size, file) : 0;
+            free(copy);
+            if (error || !file || fclose(file) || written != plane->size)
+                return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
+            uint32_t width = p >= PT_PLANE_COMBINED ? frame->crop[2] : (frame->plane_width + (1u << level) - 1) >> level;
+            snprintf(path, sizeof path, "%s/%s_%d.txt", folder, plane_names[p], level);
+            file = fopen(path, "w");
+            if (!file || fprintf(file, "%s level %d: %u pixels wide, %zu rows, %u bytes a pixel, row 0 at the bottom\n",
+                                 plane_names[p], level, width, width ? plane->size / plane_bytes[p] / width : 0,
+                                 plane_bytes[p]) < 0 || fclose(file))
+                return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
+        }
+    return PATINA_OK;
+}
+
+void pt_frame_release(struct patina_frame *frame)
+{
+    destroy_planes(frame);
+    pt_residency_release(&frame->residency, frame->device);
+}

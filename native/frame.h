@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#ifndef PT_FRAME_H
+#define PT_FRAME_H
+
+#include "plan.h"
+
+enum { PT_TIMINGS = PT_KERNEL_COUNT + 4 };
+
+struct pt_timing {
+    const char *name;
+    double ms;
+};
+
+struct pt_resident;
+
+// The clouds whose buffers a device holds for a frame.
+struct pt_residency {
+    struct pt_resident *first;
+};
+
+struct patina_frame {
+    struct pt_handle handle;
+    struct patina_device *device;
+    struct pt_residency residency;
+    struct pt_buffer planes[PT_PLANE_COUNT][PT_LEVELS];
+    atomic_int cancel;
+    _Atomic float progress;
+    patina_frame_stats stats; // of the last finished render
+    struct pt_timing timings[PT_TIMINGS];
+    uint32_t timing_count;
+    struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
+    uint32_t skipped_count;
+    uint32_t passes;          // bits of what was rendered
+    uint32_t crop[4], plane_width;
+    int keys_valid, picture_valid;
+};
+
+int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene);
+int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
+int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);
+size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size);
+int pt_frame_dump(const struct patina_frame *frame, const char *folder);
+void pt_frame_release(struct patina_frame *frame); // planes and resident clouds
+
+#endif

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Patina: image-space rendering of point clouds. This header is the manual.
+//
+// A program describes a scene (clouds, lights, a camera, settings), renders it into a frame on a
+// device, and reads passes (pictures of one float kind) out of the frame:
+//
+//     patina_device *dev;  patina_device_create(NULL, &dev);
+//     patina_cloud *cloud; patina_cloud_load("statue.ply", NULL, NULL, &cloud);
+//     patina_scene *scene; patina_scene_create(&scene);
+//     patina_scene_add_cloud(scene, cloud, NULL);
+//     patina_frame *frame; patina_frame_create(dev, &frame);
+//     patina_frame_render(frame, scene);
+//     patina_frame_read(frame, PATINA_PASS_COMBINED, rgba, sizeof rgba);
+//
+// Conventions
+//   Handles are opaque; `*_create`, `*_open` and `*_load` give ownership, `*_destroy` takes it back and accepts NULL.
+//   Functions return PATINA_OK (0) or a negative code; the sentence that says what and where is at the
+//   handle (patina_message), or at the thread (patina_message(NULL)) when no handle came to be.
+//   A descriptor's first field is struct_size = sizeof of it; every other field's zero means "default".
+//   Passing NULL for a descriptor means all defaults. Inputs are copied before the call returns.
+//   Pictures are row-major float32, row 0 at the BOTTOM (as Blender's and OpenGL's), colour scene-linear and
+//   premultiplied. Matrices are float64, row-major, column vectors: world = M * object.
+//   View space is right-handed and looks down -z. "z" in passes is linear distance: to the camera plane in
+//   perspective, from the near plane in orthographic views; +inf where nothing is.
+//
+// Threads: any handle may be used from any thread, one call at a time per handle; the exceptions, which may be
+// called at any time from any thread, are patina_frame_cancel, patina_frame_progress, patina_progress_cancel,
+// patina_progress_value, patina_message and patina_log_next. Different handles are independent. A cloud may be
+// in many scenes and frames at once: it is immutable after creation.
+#ifndef PATINA_H
+#define PATINA_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(_WIN32)
+#define PATINA_API __declspec(dllexport)
+#else
+#define PATINA_API __attribute__((visibility("default")))
+#endif
+
+#define PATINA_VERSION_MAJOR 0
+#define PATINA_VERSION_MINOR 1
+#define PATINA_VERSION_PATCH 0
+
+// One list of errors. X(name, code, sentence)
+#define PATINA_ERRORS(X)                                                                 \
+    X(ERROR_ARGUMENT, -1, "an argument is out of range")                                 \
+    X(ERROR_MEMORY, -2, "out of memory")                                                 \
+    X(ERROR_FILE, -3, "the file cannot be opened, read or written")                      \
+    X(ERROR_FORMAT, -4, "the file does not hold what its format promises")               \
+    X(ERROR_UNSUPPORTED, -5, "this build or machine cannot do that")                     \
+    X(ERROR_DEVICE, -6, "the device failed or was lost")                                 \
+    X(ERROR_CANCELLED, -7, "cancelled")                                                  \
+    X(ERROR_TOO_MANY_POINTS, -8, "more than 2^32 - 2 points in one scene")               \
+    X(ERROR_EMPTY, -9, "there is nothing to read")                                       \
+    X(ERROR_INTERNAL, -10, "internal error")
+
+enum patina_error {
+    PATINA_OK = 0,
+#define PATINA_X(name, code, text) PATINA_##name = code,
+    PATINA_ERRORS(PATINA_X)
+#undef PATINA_X
+};
+
+typedef struct patina_device patina_device;
+typedef struct patina_cloud patina_cloud;
+typedef struct patina_scene patina_scene;
+typedef struct patina_frame patina_frame;
+typedef struct patina_file patina_file;
+typedef struct patina_progress patina_progress;
+
+// ---- errors, log, version -------------------------------------------------------------------------------------
+
+// Library version as "0.1.0"; static storage.
+PATINA_API const char *patina_version(void);
+// The general sentence of a code; static storage, never NULL.
+PATINA_API const char *patina_error_text(int code);
+// Copies the last message of a handle (any kind), or of the calling thread when handle is NULL, as UTF-8 into
+// buffer (size bytes, always terminated). Returns the full length, 0 when there is none.
+PATINA_API size_t patina_message(const void *handle, char *buffer, size_t size);
+// Takes the oldest unread log line out of the process-wide ring (256 lines, oldest dropped). Returns its length, 0 when
+// there is none. level: 0 error, 1 warning, 2 information.
+PATINA_API size_t patina_log_next(char *buffer, size_t size, int *level);
+
+// ---- progress of long calls that have no frame (loading, building a cloud) --------------------------------------
+
+PATINA_API int patina_progress_create(patina_progress **out);
+PATINA_API void patina_progress_destroy(patina_progress *progress);
+PATINA_API void patina_progress_cancel(patina_progress *progress);      // the call returns PATINA_ERROR_CANCELLED soon
+PATINA_API float patina_progress_value(const patina_progress *progress); // 0..1
+
+// ---- device ----------------------------------------------------------------------------------------------------
+
+typedef struct patina_device_desc {
+    size_t struct_size;
+    const char *name; // "auto" (default), "cpu", "cpu-scalar", "gl-egl", "gl-osmesa"; CPU levels may be asked for
+                      // by name too: "cpu-sse42", "cpu-avx2", "cpu-avx512"
+    uint32_t threads; // CPU worker threads; 0 = one per core available to the process
+    uint32_t batch;   // scheduling batch (items a worker takes at once); 0 = automatic. Never changes a picture.
+    uint64_t memory_cap; // bytes of private planes the device may hold; 0 = 2 GiB
+} patina_device_desc;
+
+typedef struct patina_device_info {
+    size_t struct_size;
+    char name[32];          // "cpu-avx512", "gl-egl", ...
+    char description[192];  // processor or GL renderer and version
+    uint32_t threads;
+    uint32_t hardware;      // 1 when a GPU does the work
+    uint32_t key64;         // 1 when 64-bit atomics passed the self-test
+} patina_device_info;
+
+// Makes a device. "auto" takes GL on a hardware driver, else the CPU. A device that cannot be had is
+// PATINA_ERROR_UNSUPPORTED with the reason; it is never silently replaced by another (auto excepted).
+PATINA_API int patina_device_create(const patina_device_desc *desc, patina_device **out);
+PATINA_API void patina_device_destroy(patina_device *device); // after its frames
+PATINA_API int patina_device_get_info(const patina_device *device, patina_device_info *info);
+
+// ---- cloud -----------------------------------------------------------------------------------------------------
+
+enum patina_type { // element types of caller's arrays
+    PATINA_NONE = 0,
+    PATINA_FLOAT32 = 1,
+    PATINA_FLOAT64 = 2,
+    PATINA_UINT8 = 3,
+    PATINA_UINT16 = 4,
+    PATINA_UINT32 = 5,
+    PATINA_INT8 = 6,
+    PATINA_INT16 = 7,
+    PATINA_INT32 = 8,
+};
+
+// A view of a caller's array: element i starts at data + i * stride; stride 0 = tightly packed.
+typedef struct patina_array {
+    const void *data;
+    uint32_t type; // patina_type
+    uint32_t components;
+    uint64_t stride; // bytes
+} patina_array;
+
+typedef struct patina_cloud_desc {
+    size_t struct_size;
+    uint64_t count;
+    patina_array position; // 3 x FLOAT32 or FLOAT64, in object units. NaN/Inf rows are left out (and counted)
+    patina_array normal;   // 3 x FLOAT32/FLOAT64, any length; zero or NaN = that point has none. Optional
+    patina_array color;    // 3 or 4 x UINT8/UINT16 (sRGB, 0..max) or FLOAT32 (linear). A 4th component is ignored. Optional
+    double origin[3];      // added to every position, in float64
+    uint32_t threads;      // 0 = one per core
+} patina_cloud_desc;
+
+typedef struct patina_cloud_info {
+    size_t struct_size;
+    uint64_t count;          // points as given; ids are 0 .. count-1 in the given order
+    uint64_t drawn;          // of them with finite positions
+    uint64_t chunks;
+    uint64_t bytes;          // anonymous memory held at rest
+    double box_min[3], box_max[3]; // over the drawn points; an empty cloud has min > max
+    double spacing;          // median over chunks of the local spacing (about 1/sqrt(points per area)), object units
+    double spacing_min, spacing_max;
+    uint64_t invalid_positions, invalid_normals, invalid_colors; // NaN/Inf (normals: or zero)
+    uint32_t has_normals, has_colors;
+    double origin[3];
+} patina_cloud_info;
+
+// Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
+// at rest (position 12, id 4, colour 3, normal and spacing 4), at most 16 more while building.
+PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
+PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
+PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
+
+// ---- files -----------------------------------------------------------------------------------------------------
+
+typedef struct patina_file_info {
+    size_t struct_size;
+    char format[48];        // "PLY binary_little_endian", ...
+    uint64_t count;         // points
+    uint32_t attributes;    // scalar attributes beside position, normal, colour
+    uint32_t position_type; // patina_type as stored in the file
+    uint32_t color_type;    // PATINA_NONE without colour
+    uint32_t has_normals;
+    double origin[3];       // float64 origin that positions are relative to; 0 unless float32 would lose detail
+    double box_min[3], box_max[3]; // of all finite positions, origin included
+    uint64_t invalid_positions;
+} patina_file_info;
+
+typedef struct patina_file_attribute {
+    size_t struct_size;
+    char name[64];
+    uint32_t type; // as in the file
+} patina_file_attribute;
+
+// Reads a PLY file (ascii, both byte orders) whole. Errors name the byte offset (binary) or line (ascii).
+PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
+PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
+PATINA_API void patina_file_destroy(patina_file *file);
+PATINA_API int patina_file_get_info(const patina_file *file, patina_file_info *info);
+PATINA_API int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_file_attribute *attribute);
+// Copies one column as float32 (uint8 for colour) into the caller's buffer of `size` bytes.
+PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, size_t size);   // relative to origin
+PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);
+PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size);   // sRGB
+PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
+PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
+// Builds a cloud from an opened file.
+PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
+// Open + build in one call.
+PATINA_API int patina_cloud_load(const char *path, patina_progress *progress, patina_cloud **out);
+// Writes a binary little-endian PLY; columns as in the descriptor (positions are written as float64 when the
+// descriptor has an origin, else in their own type).
+PATINA_API int patina_write_ply(const char *path, const patina_cloud_desc *desc);
+
+// ---- scene -----------------------------------------------------------------------------------------------------
+
+enum patina_lighting { PATINA_LIGHTING_AUTO = 0, PATINA_LIGHTING_UNLIT = 1, PATINA_LIGHTING_LIT = 2 };
+// AUTO: clouds with colours are shown unlit (the colours hold the light of the day of the scan), others lit.
+
+typedef struct patina_cloud_style {
+    size_t struct_size;
+    double world_from_object[16]; // all zero = identity. Mirrored, non-uniform, singular: all allowed
+    uint32_t lighting;            // patina_lighting
+    uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals
+    float d_min;                  // the paper's d~, world units: least distance of two layers; 0 = automatic
+    float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8)
+    float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
+    uint32_t shininess;           // Phong exponent; 0 = 32
+} patina_cloud_style;
+
+enum patina_light_type { PATINA_LIGHT_SUN = 1, PATINA_LIGHT_POINT = 2 };
+
+typedef struct patina_light_desc {
+    size_t struct_size;
+    uint32_t type;
+    float color[3];     // linear; all zero = white
+    float power;        // sun: irradiance W/m2; point: radiant power W. As in Blender
+    double position[3]; // world, point
+    double direction[3]; // world, sun: the way the light travels; zero = (0,0,-1)
+} patina_light_desc;
+
+typedef struct patina_camera {
+    size_t struct_size;
+    uint32_t orthographic;
+    double world_from_camera[16]; // columns are normalised; a scaled camera is allowed
+    double left, right, bottom, top; // window at distance 1 (perspective) or in world units (orthographic)
+    double near_clip, far_clip;   // distances along the view; orthographic near may be negative
+} patina_camera;
+
+enum patina_quality { PATINA_QUALITY_REFINED = 0, PATINA_QUALITY_PAPER = 1 }; // filled depth: tangent plane | source's
+enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OFF = 2 };
+enum patina_smooth { PATINA_SMOOTH_ALLEVIATED = 0, PATINA_SMOOTH_GAUSSIAN = 1, PATINA_SMOOTH_BOX = 2, PATINA_SMOOTH_OFF = 3 };
+enum patina_antialias { PATINA_ANTIALIAS_LAYERS = 0, PATINA_ANTIALIAS_BACKGROUND = 1, PATINA_ANTIALIAS_OFF = 2 };
+
+typedef struct patina_settings {
+    size_t struct_size;
+    uint32_t width, height;    // full picture; 0 = 1024
+    uint32_t region[4];        // x0, y0, x1, y1 in pixels (from bottom left): render only this crop; all zero = whole
+    uint32_t quality;          // patina_quality
+    uint32_t fill;             // patina_fill
+    uint32_t fill_iterations;  // 0 = automatic (closed: follows the spacing on screen; paper: 1)
+    uint32_t smooth;           // patina_smooth
+    uint32_t antialias;        // patina_antialias
+    uint32_t film_transparent; // 1 = background has alpha 0
+    float world_color[3];      // linear; background and ambient light
+    uint32_t passes;           // bits 1 << PATINA_PASS_*: passes to make beside the combined one; 0 = all
+} patina_settings;
+
+PATINA_API int patina_scene_create(patina_scene **out);
+PATINA_API void patina_scene_destroy(patina_scene *scene); // clouds stay
+PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds and lights
+// The cloud must outlive the scene or the next patina_scene_clear. Instances get ids in order of adding: the base
+// of instance i is the sum of the counts before it.
+PATINA_API int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style);
+PATINA_API int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light);
+PATINA_API int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera);
+PATINA_API int patina_scene_set_settings(patina_scene *scene, const patina_settings *settings);
+// A camera that frames the scene's clouds, seen from `azimuth` degrees around z (0 = from -y) and `elevation`
+// degrees above the horizon, vertical field of view fov_degrees (0 = 45.8).
+PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation,
+                                         double fov_degrees, patina_camera *camera);
+
+// ---- frame -----------------------------------------------------------------------------------------------------
+
+// X(NAME, channels, sentence)
+#define PATINA_PASSES(X)                                                                                       \
+    X(COMBINED, 4, "premultiplied scene-linear colour")                                                        \
+    X(DEPTH, 1, "linear z, +inf where nothing is")                                                             \
+    X(NORMAL, 3, "world-space unit normal, 0 where nothing is")                                                \
+    X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")
+
+enum patina_pass {
+#define PATINA_X(name, channels, text) PATINA_PASS_##name,
+    PATINA_PASSES(PATINA_X)
+#undef PATINA_X
+        PATINA_PASS_COUNT
+};
+
+typedef struct patina_frame_stats {
+    size_t struct_size;
+    uint32_t width, height;     // of the passes (the region's)
+    uint64_t points;            // in the scene
+    uint64_t points_scattered;  // in chunks that were not culled
+    uint64_t chunks, chunks_culled;
+    double ms;                  // whole render call
+    uint64_t plane_bytes;       // planes held by the frame
+} patina_frame_stats;
+
+// A frame keeps its planes from render to render. The device must outlive it.
+PATINA_API int patina_frame_create(patina_device *device, patina_frame **out);
+PATINA_API void patina_frame_destroy(patina_frame *frame);
+// Renders; blocks. On any error the last good picture stays readable.
+PATINA_API int patina_frame_render(patina_frame *frame, const patina_scene *scene);
+PATINA_API void patina_frame_cancel(patina_frame *frame); // the running (or else the next) render stops soon
+PATINA_API float patina_frame_progress(const patina_frame *frame); // 0..1
+// Copies a pass, width * height * channels float32, into the caller's buffer; size in bytes must fit exactly.
+PATINA_API int patina_frame_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size);
+// The visibility keys, width * height uint64: float_bits(z) << 32 | id.
+PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
+PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
+// Milliseconds by pass, and why each other pass was left out, as JSON: {"passes":{..},"skipped":{..}}.
+// Returns the full length; truncates to size.
+PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
+// The plan as text, a line a pass, without rendering. Returns the full length.
+PATINA_API size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size);
+// Writes every plane of the last render as raw little-endian files with a .txt line of their shape into a folder.
+PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

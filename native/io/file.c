@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// patina_file_*: opens files by mapping them, hands columns out. Formats are told apart by content, not by name.
+#include "file.h"
+#include "../progress.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+size_t pt_type_size(uint32_t type)
+{
+    switch (type) {
+    case PATINA_INT8:
+    case PATINA_UINT8: return 1;
+    case PATINA_INT16:
+    case PATINA_UINT16: return 2;
+    case PATINA_INT32:
+    case PATINA_UINT32:
+    case PATINA_FLOAT32: return 4;
+    case PATINA_FLOAT64: return 8;
+    }
+    return 0;
+}
+
+void pt_clip_name(char *name, size_t size, const char *path)
+{
+    size_t length = strlen(path);
+    if (length < size) {
+        memcpy(name, path, length + 1);
+        return;
+    }
+    const char *end = path + length - (size - 4);
+    while ((*end & 0xc0) == 0x80) // not within a UTF-8 character
+        end++;
+    memcpy(name, "...", 3);
+    memcpy(name + 3, end, strlen(end) + 1);
+}
+
+// ---- open ----------------------------------------------------------------------------------------------------------
+
+static int read_input(const struct pt_input *input, patina_file **out)
+{
+    struct patina_file *file = calloc(1, sizeof *file);
+    if (!file)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
+    pt_handle_init(&file->handle);
+    int code = pt_ply_read(file, input);
+    if (code) {
+        patina_file_destroy(file);
+        return code;
+    }
+    *out = file;
+    return PATINA_OK;
+}
+
+static int fail_to_open(const struct pt_input *input, int error)
+{
+    char buffer[128];
+    const char *reason = strerror_r(error, buffer, sizeof buffer); // GNU's, which returns the text
+    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be read: %s", input->name, reason);
+}
+
+// Maps the file and reads it. Another process that cuts the file short meanwhile would stop us with SIGBUS: the price
+// of not copying it.
+static int read_descriptor(int descriptor, struct pt_input *input, patina_file **out)
+{
+    struct stat status;
+    if (fstat(descriptor, &status))
+        return fail_to_open(input, errno);
+    if (!S_ISREG(status.st_mode))
+        return pt_fail(NULL, PATINA_ERROR_FILE, "%s: is %s, not a file", input->name,
+                       S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
+    input->size = (size_t)status.st_size;
+    if (input->size == 0) // cannot be mapped; the reader has the words for it
+        return read_input(input, out);
+    void *data = mmap(NULL, input->size, PROT_READ, MAP_PRIVATE, descriptor, 0);
+    if (data == MAP_FAILED)
+        return fail_to_open(input, errno);
+    madvise(data, input->size, MADV_SEQUENTIAL);
+    input->data = data;
+    int code = read_input(input, out);
+    munmap(data, input->size);
+    return code;
+}
+
+int patina_file_open(const char *path, patina_progress *progress, patina_file **out)
+{
+    if (!out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open: out is NULL");
+    *out = NULL;
+    if (!path)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open: path is NULL");
+    struct pt_input input = { .progress = progress };
+    pt_clip_name(input.name, sizeof input.name, path);
+    pt_progress_set(progress, 0);
+    int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a named pipe must not block
+    if (descriptor < 0)
+        return fail_to_open(&input, errno);
+    int code = read_descriptor(descriptor, &input, out);
+    close(descriptor);
+    return code;
+}
+
+int patina_file_open_memory(const void *data, size_t size, patina_file **out)
+{
+    if (!out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open_memory: out is NULL");
+    *out = NULL;
+    if (!data && size)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open_memory: data is NULL");
+    struct pt_input input = { .name = "(memory)", .data = data, .size = size };
+    return read_input(&input, out);
+}
+
+void patina_file_destroy(patina_file *file)
+{
+    if (!file)
+        return;
+    for (uint32_t i = 0; i < file->attribute_count; i++)
+        free(file->attributes[i].data);
+    free(file->attributes);
+    free(file->position);
+    free(file->normal);
+    free(file->color);
+    pt_handle_destroy(&file->handle);
+    free(file);
+}
+
+// ---- what is in it -------------------------------------------------------------------------------------------------
+
+// Fills as much of a caller's struct as the caller knows of; its struct_size stays.
+static int hand_out(const patina_file *file, const char *call, void *caller, size_t caller_size, const void *ours,
+                    size_t our_size)
+{
+    if (caller_size <= sizeof(size_t))
+        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: struct_size is not set", call);
+    size_t size = caller_size < our_size ? caller_size : our_size;
+    memcpy((char *)caller + sizeof(size_t), (const char *)ours + sizeof(size_t), size - sizeof(size_t));
+    return PATINA_OK;
+}
+
+int patina_file_get_info(const patina_file *file, patina_file_info *info)
+{
+    if (!file || !info)
+        return pt_fail(file ? &file->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_file_get_info: %s is NULL",
+                       file ? "info" : "file");
+    patina_file_info ours = { .count = file->count,
+                              .attributes = file->attribute_count,
+                              .position_type = file->position_type,
+                              .color_type = file->color_type,
+                              .has_normals = file->normal != NULL,
+                              .invalid_positions = file->invalid_positions };
+    memcpy(ours.format, file->format, sizeof ours.format);
+    memcpy(ours.origin, file->origin, sizeof ours.origin);
+    memcpy(ours.box_min, file->box_min, sizeof ours.box_min);
+    memcpy(ours.box_max, file->box_max, sizeof ours.box_max);
+    return hand_out(file, "patina_file_get_info", info, info->struct_size, &ours, sizeof ours);
+}
+
+static int check_index(const patina_file *file, const char *call, uint32_t index)
+{
+    if (index < file->attribute_count)
+        return PATINA_OK;
+    return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: there is no attribute %u, the file has %u", call, index,
+                   file->attribute_count);
+}
+
+int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_file_attribute *attribute)
+{
+    if (!file || !attribute)
+        return pt_fail(file ? &file->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_file_get_attribute: %s is NULL",
+                       file ? "attribute" : "file");
+    int code = check_index(file, "patina_file_get_attribute", index);
+    if (code)
+        return code;
+    patina_file_attribute ours = { .type = file->attributes[index].type };
+    memcpy(ours.name, file->attributes[index].name, sizeof ours.name);
+    return hand_out(file, "patina_file_get_attribute", attribute, attribute->struct_size, &ours, sizeof ours);
+}
+
+// ---- columns -------------------------------------------------------------------------------------------------------
+
+// A column of point_size bytes a point, into a buffer of `size` bytes.
+static int check_read(const patina_file *file, const char *call, bool has, const char *column, const void *buffer,
+                      size_t size, size_t point_size)
+{
+    if (!file)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: file is NULL", call);
+    if (!has)
+        return pt_fail(&file->handle, PATINA_ERROR_EMPTY, "%s: the file has no %s", call, column);
+    if (size / point_size < file->count)
+        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: a buffer of %zu bytes cannot hold %llu points of %zu",
+                       call, size, (unsigned long long)file->count, point_size);
+    if (!buffer && file->count)
+        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: the buffer is NULL", call);
+    return PATINA_OK;
+}
+
+int patina_file_read_positions(const patina_file *file, float *xyz, size_t size)
+{
+    int code = check_read(file, "patina_file_read_positions", true, "positions", xyz, size, 3 * sizeof *xyz);
+    if (!code && file->count)
+        memcpy(xyz, file->position, (size_t)file->count * 3 * sizeof *xyz);
+    return code;
+}
+
+int patina_file_read_normals(const patina_file *file, float *xyz, size_t size)
+{
+    int code =
+        check_read(file, "patina_file_read_normals", file && file->normal, "normals", xyz, size, 3 * sizeof *xyz);
+    if (!code && file->count)
+        memcpy(xyz, file->normal, (size_t)file->count * 3 * sizeof *xyz);
+    return code;
+}
+
+// IEC 61966-2-1, both ways.
+static float linear_from_srgb(float s)
+{
+    return s <= 0.04045f ? s / 12.92f : powf((s + 0.055f) / 1.055f, 2.4f);
+}
+
+static float srgb_from_linear(float l)
+{
+    return l <= 0.0031308f ? l * 12.92f : 1.055f * powf(l, 1 / 2.4f) - 0.055f;
+}
+
+static uint8_t byte_from_unit(float value)
+{
+    return (uint8_t)((value > 0 ? (value < 1 ? value : 1) : 0) * 255 + 0.5f); // NaN: 0
+}
+
+int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size)
+{
+    int code = check_read(file, "patina_file_read_colors_u8", file && file->color, "colours", rgba, size, 4);
+    if (code)
+        return code;
+    const uint16_t *u16 = file->color;
+    const float *f32 = file->color;
+    switch (file->color_type) {
+    case PATINA_UINT8:
+        if (file->count)
+            memcpy(rgba, file->color, (size_t)file->count * 4);
+        break;
+    case PATINA_UINT16:
+        for (uint64_t i = 0; i < 4 * file->count; i++)
+            rgba[i] = (uint8_t)((u16[i] * 255u + 32767u) / 65535u);
+        break;
+    default:
+        for (uint64_t i = 0; i < 4 * file->count; i++)
+            rgba[i] = byte_from_unit(i % 4 == 3 ? f32[i] : srgb_from_linear(f32[i]));
+    }
+    return PATINA_OK;
+}
+
+int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size)
+{
+    int code =
+        check_read(file, "patina_file_read_colors_f32", file && file->color, "colours", rgba, size, 4 * sizeof *rgba);
+    if (code)
+        return code;
+    const uint8_t *u8 = file->color;
+    const uint16_t *u16 = file->color;
+    float decoded[256];
+    for (int i = 0; i < 256; i++)
+        decoded[i] = linear_from_srgb((float)i / 255);
+    switch (file->color_type) {
+    case PATINA_UINT8:
+        for (uint64_t i = 0; i < 4 * file->count; i++)
+            rgba[i] = i % 4 == 3 ? (float)u8[i] / 255 : decoded[u8[i]];
+        break;
+    case PATINA_UINT16:
+        for (uint64_t i = 0; i < 4 * file->count; i++)
+            rgba[i] = i % 4 == 3 ? (float)u16[i] / 65535 : linear_from_srgb((float)u16[i] / 65535);
+        break;
+    default:
+        if (file->count)
+            memcpy(rgba, file->color, (size_t)file->count * 4 * sizeof *rgba);
+    }
+    return PATINA_OK;
+}
+
+static float attribute_value(const struct pt_column *column, uint64_t i)
+{
+    switch (column->type) {
+    case PATINA_INT8: return ((const int8_t *)column->data)[i];
+    case PATINA_UINT8: return ((const uint8_t *)column->data)[i];
+    case PATINA_INT16: return ((const int16_t *)column->data)[i];
+    case PATINA_UINT16: return ((const uint16_t *)column->data)[i];
+    case PATINA_INT32: return (float)((const int32_t *)column->data)[i];
+    case PATINA_UINT32: return (float)((const uint32_t *)column->data)[i];
+    case PATINA_FLOAT64: return (float)((const double *)column->data)[i];
+    }
+    return ((const float *)column->data)[i];
+}
+
+int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size)
+{
+    int code = check_read(file, "patina_file_read_attribute", true, "attributes", values, size, sizeof *values);
+    if (!code)
+        code = check_index(file, "patina_file_read_attribute", index);
+    if (code)
+        return code;
+    const struct pt_column *column = &file->attributes[index];
+    for (uint64_t i = 0; i < file->count; i++)
+        values[i] = attribute_value(column, i);
+    return PATINA_OK;
+}

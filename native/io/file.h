@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A file of points, read whole into columns in file order. Every reader (PLY now) fills this one struct.
+#ifndef PT_FILE_H
+#define PT_FILE_H
+
+#include "../error.h"
+
+// A scalar of every point that is neither position, normal nor colour.
+struct pt_column {
+    char name[64];
+    uint32_t type; // patina_type, as in the file
+    void *data;    // count elements of that type, tightly packed
+};
+
+// Immutable once opened. All pointers are owned; a column that the file lacks is NULL.
+struct patina_file {
+    struct pt_handle handle;       // first: patina_message() takes any handle
+    char format[48];               // "PLY ascii", ...
+    uint64_t count;                // points; index = place in the file
+    double origin[3];              // position in the file = position[i] + origin, in float64
+    double box_min[3], box_max[3]; // of the finite positions, origin included; min > max when there is none
+    uint64_t invalid_positions;    // rows with a NaN or infinite coordinate; they stay in the columns
+    uint32_t position_type;        // patina_type as stored in the file
+    uint32_t color_type;           // of `color`: UINT8, UINT16 (both sRGB), FLOAT32 (linear), NONE without colour
+    float *position;               // 3 a point, relative to origin
+    float *normal;                 // 3 a point, any length, as in the file
+    void *color;                   // 4 (RGBA) a point; alpha is opaque where the file has none
+    struct pt_column *attributes;
+    uint32_t attribute_count;
+};
+
+// The bytes that a reader is given. name: what messages call the file, short enough for one.
+struct pt_input {
+    char name[200];
+    const uint8_t *data;
+    size_t size;
+    struct patina_progress *progress; // may be NULL
+};
+
+// Readers: fill a zeroed file. On failure the caller destroys what was filled.
+int pt_ply_read(struct patina_file *file, const struct pt_input *input);
+
+// Takes over `staged`, 3 float64 a point from malloc: chooses the origin, narrows to file->position in place.
+// file->count must be set, file->origin holds what the file already declared (or 0) and is added to.
+void pt_file_place(struct patina_file *file, double *staged);
+// Sets the box and invalid_positions from file->position.
+void pt_file_measure(struct patina_file *file);
+
+// Bytes of one element of a patina_type; 0 for PATINA_NONE and unknown ones.
+size_t pt_type_size(uint32_t type);
+// Copies a path into a message-sized buffer; a long one keeps its end, behind three dots.
+void pt_clip_name(char *name, size_t size, const char *path);
+
+#endif

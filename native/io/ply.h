@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the parts of the PLY reader share: the header as parsed, and where each value goes. The format is Greg Turk's
+// (The PLY Polygon File Format, Stanford 1994), with the type names that came later.
+#ifndef PT_PLY_H
+#define PT_PLY_H
+
+#include "file.h"
+
+#include <stdbool.h>
+
+enum {
+    PLY_NAME_SIZE = 64,          // with the final zero; as patina_file_attribute.name
+    PLY_MOST_ELEMENTS = 64,      // in a header
+    PLY_MOST_PROPERTIES = 1024,  // in a header, all elements together
+    PLY_LONGEST_HEADER = 1 << 20 // bytes
+};
+
+enum ply_format { PLY_NO_FORMAT, PLY_ASCII, PLY_LITTLE_ENDIAN, PLY_BIG_ENDIAN };
+
+struct ply_property {
+    char name[PLY_NAME_SIZE];
+    uint32_t type;       // patina_type of the value, or of a list's items
+    uint32_t count_type; // of a list's count; PATINA_NONE: not a list
+};
+
+struct ply_element {
+    char name[PLY_NAME_SIZE];
+    uint64_t count;
+    uint32_t first, properties; // of ply_header.properties
+};
+
+struct ply_header {
+    enum ply_format format;
+    double origin[3]; // from "comment patina origin X Y Z"
+    uint32_t element_count;
+    struct ply_element elements[PLY_MOST_ELEMENTS];
+    uint32_t property_count;
+    struct ply_property properties[PLY_MOST_PROPERTIES];
+    uint64_t body;      // offset of the first byte behind the header
+    uint64_t body_line; // its line number
+};
+
+// Where the values of one vertex property go. data NULL: nowhere.
+struct ply_target {
+    void *data;    // the first point's value
+    uint32_t type; // of the column: any patina_type
+    uint32_t step; // in elements, from point to point
+    double scale;  // values are multiplied by it
+    bool wrap;     // negative values are bytes that a writer called signed: -1 is 255
+};
+
+int ply_read_header(const struct pt_input *input, struct ply_header *header);
+
+// Read the rows up to and with header->elements[vertex], of which property i goes to targets[i].
+int ply_read_binary(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
+                    const struct ply_target *targets);
+int ply_read_ascii(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
+                   const struct ply_target *targets);
+
+// Puts n values at points first, first + 1, ... of a column; integers are clamped to what their type holds.
+void ply_store(const struct ply_target *target, uint64_t first, size_t n, const double *values);
+// Error when the file, from offset on, cannot hold the rows that the element declares.
+int ply_check_count(const struct pt_input *input, const struct ply_header *header, const struct ply_element *element,
+                    uint64_t offset);
+// Copies bytes of a file into a message: at most 40 of them, what is not printable ASCII as '?'.
+const char *ply_quote(char quoted[44], const void *bytes, size_t size);
+// Sets the progress to offset / size. PATINA_ERROR_CANCELLED when the caller wants no more.
+int ply_poll(const struct pt_input *input, uint64_t offset);
+// The name of a patina_type in a PLY header.
+const char *ply_type_name(uint32_t type);
+
+#endif

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From header to columns: which property is what, room for the columns, then the rows of either kind.
+//
+// Only the elements up to the points are read: faces and range grids behind them are neither needed nor checked.
+// Integer colours of type char, short, int and uint are taken as 0..255 (their writers meant bytes), uchar is 0..255,
+// ushort 0..65535, float and double are linear. What is no position, normal or colour becomes an attribute; lists are
+// left out.
+#include "../progress.h"
+#include "ply.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FAMILY = 4 }; // names in a family: x y z, or red green blue alpha
+
+static const char *const position_names[][FAMILY] = { { "x", "y", "z", NULL } };
+static const char *const normal_names[][FAMILY] = { { "nx", "ny", "nz", NULL },
+                                                    { "normal_x", "normal_y", "normal_z", NULL },
+                                                    { "normalx", "normaly", "normalz", NULL } };
+static const char *const color_names[][FAMILY] = { { "red", "green", "blue", "alpha" },
+                                                   { "r", "g", "b", "a" },
+                                                   { "diffuse_red", "diffuse_green", "diffuse_blue",
+                                                     "diffuse_alpha" } };
+
+struct plan {
+    const struct pt_input *input;
+    struct patina_file *file;
+    const struct ply_header *header;
+    const struct ply_element *points;
+    const struct ply_property *properties; // of the points
+    struct ply_target *targets;            // one a property
+    bool *taken;                           // one a property: it is part of a position, normal or colour
+    double *staged;                        // positions whose detail float32 may not hold
+};
+
+static int out_of_memory(const struct plan *plan)
+{
+    return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: no memory for %llu points", plan->input->name,
+                   (unsigned long long)plan->points->count);
+}
+
+// Room for a column; counts have been held against the file's size, so the product stays far below 2^64.
+static void *column(const struct plan *plan, size_t bytes_per_point)
+{
+    return malloc(plan->points->count ? (size_t)plan->points->count * bytes_per_point : 1);
+}
+
+// ---- finding properties --------------------------------------------------------------------------------------------
+
+static int64_t find(const struct plan *plan, const char *name)
+{
+    for (uint32_t k = 0; name && k < plan->points->properties; k++)
+        if (!strcmp(plan->properties[k].name, name))
+            return k;
+    return -1;
+}
+
+// The first family whose first three names are all scalars of the points. found[3] is -1 where the family's fourth is
+// missing.
+static bool find_family(const struct plan *plan, const char *const families[][FAMILY], size_t count,
+                        int64_t found[FAMILY])
+{
+    for (size_t f = 0; f < count; f++) {
+        bool all = true;
+        for (int c = 0; c < FAMILY; c++) {
+            found[c] = find(plan, families[f][c]);
+            if (found[c] >= 0 && plan->properties[found[c]].count_type != PATINA_NONE)
+                found[c] = -1;
+            all &= c == 3 || found[c] >= 0;
+        }
+        if (all)
+            return true;
+    }
+    return false;
+}
+
+static bool is_float(uint32_t type)
+{
+    return type == PATINA_FLOAT32 || type == PATINA_FLOAT64;
+}
+
+// ---- columns -------------------------------------------------------------------------------------------------------
+
+static void aim(struct plan *plan, int64_t property, void *data, uint32_t type, uint32_t step)
+{
+    plan->taken[property] = true;
+    plan->targets[property] = (struct ply_target){ .data = data, .type = type, .step = step, .scale = 1 };
+}
+
+// Text may hold more digits than its declared float does, so it is staged like the types that float32 cannot hold.
+static int plan_positions(struct plan *plan)
+{
+    struct patina_file *file = plan->file;
+    int64_t found[FAMILY];
+    if (!find_family(plan, position_names, 1, found)) {
+        int missing = found[0] < 0 ? 0 : found[1] < 0 ? 1 : 2;
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: element %s has no scalar property %s", plan->input->name,
+                       plan->points->name, position_names[0][missing]);
+    }
+    bool stage = plan->header->format == PLY_ASCII;
+    file->position_type = plan->properties[found[0]].type;
+    for (int c = 0; c < 3; c++) {
+        uint32_t type = plan->properties[found[c]].type;
+        stage |= type == PATINA_FLOAT64 || type == PATINA_INT32 || type == PATINA_UINT32;
+        if (type == PATINA_FLOAT64)
+            file->position_type = type;
+    }
+    if (stage)
+        plan->staged = column(plan, 3 * sizeof(double));
+    else
+        file->position = column(plan, 3 * sizeof(float));
+    if (stage ? !plan->staged : !file->position)
+        return out_of_memory(plan);
+    for (int c = 0; c < 3; c++) {
+        if (stage)
+            aim(plan, found[c], plan->staged + c, PATINA_FLOAT64, 3);
+        else
+            aim(plan, found[c], file->position + c, PATINA_FLOAT32, 3);
+    }
+    return PATINA_OK;
+}
+
+static int plan_normals(struct plan *plan)
+{
+    int64_t found[FAMILY];
+    if (!find_family(plan, normal_names, sizeof normal_names / sizeof *normal_names, found))
+        return PATINA_OK;
+    plan->file->normal = column(plan, 3 * sizeof(float));
+    if (!plan->file->normal)
+        return out_of_memory(plan);
+    for (int c = 0; c < 3; c++)
+        aim(plan, found[c], plan->file->normal + c, PATINA_FLOAT32, 3);
+    return PATINA_OK;
+}
+
+static uint32_t color_class(uint32_t type)
+{
+    return is_float(type) ? PATINA_FLOAT32 : type == PATINA_UINT16 ? PATINA_UINT16 : PATINA_UINT8;
+}
+
+static double color_maximum(uint32_t color_type)
+{
+    return color_type == PATINA_UINT8 ? 255 : color_type == PATINA_UINT16 ? 65535 : 1;
+}
+
+static void fill_alpha(struct patina_file *file)
+{
+    for (uint64_t i = 0; i < file->count; i++) {
+        if (file->color_type == PATINA_UINT8)
+            ((uint8_t *)file->color)[4 * i + 3] = UINT8_MAX;
+        else if (file->color_type == PATINA_UINT16)
+            ((uint16_t *)file->color)[4 * i + 3] = UINT16_MAX;
+        else
+            ((float *)file->color)[4 * i + 3] = 1;
+    }
+}
+
+static int plan_colors(struct plan *plan)
+{
+    struct patina_file *file = plan->file;
+    const struct ply_property *p = plan->properties;
+    int64_t found[FAMILY];
+    if (!find_family(plan, color_names, sizeof color_names / sizeof *color_names, found))
+        return PATINA_OK;
+    uint32_t type = color_class(p[found[0]].type);
+    if (type != color_class(p[found[1]].type) || type != color_class(p[found[2]].type))
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: properties %s, %s and %s mix the types %s, %s and %s",
+                       plan->input->name, p[found[0]].name, p[found[1]].name, p[found[2]].name,
+                       ply_type_name(p[found[0]].type), ply_type_name(p[found[1]].type),
+                       ply_type_name(p[found[2]].type));
+    size_t size = pt_type_size(type);
+    file->color_type = type;
+    file->color = column(plan, 4 * size);
+    if (!file->color)
+        return out_of_memory(plan);
+    for (size_t c = 0; c < 4; c++) {
+        if (found[c] < 0) {
+            fill_alpha(file);
+            continue;
+        }
+        aim(plan, found[c], (uint8_t *)file->color + c * size, type, 4);
+        plan->targets[found[c]].wrap = p[found[c]].type == PATINA_INT8;
+        // Alpha may be of another type than the colours.
+        plan->targets[found[c]].scale = color_maximum(type) / color_maximum(color_class(p[found[c]].type));
+    }
+    return PATINA_OK;
+}
+
+static int plan_attributes(struct plan *plan)
+{
+    struct patina_file *file = plan->file;
+    const struct ply_property *p = plan->properties;
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < plan->points->properties; k++)
+        count += !plan->taken[k] && p[k].count_type == PATINA_NONE;
+    file->attributes = calloc(count ? count : 1, sizeof *file->attributes);
+    if (!file->attributes)
+        return out_of_memory(plan);
+    for (uint32_t k = 0; k < plan->points->properties; k++) {
+        if (plan->taken[k] || p[k].count_type != PATINA_NONE)
+            continue;
+        struct pt_column *attribute = &file->attributes[file->attribute_count++];
+        memcpy(attribute->name, p[k].name, sizeof attribute->name);
+        attribute->type = p[k].type;
+        attribute->data = column(plan, pt_type_size(p[k].type));
+        if (!attribute->data)
+            return out_of_memory(plan);
+        aim(plan, k, attribute->data, attribute->type, 1);
+    }
+    return PATINA_OK;
+}
+
+// ---- the whole -----------------------------------------------------------------------------------------------------
+
+static const struct ply_element *find_points(const struct ply_header *header)
+{
+    static const char *const names[] = { "vertex", "vertices", "point", "points" };
+    for (size_t n = 0; n < sizeof names / sizeof *names; n++)
+        for (uint32_t e = 0; e < header->element_count; e++)
+            if (!strcmp(header->elements[e].name, names[n]))
+                return &header->elements[e];
+    return NULL;
+}
+
+static int read_points(struct plan *plan)
+{
+    static const char *const formats[] = { "", "PLY ascii", "PLY binary_little_endian", "PLY binary_big_endian" };
+    struct patina_file *file = plan->file;
+    uint32_t vertex = (uint32_t)(plan->points - plan->header->elements);
+    // Before a byte is allocated; again by the readers of the rows, where elements stand before the points.
+    int code = ply_check_count(plan->input, plan->header, plan->points, plan->header->body);
+    if (code)
+        return code;
+    if (plan->points->count > UINT32_MAX - 1)
+        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points, more than 2^32 - 2", plan->input->name,
+                       (unsigned long long)plan->points->count);
+    file->count = plan->points->count;
+    snprintf(file->format, sizeof file->format, "%s", formats[plan->header->format]);
+    memcpy(file->origin, plan->header->origin, sizeof file->origin);
+    plan->targets = calloc(plan->points->properties + 1u, sizeof *plan->targets);
+    plan->taken = calloc(plan->points->properties + 1u, sizeof *plan->taken);
+    if (!plan->targets || !plan->taken)
+        return out_of_memory(plan);
+    if ((code = plan_positions(plan)) || (code = plan_normals(plan)) || (code = plan_colors(plan)) ||
+        (code = plan_attributes(plan)))
+        return code;
+    code = plan->header->format == PLY_ASCII ? ply_read_ascii(plan->input, plan->header, vertex, plan->targets)
+                                             : ply_read_binary(plan->input, plan->header, vertex, plan->targets);
+    if (code)
+        return code;
+    if (plan->staged) {
+        pt_file_place(file, plan->staged);
+        plan->staged = NULL;
+    }
+    pt_file_measure(file);
+    pt_progress_set(plan->input->progress, 1);
+    return PATINA_OK;
+}
+
+int pt_ply_read(struct patina_file *file, const struct pt_input *input)
+{
+    struct plan plan = { .input = input, .file = file };
+    struct ply_header *header = calloc(1, sizeof *header); // 150 KB: too much for a stack
+    if (!header)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
+    int code = ply_read_header(input, header);
+    if (code)
+        goto done;
+    plan.header = header;
+    plan.points = find_points(header);
+    if (!plan.points) {
+        code = pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: the header declares no element vertex", input->name);
+        goto done;
+    }
+    plan.properties = header->properties + plan.points->first;
+    code = read_points(&plan);
+done:
+    free(plan.staged);
+    free(plan.targets);
+    free(plan.taken);
+    free(header);
+    return code;
+}

@@ -1,0 +1,436 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// THE file: scene + settings -> passes, each with its reason, and why each other pass is left out.
+#include "plan.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { ESTIMATE_RADIUS = 3 }; // of image-space normals after filling: 7 x 7, noise of half a spacing tilts them 5 degrees
+
+static const struct {
+    uint32_t bytes, levels;
+} plane_table[PT_PLANE_COUNT] = {
+#define PT_X(name, bytes, levels) { bytes, levels },
+    PT_PLANES(PT_X)
+#undef PT_X
+};
+
+struct builder {
+    const struct patina_scene *scene;
+    struct pt_plan *plan;
+    uint32_t room;
+    int failed;
+};
+
+// ---- adding passes -------------------------------------------------------------------------------------------------
+
+static struct pt_ref plane(enum pt_plane which, uint32_t level) { return (struct pt_ref){ 0, which, level }; }
+static struct pt_ref buffer(enum pt_instance_buffer which, uint32_t instance)
+{
+    return (struct pt_ref){ 1, which, instance };
+}
+
+static void *copy(struct builder *builder, const void *source, size_t size)
+{
+    void *memory = pt_arena_take(&builder->plan->arena, size);
+    if (memory)
+        memcpy(memory, source, size);
+    else
+        builder->failed = 1;
+    return memory;
+}
+
+static struct pt_pass *add(struct builder *builder, enum pt_kernel kernel, const char *name, const void *arguments,
+                           size_t argument_size, const struct pt_ref *refs, uint32_t ref_count)
+{
+    struct pt_plan *plan = builder->plan;
+    static struct pt_pass nowhere; // written to when memory lacks; the plan then fails as a whole
+    if (plan->pass_count == builder->room) {
+        uint32_t room = builder->room ? 2 * builder->room : 32;
+        struct pt_pass *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
+        if (!grown) {
+            builder->failed = 1;
+            return &nowhere;
+        }
+        if (plan->pass_count)
+            memcpy(grown, plan->passes, plan->pass_count * sizeof *grown);
+        plan->passes = grown;
+        builder->room = room;
+    }
+    struct pt_pass *pass = &plan->passes[plan->pass_count++];
+    *pass = (struct pt_pass){ .kernel = kernel,
+                              .name = name,
+                              .arguments = copy(builder, arguments, argument_size),
+                              .argument_size = argument_size,
+                              .refs = copy(builder, refs, ref_count * sizeof *refs),
+                              .ref_count = ref_count };
+    return pass;
+}
+
+#define ADD(builder, kernel, args, ...)                                                         \
+    add(builder, PT_KERNEL_##kernel, #kernel, &(args), sizeof(args), (struct pt_ref[])__VA_ARGS__, \
+        sizeof((struct pt_ref[])__VA_ARGS__) / sizeof(struct pt_ref))
+#define REASON(pass, ...) snprintf((pass)->reason, sizeof(pass)->reason, __VA_ARGS__)
+
+static void skip(struct builder *builder, const char *name, const char *reason)
+{
+    struct pt_skipped *skipped = &builder->plan->skipped[builder->plan->skipped_count++];
+    skipped->name = name;
+    snprintf(skipped->reason, sizeof skipped->reason, "%s", reason);
+}
+
+// ---- views -----------------------------------------------------------------------------------------------------------
+
+static struct view_args view_at(const struct pt_plan *plan, uint32_t level)
+{
+    struct view_args view = plan->view;
+    uint32_t cell = 1u << level;
+    view.level = level;
+    view.width = (view.width + cell - 1) >> level;
+    view.height = (view.height + cell - 1) >> level;
+    for (int k = 0; k < 2; k++) {
+        view.rect[k] >>= level;
+        view.rect[2 + k] = (view.rect[2 + k] + cell - 1) >> level;
+    }
+    return view;
+}
+
+// The instance's rectangle, wider by what filling may carry its points.
+static struct view_args view_of(const struct pt_plan *plan, const struct pt_plan_instance *instance, uint32_t margin)
+{
+    struct view_args view = plan->view;
+    const uint32_t *rect = instance->rect;
+    for (int k = 0; k < 2; k++) {
+        view.rect[k] = rect[k] > margin ? rect[k] - margin : 0;
+        view.rect[2 + k] = rect[2 + k] + margin;
+    }
+    view.rect[2] = view.rect[2] < view.width ? view.rect[2] : view.width;
+    view.rect[3] = view.rect[3] < view.height ? view.rect[3] : view.height;
+    return view;
+}
+
+// ---- the passes --------------------------------------------------------------------------------------------------------
+
+static void plan_scatter(struct builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    struct scatter_args args = { .view = plan->view };
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (1 + 4 * (size_t)plan->instance_count) * sizeof *refs);
+    uint32_t count = 0;
+    if (!refs) {
+        builder->failed = 1;
+        return;
+    }
+    refs[count++] = plane(PT_PLANE_KEYS, 0);
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        if (!plan->instances[i].chunk_count)
+            continue;
+        refs[count++] = buffer(PT_CHUNKS, i);
+        refs[count++] = buffer(PT_POSITIONS, i);
+        refs[count++] = buffer(PT_IDS, i);
+        refs[count++] = buffer(PT_SURFACE, i);
+        args.instances++;
+    }
+    struct pt_pass *pass = add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
+    REASON(pass, "%llu points in %llu chunks of %u instances are in view", (unsigned long long)plan->points_scattered,
+           (unsigned long long)(plan->chunks - plan->chunks_culled), args.instances);
+}
+
+static void plan_surface(struct builder *builder, uint32_t i)
+{
+    struct pt_plan *plan = builder->plan;
+    const struct pt_plan_instance *instance = &plan->instances[i];
+    if (!instance->args.has_normals) {
+        double wanted = ceil(1.5 * plan->spacing_px);
+        struct normals_args args = { .view = view_of(plan, instance, 0), .instance = instance->args };
+        args.radius = wanted < 2.0 ? 2 : wanted > 6.0 ? 6 : (uint32_t)wanted;
+        REASON(ADD(builder, normals, args,
+                   { plane(PT_PLANE_KEYS, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0) }),
+               "instance %u has no normals: estimated from the depth of %u x %u pixels", i, 2 * args.radius + 1,
+               2 * args.radius + 1);
+    }
+    struct surface_args args = { .view = view_of(plan, instance, 0), .instance = instance->args };
+    REASON(ADD(builder, surface, args,
+               { plane(PT_PLANE_KEYS, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
+                 plane(PT_PLANE_FROM, 0) }),
+           "layer distance and normal of instance %u's pixels", i);
+}
+
+static void plan_fill_level(struct builder *builder, uint32_t level)
+{
+    struct pt_plan *plan = builder->plan;
+    const patina_settings *settings = &builder->scene->settings;
+    struct fill_args args = { .view = view_at(plan, level),
+                              .iterations = plan->iterations,
+                              .unfills = settings->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
+                              .refined = settings->quality == PATINA_QUALITY_REFINED,
+                              .base_width = plan->view.width };
+    for (args.occluded = 0; args.occluded < 2; args.occluded++)
+        REASON(ADD(builder, fill, args,
+                   { plane(PT_PLANE_KEYS, level), plane(PT_PLANE_FROM, level), plane(PT_PLANE_NORMAL, 0),
+                     plane(PT_PLANE_DEFF, 0) }),
+               "%s pixels at level %u, %u fills, at most %u un-fills (spacing %.2f pixels)",
+               args.occluded ? "occluded" : "background", level, args.iterations, args.unfills, plan->spacing_px);
+}
+
+static void plan_pyramid(struct builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    for (uint32_t level = 1; level <= plan->levels; level++) {
+        struct view_args fine = view_at(plan, level - 1);
+        struct pull_args args = { .view = view_at(plan, level), .fine_width = fine.width, .fine_height = fine.height };
+        // the whole plane: filters may look one pixel past the rectangle
+        args.view.rect[0] = args.view.rect[1] = 0;
+        args.view.rect[2] = args.view.width;
+        args.view.rect[3] = args.view.height;
+        REASON(ADD(builder, pull, args,
+                   { plane(PT_PLANE_KEYS, level - 1), plane(PT_PLANE_FROM, level - 1), plane(PT_PLANE_KEYS, level),
+                     plane(PT_PLANE_FROM, level) }),
+               "spacing %.2f pixels: holes are closed at coarser levels first", plan->spacing_px);
+    }
+    for (uint32_t level = plan->levels; level > 0; level--) {
+        plan_fill_level(builder, level);
+        struct view_args coarse = view_at(plan, level);
+        struct push_args args = { .view = view_at(plan, level - 1),
+                                  .coarse_width = coarse.width,
+                                  .coarse_height = coarse.height,
+                                  .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED,
+                                  .base_width = plan->view.width };
+        REASON(ADD(builder, push, args,
+                   { plane(PT_PLANE_KEYS, level), plane(PT_PLANE_FROM, level), plane(PT_PLANE_KEYS, level - 1),
+                     plane(PT_PLANE_FROM, level - 1), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
+               "level %u to level %u", level, level - 1);
+    }
+}
+
+static void plan_filling(struct builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    if (!plan->iterations) {
+        skip(builder, "fill", "switched off in the settings");
+        skip(builder, "pull", "no filling");
+        skip(builder, "push", "no filling");
+        return;
+    }
+    if (plan->levels) {
+        plan_pyramid(builder);
+    } else {
+        char reason[96];
+        snprintf(reason, sizeof reason,
+                 builder->scene->settings.fill == PATINA_FILL_PAPER ? "filling as in the paper has one level"
+                                                                    : "spacing %.2f pixels needs no coarser level",
+                 plan->spacing_px);
+        skip(builder, "pull", reason);
+        skip(builder, "push", reason);
+    }
+    plan_fill_level(builder, 0);
+}
+
+static void set_lights(const struct patina_scene *scene, struct shade_args *args)
+{
+    double axes[9], position[3];
+    pt_camera_axes(&scene->camera, axes, position);
+    for (uint32_t i = 0; i < scene->light_count && i < PT_MAX_LIGHTS; i++) {
+        const patina_light_desc *light = &scene->lights[i];
+        struct light_args *out = &args->lights[args->light_count++];
+        double vector[3], view[3], strength = (double)light->power;
+        double length = sqrt(pt_dot(light->direction, light->direction));
+        for (int k = 0; k < 3; k++)
+            vector[k] = light->type == PATINA_LIGHT_SUN ? -light->direction[k] / length : light->position[k] - position[k];
+        pt_apply(axes, vector, view);
+        if (light->type == PATINA_LIGHT_POINT)
+            strength /= 4.0 * 3.14159265358979323846; // radiant power -> intensity
+        out->type = light->type;
+        for (int k = 0; k < 3; k++) {
+            out->vector[k] = (float)view[k];
+            out->color[k] = (float)((double)light->color[k] * strength);
+        }
+    }
+}
+
+static void plan_shade(struct builder *builder, uint32_t i)
+{
+    struct pt_plan *plan = builder->plan;
+    const struct pt_plan_instance *instance = &plan->instances[i];
+    uint32_t margin = (plan->iterations + 2) << plan->levels;
+    if (!instance->args.has_normals) {
+        struct normals_args estimate = { .view = view_of(plan, instance, margin),
+                                         .instance = instance->args,
+                                         .radius = ESTIMATE_RADIUS };
+        REASON(ADD(builder, normals, estimate,
+                   { plane(PT_PLANE_KEYS, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_SHADING, 0) }),
+               "instance %u has no normals: estimated again where holes are filled now", i);
+    }
+    struct shade_args args = { .view = view_of(plan, instance, margin),
+                               .instance = instance->args,
+                               .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED };
+    memcpy(args.world, builder->scene->settings.world_color, sizeof args.world);
+    args.eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f;
+    if (instance->args.lit)
+        set_lights(builder->scene, &args);
+    REASON(ADD(builder, shade, args,
+               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
+                 buffer(PT_SURFACE, i), buffer(PT_COLORS, i), plane(PT_PLANE_SHADING, 0), plane(PT_PLANE_COLOR_A, 0) }),
+           "instance %u, %s, %u lights", i, instance->args.lit ? "lit" : "unlit", args.light_count);
+}
+
+// Returns the plane that holds the finished colour.
+static enum pt_plane plan_image_filters(struct builder *builder)
+{
+    static const float weights[3][3] = { { 16.0f, 2.0f, 1.0f }, { 4.0f, 2.0f, 1.0f }, { 1.0f, 1.0f, 1.0f } };
+    static const char *const names[3] = { "alleviated Gaussian", "Gaussian", "box" };
+    struct pt_plan *plan = builder->plan;
+    const patina_settings *settings = &builder->scene->settings;
+    enum pt_plane color = PT_PLANE_COLOR_A, other = PT_PLANE_COLOR_B;
+    if (settings->smooth != PATINA_SMOOTH_OFF) {
+        const float *w = weights[settings->smooth];
+        struct smooth_args args = { .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2] };
+        REASON(ADD(builder, smooth, args,
+                   { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
+                     plane(other, 0) }),
+               "%s, 3 x 3", names[settings->smooth]);
+        color = PT_PLANE_COLOR_B;
+        other = PT_PLANE_COLOR_A;
+    } else {
+        skip(builder, "smooth", "switched off in the settings");
+    }
+    if (settings->antialias == PATINA_ANTIALIAS_OFF) {
+        skip(builder, "antialias", "switched off in the settings");
+        return color;
+    }
+    struct antialias_args args = { .view = plan->view, .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS };
+    REASON(ADD(builder, antialias, args,
+               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
+                 plane(other, 0) }),
+           args.layers ? "edges of background and layers" : "edges of background");
+    return other;
+}
+
+static void plan_output(struct builder *builder, enum pt_plane color)
+{
+    const struct pt_plan *plan = builder->plan;
+    const patina_settings *settings = &builder->scene->settings;
+    struct compose_args compose = { .view = plan->view,
+                                    .crop_x = plan->crop[0],
+                                    .crop_y = plan->crop[1],
+                                    .crop_width = plan->crop[2],
+                                    .crop_height = plan->crop[3] };
+    for (int k = 0; k < 3 && !settings->film_transparent; k++)
+        compose.background[k] = settings->world_color[k];
+    compose.background[3] = settings->film_transparent ? 0.0f : 1.0f;
+    REASON(ADD(builder, compose, compose,
+               { plane(PT_PLANE_KEYS, 0), plane(color, 0), plane(PT_PLANE_COMBINED, 0) }),
+           settings->film_transparent ? "transparent film" : "over the world colour");
+
+    struct extract_args extract = { .view = plan->view,
+                                    .crop_x = plan->crop[0],
+                                    .crop_y = plan->crop[1],
+                                    .crop_width = plan->crop[2],
+                                    .crop_height = plan->crop[3],
+                                    .depth = settings->passes >> PATINA_PASS_DEPTH & 1u,
+                                    .normal = settings->passes >> PATINA_PASS_NORMAL & 1u,
+                                    .source = settings->passes >> PATINA_PASS_SOURCE & 1u };
+    double axes[9], position[3];
+    pt_camera_axes(&builder->scene->camera, axes, position);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            extract.world_from_view[3 * r + c] = (float)axes[3 * c + r];
+    if (!extract.depth && !extract.normal && !extract.source) {
+        skip(builder, "extract", "no pass beside the combined one is asked for");
+        return;
+    }
+    REASON(ADD(builder, extract, extract,
+               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_SHADING, 0),
+                 plane(PT_PLANE_DEPTH, 0), plane(PT_PLANE_NORMALS, 0), plane(PT_PLANE_SOURCE, 0) }),
+           "asked for:%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
+           extract.source ? " source" : "");
+}
+
+static void plan_points(struct builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    int estimate = 0;
+    plan_scatter(builder);
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        if (plan->instances[i].chunk_count) {
+            plan_surface(builder, i);
+            estimate |= !plan->instances[i].args.has_normals;
+        }
+    if (!estimate)
+        skip(builder, "normals", "every cloud in view has normals");
+    plan_filling(builder);
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        if (plan->instances[i].chunk_count)
+            plan_shade(builder, i);
+    plan_output(builder, plan_image_filters(builder));
+}
+
+static void plan_nothing(struct builder *builder, const char *reason)
+{
+    static const char *const names[] = { "scatter", "normals", "surface", "pull", "fill", "push", "shade", "smooth",
+                                         "antialias" };
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        skip(builder, names[i], reason);
+    plan_output(builder, PT_PLANE_COLOR_A);
+}
+
+int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
+{
+    struct builder builder = { .scene = scene, .plan = plan };
+    *plan = (struct pt_plan){ 0 };
+    if (!scene->has_camera)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
+    int error = pt_plan_view(scene, plan);
+    if (!error) {
+        if (plan->points_scattered)
+            plan_points(&builder);
+        else
+            plan_nothing(&builder, !scene->instance_count  ? "the scene has no cloud"
+                                   : !plan->chunks       ? "the clouds have no points"
+                                                         : "no cloud is in view");
+        error = builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+    }
+    if (error == PATINA_ERROR_MEMORY)
+        pt_fail(&scene->handle, error, "planning the frame: out of memory");
+    if (error)
+        pt_plan_destroy(plan);
+    return error;
+}
+
+void pt_plan_destroy(struct pt_plan *plan)
+{
+    pt_arena_free(plan->arena);
+    *plan = (struct pt_plan){ 0 };
+}
+
+void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_t level, uint32_t size[2])
+{
+    if (which >= PT_PLANE_COMBINED) {
+        size[0] = plan->crop[2];
+        size[1] = plan->crop[3];
+        return;
+    }
+    struct view_args view = view_at(plan, plane_table[which].levels ? level : 0);
+    size[0] = view.width;
+    size[1] = view.height;
+}
+
+size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
+{
+    size_t length = 0;
+#define LINE(...)                                                                                      \
+    length += (size_t)snprintf(buffer_out && length < size ? buffer_out + length : NULL,              \
+                               buffer_out && length < size ? size - length : 0, __VA_ARGS__)
+    LINE("planes %u x %u, crop %u x %u at %u, %u, %u coarse levels\n", plan->view.width, plan->view.height, plan->crop[2],
+         plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
+    LINE("points %llu, scattered %llu, chunks %llu, culled %llu\n", (unsigned long long)plan->points,
+         (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
+         (unsigned long long)plan->chunks_culled);
+    for (uint32_t i = 0; i < plan->pass_count; i++)
+        LINE("run  %-10s %s\n", plan->passes[i].name, plan->passes[i].reason);
+    for (uint32_t i = 0; i < plan->skipped_count; i++)
+        LINE("skip %-10s %s\n", plan->skipped[i].name, plan->skipped[i].reason);
+#undef LINE
+    return length;
+}

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The plan of a frame: which kernels run, on what, and why the others do not. Pure data from scene and settings; no device
+// is called (SPEC 8, DESIGN rule 3).
+#ifndef PT_PLAN_H
+#define PT_PLAN_H
+
+#include "device.h"
+#include "scene/scene.h"
+
+enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
+
+// X(name, bytes a pixel, has coarse levels)
+#define PT_PLANES(X)   \
+    X(KEYS, 8, 1)      \
+    X(FROM, 4, 1)      \
+    X(NORMAL, 16, 0)   \
+    X(DEFF, 4, 0)      \
+    X(SHADING, 16, 0)  \
+    X(COLOR_A, 16, 0)  \
+    X(COLOR_B, 16, 0)  \
+    X(COMBINED, 16, 0) \
+    X(DEPTH, 4, 0)     \
+    X(NORMALS, 12, 0)  \
+    X(SOURCE, 4, 0)
+
+enum pt_plane {
+#define PT_X(name, bytes, levels) PT_PLANE_##name,
+    PT_PLANES(PT_X)
+#undef PT_X
+        PT_PLANE_COUNT
+};
+// From COMBINED on, planes have the size of the crop; they are the picture that callers read.
+
+enum pt_instance_buffer { PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS };
+
+// What a pass binds: a plane at a level, or a buffer of an instance.
+struct pt_ref {
+    uint32_t of_instance;
+    uint32_t which; // pt_plane or pt_instance_buffer
+    uint32_t index; // level or instance
+};
+
+struct pt_pass {
+    enum pt_kernel kernel;
+    const char *name;      // what statistics add it to
+    char reason[96];
+    const void *arguments; // owned by the plan
+    size_t argument_size;
+    const struct pt_ref *refs;
+    uint32_t ref_count;
+};
+
+struct pt_skipped {
+    const char *name;
+    char reason[128];
+};
+
+struct pt_plan_instance {
+    const struct pt_instance *instance;
+    struct instance_args args;
+    struct chunk_view *chunks; // those in view
+    uint32_t chunk_count;
+    uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
+};
+
+struct pt_plan {
+    struct view_args view;  // level 0; rect: union over instances
+    uint32_t levels;        // coarse levels
+    uint32_t crop[4];       // x, y, width, height of the picture in the planes
+    uint32_t pixel_offset[2]; // of the crop in the full picture
+    struct pt_plan_instance *instances;
+    uint32_t instance_count;
+    struct pt_pass *passes;
+    uint32_t pass_count;
+    struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
+    uint32_t skipped_count;
+    uint64_t points, points_scattered, chunks, chunks_culled;
+    double spacing_px;      // local spacing on screen that 95% of the covered area stays below
+    uint32_t iterations;    // of each filling filter
+    struct pt_arena *arena;
+};
+
+// Every pointer inside belongs to the plan; the clouds must outlive it. Message on the scene when it fails.
+int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan);
+void pt_plan_destroy(struct pt_plan *plan);
+
+// Width and height of a level's planes; index > 0 only for planes with levels.
+void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_t level, uint32_t size[2]);
+
+// A line a pass, and one for each that is left out. Returns the full length.
+size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
+
+// plan_view.c: how the camera sees the scene.
+int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
+
+// Memory that lives as long as the plan; zeroed. NULL when memory lacks.
+void *pt_arena_take(struct pt_arena **arena, size_t size);
+void pt_arena_free(struct pt_arena *arena);
+
+#endif

@@ -1,0 +1,490 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How the camera sees the scene: matrices in float64 up to the chunk-to-screen product (DESIGN rule 6), chunks culled by
+// box and normal cone, local spacing on screen, and from it the window of pixels that the planes hold.
+//
+// Planes reach a guard G beyond the picture, so that holes at its border fill as elsewhere. All pixel coordinates in kernels
+// are of this padded picture. A region's planes reach as far beyond it as filters can carry anything, at most to the padded
+// picture's edge: a region is a crop of the whole, to the bit (SPEC 2.5).
+#include "plan.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct camera {
+    double axes[9], position[3];
+    double xs, ys;         // window units a pixel
+    double near_clip, far_clip;
+    double left, bottom;   // of the padded picture
+    int orthographic;
+    double width, height;  // padded picture, pixels
+};
+
+// One chunk in view, before it is known which window the planes get.
+struct seen {
+    uint32_t chunk;
+    uint32_t cull;
+    double rect[4];        // bounds on screen, padded picture
+    double spacing_px, area_px;
+};
+
+struct object {
+    double linear[9], translation[3]; // world from object
+    double view[9];                   // camera axes x linear
+    double inverse[9];                // object from world, linear part; valid when !singular
+    double scale;                     // largest stretch
+    int singular;
+};
+
+// ---- camera and objects ------------------------------------------------------------------------------------------------
+
+static int set_camera(const struct patina_scene *scene, struct camera *camera)
+{
+    const patina_camera *c = &scene->camera;
+    const patina_settings *s = &scene->settings;
+    if (pt_camera_axes(c, camera->axes, camera->position))
+        return pt_fail_again(&scene->handle, PATINA_ERROR_ARGUMENT);
+    camera->orthographic = c->orthographic != 0;
+    camera->xs = (c->right - c->left) / s->width;
+    camera->ys = (c->top - c->bottom) / s->height;
+    camera->left = c->left;
+    camera->bottom = c->bottom;
+    camera->near_clip = c->near_clip;
+    camera->far_clip = c->far_clip;
+    camera->width = s->width;
+    camera->height = s->height;
+    return PATINA_OK;
+}
+
+static void pad_camera(struct camera *camera, uint32_t guard)
+{
+    camera->left -= guard * camera->xs;
+    camera->bottom -= guard * camera->ys;
+    camera->width += 2.0 * guard;
+    camera->height += 2.0 * guard;
+}
+
+static void set_object(const struct camera *camera, const struct pt_instance *instance, struct object *object)
+{
+    pt_split_matrix(instance->style.world_from_object, object->linear, object->translation);
+    pt_multiply(camera->axes, object->linear, object->view);
+    double cofactors[9], size = 0.0;
+    pt_cofactors(object->linear, cofactors);
+    double determinant = pt_dot(object->linear, cofactors);
+    object->scale = 0.0;
+    for (int c = 0; c < 3; c++) {
+        double column[3] = { object->linear[c], object->linear[3 + c], object->linear[6 + c] };
+        object->scale = fmax(object->scale, sqrt(pt_dot(column, column)));
+    }
+    size = object->scale * object->scale * object->scale;
+    object->singular = !(fabs(determinant) > 1e-14 * size) || !(size > 0.0);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            object->inverse[3 * r + c] = object->singular ? 0.0 : cofactors[3 * c + r] / determinant;
+}
+
+// Normals are covectors: the inverse transposed, which also keeps "outward" under mirroring. Scaled to about 1.
+static void normal_matrix(const struct camera *camera, const struct object *object, float out[9])
+{
+    double cofactors[9], product[9], largest = 0.0;
+    pt_cofactors(object->linear, cofactors);
+    double sign = pt_dot(object->linear, cofactors) < 0.0 ? -1.0 : 1.0;
+    pt_multiply(camera->axes, cofactors, product);
+    for (int i = 0; i < 9; i++)
+        largest = fmax(largest, fabs(product[i]));
+    for (int i = 0; i < 9; i++) // a singular object has no normals
+        out[i] = object->singular || !(largest > 0.0) ? 0.0f : (float)(sign * product[i] / largest);
+}
+
+// The chunk's product: screen X, Y (perspective: times z) and z rows, and their translation.
+static void chunk_product(const struct camera *camera, const struct object *object, const struct pt_chunk *chunk,
+                          double rows[9], double translation[3])
+{
+    double world[3], view[3];
+    pt_apply(object->linear, chunk->origin, world);
+    for (int k = 0; k < 3; k++) // subtract first: the difference is exact where 5e6 m cancel
+        world[k] = (world[k] + object->translation[k]) - camera->position[k];
+    pt_apply(camera->axes, world, view);
+    const double sx = 1.0 / camera->xs, sy = 1.0 / camera->ys;
+    const double ox = -camera->left * sx, oy = -camera->bottom * sy; // pixel of the axis
+    const double *v = object->view;
+    for (int c = 0; c < 3; c++) {
+        rows[c] = sx * v[c];
+        rows[3 + c] = sy * v[3 + c];
+        rows[6 + c] = -v[6 + c];
+        if (!camera->orthographic) {
+            rows[c] += ox * rows[6 + c];
+            rows[3 + c] += oy * rows[6 + c];
+        }
+    }
+    translation[2] = camera->orthographic ? -view[2] - camera->near_clip : -view[2];
+    translation[0] = sx * view[0] + ox * (camera->orthographic ? 1.0 : translation[2]);
+    translation[1] = sy * view[1] + oy * (camera->orthographic ? 1.0 : translation[2]);
+}
+
+// ---- culling -----------------------------------------------------------------------------------------------------------
+
+// Bounds on screen of the chunk's box, a pixel wider than exact; 0 when it is outside the view.
+static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chunk, const double rows[9],
+                        const double translation[3], double rect[4], double *z_middle)
+{
+    const double z_far = camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip;
+    const double z_near = camera->orthographic ? 0.0 : camera->near_clip;
+    double z_min = INFINITY, z_max = -INFINITY, p[3], q[3];
+    rect[0] = rect[1] = INFINITY;
+    rect[2] = rect[3] = -INFINITY;
+    for (int corner = 0; corner < 8; corner++) {
+        for (int k = 0; k < 3; k++)
+            p[k] = (double)(corner >> k & 1 ? chunk->box_max[k] : chunk->box_min[k]);
+        pt_apply(rows, p, q);
+        for (int k = 0; k < 3; k++)
+            q[k] += translation[k];
+        z_min = fmin(z_min, q[2]);
+        z_max = fmax(z_max, q[2]);
+        double w = camera->orthographic ? 1.0 : q[2];
+        for (int k = 0; k < 2 && w > 0.0; k++) {
+            rect[k] = fmin(rect[k], q[k] / w - 1.0);
+            rect[2 + k] = fmax(rect[2 + k], q[k] / w + 1.0);
+        }
+    }
+    double slop = 1e-5 * (fabs(z_min) + fabs(z_max)); // what float32 may round
+    *z_middle = fmax(0.5 * (z_min + z_max), z_near);
+    if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
+        return 0;
+    if (!camera->orthographic && z_min < z_near) { // corners behind the camera bound nothing
+        rect[0] = rect[1] = 0.0;
+        rect[2] = camera->width;
+        rect[3] = camera->height;
+    }
+    rect[0] = fmax(rect[0], 0.0);
+    rect[1] = fmax(rect[1], 0.0);
+    rect[2] = fmin(rect[2], camera->width);
+    rect[3] = fmin(rect[3], camera->height);
+    return rect[0] < rect[2] && rect[1] < rect[3];
+}
+
+enum facing { FACES_AWAY, FACES_BOTH, FACES_US };
+
+// The eye in the chunk's coordinates: xyz and 1, or the direction towards the viewer and 0.
+static void chunk_eye(const struct camera *camera, const struct object *object, const struct pt_chunk *chunk,
+                      double eye[4])
+{
+    if (camera->orthographic) {
+        pt_apply(object->inverse, camera->axes + 6, eye);
+        eye[3] = 0.0;
+        return;
+    }
+    double offset[3];
+    for (int k = 0; k < 3; k++)
+        offset[k] = camera->position[k] - object->translation[k];
+    pt_apply(object->inverse, offset, eye);
+    for (int k = 0; k < 3; k++)
+        eye[k] -= chunk->origin[k];
+    eye[3] = 1.0;
+}
+
+// Whether every point of the chunk faces us, or away, by the cone of its normals; a thousandth of a radian of caution.
+static enum facing chunk_facing(const struct pt_chunk *chunk, const double eye[4])
+{
+    if (chunk->cone_cosine < -1.0f)
+        return FACES_BOTH; // a point without a normal is never culled
+    double towards[3], radius = 0.0, axis[3];
+    for (int k = 0; k < 3; k++) {
+        double half = 0.5 * ((double)chunk->box_max[k] - (double)chunk->box_min[k]);
+        double middle = 0.5 * ((double)chunk->box_max[k] + (double)chunk->box_min[k]);
+        towards[k] = eye[k] - eye[3] * middle;
+        radius += half * half;
+        axis[k] = (double)chunk->cone_axis[k];
+    }
+    double distance = sqrt(pt_dot(towards, towards));
+    radius = eye[3] > 0.0 ? sqrt(radius) : 0.0;
+    if (!(distance > radius))
+        return FACES_BOTH;
+    double cosine = pt_dot(axis, towards) / distance;
+    double angle = acos(fmax(-1.0, fmin(1.0, cosine)));
+    double spread = acos(fmax(-1.0, (double)chunk->cone_cosine)) + asin(radius / distance) + 1e-3;
+    const double right_angle = 1.57079632679489661923;
+    return angle + spread < right_angle ? FACES_US : angle - spread > right_angle ? FACES_AWAY : FACES_BOTH;
+}
+
+// ---- the chunks in view ------------------------------------------------------------------------------------------------
+
+struct survey {
+    struct camera camera;
+    struct object *objects;
+    struct seen **seen; // per instance
+    uint32_t *seen_count;
+};
+
+static int look_at_instance(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey, uint32_t i)
+{
+    const struct pt_instance *instance = &scene->instances[i];
+    const struct patina_cloud *cloud = instance->cloud;
+    const struct camera *camera = &survey->camera;
+    struct object *object = &survey->objects[i];
+    set_object(camera, instance, object);
+    int cull = instance->style.cull_back && cloud->info.has_normals && !object->singular;
+    struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
+    if (!list)
+        return PATINA_ERROR_MEMORY;
+    survey->seen[i] = list;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        const struct pt_chunk *chunk = &cloud->chunks[c];
+        struct seen seen = { .chunk = c };
+        double rows[9], translation[3], eye[4], z;
+        chunk_product(camera, object, chunk, rows, translation);
+        if (!chunk_bounds(camera, chunk, rows, translation, seen.rect, &z))
+            continue;
+        if (cull) {
+            chunk_eye(camera, object, chunk, eye);
+            enum facing facing = chunk_facing(chunk, eye);
+            if (facing == FACES_AWAY)
+                continue;
+            seen.cull = facing == FACES_BOTH;
+        }
+        double footprint = fmax(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
+        seen.spacing_px = (double)chunk->spacing * object->scale / footprint;
+        seen.area_px = chunk->count * seen.spacing_px * seen.spacing_px;
+        list[survey->seen_count[i]++] = seen;
+    }
+    return PATINA_OK;
+}
+
+struct weighted {
+    double value, weight;
+};
+
+static int compare_weighted(const void *a, const void *b)
+{
+    double x = ((const struct weighted *)a)->value, y = ((const struct weighted *)b)->value;
+    return (x > y) - (x < y);
+}
+
+// The spacing on screen that 95% of the covered area stays below.
+static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
+{
+    uint32_t count = 0, total = 0;
+    double area = 0.0, sum = 0.0;
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        total += survey->seen_count[i];
+    struct weighted *list = malloc((total + 1) * sizeof *list);
+    if (!list)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        for (uint32_t c = 0; c < survey->seen_count[i]; c++) {
+            const struct seen *seen = &survey->seen[i][c];
+            if (!(seen->area_px > 0.0) || !isfinite(seen->area_px))
+                continue;
+            list[count++] = (struct weighted){ seen->spacing_px, seen->area_px };
+            area += seen->area_px;
+        }
+    qsort(list, count, sizeof *list, compare_weighted);
+    for (uint32_t k = 0; k < count && sum <= 0.95 * area; k++) {
+        sum += list[k].weight;
+        plan->spacing_px = list[k].value;
+    }
+    free(list);
+    return PATINA_OK;
+}
+
+// ---- levels, iterations, window ------------------------------------------------------------------------------------------
+
+// How many levels and iterations the spacing asks for. With s = spacing in pixels a pixel stays empty with probability
+// exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.8 (0.3 points a pixel) n alone leaves holes
+// open (n = 8 at 0.1 points a pixel: 64%), so coarser levels halve s down to 1.2 first.
+static void choose_filling(const patina_settings *settings, struct pt_plan *plan)
+{
+    double s = plan->spacing_px;
+    plan->levels = 0;
+    if (settings->fill == PATINA_FILL_PAPER) {
+        plan->iterations = settings->fill_iterations ? settings->fill_iterations : 1;
+        return;
+    }
+    if (settings->fill == PATINA_FILL_OFF) {
+        plan->iterations = 0;
+        return;
+    }
+    for (; s > 1.8 || (plan->levels && s > 1.2); s *= 0.5)
+        if (plan->levels++ == PT_LEVELS - 2)
+            break;
+    plan->iterations = settings->fill_iterations ? settings->fill_iterations : s < 0.4 ? 1 : s < 0.75 ? 2 : s < 0.9 ? 3 : 4;
+}
+
+static uint32_t round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
+
+// How far, in pixels, anything can carry influence: fills and un-fills of both phases and the push at every level, the
+// window of normals (6 before and 3 after filling), the blend of normals (9), smoothing and anti-aliasing.
+static uint32_t reach_of(const struct pt_plan *plan)
+{
+    uint32_t reach = 6 + 3 + 9 + 1 + 1;
+    for (uint32_t level = 0; level <= plan->levels; level++)
+        reach += (4 * plan->iterations + 3) << level;
+    return reach;
+}
+
+static void choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard)
+{
+    const uint32_t *region = scene->settings.region, cell = 1u << plan->levels;
+    const uint32_t full[2] = { scene->settings.width + 2 * guard, scene->settings.height + 2 * guard };
+    uint32_t reach = reach_of(plan), origin[2], size[2];
+    for (int k = 0; k < 2; k++) {
+        uint32_t first = region[k] + guard, last = region[2 + k] + guard;
+        int whole = region[k] == 0 && last + guard == full[k];
+        origin[k] = whole || first < reach ? 0 : (first - reach) / cell * cell;
+        uint32_t end = round_up(last + reach, cell);
+        size[k] = (whole || end > full[k] ? full[k] : end) - origin[k];
+        plan->crop[k] = first - origin[k];
+        plan->crop[2 + k] = last - first;
+        plan->pixel_offset[k] = region[k];
+    }
+    plan->view.origin_x = (int32_t)origin[0];
+    plan->view.origin_y = (int32_t)origin[1];
+    plan->view.width = size[0];
+    plan->view.height = size[1];
+}
+
+static void set_view(const struct camera *camera, struct view_args *view)
+{
+    view->perspective = !camera->orthographic;
+    view->z_near = camera->orthographic ? 0.0f : (float)camera->near_clip;
+    view->z_far = (float)(camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip);
+    view->ray_x0 = (float)camera->left;
+    view->ray_xs = (float)camera->xs;
+    view->ray_y0 = (float)camera->bottom;
+    view->ray_ys = (float)camera->ys;
+    view->footprint = (float)fmax(camera->xs, camera->ys);
+}
+
+// ---- what kernels get ----------------------------------------------------------------------------------------------------
+
+static void set_chunk(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
+                      const struct pt_chunk *chunk, uint32_t cull, struct chunk_view *out)
+{
+    double rows[9], translation[3], eye[4] = { 0 };
+    chunk_product(camera, object, chunk, rows, translation);
+    for (int k = 0; k < 9; k++)
+        out->row[k] = (float)rows[k];
+    for (int k = 0; k < 3; k++) {
+        out->hi[k] = (float)translation[k];
+        out->lo[k] = (float)(translation[k] - (double)out->hi[k]);
+    }
+    if (cull)
+        chunk_eye(camera, object, chunk, eye);
+    for (int k = 0; k < 4; k++)
+        out->eye[k] = (float)eye[k];
+    out->first = chunk->first;
+    out->count = chunk->count;
+    out->padded = chunk->padded;
+    out->cull = cull;
+    out->id_base = instance->id_base;
+}
+
+static void set_instance(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
+                         struct instance_args *args)
+{
+    const struct patina_cloud *cloud = instance->cloud;
+    const patina_cloud_style *style = &instance->style;
+    args->id_base = instance->id_base;
+    args->id_count = (uint32_t)cloud->info.count;
+    args->has_normals = cloud->info.has_normals;
+    args->color_format = cloud->color_format;
+    args->lit = style->lighting == PATINA_LIGHTING_LIT;
+    args->shininess = style->shininess;
+    args->ambient = style->ambient;
+    args->diffuse = style->diffuse;
+    args->specular = style->specular;
+    memcpy(args->color, style->color, sizeof args->color);
+    args->d_min = style->d_min;
+    normal_matrix(camera, object, args->normal_matrix);
+    for (uint32_t k = 0; k < PT_NO_SPACINGS; k++)
+        args->spacing[k] = (float)(cloud->spacing_base * pt_spacing_of_class(k) * object->scale);
+}
+
+static void join_rect(uint32_t rect[4], const uint32_t other[4])
+{
+    if (rect[0] >= rect[2]) {
+        memcpy(rect, other, 4 * sizeof *rect);
+        return;
+    }
+    for (int k = 0; k < 2; k++) {
+        rect[k] = other[k] < rect[k] ? other[k] : rect[k];
+        rect[2 + k] = other[2 + k] > rect[2 + k] ? other[2 + k] : rect[2 + k];
+    }
+}
+
+// The part of a chunk's bounds that the planes hold; 0 when none.
+static int rect_in_window(const struct view_args *view, const double bounds[4], uint32_t rect[4])
+{
+    const double origin[2] = { view->origin_x, view->origin_y }, size[2] = { view->width, view->height };
+    for (int k = 0; k < 2; k++) {
+        double first = floor(bounds[k] - origin[k]), last = ceil(bounds[2 + k] - origin[k]);
+        if (!(last > 0.0) || !(first < size[k]))
+            return 0;
+        rect[k] = (uint32_t)fmax(first, 0.0);
+        rect[2 + k] = (uint32_t)fmin(last, size[k]);
+    }
+    return rect[0] < rect[2] && rect[1] < rect[3];
+}
+
+static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey,
+                          uint32_t i)
+{
+    const struct pt_instance *instance = &scene->instances[i];
+    struct pt_plan_instance *out = &plan->instances[i];
+    out->instance = instance;
+    set_instance(&survey->camera, &survey->objects[i], instance, &out->args);
+    out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
+    if (!out->chunks)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t k = 0; k < survey->seen_count[i]; k++) {
+        const struct seen *seen = &survey->seen[i][k];
+        const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
+        double rows[9], translation[3], bounds[4], z;
+        uint32_t rect[4];
+        chunk_product(&survey->camera, &survey->objects[i], chunk, rows, translation);
+        if (!chunk_bounds(&survey->camera, chunk, rows, translation, bounds, &z) ||
+            !rect_in_window(&plan->view, bounds, rect))
+            continue;
+        set_chunk(&survey->camera, &survey->objects[i], instance, chunk, seen->cull, &out->chunks[out->chunk_count++]);
+        join_rect(out->rect, rect);
+        plan->points_scattered += chunk->count;
+    }
+    join_rect(plan->view.rect, out->rect);
+    plan->chunks += instance->cloud->chunk_count;
+    plan->chunks_culled += instance->cloud->chunk_count - out->chunk_count;
+    plan->points += instance->cloud->info.count;
+    return PATINA_OK;
+}
+
+int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
+{
+    struct survey survey = { 0 };
+    plan->instance_count = scene->instance_count;
+    plan->instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *plan->instances);
+    survey.objects = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.objects);
+    survey.seen = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.seen);
+    survey.seen_count = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.seen_count);
+    if (!plan->instances || !survey.objects || !survey.seen || !survey.seen_count)
+        return PATINA_ERROR_MEMORY;
+    int error = set_camera(scene, &survey.camera);
+    if (error)
+        return error;
+    // 1. What the whole picture sees decides spacing, levels, guard: a region must decide alike. 160 covers any guard.
+    struct camera bare = survey.camera;
+    pad_camera(&survey.camera, 160);
+    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
+        error = look_at_instance(scene, plan, &survey, i);
+    if (error || (error = spacing_on_screen(plan, &survey)))
+        return error;
+    choose_filling(&scene->settings, plan);
+    uint32_t cell = 1u << plan->levels;
+    uint32_t guard = round_up(8 + 4 * cell, cell > 16 ? cell : 16);
+    // 2. The window, and what of the scene falls into it.
+    survey.camera = bare;
+    pad_camera(&survey.camera, guard);
+    set_view(&survey.camera, &plan->view);
+    choose_window(scene, plan, guard);
+    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
+        error = place_instance(scene, plan, &survey, i);
+    return error;
+}

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pool.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+enum { MAX_THREADS = 256 };
+
+struct job {
+    pt_work *work;
+    void *context;
+    uint32_t items, grain;
+    atomic_uint next;
+};
+
+struct pt_pool {
+    pthread_mutex_t lock;
+    pthread_mutex_t caller; // one pt_parallel at a time
+    pthread_cond_t wake, done;
+    struct job *job;
+    uint64_t generation;
+    uint32_t running; // helpers still in the current job
+    uint32_t threads, batch;
+    int quit;
+    pthread_t helpers[MAX_THREADS];
+    uint32_t started;
+};
+
+struct helper_start {
+    struct pt_pool *pool;
+    uint32_t thread;
+};
+
+static void take_part(struct job *job, uint32_t thread)
+{
+    for (;;) {
+        uint32_t begin = atomic_fetch_add_explicit(&job->next, job->grain, memory_order_relaxed);
+        if (begin >= job->items)
+            return;
+        uint32_t end = job->items - begin < job->grain ? job->items : begin + job->grain;
+        job->work(job->context, begin, end, thread);
+    }
+}
+
+static void *helper_main(void *argument)
+{
+    struct helper_start start = *(struct helper_start *)argument;
+    free(argument);
+    struct pt_pool *pool = start.pool;
+    uint64_t seen = 0;
+    pthread_mutex_lock(&pool->lock);
+    for (;;) {
+        while (!pool->quit && pool->generation == seen)
+            pthread_cond_wait(&pool->wake, &pool->lock);
+        if (pool->quit)
+            break;
+        seen = pool->generation;
+        struct job *job = pool->job;
+        pthread_mutex_unlock(&pool->lock);
+        take_part(job, start.thread);
+        pthread_mutex_lock(&pool->lock);
+        if (--pool->running == 0)
+            pthread_cond_signal(&pool->done);
+    }
+    pthread_mutex_unlock(&pool->lock);
+    return NULL;
+}
+
+static uint32_t core_count(void)
+{
+    cpu_set_t set;
+    if (sched_getaffinity(0, sizeof set, &set) == 0)
+        return (uint32_t)CPU_COUNT(&set);
+    return 1;
+}
+
+struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
+{
+    struct pt_pool *pool = calloc(1, sizeof *pool);
+    if (!pool)
+        return NULL;
+    pool->threads = threads ? threads : core_count();
+    if (pool->threads > MAX_THREADS)
+        pool->threads = MAX_THREADS;
+    pool->batch = batch;
+    pthread_mutex_init(&pool->lock, NULL);
+    pthread_mutex_init(&pool->caller, NULL);
+    pthread_cond_init(&pool->wake, NULL);
+    pthread_cond_init(&pool->done, NULL);
+    for (uint32_t i = 1; i < pool->threads; i++) {
+        struct helper_start *start = malloc(sizeof *start);
+        if (start)
+            *start = (struct helper_start){ pool, i };
+        if (!start || pthread_create(&pool->helpers[pool->started], NULL, helper_main, start)) {
+            free(start);
+            pt_pool_destroy(pool);
+            return NULL;
+        }
+        pool->started++;
+    }
+    return pool;
+}
+
+void pt_pool_destroy(struct pt_pool *pool)
+{
+    if (!pool)
+        return;
+    pthread_mutex_lock(&pool->lock);
+    pool->quit = 1;
+    pthread_cond_broadcast(&pool->wake);
+    pthread_mutex_unlock(&pool->lock);
+    for (uint32_t i = 0; i < pool->started; i++)
+        pthread_join(pool->helpers[i], NULL);
+    pthread_cond_destroy(&pool->wake);
+    pthread_cond_destroy(&pool->done);
+    pthread_mutex_destroy(&pool->caller);
+    pthread_mutex_destroy(&pool->lock);
+    free(pool);
+}
+
+uint32_t pt_pool_threads(const struct pt_pool *pool) { return pool ? pool->threads : 1; }
+
+void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *work, void *context)
+{
+    if (!items)
+        return;
+    if (!pool || pool->threads == 1) {
+        work(context, 0, items, 0);
+        return;
+    }
+    if (pool->batch)
+        grain = pool->batch;
+    if (!grain)
+        grain = items / (4 * pool->threads);
+    // next runs past items by up to threads * grain; keep that from wrapping
+    uint32_t most = UINT32_MAX / (2 * pool->threads);
+    grain = grain < 1 ? 1 : grain > most ? most : grain;
+    struct job job = { .work = work, .context = context, .items = items, .grain = grain };
+    pthread_mutex_lock(&pool->caller);
+    if (items > grain) {
+        pthread_mutex_lock(&pool->lock);
+        pool->job = &job;
+        pool->running = pool->started;
+        pool->generation++;
+        pthread_cond_broadcast(&pool->wake);
+        pthread_mutex_unlock(&pool->lock);
+        take_part(&job, 0);
+        pthread_mutex_lock(&pool->lock);
+        while (pool->running)
+            pthread_cond_wait(&pool->done, &pool->lock);
+        pthread_mutex_unlock(&pool->lock);
+    } else {
+        take_part(&job, 0);
+    }
+    pthread_mutex_unlock(&pool->caller);
+}

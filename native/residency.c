@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "residency.h"
+
+#include <stdlib.h>
+
+static void destroy(struct pt_resident *resident, struct patina_device *device)
+{
+    for (int i = 0; i <= PT_COLORS; i++)
+        device->ops->buffer_destroy(device, &resident->buffers[i]);
+    pt_alive_release(resident->alive);
+    free(resident);
+}
+
+static void forget_dead(struct pt_residency *residency, struct patina_device *device)
+{
+    for (struct pt_resident **at = &residency->first; *at;) {
+        struct pt_resident *resident = *at;
+        if (atomic_load(&resident->alive->alive)) {
+            at = &resident->next;
+            continue;
+        }
+        *at = resident->next;
+        destroy(resident, device);
+    }
+}
+
+static int upload(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    static const uint32_t color_bytes[] = { 0, 3, 12 };
+    const struct {
+        enum pt_instance_buffer which;
+        const void *data;
+        size_t size;
+    } parts[] = {
+        { PT_POSITIONS, cloud->positions, cloud->slots * 12 },
+        { PT_IDS, cloud->ids, cloud->slots * 4 },
+        { PT_SURFACE, cloud->surface, cloud->info.count * 4 },
+        { PT_COLORS, cloud->colors, cloud->info.count * color_bytes[cloud->color_format] },
+    };
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        if (!parts[i].data)
+            continue;
+        int error = device->ops->buffer_create(device, parts[i].size, parts[i].data, 1, &resident->buffers[parts[i].which]);
+        if (error)
+            return error;
+    }
+    return PATINA_OK;
+}
+
+int pt_residency_take(struct pt_residency *residency, struct patina_device *device, const struct patina_cloud *cloud,
+                      struct pt_resident **out)
+{
+    forget_dead(residency, device);
+    for (struct pt_resident *resident = residency->first; resident; resident = resident->next)
+        if (resident->alive == cloud->alive) {
+            *out = resident;
+            return PATINA_OK;
+        }
+    struct pt_resident *resident = calloc(1, sizeof *resident);
+    if (!resident)
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "a cloud's place on the device: out of memory");
+    resident->alive = cloud->alive;
+    atomic_fetch_add(&cloud->alive->references, 1);
+    int error = upload(device, cloud, resident);
+    if (error) {
+        destroy(resident, device);
+        return error;
+    }
+    resident->next = residency->first;
+    residency->first = resident;
+    *out = resident;
+    return PATINA_OK;
+}
+
+void pt_residency_release(struct pt_residency *residency, struct patina_device *device)
+{
+    while (residency->first) {
+        struct pt_resident *resident = residency->first;
+        residency->first = resident->next;
+        destroy(resident, device);
+    }
+}

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which clouds lie on a device. A CPU device borrows the cloud's memory, a GL device holds a copy until the cloud dies.
+#ifndef PT_RESIDENCY_H
+#define PT_RESIDENCY_H
+
+#include "frame.h"
+
+struct pt_resident {
+    struct pt_resident *next;
+    struct pt_alive *alive;
+    struct pt_buffer buffers[PT_COLORS + 1]; // by pt_instance_buffer; PT_CHUNKS is unused
+};
+
+// The cloud's buffers on the device, uploaded at the first call; forgets dead clouds on the way.
+int pt_residency_take(struct pt_residency *residency, struct patina_device *device, const struct patina_cloud *cloud,
+                      struct pt_resident **out);
+void pt_residency_release(struct pt_residency *residency, struct patina_device *device);
+
+#endif

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scene.h"
+
+#include <math.h>
+
+double pt_dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+void pt_cofactors(const double m[9], double out[9])
+{
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) {
+            int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+            out[3 * r + c] = m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
+        }
+}
+
+double pt_determinant(const double m[9])
+{
+    double cofactors[9];
+    pt_cofactors(m, cofactors);
+    return pt_dot(m, cofactors);
+}
+
+void pt_multiply(const double a[9], const double b[9], double out[9])
+{
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            out[3 * r + c] = a[3 * r] * b[c] + a[3 * r + 1] * b[3 + c] + a[3 * r + 2] * b[6 + c];
+}
+
+void pt_apply(const double m[9], const double v[3], double out[3])
+{
+    for (int r = 0; r < 3; r++)
+        out[r] = pt_dot(m + 3 * r, v);
+}
+
+void pt_split_matrix(const double matrix[16], double linear[9], double translation[3])
+{
+    for (int r = 0; r < 3; r++) {
+        for (int c = 0; c < 3; c++)
+            linear[3 * r + c] = matrix[4 * r + c];
+        translation[r] = matrix[4 * r + 3];
+    }
+}
+
+int pt_camera_axes(const patina_camera *camera, double axes[9], double position[3])
+{
+    double linear[9];
+    pt_split_matrix(camera->world_from_camera, linear, position);
+    for (int axis = 0; axis < 3; axis++) {
+        double column[3] = { linear[axis], linear[3 + axis], linear[6 + axis] };
+        double length = sqrt(pt_dot(column, column));
+        if (!(length > 0.0) || !isfinite(length) || !isfinite(position[axis]))
+            return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "camera: world_from_camera is singular or not finite");
+        for (int i = 0; i < 3; i++)
+            axes[3 * axis + i] = column[i] / length;
+    }
+    return PATINA_OK;
+}

@@ -1,0 +1,618 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Building a cloud: box -> Morton order -> chunks (strata, boxes, spacing) -> surface words and cones -> colours.
+#include "cloud.h"
+#include "kernel_args.h"
+#include "memory.h"
+#include "progress.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// ---- reading the caller's arrays ---------------------------------------------------------------------------------
+
+static const uint8_t *element(const patina_array *array, uint64_t index) // stride was made explicit by check_array
+{
+    return (const uint8_t *)array->data + index * array->stride;
+}
+
+static void read_vector(const patina_array *array, uint64_t index, double v[3])
+{
+    if (array->type == PATINA_FLOAT64) {
+        memcpy(v, element(array, index), 3 * sizeof *v);
+    } else {
+        float f[3];
+        memcpy(f, element(array, index), sizeof f);
+        for (int i = 0; i < 3; i++)
+            v[i] = (double)f[i];
+    }
+}
+
+static int finite3(const double v[3]) { return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]); }
+
+// ---- the build -----------------------------------------------------------------------------------------------------
+
+struct build {
+    patina_cloud_desc desc;
+    struct patina_cloud *cloud;
+    struct pt_pool *pool;
+    struct patina_progress *progress;
+    uint64_t *words, *scratch; // Morton code << 32 | id of the drawn points
+    uint32_t drawn;
+    double box_min[3], box_max[3];
+    struct block {
+        uint32_t drawn, offset;
+        uint64_t invalid_normals, invalid_colors;
+        double box_min[3], box_max[3];
+    } *blocks;
+    uint32_t block_count;
+    atomic_uint chunks_done;
+    double cell[3], cell_min[3]; // of the Morton grid being coded
+};
+
+enum { BLOCK_POINTS = 1 << 16 };
+
+static void position(const struct build *build, uint64_t index, double p[3])
+{
+    read_vector(&build->desc.position, index, p);
+    for (int i = 0; i < 3; i++)
+        p[i] += build->desc.origin[i];
+}
+
+static void box_reset(double box_min[3], double box_max[3])
+{
+    for (int i = 0; i < 3; i++) {
+        box_min[i] = INFINITY;
+        box_max[i] = -INFINITY;
+    }
+}
+
+static void box_add(double box_min[3], double box_max[3], const double lower[3], const double upper[3])
+{
+    for (int i = 0; i < 3; i++) {
+        box_min[i] = fmin(box_min[i], lower[i]);
+        box_max[i] = fmax(box_max[i], upper[i]);
+    }
+}
+
+static void measure_blocks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct build *build = context;
+    (void)thread;
+    for (uint32_t b = begin; b < end && !pt_progress_cancelled(build->progress); b++) {
+        struct block *block = &build->blocks[b];
+        uint64_t first = (uint64_t)b * BLOCK_POINTS;
+        uint64_t last = first + BLOCK_POINTS < build->desc.count ? first + BLOCK_POINTS : build->desc.count;
+        box_reset(block->box_min, block->box_max);
+        for (uint64_t i = first; i < last; i++) {
+            double p[3];
+            position(build, i, p);
+            if (!finite3(p))
+                continue;
+            box_add(block->box_min, block->box_max, p, p);
+            block->drawn++;
+        }
+    }
+}
+
+static uint32_t grid_code(const struct build *build, const double p[3])
+{
+    uint32_t grid[3];
+    for (int i = 0; i < 3; i++) {
+        double g = (p[i] - build->cell_min[i]) * build->cell[i];
+        grid[i] = g > 0.0 ? g < 1023.0 ? (uint32_t)g : 1023u : 0u;
+    }
+    return pt_morton_code(grid[0], grid[1], grid[2]);
+}
+
+static void set_grid(struct build *build, const double box_min[3], const double box_max[3])
+{
+    double edge = fmax(box_max[0] - box_min[0], fmax(box_max[1] - box_min[1], box_max[2] - box_min[2]));
+    for (int i = 0; i < 3; i++) {
+        build->cell_min[i] = box_min[i];
+        build->cell[i] = edge > 0.0 && isfinite(1024.0 / edge) ? 1024.0 / edge : 0.0; // cubes keep Morton neighbours near
+    }
+}
+
+static void code_blocks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct build *build = context;
+    (void)thread;
+    for (uint32_t b = begin; b < end; b++) {
+        uint64_t first = (uint64_t)b * BLOCK_POINTS;
+        uint64_t last = first + BLOCK_POINTS < build->desc.count ? first + BLOCK_POINTS : build->desc.count;
+        uint64_t *out = build->words + build->blocks[b].offset;
+        for (uint64_t i = first; i < last; i++) {
+            double p[3];
+            position(build, i, p);
+            if (finite3(p))
+                *out++ = (uint64_t)grid_code(build, p) << 32 | i;
+        }
+    }
+}
+
+// Points that share a grid cell (an outlier stretched the box, say) are ordered by a finer grid of their own.
+static int refine_range(struct build *build, uint32_t begin, uint32_t end, int depth)
+{
+    for (uint32_t i = begin, run; i < end; i = run) {
+        for (run = i + 1; run < end && build->words[run] >> 32 == build->words[i] >> 32; run++)
+            ;
+        if (run - i <= PT_CHUNK_POINTS / 4 || depth > 8)
+            continue;
+        double box_min[3], box_max[3], p[3];
+        box_reset(box_min, box_max);
+        for (uint32_t k = i; k < run; k++) {
+            position(build, (uint32_t)build->words[k], p);
+            box_add(box_min, box_max, p, p);
+        }
+        if (!memcmp(box_min, box_max, sizeof box_min))
+            continue; // coincident
+        set_grid(build, box_min, box_max);
+        for (uint32_t k = i; k < run; k++) {
+            uint32_t id = (uint32_t)build->words[k];
+            position(build, id, p);
+            build->words[k] = (uint64_t)grid_code(build, p) << 32 | id;
+        }
+        int error = pt_morton_sort(build->pool, build->words + i, build->scratch, run - i);
+        if (error || (error = refine_range(build, i, run, depth + 1)))
+            return error;
+    }
+    return PATINA_OK;
+}
+
+static int sort_points(struct build *build)
+{
+    size_t bytes = (size_t)build->drawn * sizeof *build->words;
+    build->words = pt_pages_alloc(bytes);
+    build->scratch = pt_pages_alloc(bytes);
+    if (!build->words || !build->scratch)
+        return PATINA_ERROR_MEMORY;
+    set_grid(build, build->box_min, build->box_max);
+    pt_parallel(build->pool, build->block_count, 1, code_blocks, build);
+    pt_progress_set(build->progress, 0.2);
+    int error = pt_morton_sort(build->pool, build->words, build->scratch, build->drawn);
+    if (!error)
+        error = refine_range(build, 0, build->drawn, 0);
+    pt_pages_free(build->scratch, bytes);
+    build->scratch = NULL;
+    pt_progress_set(build->progress, 0.5);
+    return error;
+}
+
+// ---- chunks --------------------------------------------------------------------------------------------------------
+
+uint32_t pt_chunk_prefix(const struct pt_chunk *chunk, uint32_t strata)
+{
+    uint32_t stride = 1u << (PT_STRATA - strata);
+    return (chunk->count + stride - 1) / stride;
+}
+
+// Slot order of `count` Morton-ordered points: every 32nd, then the rest of every 16th, ... Each stratum is in Morton order.
+static void stratify(const uint64_t *words, uint32_t count, uint32_t *ids)
+{
+    uint32_t slot = 0;
+    for (uint32_t stratum = 1; stratum <= PT_STRATA; stratum++) {
+        uint32_t stride = 1u << (PT_STRATA - stratum);
+        for (uint32_t i = stratum == 1 ? 0 : stride; i < count; i += stratum == 1 ? stride : 2 * stride)
+            ids[slot++] = (uint32_t)words[i];
+    }
+}
+
+static void fill_chunk(struct build *build, struct pt_chunk *chunk, const uint64_t *words)
+{
+    struct patina_cloud *cloud = build->cloud;
+    uint32_t *ids = cloud->ids + chunk->first;
+    float *axis[3];
+    for (int k = 0; k < 3; k++)
+        axis[k] = cloud->positions + 3 * (size_t)chunk->first + (size_t)k * chunk->padded;
+    stratify(words, chunk->count, ids);
+
+    double box_min[3], box_max[3], p[3];
+    box_reset(box_min, box_max);
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        position(build, ids[i], p);
+        box_add(box_min, box_max, p, p);
+    }
+    for (int k = 0; k < 3; k++) // exact where the coordinates' spread leaves a bit free: see the 5e6 m case
+        chunk->origin[k] = box_min[k] + 0.5 * (box_max[k] - box_min[k]);
+    for (uint32_t i = 0; i < chunk->padded; i++) {
+        if (i >= chunk->count)
+            ids[i] = ids[chunk->count - 1];
+        position(build, ids[i], p);
+        for (int k = 0; k < 3; k++) {
+            float offset = (float)(p[k] - chunk->origin[k]);
+            axis[k][i] = offset;
+            chunk->box_min[k] = i ? fminf(chunk->box_min[k], offset) : offset;
+            chunk->box_max[k] = i ? fmaxf(chunk->box_max[k], offset) : offset;
+        }
+    }
+    chunk->spacing = pt_spacing_estimate(axis[0], axis[1], axis[2], chunk->count);
+}
+
+static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct build *build = context;
+    (void)thread;
+    for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++) {
+        fill_chunk(build, &build->cloud->chunks[c], build->words + (size_t)c * PT_CHUNK_POINTS);
+        uint32_t done = atomic_fetch_add_explicit(&build->chunks_done, 1, memory_order_relaxed);
+        pt_progress_set(build->progress, 0.5 + 0.3 * done / build->cloud->chunk_count);
+    }
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// The median goes into the info, and stands in for chunks too small to have a spacing of their own.
+static int settle_spacing(struct patina_cloud *cloud)
+{
+    double *known = malloc(cloud->chunk_count * sizeof *known);
+    if (!known)
+        return PATINA_ERROR_MEMORY;
+    uint32_t count = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (cloud->chunks[c].count > 1)
+            known[count++] = (double)cloud->chunks[c].spacing;
+    qsort(known, count, sizeof *known, compare_doubles);
+    cloud->info.spacing = count ? known[count / 2] : 0.0;
+    cloud->info.spacing_min = count ? known[0] : 0.0;
+    cloud->info.spacing_max = count ? known[count - 1] : 0.0;
+    for (uint32_t i = 0; i < count && !(cloud->spacing_base > 0.0); i++)
+        cloud->spacing_base = known[i];
+    // sixteen octaves of classes: where density varies more than that, the finest spacings are rounded up
+    if (count && cloud->spacing_base < known[count - 1] / 32768.0)
+        cloud->spacing_base = known[count - 1] / 32768.0;
+    free(known);
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (cloud->chunks[c].count == 1)
+            cloud->chunks[c].spacing = (float)cloud->info.spacing;
+    return PATINA_OK;
+}
+
+double pt_spacing_of_class(uint32_t index) { return index ? exp2(((double)index - 1.0) / 4.0) : 0.0; }
+
+static uint32_t class_of_spacing(double spacing, double base) // rounded up: a layer distance may be too wide, not too narrow
+{
+    if (!(spacing > 0.0) || !(base > 0.0))
+        return 0;
+    double steps = ceil(4.0 * log2(spacing / base) - 1e-6);
+    return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
+}
+
+// ---- normals -------------------------------------------------------------------------------------------------------
+
+static void decode_normal(uint32_t word, double n[3])
+{
+    double x = ((double)(word & 0x1FFFu) - 4095.0) / 4095.0;
+    double y = ((double)(word >> 13 & 0x1FFFu) - 4095.0) / 4095.0;
+    double z = 1.0 - fabs(x) - fabs(y), fold = fmax(-z, 0.0);
+    n[0] = x >= 0.0 ? x - fold : x + fold;
+    n[1] = y >= 0.0 ? y - fold : y + fold;
+    n[2] = z;
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int i = 0; i < 3; i++)
+        n[i] /= length;
+}
+
+uint32_t pt_encode_normal(const double n[3])
+{
+    double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    double v[3] = { n[0] / largest, n[1] / largest, n[2] / largest };
+    double sum = fabs(v[0]) + fabs(v[1]) + fabs(v[2]);
+    double x = v[0] / sum, y = v[1] / sum;
+    if (v[2] < 0.0) {
+        double folded = (1.0 - fabs(y)) * (x >= 0.0 ? 1.0 : -1.0);
+        y = (1.0 - fabs(x)) * (y >= 0.0 ? 1.0 : -1.0);
+        x = folded;
+    }
+    double gx = floor((x + 1.0) * 4095.0), gy = floor((y + 1.0) * 4095.0), best = -2.0;
+    uint32_t word = 0;
+    for (int k = 0; k < 4; k++) { // the nearest of the four grid directions around
+        double cx = fmin(gx + (k & 1), 8190.0), cy = fmin(gy + (k >> 1), 8190.0), c[3];
+        uint32_t candidate = (uint32_t)cx | (uint32_t)cy << 13;
+        decode_normal(candidate, c);
+        double dot = c[0] * v[0] + c[1] * v[1] + c[2] * v[2];
+        if (dot > best) {
+            best = dot;
+            word = candidate;
+        }
+    }
+    return word;
+}
+
+// Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
+static void surface_chunk(struct build *build, struct pt_chunk *chunk)
+{
+    struct patina_cloud *cloud = build->cloud;
+    const uint32_t *ids = cloud->ids + chunk->first;
+    uint32_t class = class_of_spacing((double)chunk->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
+    double axis[3] = { 0.0, 0.0, 0.0 }, n[3];
+    int all = build->desc.normal.data != NULL;
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        uint32_t bits = PT_NORMAL_NONE;
+        if (build->desc.normal.data) {
+            read_vector(&build->desc.normal, ids[i], n);
+            if (finite3(n) && (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0)) {
+                bits = pt_encode_normal(n);
+                decode_normal(bits, n);
+                for (int k = 0; k < 3; k++)
+                    axis[k] += n[k];
+            } else {
+                all = 0;
+            }
+        }
+        cloud->surface[ids[i]] = bits | class;
+    }
+    double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]), cosine = 1.0;
+    chunk->cone_cosine = -2.0f;
+    if (!all || !(length > 0.0))
+        return;
+    for (int k = 0; k < 3; k++) {
+        axis[k] /= length;
+        chunk->cone_axis[k] = (float)axis[k];
+    }
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        decode_normal(cloud->surface[ids[i]] & PT_NORMAL_BITS, n);
+        cosine = fmin(cosine, n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2]);
+    }
+    chunk->cone_cosine = (float)(cosine - 1e-6);
+}
+
+static void surface_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct build *build = context;
+    (void)thread;
+    for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++)
+        surface_chunk(build, &build->cloud->chunks[c]);
+}
+
+// ---- attributes in file order ----------------------------------------------------------------------------------------
+
+static void read_color(const patina_array *array, uint64_t index, float rgb[3])
+{
+    const uint8_t *at = element(array, index);
+    for (int k = 0; k < 3; k++) {
+        if (array->type == PATINA_FLOAT32) {
+            memcpy(&rgb[k], at + 4 * k, 4);
+        } else if (array->type == PATINA_UINT16) {
+            uint16_t v;
+            memcpy(&v, at + 2 * k, 2);
+            double c = v / 65535.0; // sRGB transfer function, IEC 61966-2-1
+            rgb[k] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+        }
+    }
+}
+
+static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct build *build = context;
+    struct patina_cloud *cloud = build->cloud;
+    const patina_array *color = &build->desc.color;
+    (void)thread;
+    for (uint32_t b = begin; b < end && !pt_progress_cancelled(build->progress); b++) {
+        uint64_t first = (uint64_t)b * BLOCK_POINTS;
+        uint64_t last = first + BLOCK_POINTS < build->desc.count ? first + BLOCK_POINTS : build->desc.count;
+        for (uint64_t i = first; i < last; i++) {
+            double n[3];
+            if (build->desc.normal.data) {
+                read_vector(&build->desc.normal, i, n);
+                if (!finite3(n) || (n[0] == 0.0 && n[1] == 0.0 && n[2] == 0.0))
+                    build->blocks[b].invalid_normals++;
+            }
+            if (cloud->color_format == PT_COLOR_SRGB8) {
+                memcpy((uint8_t *)cloud->colors + 3 * i, element(color, i), 3);
+            } else if (cloud->color_format == PT_COLOR_FLOAT) {
+                float *rgb = (float *)cloud->colors + 3 * i;
+                int valid = 1;
+                read_color(color, i, rgb);
+                for (int k = 0; k < 3; k++)
+                    if (!isfinite(rgb[k])) {
+                        rgb[k] = 0.0f;
+                        valid = 0;
+                    }
+                build->blocks[b].invalid_colors += !valid;
+            }
+        }
+    }
+}
+
+// ---- create --------------------------------------------------------------------------------------------------------
+
+static size_t color_bytes(enum pt_color_format format)
+{
+    return format == PT_COLOR_SRGB8 ? 3 : format == PT_COLOR_FLOAT ? 12 : 0;
+}
+
+static int allocate(struct patina_cloud *cloud, uint64_t drawn)
+{
+    uint64_t full = drawn / PT_CHUNK_POINTS, rest = drawn % PT_CHUNK_POINTS;
+    cloud->chunk_count = (uint32_t)(full + (rest != 0));
+    cloud->slots = full * PT_CHUNK_POINTS + (rest + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
+    cloud->chunks = calloc(cloud->chunk_count ? cloud->chunk_count : 1, sizeof *cloud->chunks);
+    cloud->positions = pt_pages_alloc(cloud->slots * 12);
+    cloud->ids = pt_pages_alloc(cloud->slots * 4);
+    cloud->surface = pt_pages_alloc(cloud->info.count * 4);
+    cloud->colors = cloud->color_format ? pt_pages_alloc(cloud->info.count * color_bytes(cloud->color_format)) : NULL;
+    if (!cloud->chunks || !cloud->positions || !cloud->ids || !cloud->surface ||
+        (cloud->color_format && !cloud->colors))
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        struct pt_chunk *chunk = &cloud->chunks[c];
+        chunk->first = c * PT_CHUNK_POINTS;
+        chunk->count = c < full ? PT_CHUNK_POINTS : (uint32_t)rest;
+        chunk->padded = c < full ? PT_CHUNK_POINTS : (uint32_t)(cloud->slots - full * PT_CHUNK_POINTS);
+    }
+    cloud->info.bytes = cloud->slots * 16 + cloud->info.count * (4 + color_bytes(cloud->color_format)) +
+                        cloud->chunk_count * sizeof *cloud->chunks;
+    return PATINA_OK;
+}
+
+static int build_cloud(struct build *build)
+{
+    struct patina_cloud *cloud = build->cloud;
+    build->block_count = (uint32_t)((build->desc.count + BLOCK_POINTS - 1) / BLOCK_POINTS);
+    build->blocks = calloc(build->block_count ? build->block_count : 1, sizeof *build->blocks);
+    if (!build->blocks)
+        return PATINA_ERROR_MEMORY;
+    pt_parallel(build->pool, build->block_count, 1, measure_blocks, build);
+    box_reset(build->box_min, build->box_max);
+    for (uint32_t b = 0; b < build->block_count; b++) {
+        build->blocks[b].offset = build->drawn;
+        build->drawn += build->blocks[b].drawn;
+        box_add(build->box_min, build->box_max, build->blocks[b].box_min, build->blocks[b].box_max);
+    }
+    pt_progress_set(build->progress, 0.1);
+    if (pt_progress_cancelled(build->progress))
+        return PATINA_ERROR_CANCELLED;
+    int error = sort_points(build);
+    if (error || (error = allocate(cloud, build->drawn)))
+        return error;
+    pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
+    if ((error = settle_spacing(cloud)))
+        return error;
+    for (uint64_t i = 0; i < cloud->info.count && build->drawn != cloud->info.count; i++)
+        cloud->surface[i] = PT_NORMAL_NONE; // points that are not drawn have a defined word too
+    pt_parallel(build->pool, cloud->chunk_count, 1, surface_chunks, build);
+    pt_progress_set(build->progress, 0.9);
+    pt_parallel(build->pool, build->block_count, 1, attribute_blocks, build);
+    if (pt_progress_cancelled(build->progress))
+        return PATINA_ERROR_CANCELLED;
+    for (uint32_t b = 0; b < build->block_count; b++) {
+        cloud->info.invalid_normals += build->blocks[b].invalid_normals;
+        cloud->info.invalid_colors += build->blocks[b].invalid_colors;
+    }
+    memcpy(cloud->info.box_min, build->box_min, sizeof build->box_min);
+    memcpy(cloud->info.box_max, build->box_max, sizeof build->box_max);
+    cloud->info.drawn = build->drawn;
+    cloud->info.chunks = cloud->chunk_count;
+    cloud->info.invalid_positions = cloud->info.count - build->drawn;
+    pt_progress_set(build->progress, 1.0);
+    return PATINA_OK;
+}
+
+static size_t type_bytes(uint32_t type)
+{
+    switch (type) {
+    case PATINA_FLOAT64: return 8;
+    case PATINA_FLOAT32: return 4;
+    case PATINA_UINT16: return 2;
+    case PATINA_UINT8: return 1;
+    }
+    return 0;
+}
+
+static int check_array(patina_array *array, const char *what, uint32_t types, uint32_t most_components)
+{
+    if (!array->data)
+        return PATINA_OK;
+    if (array->type > PATINA_INT32 || !(types >> array->type & 1u))
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: element type %u is not supported", what, array->type);
+    if (array->components < 3 || array->components > most_components)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: %u components; 3%s are needed", what, array->components,
+                       most_components > 3 ? " or 4" : "");
+    if (!array->stride)
+        array->stride = array->components * type_bytes(array->type);
+    return PATINA_OK;
+}
+
+static int check_desc(patina_cloud_desc *desc)
+{
+    const uint32_t floats = 1u << PATINA_FLOAT32 | 1u << PATINA_FLOAT64;
+    int error;
+    if (desc->count && !desc->position.data)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "position: no data for %llu points", (unsigned long long)desc->count);
+    if (desc->count > 0xFFFFFFFEull)
+        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "a cloud of %llu points: at most 4294967294 fit",
+                       (unsigned long long)desc->count);
+    if (!finite3(desc->origin))
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "origin: not finite");
+    if ((error = check_array(&desc->position, "position", floats, 3)) ||
+        (error = check_array(&desc->normal, "normal", floats, 3)))
+        return error;
+    return check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 4);
+}
+
+int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out)
+{
+    struct build build = { .progress = progress };
+    if (!out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: out is NULL");
+    *out = NULL;
+    if (!desc || desc->struct_size != sizeof *desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: desc->struct_size is not %zu", sizeof *desc);
+    build.desc = *desc;
+    int error = check_desc(&build.desc);
+    if (error)
+        return error;
+
+    struct patina_cloud *cloud = calloc(1, sizeof *cloud);
+    struct pt_alive *alive = calloc(1, sizeof *alive);
+    build.pool = pt_pool_create(desc->threads, 0);
+    error = PATINA_ERROR_MEMORY;
+    if (cloud && alive && build.pool) {
+        pt_handle_init(&cloud->handle);
+        atomic_init(&alive->references, 1);
+        atomic_init(&alive->alive, 1);
+        cloud->alive = alive;
+        cloud->info = (patina_cloud_info){ .struct_size = sizeof cloud->info,
+                                           .count = desc->count,
+                                           .has_normals = desc->normal.data != NULL,
+                                           .has_colors = desc->color.data != NULL };
+        memcpy(cloud->info.origin, desc->origin, sizeof desc->origin);
+        cloud->color_format = !desc->color.data                    ? PT_COLOR_NONE
+                              : desc->color.type == PATINA_UINT8 ? PT_COLOR_SRGB8
+                                                                   : PT_COLOR_FLOAT;
+        build.cloud = cloud;
+        error = build_cloud(&build);
+    }
+    pt_pages_free(build.words, (size_t)build.drawn * sizeof *build.words);
+    pt_pages_free(build.scratch, (size_t)build.drawn * sizeof *build.scratch);
+    free(build.blocks);
+    pt_pool_destroy(build.pool);
+    if (error) {
+        if (cloud && cloud->alive) {
+            patina_cloud_destroy(cloud);
+        } else {
+            free(cloud);
+            free(alive);
+        }
+        return error == PATINA_ERROR_CANCELLED
+                   ? pt_fail(NULL, error, "building the cloud was cancelled")
+                   : pt_fail(NULL, error, "building a cloud of %llu points: out of memory",
+                             (unsigned long long)desc->count);
+    }
+    *out = cloud;
+    return PATINA_OK;
+}
+
+void pt_alive_release(struct pt_alive *alive)
+{
+    if (atomic_fetch_sub(&alive->references, 1) == 1)
+        free(alive);
+}
+
+void patina_cloud_destroy(patina_cloud *cloud)
+{
+    if (!cloud)
+        return;
+    pt_pages_free(cloud->positions, cloud->slots * 12);
+    pt_pages_free(cloud->ids, cloud->slots * 4);
+    pt_pages_free(cloud->surface, cloud->info.count * 4);
+    pt_pages_free(cloud->colors, cloud->info.count * color_bytes(cloud->color_format));
+    free(cloud->chunks);
+    atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
+    pt_alive_release(cloud->alive);
+    pt_handle_destroy(&cloud->handle);
+    free(cloud);
+}
+
+int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info)
+{
+    if (!cloud || !info || info->struct_size != sizeof *info)
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_get_info: bad arguments");
+    *info = cloud->info;
+    return PATINA_OK;
+}

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A cloud: chunks of Morton neighbours. Positions lie in chunk order, attributes in file order (DESIGN rule 5).
+#ifndef PT_CLOUD_H
+#define PT_CLOUD_H
+
+#include "error.h"
+#include "pool.h"
+
+#include <stdatomic.h>
+
+// 4096 points: small enough that a chunk's normal cone and box cull well (a torus of 1M points loses 45% of its chunks
+// to the back-face cone), large enough that 96 bytes of chunk_view a frame vanish beside 48 KiB of positions.
+enum { PT_CHUNK_POINTS = 4096, PT_CHUNK_ALIGN = 16, PT_STRATA = 6 };
+
+struct pt_chunk {
+    double origin[3];                // object units
+    float box_min[3], box_max[3];    // relative to origin
+    float cone_axis[3], cone_cosine; // every normal n: n . axis >= cosine; cosine -2: a point has no normal
+    float spacing;                   // about 1 / sqrt(points per area), object units; 0 unknown
+    uint32_t first;                  // slot of the first point
+    uint32_t count, padded;          // padded slots repeat the last point
+};
+
+// Whether a cloud still lives, shared with the devices that hold its buffers.
+struct pt_alive {
+    atomic_int references, alive;
+};
+
+enum pt_color_format { PT_COLOR_NONE = 0, PT_COLOR_SRGB8 = 1, PT_COLOR_FLOAT = 2 };
+
+struct patina_cloud {
+    struct pt_handle handle;
+    patina_cloud_info info;
+    struct pt_alive *alive;
+    uint64_t slots; // padded points
+    uint32_t chunk_count;
+    struct pt_chunk *chunks;
+    float *positions;  // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
+    uint32_t *ids;     // slots: index in file order
+    uint32_t *surface; // count: octahedral normal and spacing class (kernel_args.h)
+    void *colors;      // count x 3 uint8 (sRGB) or float (linear), or NULL
+    enum pt_color_format color_format;
+    double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
+};
+
+// Points of a chunk that the first `strata` of PT_STRATA strata hold: every 2^(PT_STRATA - strata)-th in Morton order.
+uint32_t pt_chunk_prefix(const struct pt_chunk *chunk, uint32_t strata);
+
+// The spacing of a class, as a fraction of spacing_base.
+double pt_spacing_of_class(uint32_t index);
+
+// Octahedral encoding of any non-zero finite vector: 26 bits, nearest of the four roundings.
+uint32_t pt_encode_normal(const double n[3]);
+
+// Local spacing by sampled nearest neighbours among the `count` points x, y, z.
+float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);
+
+void pt_alive_release(struct pt_alive *alive);
+
+// Sorts (code << 32 | id) words by their upper 30 bits; scratch has room for as many. The result is in words.
+int pt_morton_sort(struct pt_pool *pool, uint64_t *words, uint64_t *scratch, uint32_t count);
+// 30-bit Morton code of integer coordinates 0..1023.
+uint32_t pt_morton_code(uint32_t x, uint32_t y, uint32_t z);
+
+#endif

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double identity[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
+
+static int fail(const patina_scene *scene, const char *what)
+{
+    return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "%s", what);
+}
+
+static int all_finite(const double *values, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!isfinite(values[i]))
+            return 0;
+    return 1;
+}
+
+int patina_scene_create(patina_scene **out)
+{
+    if (!out)
+        return fail(NULL, "patina_scene_create: out is NULL");
+    patina_scene *scene = *out = calloc(1, sizeof *scene);
+    if (!scene)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "a scene: out of memory");
+    pt_handle_init(&scene->handle);
+    patina_settings defaults = { .struct_size = sizeof defaults };
+    return patina_scene_set_settings(scene, &defaults);
+}
+
+void patina_scene_destroy(patina_scene *scene)
+{
+    if (!scene)
+        return;
+    free(scene->instances);
+    free(scene->lights);
+    pt_handle_destroy(&scene->handle);
+    free(scene);
+}
+
+int patina_scene_clear(patina_scene *scene)
+{
+    if (!scene)
+        return fail(NULL, "patina_scene_clear: scene is NULL");
+    scene->instance_count = scene->light_count = 0;
+    scene->points = 0;
+    return PATINA_OK;
+}
+
+// Room for one more element, or NULL.
+static void *grow(void *array, uint32_t count, uint32_t *room, size_t size)
+{
+    if (count < *room)
+        return array;
+    uint32_t wanted = *room ? 2 * *room : 8;
+    void *grown = realloc(array, wanted * size);
+    if (grown)
+        *room = wanted;
+    return grown;
+}
+
+static int check_style(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
+{
+    static const double zero[16];
+    const float *c = style->color;
+    if (!memcmp(style->world_from_object, zero, sizeof zero))
+        memcpy(style->world_from_object, identity, sizeof identity);
+    if (!all_finite(style->world_from_object, 16))
+        return fail(scene, "cloud style: world_from_object is not finite");
+    if (!(style->d_min >= 0.0f) || !isfinite(style->d_min))
+        return fail(scene, "cloud style: d_min must be 0 or more");
+    if (style->lighting > PATINA_LIGHTING_LIT)
+        return fail(scene, "cloud style: no such lighting");
+    if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) ||
+        !isfinite(style->ambient + style->diffuse + style->specular))
+        return fail(scene, "cloud style: colour and Phong factors must be finite");
+    if (style->lighting == PATINA_LIGHTING_AUTO)
+        style->lighting = cloud->info.has_colors ? PATINA_LIGHTING_UNLIT : PATINA_LIGHTING_LIT;
+    if (c[0] == 0.0f && c[1] == 0.0f && c[2] == 0.0f)
+        style->color[0] = style->color[1] = style->color[2] = 0.8f;
+    if (style->ambient == 0.0f && style->diffuse == 0.0f && style->specular == 0.0f)
+        style->ambient = style->diffuse = 1.0f;
+    style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
+    return PATINA_OK;
+}
+
+int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style)
+{
+    patina_cloud_style checked = { .struct_size = sizeof checked };
+    if (!scene || !cloud || cloud->handle.magic != PT_MAGIC)
+        return fail(scene, "patina_scene_add_cloud: scene or cloud is NULL or destroyed");
+    if (style && style->struct_size != sizeof *style)
+        return fail(scene, "patina_scene_add_cloud: style->struct_size is wrong");
+    if (style)
+        checked = *style;
+    int error = check_style(scene, &checked, cloud);
+    if (error)
+        return error;
+    if (scene->points + cloud->info.count > 0xFFFFFFFEull)
+        return pt_fail(&scene->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                       "the scene would hold %llu points with this instance; ids end at 4294967294",
+                       (unsigned long long)(scene->points + cloud->info.count));
+    void *grown = grow(scene->instances, scene->instance_count, &scene->instance_room, sizeof *scene->instances);
+    if (!grown)
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->instance_count);
+    scene->instances = grown;
+    scene->instances[scene->instance_count++] =
+        (struct pt_instance){ .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points };
+    scene->points += cloud->info.count;
+    return PATINA_OK;
+}
+
+int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
+{
+    if (!scene || !light || light->struct_size != sizeof *light)
+        return fail(scene, "patina_scene_add_light: bad arguments");
+    patina_light_desc checked = *light;
+    if (checked.type != PATINA_LIGHT_SUN && checked.type != PATINA_LIGHT_POINT)
+        return fail(scene, "light: no such type");
+    if (!all_finite(checked.position, 3) || !all_finite(checked.direction, 3) || !isfinite(checked.power) ||
+        !isfinite(checked.color[0] + checked.color[1] + checked.color[2]))
+        return fail(scene, "light: position, direction, power and colour must be finite");
+    if (checked.color[0] == 0.0f && checked.color[1] == 0.0f && checked.color[2] == 0.0f)
+        checked.color[0] = checked.color[1] = checked.color[2] = 1.0f;
+    if (pt_dot(checked.direction, checked.direction) == 0.0)
+        checked.direction[2] = -1.0;
+    void *grown = grow(scene->lights, scene->light_count, &scene->light_room, sizeof *scene->lights);
+    if (!grown)
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for light %u", scene->light_count);
+    scene->lights = grown;
+    scene->lights[scene->light_count++] = checked;
+    return PATINA_OK;
+}
+
+int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera)
+{
+    double axes[9], position[3];
+    if (!scene || !camera || camera->struct_size != sizeof *camera)
+        return fail(scene, "patina_scene_set_camera: bad arguments");
+    if (!all_finite(camera->world_from_camera, 16) || pt_camera_axes(camera, axes, position))
+        return fail(scene, "camera: world_from_camera is singular or not finite");
+    if (!(camera->right > camera->left) || !(camera->top > camera->bottom) || !isfinite(camera->right - camera->left) ||
+        !isfinite(camera->top - camera->bottom))
+        return fail(scene, "camera: the window must have right > left and top > bottom");
+    if (!(camera->far_clip > camera->near_clip) || !isfinite(camera->far_clip) || !isfinite(camera->near_clip))
+        return fail(scene, "camera: far_clip must be beyond near_clip");
+    if (!camera->orthographic && !(camera->near_clip > 0.0))
+        return fail(scene, "camera: near_clip must be above 0 in perspective");
+    scene->camera = *camera;
+    scene->has_camera = 1;
+    return PATINA_OK;
+}
+
+int patina_scene_set_settings(patina_scene *scene, const patina_settings *settings)
+{
+    if (!scene || !settings || settings->struct_size != sizeof *settings)
+        return fail(scene, "patina_scene_set_settings: bad arguments");
+    patina_settings s = *settings;
+    s.width = s.width ? s.width : 1024;
+    s.height = s.height ? s.height : 1024;
+    if (s.width > 65536 || s.height > 65536)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: a picture of %u x %u; the most is 65536", s.width,
+                       s.height);
+    if (!s.region[0] && !s.region[1] && !s.region[2] && !s.region[3]) {
+        s.region[2] = s.width;
+        s.region[3] = s.height;
+    }
+    if (s.region[0] >= s.region[2] || s.region[1] >= s.region[3] || s.region[2] > s.width || s.region[3] > s.height)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: the region %u,%u - %u,%u is empty or outside %u x %u",
+                       s.region[0], s.region[1], s.region[2], s.region[3], s.width, s.height);
+    if (s.quality > PATINA_QUALITY_PAPER || s.fill > PATINA_FILL_OFF || s.smooth > PATINA_SMOOTH_OFF ||
+        s.antialias > PATINA_ANTIALIAS_OFF || s.fill_iterations > 64)
+        return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
+    if (!isfinite(s.world_color[0] + s.world_color[1] + s.world_color[2]))
+        return fail(scene, "settings: world_color is not finite");
+    if (!s.passes)
+        s.passes = (1u << PATINA_PASS_COUNT) - 1;
+    scene->settings = s;
+    return PATINA_OK;
+}
+
+// ---- a camera that frames the scene -----------------------------------------------------------------------------------
+
+// World-space box of all instances; 0 when there is nothing.
+static int scene_box(const patina_scene *scene, double lower[3], double upper[3])
+{
+    int some = 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        const patina_cloud_info *info = &scene->instances[i].cloud->info;
+        double linear[9], translation[3];
+        pt_split_matrix(scene->instances[i].style.world_from_object, linear, translation);
+        for (int corner = 0; corner < 8 && info->drawn; corner++) {
+            double p[3], q[3];
+            for (int k = 0; k < 3; k++)
+                p[k] = corner >> k & 1 ? info->box_max[k] : info->box_min[k];
+            pt_apply(linear, p, q);
+            for (int k = 0; k < 3; k++) {
+                q[k] += translation[k];
+                lower[k] = some ? fmin(lower[k], q[k]) : q[k];
+                upper[k] = some ? fmax(upper[k], q[k]) : q[k];
+            }
+            some = 1;
+        }
+    }
+    return some;
+}
+
+int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
+                              patina_camera *camera)
+{
+    if (!scene || !camera || camera->struct_size != sizeof *camera || !isfinite(azimuth + elevation + fov_degrees))
+        return fail(scene, "patina_scene_frame_camera: bad arguments");
+    const double degree = 3.14159265358979323846 / 180.0;
+    double lower[3] = { -1, -1, -1 }, upper[3] = { 1, 1, 1 }, center[3];
+    scene_box(scene, lower, upper);
+    double ca = cos(azimuth * degree), sa = sin(azimuth * degree);
+    double ce = cos(elevation * degree), se = sin(elevation * degree);
+    const double x[3] = { ca, sa, 0.0 }, y[3] = { -sa * se, ca * se, ce }, z[3] = { sa * ce, -ca * ce, se };
+    double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
+    double half_y = tan(0.5 * fov * degree);
+    double half_x = half_y * scene->settings.width / scene->settings.height, distance = 0.0, extent = 0.0;
+    for (int k = 0; k < 3; k++) {
+        center[k] = 0.5 * (lower[k] + upper[k]);
+        extent = fmax(extent, upper[k] - lower[k]);
+    }
+    // the nearest place from which every corner of the box is in view, with 4% of air
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3];
+        for (int k = 0; k < 3; k++)
+            p[k] = (corner >> k & 1 ? upper[k] : lower[k]) - center[k];
+        distance = fmax(distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, x)) / half_x);
+        distance = fmax(distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, y)) / half_y);
+    }
+    if (!(distance > 0.0))
+        distance = 1.0; // a single point
+    double reach = extent > 0.0 ? 1.75 * extent : distance;
+    *camera = (patina_camera){ .struct_size = sizeof *camera,
+                               .left = -half_x,
+                               .right = half_x,
+                               .bottom = -half_y,
+                               .top = half_y,
+                               .near_clip = fmax(distance - reach, 1e-3 * distance),
+                               .far_clip = distance + reach };
+    for (int k = 0; k < 3; k++) {
+        camera->world_from_camera[4 * k] = x[k];
+        camera->world_from_camera[4 * k + 1] = y[k];
+        camera->world_from_camera[4 * k + 2] = z[k];
+        camera->world_from_camera[4 * k + 3] = center[k] + distance * z[k];
+    }
+    camera->world_from_camera[15] = 1.0;
+    return PATINA_OK;
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A scene: instances of clouds, lights, a camera, settings. Knows no device.
+#ifndef PT_SCENE_H
+#define PT_SCENE_H
+
+#include "cloud.h"
+
+struct pt_instance {
+    const struct patina_cloud *cloud;
+    patina_cloud_style style; // defaults made explicit
+    uint32_t id_base;
+};
+
+struct patina_scene {
+    struct pt_handle handle;
+    struct pt_instance *instances;
+    uint32_t instance_count, instance_room;
+    patina_light_desc *lights;
+    uint32_t light_count, light_room;
+    uint64_t points; // of all instances
+    patina_camera camera;
+    int has_camera;
+    patina_settings settings; // defaults made explicit
+};
+
+// Small 3 x 3 algebra in float64, row-major.
+double pt_determinant(const double m[9]);
+void pt_cofactors(const double m[9], double out[9]); // inverse transposed = cofactors / determinant
+void pt_multiply(const double a[9], const double b[9], double out[9]);
+void pt_apply(const double m[9], const double v[3], double out[3]);
+double pt_dot(const double a[3], const double b[3]);
+
+// The camera's axes (unit, rows x, y, z) and position from world_from_camera. PATINA_ERROR_ARGUMENT when singular.
+int pt_camera_axes(const patina_camera *camera, double axes[9], double position[3]);
+// The linear part (row-major 3 x 3) and translation of a 4 x 4 matrix.
+void pt_split_matrix(const double matrix[16], double linear[9], double translation[3]);
+
+#endif

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// patina info FILE
+#include "tool.h"
+
+#include <stdio.h>
+
+static const char *type_name(uint32_t type)
+{
+    static const char *const names[] = {"none",   "float32", "float64", "uint8", "uint16",
+                                        "uint32", "int8",    "int16",   "int32"};
+    return type < sizeof names / sizeof *names ? names[type] : "?";
+}
+
+static void print_file(const patina_file_info *info)
+{
+    printf("format      %s\n", info->format);
+    printf("points      %llu\n", (unsigned long long)info->count);
+    printf("positions   %s\n", type_name(info->position_type));
+    if (info->invalid_positions)
+        printf("  not finite %llu\n", (unsigned long long)info->invalid_positions);
+    if (info->origin[0] != 0 || info->origin[1] != 0 || info->origin[2] != 0)
+        printf("origin      %.17g %.17g %.17g\n", info->origin[0], info->origin[1], info->origin[2]);
+    if (info->box_min[0] <= info->box_max[0]) {
+        printf("box         %.9g %.9g %.9g\n", info->box_min[0], info->box_min[1], info->box_min[2]);
+        printf("            %.9g %.9g %.9g\n", info->box_max[0], info->box_max[1], info->box_max[2]);
+        printf("size        %.6g %.6g %.6g\n", info->box_max[0] - info->box_min[0], info->box_max[1] - info->box_min[1],
+               info->box_max[2] - info->box_min[2]);
+    }
+    printf("normals     %s\n", info->has_normals ? "yes" : "no");
+    printf("colours     %s\n", info->color_type ? type_name(info->color_type) : "no");
+}
+
+static void print_attributes(const patina_file *file, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        patina_file_attribute attribute = {.struct_size = sizeof attribute};
+        if (patina_file_get_attribute(file, i, &attribute))
+            continue;
+        printf("attribute   %s (%s)\n", attribute.name, type_name(attribute.type));
+    }
+}
+
+static void print_cloud(const patina_cloud_info *info)
+{
+    printf("spacing     %.4g (%.4g to %.4g)\n", info->spacing, info->spacing_min, info->spacing_max);
+    if (info->invalid_normals)
+        printf("  no normal  %llu\n", (unsigned long long)info->invalid_normals);
+    if (info->invalid_colors)
+        printf("  no colour  %llu\n", (unsigned long long)info->invalid_colors);
+    printf("chunks      %llu\n", (unsigned long long)info->chunks);
+    printf("memory      %.1f MB", (double)info->bytes / 1e6);
+    if (info->drawn)
+        printf(", %.1f bytes a point", (double)info->bytes / (double)info->drawn);
+    printf("\n");
+}
+
+int tool_info(int count, char **arguments)
+{
+    if (count != 1)
+        return tool_misuse("info: one file, please");
+    patina_progress *progress = NULL;
+    patina_file *file = NULL;
+    patina_cloud *cloud = NULL;
+    int result = TOOL_FAILED;
+    int code = patina_progress_create(&progress);
+    tool_cancellable(progress, NULL);
+    if (!code)
+        code = patina_file_open(arguments[0], progress, &file);
+    if (code) {
+        result = tool_failed(arguments[0], NULL, code);
+        goto done;
+    }
+    patina_file_info info = {.struct_size = sizeof info};
+    code = patina_file_get_info(file, &info);
+    if (code) {
+        result = tool_failed(arguments[0], file, code);
+        goto done;
+    }
+    print_file(&info);
+    print_attributes(file, info.attributes);
+    fflush(stdout);
+    code = patina_file_cloud(file, 0, progress, &cloud);
+    patina_cloud_info built = {.struct_size = sizeof built};
+    if (!code)
+        code = patina_cloud_get_info(cloud, &built);
+    if (code) {
+        result = tool_failed(arguments[0], NULL, code);
+        goto done;
+    }
+    print_cloud(&built);
+    result = TOOL_OK;
+done:
+    tool_cancellable(NULL, NULL);
+    tool_drain_log(1);
+    patina_cloud_destroy(cloud);
+    patina_file_destroy(file);
+    patina_progress_destroy(progress);
+    return result;
+}

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// patina: looks at, renders and converts point clouds without Blender.
+#include "tool.h"
+
+#include <pthread.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char usage[] =
+    "patina info FILE                     what a file of points holds\n"
+    "patina convert IN.ply OUT.ply        writes a binary PLY\n"
+    "patina render FILE... -o OUT.png     draws clouds as surfaces\n"
+    "  --size WxH                         of the picture (1024x1024)\n"
+    "  --region X0,Y0,X1,Y1               only these pixels, from the bottom left\n"
+    "  --camera AZIMUTH,ELEVATION[,FOV]   degrees; frames the clouds (default 30,40)\n"
+    "  --look X,Y,Z,X,Y,Z[,FOV]           from the first point to the second\n"
+    "  --ortho WIDTH                      parallel projection, WIDTH world units wide\n"
+    "  --quality refined|paper            depth of filled pixels: tangent plane, or as in the paper\n"
+    "  --fill closed|paper|off            hole filling; --iterations N (0: automatic)\n"
+    "  --smooth alleviated|gaussian|box|off\n"
+    "  --antialias layers|background|off\n"
+    "  --lit, --unlit                     default: clouds with colours are shown unlit\n"
+    "  --cull                             leave out points that face away\n"
+    "  --background R,G,B                 linear; also the ambient light\n"
+    "  --transparent                      background with alpha 0\n"
+    "  --device auto|cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|gl-egl|gl-osmesa\n"
+    "  --threads N, --batch N             of the CPU device (0: automatic)\n"
+    "  --repeat N                         then measure N frames, the camera turning one degree a frame\n"
+    "  --stats json                       one JSON object on standard output\n"
+    "  --dump-plan                        the passes, and why\n"
+    "  --dump-planes FOLDER               raw planes of the picture\n"
+    "  --verbose                          the library's log too\n"
+    "patina version\n"
+    "Exit status: 0 done, 1 failed, 2 wrong use, 130 cancelled.\n";
+
+// ---- messages ----------------------------------------------------------------------------------------------------
+
+static void say(const char *format, va_list list)
+{
+    fputs("patina: ", stderr);
+    vfprintf(stderr, format, list);
+    fputc('\n', stderr);
+}
+
+void tool_say(const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    say(format, list);
+    va_end(list);
+}
+
+int tool_misuse(const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    say(format, list);
+    va_end(list);
+    fputs("'patina help' lists commands and options.\n", stderr);
+    return TOOL_USAGE;
+}
+
+int tool_failed(const char *what, const void *handle, int code)
+{
+    if (code == PATINA_ERROR_CANCELLED || tool_cancelled()) {
+        tool_say("cancelled");
+        return TOOL_CANCELLED;
+    }
+    char message[1024] = "";
+    if (!handle || !patina_message(handle, message, sizeof message))
+        patina_message(NULL, message, sizeof message);
+    const char *sentence = message[0] ? message : patina_error_text(code);
+    if (!strncmp(sentence, what, strlen(what))) // it names the file itself
+        tool_say("%s", sentence);
+    else
+        tool_say("%s: %s", what, sentence);
+    return TOOL_FAILED;
+}
+
+void tool_drain_log(int least)
+{
+    static const char *const kinds[] = {"error", "warning", "note"};
+    char line[1024];
+    int level;
+    while (patina_log_next(line, sizeof line, &level))
+        if (level > 0 && level <= least) // errors reach the user as the message of the call that failed
+            tool_say("%s: %s", kinds[level > 2 ? 2 : level], line);
+}
+
+// ---- signals -----------------------------------------------------------------------------------------------------
+
+static pthread_mutex_t cancel_lock = PTHREAD_MUTEX_INITIALIZER;
+static patina_progress *cancel_progress;
+static patina_frame *cancel_frame;
+static atomic_int cancelled;
+
+// A thread that waits, rather than a handler: the library's cancel calls need not be async-signal-safe.
+static void *watch(void *context)
+{
+    (void)context;
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    for (int caught;;) {
+        if (sigwait(&set, &caught))
+            continue;
+        pthread_mutex_lock(&cancel_lock);
+        if (atomic_exchange(&cancelled, 1) || (!cancel_progress && !cancel_frame))
+            _exit(TOOL_CANCELLED);
+        if (cancel_progress)
+            patina_progress_cancel(cancel_progress);
+        if (cancel_frame)
+            patina_frame_cancel(cancel_frame);
+        pthread_mutex_unlock(&cancel_lock);
+    }
+    return NULL;
+}
+
+int tool_watch_signals(void)
+{
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    if (pthread_sigmask(SIG_BLOCK, &set, NULL))
+        return -1;
+    pthread_t thread;
+    if (pthread_create(&thread, NULL, watch, NULL))
+        return -1;
+    return pthread_detach(thread);
+}
+
+void tool_cancellable(patina_progress *progress, patina_frame *frame)
+{
+    pthread_mutex_lock(&cancel_lock);
+    cancel_progress = progress;
+    cancel_frame = frame;
+    pthread_mutex_unlock(&cancel_lock);
+}
+
+int tool_cancelled(void)
+{
+    return atomic_load(&cancelled);
+}
+
+// ------------------------------------------------------------------------------------------------------------------
+
+int main(int count, char **arguments)
+{
+    if (count < 2) {
+        fputs(usage, stderr);
+        return TOOL_USAGE;
+    }
+    const char *command = arguments[1];
+    if (!strcmp(command, "help") || !strcmp(command, "--help") || !strcmp(command, "-h")) {
+        fputs(usage, stdout);
+        return TOOL_OK;
+    }
+    if (!strcmp(command, "version") || !strcmp(command, "--version")) {
+        printf("patina %s\n", patina_version());
+        return TOOL_OK;
+    }
+    if (tool_watch_signals())
+        tool_say("warning: Ctrl-C will end the program without tidying up");
+    if (!strcmp(command, "render"))
+        return tool_render(count - 2, arguments + 2);
+    if (!strcmp(command, "info"))
+        return tool_info(count - 2, arguments + 2);
+    if (!strcmp(command, "convert"))
+        return tool_convert(count - 2, arguments + 2);
+    return tool_misuse("there is no command '%s'", command);
+}

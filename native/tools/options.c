@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The options of `patina render`: one table, one parser by kind of value.
+#include "tool.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_SIZE = 65536, MAX_REPEAT = 100000 };
+
+// Reads between `least` and `most` numbers separated by commas. Returns how many, or -1.
+static int parse_numbers(const char *text, double *numbers, int least, int most)
+{
+    int count = 0;
+    for (const char *at = text;; at++) {
+        char *end;
+        if (count == most)
+            return -1;
+        numbers[count] = strtod(at, &end);
+        if (end == at || !isfinite(numbers[count]))
+            return -1;
+        count++;
+        at = end;
+        if (!*at)
+            break;
+        if (*at != ',')
+            return -1;
+    }
+    return count < least ? -1 : count;
+}
+
+static int parse_count(const char *text, uint32_t least, uint32_t most, uint32_t *value)
+{
+    char *end;
+    errno = 0;
+    const unsigned long number = strtoul(text, &end, 10);
+    if (text[0] < '0' || text[0] > '9' || *end || errno || number < least || number > most)
+        return -1;
+    *value = (uint32_t)number;
+    return 0;
+}
+
+static int parse_size(const char *text, patina_settings *settings)
+{
+    unsigned width, height;
+    char rest;
+    if (sscanf(text, "%6ux%6u%c", &width, &height, &rest) != 2)
+        return -1;
+    if (!width || !height || width > MAX_SIZE || height > MAX_SIZE)
+        return -1;
+    settings->width = width;
+    settings->height = height;
+    return 0;
+}
+
+// words: a list separated by |; value: the word's place.
+static int parse_word(const char *text, const char *words, uint32_t *value)
+{
+    const size_t length = strlen(text);
+    uint32_t place = 0;
+    for (const char *at = words; at; place++) {
+        const char *end = strchr(at, '|');
+        const size_t size = end ? (size_t)(end - at) : strlen(at);
+        if (size == length && !memcmp(at, text, length)) {
+            *value = place;
+            return 0;
+        }
+        at = end ? end + 1 : NULL;
+    }
+    return -1;
+}
+
+static int parse_camera(const char *text, struct tool_options *options)
+{
+    double n[3] = {0};
+    if (parse_numbers(text, n, 2, 3) < 0 || n[1] < -90 || n[1] > 90 || n[2] < 0 || n[2] >= 180)
+        return -1;
+    options->view = VIEW_ANGLES;
+    options->azimuth = n[0];
+    options->elevation = n[1];
+    options->fov = n[2];
+    return 0;
+}
+
+static int parse_look(const char *text, struct tool_options *options)
+{
+    double n[7] = {0};
+    if (parse_numbers(text, n, 6, 7) < 0 || n[6] < 0 || n[6] >= 180)
+        return -1;
+    if (n[0] == n[3] && n[1] == n[4] && n[2] == n[5])
+        return -1;
+    options->view = VIEW_LOOK;
+    memcpy(options->eye, n, sizeof options->eye);
+    memcpy(options->target, n + 3, sizeof options->target);
+    options->fov = n[6];
+    return 0;
+}
+
+static int parse_region(const char *text, uint32_t region[4])
+{
+    double n[4];
+    if (parse_numbers(text, n, 4, 4) < 0)
+        return -1;
+    for (int i = 0; i < 4; i++) {
+        if (n[i] < 0 || n[i] > MAX_SIZE || n[i] != floor(n[i]))
+            return -1;
+        region[i] = (uint32_t)n[i];
+    }
+    return region[0] < region[2] && region[1] < region[3] ? 0 : -1;
+}
+
+static int parse_color(const char *text, float color[3])
+{
+    double n[3];
+    if (parse_numbers(text, n, 3, 3) < 0)
+        return -1;
+    for (int i = 0; i < 3; i++) {
+        if (n[i] < 0 || n[i] > 65504)
+            return -1;
+        color[i] = (float)n[i];
+    }
+    return 0;
+}
+
+static int parse_width(const char *text, double *width)
+{
+    return parse_numbers(text, width, 1, 1) < 0 || *width <= 0 ? -1 : 0;
+}
+
+// Switches without a value. Returns 0 when name is one.
+static int parse_switch(const char *name, struct tool_options *options)
+{
+    if (!strcmp(name, "--lit"))
+        options->lighting = PATINA_LIGHTING_LIT;
+    else if (!strcmp(name, "--unlit"))
+        options->lighting = PATINA_LIGHTING_UNLIT;
+    else if (!strcmp(name, "--cull"))
+        options->cull = 1;
+    else if (!strcmp(name, "--transparent"))
+        options->transparent = 1;
+    else if (!strcmp(name, "--dump-plan"))
+        options->dump_plan = 1;
+    else if (!strcmp(name, "--verbose"))
+        options->verbose = 1;
+    else
+        return -1;
+    return 0;
+}
+
+enum outcome { GOOD, BAD_VALUE, UNKNOWN };
+
+static enum outcome parse_valued(const char *name, const char *value, struct tool_options *o)
+{
+    patina_settings *s = &o->settings;
+    uint32_t number = 0;
+    int bad;
+    if (!strcmp(name, "-o") || !strcmp(name, "--output"))
+        bad = !*(o->output = value);
+    else if (!strcmp(name, "--dump-planes"))
+        bad = !*(o->planes = value);
+    else if (!strcmp(name, "--device"))
+        bad = !*(o->device = value);
+    else if (!strcmp(name, "--threads"))
+        bad = parse_count(value, 0, 4096, &o->threads);
+    else if (!strcmp(name, "--batch"))
+        bad = parse_count(value, 0, UINT32_MAX, &o->batch);
+    else if (!strcmp(name, "--size"))
+        bad = parse_size(value, s);
+    else if (!strcmp(name, "--region"))
+        bad = parse_region(value, s->region);
+    else if (!strcmp(name, "--camera"))
+        bad = parse_camera(value, o);
+    else if (!strcmp(name, "--look"))
+        bad = parse_look(value, o);
+    else if (!strcmp(name, "--ortho"))
+        bad = parse_width(value, &o->ortho_width);
+    else if (!strcmp(name, "--quality"))
+        bad = parse_word(value, "refined|paper", &s->quality);
+    else if (!strcmp(name, "--fill"))
+        bad = parse_word(value, "closed|paper|off", &s->fill);
+    else if (!strcmp(name, "--iterations"))
+        bad = parse_count(value, 0, 1000, &s->fill_iterations);
+    else if (!strcmp(name, "--smooth"))
+        bad = parse_word(value, "alleviated|gaussian|box|off", &s->smooth);
+    else if (!strcmp(name, "--antialias"))
+        bad = parse_word(value, "layers|background|off", &s->antialias);
+    else if (!strcmp(name, "--background"))
+        bad = parse_color(value, s->world_color);
+    else if (!strcmp(name, "--repeat")) {
+        bad = parse_count(value, 1, MAX_REPEAT, &number);
+        o->repeat = (int)number;
+    } else if (!strcmp(name, "--stats")) {
+        bad = strcmp(value, "json");
+        o->json = 1;
+    } else
+        return UNKNOWN;
+    return bad ? BAD_VALUE : GOOD;
+}
+
+int tool_parse_render(int count, char **arguments, struct tool_options *options)
+{
+    *options = (struct tool_options){
+        .files = arguments,
+        .azimuth = 30, // three-quarter view
+        .elevation = 40,
+        .settings = {.struct_size = sizeof options->settings,
+                     .width = 1024,
+                     .height = 1024,
+                     .world_color = {0.05f, 0.05f, 0.05f}}, // dark enough behind a statue, bright enough in its folds
+    };
+    int only_files = 0;
+    for (int i = 0; i < count; i++) {
+        char *name = arguments[i];
+        if (only_files || name[0] != '-' || !name[1]) {
+            arguments[options->file_count++] = name;
+            continue;
+        }
+        if (!strcmp(name, "--")) {
+            only_files = 1;
+            continue;
+        }
+        if (!parse_switch(name, options))
+            continue;
+        const char *value = i + 1 < count ? arguments[i + 1] : NULL;
+        const enum outcome outcome = parse_valued(name, value ? value : "", options);
+        if (outcome == UNKNOWN)
+            return tool_misuse("there is no option '%s'", name);
+        if (!value)
+            return tool_misuse("option '%s' lacks its value", name);
+        if (outcome == BAD_VALUE)
+            return tool_misuse("'%s' is no value for option '%s'", value, name);
+        i++;
+    }
+    options->settings.film_transparent = options->transparent ? 1 : 0;
+    if (!options->file_count)
+        return tool_misuse("render: no file given");
+    if (!options->output && !options->planes && !options->json && !options->dump_plan && !options->repeat)
+        return tool_misuse("render: nothing to do; name the picture with -o OUT.png");
+    if (options->json && !options->repeat)
+        options->repeat = 1;
+    return TOOL_OK;
+}

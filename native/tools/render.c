@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// patina render FILE... -o OUT.png
+#include "view.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+// What one run holds; everything may be NULL.
+struct job {
+    struct tool_options options;
+    patina_device *device;
+    patina_device_info device_info;
+    patina_progress *progress;
+    patina_cloud **clouds; // options.file_count
+    patina_scene *scene;
+    patina_frame *frame;
+    struct tool_box box;
+    float *pixels;
+    patina_frame_stats stats; // of the picture
+};
+
+static double now_ms(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec * 1e3 + (double)time.tv_nsec * 1e-6;
+}
+
+static void destroy(struct job *job)
+{
+    tool_cancellable(NULL, NULL);
+    patina_frame_destroy(job->frame);
+    patina_scene_destroy(job->scene);
+    for (int i = 0; job->clouds && i < job->options.file_count; i++)
+        patina_cloud_destroy(job->clouds[i]);
+    free(job->clouds);
+    patina_progress_destroy(job->progress);
+    patina_device_destroy(job->device);
+    free(job->pixels);
+}
+
+static int open_device(struct job *job)
+{
+    const patina_device_desc desc = {.struct_size = sizeof desc,
+                                     .name = job->options.device,
+                                     .threads = job->options.threads,
+                                     .batch = job->options.batch};
+    int code = patina_device_create(&desc, &job->device);
+    if (code)
+        return tool_failed(job->options.device ? job->options.device : "auto", NULL, code);
+    job->device_info.struct_size = sizeof job->device_info;
+    code = patina_device_get_info(job->device, &job->device_info);
+    return code ? tool_failed("device", job->device, code) : TOOL_OK;
+}
+
+static void grow_box(struct tool_box *box, const patina_cloud_info *info)
+{
+    if (!info->drawn)
+        return;
+    for (int i = 0; i < 3; i++) {
+        box->min[i] = fmin(box->min[i], info->box_min[i]);
+        box->max[i] = fmax(box->max[i], info->box_max[i]);
+    }
+}
+
+static int load_clouds(struct job *job)
+{
+    const struct tool_options *options = &job->options;
+    job->box = (struct tool_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    job->clouds = calloc((size_t)options->file_count, sizeof *job->clouds);
+    int code = job->clouds ? patina_progress_create(&job->progress) : PATINA_ERROR_MEMORY;
+    if (!code)
+        code = patina_scene_create(&job->scene);
+    if (code)
+        return tool_failed("scene", NULL, code);
+
+    patina_cloud_style style = {.struct_size = sizeof style, .lighting = options->lighting};
+    style.cull_back = options->cull ? 1 : 0;
+    tool_cancellable(job->progress, NULL);
+    for (int i = 0; i < options->file_count; i++) {
+        patina_cloud_info info = {.struct_size = sizeof info};
+        code = patina_cloud_load(options->files[i], job->progress, &job->clouds[i]);
+        if (!code)
+            code = patina_cloud_get_info(job->clouds[i], &info);
+        if (code)
+            return tool_failed(options->files[i], NULL, code);
+        grow_box(&job->box, &info);
+        code = patina_scene_add_cloud(job->scene, job->clouds[i], &style);
+        if (code)
+            return tool_failed(options->files[i], job->scene, code);
+    }
+    return TOOL_OK;
+}
+
+static int set_view(struct job *job, double turn, patina_camera *camera)
+{
+    const int code = tool_camera(&job->options, job->scene, &job->box, turn, camera);
+    return code ? code : patina_scene_set_camera(job->scene, camera);
+}
+
+static int set_scene(struct job *job)
+{
+    patina_camera camera;
+    int code = patina_scene_set_settings(job->scene, &job->options.settings);
+    if (!code)
+        code = set_view(job, 0, &camera);
+    if (!code)
+        code = tool_lights(job->scene, &camera);
+    if (!code)
+        code = patina_frame_create(job->device, &job->frame);
+    if (code)
+        return tool_failed("scene", job->scene, code);
+    tool_cancellable(NULL, job->frame);
+    return tool_cancelled() ? tool_failed("scene", NULL, PATINA_ERROR_CANCELLED) : TOOL_OK;
+}
+
+static int dump_plan(struct job *job)
+{
+    const size_t size = patina_frame_plan_text(job->frame, job->scene, NULL, 0) + 1;
+    char *text = calloc(size, 1);
+    if (!text || size == 1) {
+        free(text);
+        return tool_failed("plan", job->frame, PATINA_ERROR_INTERNAL);
+    }
+    patina_frame_plan_text(job->frame, job->scene, text, size);
+    fputs(text, job->options.json ? stderr : stdout); // with --stats, standard output is one JSON object
+    free(text);
+    return TOOL_OK;
+}
+
+// The picture, with the camera as asked for; also the warm-up of the measurement.
+static int draw(struct job *job, double *ms)
+{
+    const double start = now_ms();
+    int code = patina_frame_render(job->frame, job->scene);
+    *ms = now_ms() - start;
+    job->stats.struct_size = sizeof job->stats;
+    if (!code)
+        code = patina_frame_get_stats(job->frame, &job->stats);
+    if (!code && job->options.planes)
+        code = patina_frame_dump_planes(job->frame, job->options.planes);
+    if (!code && job->options.output) {
+        const size_t size = (size_t)job->stats.width * job->stats.height * 4 * sizeof(float);
+        job->pixels = malloc(size);
+        code = job->pixels ? patina_frame_read(job->frame, PATINA_PASS_COMBINED, job->pixels, size)
+                           : PATINA_ERROR_MEMORY;
+    }
+    return code ? tool_failed("render", job->frame, code) : TOOL_OK;
+}
+
+static int measure(struct job *job)
+{
+    struct tool_times *times = tool_times_create(job->options.repeat);
+    int code = times ? PATINA_OK : PATINA_ERROR_MEMORY;
+    for (int i = 1; i <= job->options.repeat && !code; i++) {
+        patina_camera camera;
+        code = set_view(job, i, &camera);
+        const double start = now_ms();
+        if (!code)
+            code = patina_frame_render(job->frame, job->scene);
+        if (!code && tool_times_add(times, now_ms() - start, job->frame))
+            code = PATINA_ERROR_MEMORY;
+    }
+    if (!code && job->options.json)
+        tool_times_print(times, job->device_info.name, &job->stats);
+    else if (!code)
+        tool_say("median of %d frames: %.2f ms", job->options.repeat, tool_times_median(times));
+    tool_times_destroy(times);
+    return code ? tool_failed("render", job->frame, code) : TOOL_OK;
+}
+
+static int run(struct job *job)
+{
+    const struct tool_options *options = &job->options;
+    double ms = 0;
+    int result = open_device(job);
+    if (!result)
+        result = load_clouds(job);
+    if (!result)
+        result = set_scene(job);
+    if (!result && options->dump_plan)
+        result = dump_plan(job);
+    if (result || (!options->output && !options->planes && !options->repeat))
+        return result;
+
+    result = draw(job, &ms);
+    if (!result && options->output) {
+        if (tool_write_png(options->output, job->pixels, job->stats.width, job->stats.height, options->transparent))
+            return TOOL_FAILED;
+        tool_say("%s: %llu points, %ux%u, %s, %.1f ms", options->output, (unsigned long long)job->stats.points,
+                 job->stats.width, job->stats.height, job->device_info.name, ms);
+    }
+    if (!result && options->repeat)
+        result = measure(job);
+    return result;
+}
+
+int tool_render(int count, char **arguments)
+{
+    struct job job = {0};
+    int result = tool_parse_render(count, arguments, &job.options);
+    if (!result)
+        result = run(&job);
+    tool_drain_log(job.options.verbose ? 2 : 1);
+    destroy(&job);
+    return result;
+}

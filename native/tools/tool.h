@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The command line `patina`: what its files share. It sees nothing of the library but patina.h.
+#ifndef TOOL_H
+#define TOOL_H
+
+#include "patina/patina.h"
+
+enum tool_exit { TOOL_OK = 0, TOOL_FAILED = 1, TOOL_USAGE = 2, TOOL_CANCELLED = 130 };
+
+// Each takes the arguments after its own name and returns a tool_exit.
+int tool_render(int count, char **arguments);
+int tool_info(int count, char **arguments);
+int tool_convert(int count, char **arguments);
+
+// ---- messages, on stderr -----------------------------------------------------------------------------------------
+
+void tool_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+// Wrong use: the sentence and where help is. Returns TOOL_USAGE.
+int tool_misuse(const char *format, ...) __attribute__((format(printf, 1, 2)));
+// A library call failed: says `what` and the library's message. handle may be NULL. Returns a tool_exit.
+int tool_failed(const char *what, const void *handle, int code);
+// Passes the library's log on; level: the least important kind to show (1 warnings, 2 information too).
+void tool_drain_log(int level);
+
+// ---- Ctrl-C ------------------------------------------------------------------------------------------------------
+
+// Call before any other thread exists: from then on SIGINT and SIGTERM cancel what is announced below.
+int tool_watch_signals(void);
+// What a signal shall cancel; NULL, NULL: nothing. The second signal always ends the program.
+void tool_cancellable(patina_progress *progress, patina_frame *frame);
+int tool_cancelled(void);
+
+// ---- options -----------------------------------------------------------------------------------------------------
+
+enum tool_view { VIEW_ANGLES, VIEW_LOOK };
+
+struct tool_options {
+    char **files; // into the argument vector
+    int file_count;
+    const char *output, *planes; // NULL: not asked for
+    const char *device;
+    uint32_t threads, batch;
+    enum tool_view view;
+    double azimuth, elevation, fov; // degrees; fov 0 = the library's default
+    double eye[3], target[3];       // VIEW_LOOK
+    double ortho_width;             // world units; 0 = perspective
+    uint32_t lighting;              // patina_lighting
+    int cull, transparent, json, dump_plan, verbose;
+    int repeat; // measured frames; 0 = just the picture
+    patina_settings settings;
+};
+
+// Fills options from the arguments of `render`; files point into the vector, which is reordered. Returns a tool_exit.
+int tool_parse_render(int count, char **arguments, struct tool_options *options);
+
+// ---- output ------------------------------------------------------------------------------------------------------
+
+// Writes premultiplied linear RGBA, row 0 at the bottom, as an 8-bit sRGB PNG; alpha: keep it. 0, or -1 after a message.
+int tool_write_png(const char *path, const float *pixels, uint32_t width, uint32_t height, int alpha);
+
+// Times of several frames, whole and by pass.
+struct tool_times;
+struct tool_times *tool_times_create(int frames);
+void tool_times_destroy(struct tool_times *times);
+// Adds a frame of `ms`, with its passes as the frame tells them. 0, or -1 without memory.
+int tool_times_add(struct tool_times *times, double ms, const patina_frame *frame);
+double tool_times_median(const struct tool_times *times);
+// Prints one JSON object on stdout.
+void tool_times_print(struct tool_times *times, const char *device, const patina_frame_stats *stats);
+
+#endif

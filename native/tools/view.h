@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Cameras and lights of `patina render`.
+#ifndef TOOL_VIEW_H
+#define TOOL_VIEW_H
+
+#include "tool.h"
+
+struct tool_box {
+    double min[3], max[3]; // of all clouds, world units; min > max when there is no point
+};
+
+// The camera that the options ask for, turned by `turn` degrees around the vertical axis. Returns a patina_error.
+int tool_camera(const struct tool_options *options, const patina_scene *scene, const struct tool_box *box, double turn,
+                patina_camera *camera);
+// A sun over the left shoulder of that camera and a weak one from the right. Returns a patina_error.
+int tool_lights(patina_scene *scene, const patina_camera *camera);
+
+#endif

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// scatter: points -> least key a pixel. [D 3.1]; twin of native/device_cpu/kernels/scatter.c
+//
+// A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). The minimum commutes, so the order of points
+// never shows. Without 64-bit atomics a key is made in two passes over all points of all instances:
+//   PASS 0: least z;   PASS 1: least id among the points that have exactly this z.   PASS 2: both at once, 64 bits.
+#version 430 core
+#if PASS == 2
+#extension GL_ARB_gpu_shader_int64 : require
+#extension GL_NV_shader_atomic_int64 : require
+#endif
+#include "lib/math.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer arguments_block { scatter_args args; };
+#if PASS == 2
+layout(std430, binding = 1) buffer keys_block { uint64_t keys[]; };
+#else
+layout(std430, binding = 1) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
+#endif
+layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = 3) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = 4) readonly buffer ids_block { uint ids[]; };
+layout(std430, binding = 5) readonly buffer surface_block { uint surface[]; };
+
+layout(location = 0) uniform uint first_chunk; // of this dispatch
+layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
+
+bool faces_away(uint word, vec4 eye, vec3 p)
+{
+    if ((word & PT_NORMAL_BITS) == PT_NORMAL_NONE)
+        return false;
+    precise vec3 v = eye.xyz - eye.w * p;
+    return pt_dot(pt_decode_normal(word), v) <= 0.0;
+}
+
+void main()
+{
+    chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
+    view_args view = args.view;
+    vec3 row_x = vec3(chunk.row[0], chunk.row[1], chunk.row[2]);
+    vec3 row_y = vec3(chunk.row[3], chunk.row[4], chunk.row[5]);
+    vec3 row_z = vec3(chunk.row[6], chunk.row[7], chunk.row[8]);
+    vec4 eye = vec4(chunk.eye[0], chunk.eye[1], chunk.eye[2], chunk.eye[3]);
+    float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
+    float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
+    uint base = chunk.first - first_slot;
+    uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
+
+    for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
+        // 1. project
+        uint at = 3u * base + i;
+        vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+        precise float z = (((chunk.lo[2] + row_z.x * p.x) + row_z.y * p.y) + row_z.z * p.z) + chunk.hi[2];
+        precise float x = (((chunk.lo[0] + row_x.x * p.x) + row_x.y * p.y) + row_x.z * p.z) + chunk.hi[0];
+        precise float y = (((chunk.lo[1] + row_y.x * p.x) + row_y.y * p.y) + row_y.z * p.z) + chunk.hi[1];
+        if (view.perspective != 0u) {
+            float r = pt_rcp(z);
+            x = x * r;
+            y = y * r;
+        }
+        // 2. clip: NaN fails every comparison
+        if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
+            continue;
+        // 3. early depth test; the sign bit of -0 is dropped
+        uint pixel = uint(int(y) - view.origin_y) * view.width + uint(int(x) - view.origin_x);
+        uint z_bits = pt_bits(z) & 0x7FFFFFFFu;
+#if PASS == 0
+        if (keys[2u * pixel + 1u] <= z_bits)
+            continue;
+#elif PASS == 1
+        if (keys[2u * pixel + 1u] != z_bits)
+            continue;
+#else
+        if (uint(keys[pixel] >> 32) < z_bits)
+            continue;
+#endif
+        // 4. back faces, then the least key
+        uint id = ids[base + i];
+        if (chunk.cull != 0u && faces_away(surface[id], eye, p))
+            continue;
+#if PASS == 0
+        atomicMin(keys[2u * pixel + 1u], z_bits);
+#elif PASS == 1
+        atomicMin(keys[2u * pixel], chunk.id_base + id);
+#else
+        atomicMin(keys[pixel], uint64_t(z_bits) << 32 | uint64_t(chunk.id_base + id));
+#endif
+    }
+}

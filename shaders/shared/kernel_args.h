@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Argument structs of the kernels, read by C and by GLSL (std430: every member is 4 bytes wide, so both layouts agree).
+// Constants that decide pixels live here too, once.
+#ifndef PT_KERNEL_ARGS_H
+#define PT_KERNEL_ARGS_H
+
+#ifdef GL_core_profile
+#define uint32_t uint
+#define int32_t int
+#else
+#include <stdint.h>
+#endif
+
+// Effective layer distance (SPEC 1): d_eff = max(d_min, K spacing, footprint, 4 ulp(z)) / max(|n.v|, C).
+#define PT_SPACING_FACTOR 2.0f // K: a hole's rim lies up to two spacings from a neighbour that is on the same layer
+#define PT_COSINE_FLOOR 0.05f  // C: 87 degrees; beyond it a surface is narrower than a pixel's jitter
+
+// The surface word of a point: octahedral normal 2 x 13 bits (at most 0.03 degrees off), spacing class 6 bits.
+#define PT_NORMAL_NONE 0x03FFFFFFu // these 26 bits all ones: the point has no normal
+#define PT_NORMAL_BITS 0x03FFFFFFu
+#define PT_SPACING_SHIFT 26
+
+#define PT_KEY_EMPTY_Z 0x7F800000u // float bits of +inf
+#define PT_KEY_EMPTY_ID 0xFFFFFFFFu
+#define PT_FROM_MIXED 0x80000000u // top bit of the from plane: anti-aliasing mixed this pixel's colour
+
+#define PT_NO_SPACINGS 64
+#define PT_MAX_LIGHTS 32
+
+// A window of pixels of the full picture, at a level of the pyramid (a pixel of level l is 2^l wide).
+// Ray of the pixel (x, y): u = ray_x0 + ray_xs * X with X = (((origin_x >> level) + x) + 0.5) * 2^level, v likewise.
+// Perspective: view-space point = z * (u, v, -1). Orthographic: (u, v, -z - near).
+struct view_args {
+    uint32_t width, height;     // of the planes at this level
+    int32_t origin_x, origin_y; // pixel (0,0) of level 0 in the full picture; multiples of 2^levels
+    uint32_t perspective;
+    uint32_t level;
+    float z_near, z_far; // least and greatest z drawn; z_near > 0 in perspective, 0 in orthographic views
+    float ray_x0, ray_xs, ray_y0, ray_ys;
+    float footprint; // width of a level-0 pixel: at z = 1 (perspective) or anywhere (orthographic), view units
+    uint32_t rect[4]; // x0, y0, x1, y1: the kernel need not look outside; in pixels of this level
+};
+
+// A chunk as this view sees it: (X, Y, z) = (lo + R p) + hi in this order, R and hi + lo from float64.
+// Perspective: screen = (X, Y) * rcp(z), orthographic: screen = (X, Y), both in pixels of the full picture.
+struct chunk_view {
+    float row[9];   // x row, y row, z row
+    float hi[3], lo[3];
+    float eye[4];   // back-face test: n . (eye.xyz - eye.w p) <= 0 is culled; object units, relative to the chunk's origin
+    uint32_t first; // first slot: ids at first, positions at 3 first: x[padded], y[padded], z[padded]
+    uint32_t count, padded;
+    uint32_t cull;  // 1: test each point's normal
+    uint32_t id_base;
+};
+
+// scatter: points -> least key a pixel. [D 3.1]
+struct scatter_args {
+    struct view_args view;
+    uint32_t instances;
+};
+
+// What the per-instance kernels (normals, surface, shade) know of an instance of a cloud.
+struct instance_args {
+    uint32_t id_base, id_count; // ids of this instance: [id_base, id_base + id_count)
+    uint32_t has_normals;
+    uint32_t color_format;      // 0 style colour, 1 sRGB 8 bit x 3, 2 float x 3
+    uint32_t lit;
+    uint32_t shininess;
+    float ambient, diffuse, specular;
+    float color[3];
+    float normal_matrix[9];     // object normal -> view space, not yet unit
+    float d_min;                // world units
+    float spacing[PT_NO_SPACINGS]; // local spacing by class, world units
+};
+
+// normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals.
+struct normals_args {
+    struct view_args view;
+    struct instance_args instance;
+    uint32_t radius; // of the window, 1..6
+};
+
+// surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff; from = the pixel itself.
+struct surface_args {
+    struct view_args view;
+    struct instance_args instance;
+};
+
+// pull: 2 x 2 -> 1, the least key (what a scatter at half the resolution gives).
+struct pull_args {
+    struct view_args view; // of the coarse level
+    uint32_t fine_width, fine_height;
+};
+
+// push: pixels that are empty or occluded take the key of their coarse parent.
+struct push_args {
+    struct view_args view; // of the fine level
+    uint32_t coarse_width, coarse_height;
+    uint32_t refined;
+    uint32_t base_width; // width of level 0, for `from`
+};
+
+// fill: one phase of hole filling. [D 3.2, 3.3], SPEC 2.2
+struct fill_args {
+    struct view_args view;
+    uint32_t occluded;   // 0: background pixels, 1: occluded pixels
+    uint32_t iterations; // fills
+    uint32_t unfills;    // at most so many un-fills; 0 = as in the paper
+    uint32_t refined;    // 1: depth of the source's tangent plane
+    uint32_t base_width;
+};
+
+// Lights in view space.
+struct light_args {
+    uint32_t type;     // patina_light_type
+    float color[3];    // sun: irradiance; point: radiant intensity (W/sr)
+    float vector[3];   // sun: unit, towards the light; point: position
+};
+
+// shade: id -> colour, normal (blended over filled pixels when refined), Phong. [D 3.1], deferred
+struct shade_args {
+    struct view_args view;
+    struct instance_args instance;
+    float world[3];     // ambient radiance
+    float eye_z;        // orthographic: near, so that view z = -(z + near); perspective: 0
+    uint32_t refined;
+    uint32_t light_count;
+    struct light_args lights[PT_MAX_LIGHTS];
+};
+
+// smooth: 3 x 3 low-pass over non-background neighbours of the same layer. [D 3.4]
+struct smooth_args {
+    struct view_args view;
+    float center, edge, corner; // weights, renormalised over the neighbours taken
+};
+
+// antialias: Laplace on depth as steps. [D 3.5]
+struct antialias_args {
+    struct view_args view;
+    uint32_t layers; // 1: edges between layers too, 0: background edges only
+};
+
+// compose: over the background, into the crop.
+struct compose_args {
+    struct view_args view;
+    uint32_t crop_x, crop_y, crop_width, crop_height; // in the planes
+    float background[4]; // premultiplied
+};
+
+// extract: depth, world-space normal, source. Any may be left out.
+struct extract_args {
+    struct view_args view;
+    uint32_t crop_x, crop_y, crop_width, crop_height;
+    uint32_t depth, normal, source;
+    float world_from_view[9];
+};
+
+#endif

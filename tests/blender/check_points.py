@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sources of points: meshes, point clouds, instances; their colours, normals and transforms."""
+
+import bpy
+import numpy as np
+from check_camera import to_pixels
+from harness import (Skip, add_points, check, check_close, drawn, linear, new_scene, patina, render, reports, sphere)
+from mathutils import Euler, Matrix
+
+from patina.sync import clouds
+
+
+def pixel(scene, point):
+    column, row = np.floor(to_pixels(scene, np.asarray([point], np.float64))[0]).astype(int)
+    return row, column
+
+
+def grid(count=12):
+    """Points one to a pixel neighbourhood in front of the default camera."""
+    x, y = np.meshgrid(np.linspace(-0.6, 0.6, count // 3), np.linspace(-0.4, 0.4, 3))
+    return np.stack([x.ravel() + 0.003, y.ravel() + 0.007, np.full(x.size, -2.0)], 1)
+
+
+def test_byte_colors():
+    scene = new_scene()
+    points = grid()
+    colors = np.random.default_rng(3).integers(0, 256, (12, 4)).astype(np.uint8)
+    colors[0, :3], colors[1, :3] = 0, 255
+    add_points(points, colors)
+    picture = render()["Combined"]
+    for point, color in zip(points, colors):
+        got = picture[pixel(scene, point)]
+        check_close(got[:3], linear(color[:3]), 2e-6, "byte colour")
+        check(got[3] == 1, "alpha of a point")
+
+
+def test_float_colors():
+    scene = new_scene()
+    points = grid()
+    colors = np.random.default_rng(4).uniform(0, 1, (12, 4)).astype(np.float32)
+    add_points(points, colors)
+    picture = render()["Combined"]
+    for point, color in zip(points, colors):
+        # the library may keep colours in 8-bit sRGB: half a step of it, whose slope is 2.3 at most
+        check_close(picture[pixel(scene, point)][:3], color[:3], 0.5 / 255 * 2.3, "float colour")
+
+
+def test_color_attribute_by_name():
+    scene = new_scene()
+    points = grid()
+    obj = add_points(points, np.full((12, 4), 30, np.uint8))
+    second = obj.data.attributes.new("scan", 'BYTE_COLOR', 'POINT')
+    second.data.foreach_set("color_srgb", np.full(48, 200 / 255, np.float32))
+    obj.patina.color_attribute = "scan"
+    check_close(render()["Combined"][pixel(scene, points[5])][:3], linear([200] * 3), 2e-6, "named attribute")
+    obj.patina.color_attribute = "nowhere"
+    obj.patina.lighting = 'UNLIT'
+    obj.patina.color = (0.25, 0.5, 0.75)
+    check_close(render()["Combined"][pixel(scene, points[5])][:3], (0.25, 0.5, 0.75), 5e-3, "object colour")
+    check(any("no point attribute 'nowhere'" in message for _, message in reports), f"reports {reports}")
+
+
+def test_transforms():
+    """Mirrored, non-uniform, sheared, all in one picture; normals follow by the inverse transpose."""
+    scene = new_scene()
+    shear = Matrix.Identity(4)
+    shear[0][1] = 0.7
+    matrices = [Matrix.Translation((-0.5, 0.3, -2)) @ Matrix.Diagonal((-1, 1, 1, 1)),
+                Matrix.Translation((0.4, 0.2, -3)) @ Euler((0.3, 0.5, 0.9)).to_matrix().to_4x4()
+                @ Matrix.Diagonal((3, 0.2, 1.5, 1)),
+                Matrix.Translation((0.1, -0.4, -2.5)) @ shear @ Matrix.Diagonal((1, -2, 0.5, 1))]
+    points = np.array([(0.1, 0.05, 0.0), (-0.07, -0.11, 0.1)])
+    normals = np.array([(0.6, 0.0, 0.8), (0.36, 0.48, 0.8)])
+    for index, matrix in enumerate(matrices):
+        colors = np.full((2, 4), 60 + 60 * index, np.uint8)
+        colors[1, 1] = 20
+        add_points(points, colors, normals, f"object {index}", matrix)
+    bpy.context.view_layer.update()
+    picture = render()
+    check(len(drawn(picture)) == 6, f"{len(drawn(picture))} of 6 points drawn")
+    for index, matrix in enumerate(matrices):
+        world = np.array(bpy.data.objects[f"object {index}"].matrix_world, np.float64)
+        for point, normal, green in zip(points, normals, (60 + 60 * index, 20)):
+            place = pixel(scene, (world @ np.append(point, 1))[:3])
+            check_close(picture["Combined"][place][:2], linear([60 + 60 * index, green]), 2e-6, f"object {index}")
+            turned = np.linalg.inv(world[:3, :3]).T @ normal
+            check_close(picture["Normal"][place], turned / np.linalg.norm(turned), 5e-3, f"normal of {index}")
+
+
+def test_nearest_object_hides():
+    scene = new_scene()
+    add_points([(0.01, 0.01, -3)], np.full((1, 4), 50, np.uint8), name="far")
+    add_points([(0.007, 0.007, -2)], np.full((1, 4), 220, np.uint8), name="near")
+    check(pixel(scene, (0.01, 0.01, -3)) == pixel(scene, (0.007, 0.007, -2)), "the test's own points")
+    picture = render()
+    check_close(picture["Combined"][pixel(scene, (0.01, 0.01, -3))][0], linear(220), 2e-6, "nearest point")
+
+
+def test_backface_culling():
+    new_scene()
+    obj = add_points([(-0.3, 0, -2), (0.3, 0, -2)], normals=[(0, 0, 1), (0, 0, -1)])
+    check(len(drawn(render())) == 2, "both points without culling")
+    obj.patina.cull_back = True
+    check(len(drawn(render())) == 1, "one point with culling")
+
+
+def test_hidden_objects():
+    scene = new_scene()
+    place = (0.01, 0.02, -2)
+    hidden = add_points([(0.3, 0, -2)], name="hidden")
+    hidden.hide_render = True
+    unseen = add_points([(-0.3, 0, -2)], name="unseen")
+    unseen.visible_camera = False
+    shown = add_points([place], name="shown")
+    shown.hide_viewport = True  # says nothing about renders
+    check(drawn(render()) == {pixel(scene, place)}, "only the object that renders show")
+
+
+def test_collection_instances():
+    scene = new_scene()
+    collection = bpy.data.collections.new("scan")
+    collection.objects.link(add_points([(0.05, 0.02, 0)], np.full((1, 4), 90, np.uint8), link=False))
+    for index, matrix in enumerate((Matrix.Translation((-0.4, 0, -2)),
+                                    Matrix.Translation((0.4, 0.2, -2)) @ Matrix.Diagonal((-2, 3, 1, 1)))):
+        empty = bpy.data.objects.new(f"instance {index}", None)
+        empty.instance_type, empty.instance_collection = 'COLLECTION', collection
+        empty.matrix_world = matrix
+        scene.collection.objects.link(empty)
+    picture = render()
+    wanted = {pixel(scene, (-0.35, 0.02, -2)), pixel(scene, (0.3, 0.26, -2))}
+    check(drawn(picture) == wanted, f"{drawn(picture)} is not {wanted}")
+    check(len(clouds.CACHE) >= 1 and "2 points" in stats_line(), f"statistics {stats_line()}")
+
+
+def stats_line():
+    import harness
+    return harness.stats[-1]
+
+
+def mesh_to_points(obj):
+    """A geometry node tree that turns an object's vertices into a point cloud."""
+    tree = bpy.data.node_groups.new("to points", 'GeometryNodeTree')
+    if hasattr(tree, "interface"):
+        for direction in ('INPUT', 'OUTPUT'):
+            tree.interface.new_socket("Geometry", in_out=direction, socket_type='NodeSocketGeometry')
+    else:
+        tree.inputs.new('NodeSocketGeometry', "Geometry")
+        tree.outputs.new('NodeSocketGeometry', "Geometry")
+    nodes = [tree.nodes.new(kind) for kind in ('NodeGroupInput', 'GeometryNodeMeshToPoints', 'NodeGroupOutput')]
+    for first, second in zip(nodes, nodes[1:]):
+        tree.links.new(first.outputs[0], second.inputs[0])
+    obj.modifiers.new("to points", 'NODES').node_group = tree
+
+
+def test_geometry_nodes_points():
+    scene = new_scene()
+    points = grid()
+    colors = np.full((12, 4), 150, np.uint8)
+    obj = add_points(points, colors)
+    mesh_to_points(obj)
+    picture = render()
+    check(drawn(picture) == {pixel(scene, point) for point in points}, "points of geometry nodes")
+    check_close(picture["Combined"][pixel(scene, points[3])][:3], linear([150] * 3), 2e-6, "their colour")
+
+
+def test_point_cloud_object():
+    scene = new_scene()
+    points = grid()
+    obj = add_points(points, np.full((12, 4), 77, np.uint8))
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    try:
+        bpy.ops.object.convert(target='POINTCLOUD')
+    except (RuntimeError, TypeError) as error:
+        raise Skip(f"this Blender makes no point cloud object: {error}") from None
+    obj = bpy.context.view_layer.objects.active
+    if obj.type != 'POINTCLOUD':
+        raise Skip(f"this Blender converts to {obj.type}")
+    picture = render()
+    check(drawn(picture) == {pixel(scene, point) for point in points}, "points of the point cloud")
+    check_close(picture["Combined"][pixel(scene, points[3])][:3], linear([77] * 3), 2e-6, "their colour")
+
+
+def test_meshes_with_faces_are_named():
+    new_scene()
+    mesh = bpy.data.meshes.new("triangle")
+    mesh.from_pydata([(0, 0, -2), (1, 0, -2), (0, 1, -2)], [], [(0, 1, 2)])
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("triangle", mesh))
+    check(not drawn(render()), "nothing drawn")
+    texts = " ".join(message for _, message in reports)
+    check("no visible object has points" in texts and "1 mesh object with faces" in texts, texts)
+
+
+def test_invalid_positions():
+    scene = new_scene()
+    place = (0.01, 0.02, -2)
+    add_points([place, (float("nan"), 0, -2), (float("inf"), 0, -2)])
+    check(drawn(render()) == {pixel(scene, place)}, "only the finite point")
+    check(any("2 points without a finite position" in message for _, message in reports), f"reports {reports}")
+
+
+def test_cache():
+    """Unchanged points are not built again; changed ones are; another file empties the cache."""
+    new_scene()
+    clouds.CACHE.clear()
+    obj = add_points(*sphere(500))
+    built = []
+    original = clouds.native.Cloud
+
+    class Counting(original):
+        def __init__(self, *arguments, **named):
+            built.append(1)
+            super().__init__(*arguments, **named)
+
+    clouds.native.Cloud = Counting
+    try:
+        first = render()["Combined"]
+        second = render()["Combined"]
+        check(len(built) == 1, f"{len(built)} builds for two renders")
+        check(np.array_equal(first, second), "two renders differ")
+        obj.location.x = 0.3
+        render()
+        check(len(built) == 1, "moving an object rebuilt its cloud")
+        obj.data.vertices[7].co.x += 0.5
+        obj.data.update()
+        render()
+        check(len(built) == 2, "changed points were not rebuilt")
+    finally:
+        clouds.native.Cloud = original
+    check(patina._forget in bpy.app.handlers.load_pre, "the load_pre handler")
+    patina._forget()
+    check(len(clouds.CACHE) == 0, "the cache is empty for another file")

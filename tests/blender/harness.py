@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the add-on's tests share: the loaded add-on, small scenes, rendered pixels as arrays."""
+
+import atexit
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SCRATCH = Path(tempfile.mkdtemp(prefix="patina-test-"))
+atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
+
+
+class Skip(Exception):
+    """This Blender cannot run the test; the text says why."""
+
+
+def load_addon():
+    """Imports and registers the repository's addon/ as package `patina`."""
+    packages = SCRATCH / "packages"
+    packages.mkdir()
+    (packages / "patina").symlink_to(REPOSITORY / "addon", target_is_directory=True)
+    sys.path.insert(0, str(packages))
+    sys.dont_write_bytecode = True
+    import patina
+    patina.register()
+    return patina
+
+
+patina = load_addon()
+from patina import engine, passes  # noqa: E402
+
+reports: list[tuple[str, str]] = []  # (kind, message) of the last render
+stats: list[str] = []
+_pixels: dict[str, dict[str, np.ndarray]] = {}
+
+
+def _record_tell(self, kind, text):
+    reports.append((kind, text))
+    _tell(self, kind, text)
+
+
+def _record_status(self, text, progress):
+    stats.append(text)
+    _status(self, text, progress)
+
+
+def _record_write(self, layer, camera, planes):
+    _write(self, layer, camera, planes)
+    result = self.get_result()  # what Blender holds now, not what we think we gave
+    size = (result.resolution_y, result.resolution_x)
+    _pixels[layer.name] = {item.name: _rect(item, *size) for item in result.layers[layer.name].passes}
+
+
+def _rect(item, height, width):
+    flat = np.empty((height * width, item.channels), np.float32)
+    try:
+        item.rect.foreach_get(flat.reshape(-1))
+    except TypeError:  # Blender 3.x
+        item.rect.foreach_get(flat)
+    return flat.reshape(height, width, item.channels)
+
+
+# Blender looks up its own methods (report, test_break) before ours, so ours are the ones to listen at.
+_write, passes.write = passes.write, _record_write
+_Engine = engine.PatinaRenderEngine
+_tell, _Engine._tell = _Engine._tell, _record_tell
+_status, _Engine._status = _Engine._status, _record_status
+
+
+# ---- scenes --------------------------------------------------------------------------------------------------
+
+
+def new_scene(width=64, height=48):
+    """Empties the file; a camera at the origin that looks down -z, no filters, transparent film, all passes."""
+    for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.lights, bpy.data.cameras, bpy.data.worlds,
+                       bpy.data.collections, bpy.data.node_groups, bpy.data.images):
+        for item in list(collection):
+            collection.remove(item)
+    old = bpy.context.scene
+    bpy.context.window.scene = scene = bpy.data.scenes.new("test")
+    bpy.data.scenes.remove(old)
+    render = scene.render
+    render.engine = 'PATINA'
+    render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
+    render.film_transparent = True
+    settings = scene.patina
+    settings.fill = settings.smooth = settings.antialias = 'OFF'
+    settings.device = 'CPU'
+    layer = scene.view_layers[0]
+    layer.use_pass_z = layer.use_pass_normal = layer.patina.use_pass_source = True
+    scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(scene.camera)
+    return scene
+
+
+def add_points(positions, colors=None, normals=None, name="points", matrix=None, link=True):
+    """A vertex-only mesh object. colors: uint8 (sRGB) or float32 (linear), (n, 4); normals: attribute "Normal"."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(positions))
+    mesh.vertices.foreach_set("co", np.asarray(positions, np.float32).reshape(-1))
+    if colors is not None and colors.dtype == np.uint8:
+        attribute = mesh.attributes.new("Col", 'BYTE_COLOR', 'POINT')
+        attribute.data.foreach_set("color_srgb", (colors / np.float32(255)).reshape(-1))
+    elif colors is not None:
+        mesh.attributes.new("Col", 'FLOAT_COLOR', 'POINT').data.foreach_set("color", colors.reshape(-1))
+    if normals is not None:
+        values = np.asarray(normals, np.float32).reshape(-1)
+        mesh.attributes.new("Normal", 'FLOAT_VECTOR', 'POINT').data.foreach_set("vector", values)
+    obj = bpy.data.objects.new(name, mesh)
+    obj.matrix_world = Matrix(matrix) if matrix is not None else Matrix()
+    if link:
+        bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def add_light(kind, energy, location=(0, 0, 0), direction=(0, 0, -1), color=(1, 1, 1)):
+    light = bpy.data.lights.new("light", kind)
+    light.energy, light.color = energy, color
+    obj = bpy.data.objects.new("light", light)
+    obj.location = location
+    obj.rotation_mode = 'QUATERNION'
+    obj.rotation_quaternion = Vector(direction).to_track_quat('-Z', 'Y')
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def set_world(color, strength=1.0):
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    if bpy.app.version < (5, 0, 0):
+        world.use_nodes = True
+    node = next(node for node in world.node_tree.nodes if node.bl_idname == 'ShaderNodeBackground')
+    node.inputs["Color"].default_value = (*color, 1)
+    node.inputs["Strength"].default_value = strength
+    return world
+
+
+def sphere(count=6000, radius=1.0, center=(0, 0, -4)):
+    """Evenly spread points of a sphere with their normals and byte colours."""
+    index = np.arange(count) + 0.5
+    z, angle = 1 - 2 * index / count, index * np.pi * (1 + 5 ** 0.5)
+    ring = np.sqrt(1 - z * z)
+    normals = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], 1)
+    colors = np.concatenate([normals * 100 + 128, np.full((count, 1), 255)], 1).astype(np.uint8)
+    return normals * radius + np.asarray(center), colors, normals
+
+
+# ---- pictures ------------------------------------------------------------------------------------------------
+
+
+def render():
+    """F12 in the background. The passes of the first view layer as Blender holds them; {} when none were written."""
+    pictures = render_layers()
+    return pictures.get(bpy.context.scene.view_layers[0].name, {})
+
+
+def render_layers():
+    for record in (reports, stats, _pixels):
+        record.clear()
+    bpy.context.view_layer.update()
+    bpy.ops.render.render()
+    return dict(_pixels)
+
+
+def failing_render():
+    """The message of a render that must fail."""
+    try:
+        render()
+    except RuntimeError as error:
+        return str(error)
+    raise AssertionError("the render did not fail")
+
+
+def saved(kind='OPEN_EXR'):
+    """The picture as Blender saves it, (height, width, 4), row 0 at the bottom."""
+    settings = bpy.context.scene.render.image_settings
+    settings.file_format, settings.color_mode = kind, 'RGBA'
+    settings.color_depth = '32' if kind == 'OPEN_EXR' else '8'
+    path = SCRATCH / ("picture.exr" if kind == 'OPEN_EXR' else "picture.png")
+    bpy.data.images['Render Result'].save_render(str(path))
+    image = bpy.data.images.load(str(path))
+    try:
+        width, height = image.size
+        pixels = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        return pixels.reshape(height, width, 4)
+    finally:
+        bpy.data.images.remove(image)
+        os.unlink(path)
+
+
+def linear(bytes_):
+    """sRGB bytes → linear, float64."""
+    s = np.asarray(bytes_, np.float64) / 255
+    return np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4)
+
+
+def drawn(picture):
+    """(row, column) of every pixel that is not background, as a set."""
+    return {tuple(place) for place in np.argwhere(picture["Combined"][..., 3] > 0).tolist()}
+
+
+def check(condition, message):
+    if not condition:
+        raise AssertionError(message)
+
+
+def check_close(got, wanted, tolerance, what):
+    error = np.abs(np.asarray(got, np.float64) - np.asarray(wanted, np.float64)).max()
+    check(error <= tolerance, f"{what}: {np.asarray(got)} is not {np.asarray(wanted)} (off by {error:.3g})")

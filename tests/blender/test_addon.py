@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's tests. Run in Blender, or with the bpy module:
+
+    blender -b --factory-startup --python-exit-code 1 --python tests/blender/test_addon.py [-- NAME ...]
+    python tests/blender/test_addon.py [NAME ...]
+
+The library is the one that PATINA_LIBRARY names. NAMEs run only the tests whose names contain one of them.
+"""
+
+import importlib
+import os
+import sys
+import time
+import traceback
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "check_import", "check_session")
+
+
+def wanted_names():
+    arguments = sys.argv
+    if "--" in arguments:
+        return arguments[arguments.index("--") + 1:]
+    return arguments[1:] if Path(arguments[0]).name == Path(__file__).name else []
+
+
+def main():
+    import harness
+    names = wanted_names()
+    passed = failed = skipped = 0
+    for module in map(importlib.import_module, MODULES):
+        for name, test in vars(module).items():
+            if not name.startswith("test_") or names and not any(part in name for part in names):
+                continue
+            label = f"{module.__name__[len('check_'):]}/{name[len('test_'):]}"
+            start = time.perf_counter()
+            try:
+                test()
+            except harness.Skip as reason:
+                skipped += 1
+                print(f"skip {label}: {reason}", flush=True)
+            except Exception as error:
+                failed += 1
+                where = traceback.extract_tb(error.__traceback__)[-1]
+                text = " ".join(str(error).split()) or type(error).__name__
+                print(f"FAIL {label}: {text} ({Path(where.filename).name}:{where.lineno})", flush=True)
+            else:
+                passed += 1
+                print(f"ok {label} ({time.perf_counter() - start:.2f} s)", flush=True)
+    harness.patina.unregister()
+    print(f"{passed} passed, {failed} failed, {skipped} skipped", flush=True)
+    return 1 if failed or not passed else 0
+
+
+code = main()
+sys.stdout.flush()
+sys.stderr.flush()
+os._exit(code)  # the bpy module may hang in its own clean-up

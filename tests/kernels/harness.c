@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "harness.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { MOST_BUFFERS = 2048, MOST_BLOCKS = 8192, MOST_SAVED = 1024, MOST_PRINTED = 6 };
+
+// The devices of `all`. Threads and batches must not show: one CPU device runs with odd ones.
+static const struct device_choice {
+    const char *label, *name;
+    uint32_t threads, batch;
+} choices[] = {
+    {"cpu-scalar", "cpu-scalar", 1, 0}, {"cpu", "cpu", 3, 1},         {"cpu-sse42", "cpu-sse42", 2, 0},
+    {"cpu-avx2", "cpu-avx2", 7, 3},     {"cpu-avx512", "cpu-avx512", 1, 0}, {"gl-egl", "gl-egl", 0, 0},
+    {"gl-osmesa", "gl-osmesa", 0, 0},
+};
+enum { CHOICES = sizeof choices / sizeof choices[0] };
+
+static struct slot {
+    patina_device *device;
+    char reason[256];
+    int wanted;
+} slots[CHOICES];
+
+// What the first device gave, by order of the calls in a case.
+struct saved {
+    void *data;
+    size_t size;
+};
+struct baseline {
+    struct saved saved[MOST_SAVED];
+    int count;
+};
+
+struct harness {
+    const struct harness_case *test;
+    const char *label;
+    patina_device *device;
+    struct baseline *baseline;
+    int first, compared;
+    int failures;
+    size_t open, pixels; // left open by the reference, of so many
+    void *blocks[MOST_BLOCKS];
+    int block_count;
+    struct pt_buffer buffers[MOST_BUFFERS];
+    int buffer_count;
+};
+
+struct entry {
+    const struct harness_case *test;
+    int choice; // -1: no device
+    struct baseline *baseline;
+};
+
+void harness_fail(struct harness *h, const char *label, int x, int y, const char *format, ...)
+{
+    if (h->failures++ >= MOST_PRINTED)
+        return;
+    char text[512];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    printf("  %s: %s: %s (%d, %d): %s\n", h->label, h->test->name, label, x, y, text);
+}
+
+void harness_note(struct harness *h, const char *format, ...)
+{
+    if (!h->first) // the same on every device
+        return;
+    va_list list;
+    va_start(list, format);
+    printf("  %s: ", h->test->name);
+    vprintf(format, list);
+    printf("\n");
+    va_end(list);
+}
+
+int harness_failures(const struct harness *h)
+{
+    return h->failures;
+}
+
+static void must(struct harness *h, int ok, const char *what)
+{
+    if (ok)
+        return;
+    char message[512] = "";
+    if (h->device)
+        patina_message(h->device, message, sizeof message);
+    printf("  %s: %s: %s failed: %s\n", h->label, h->test->name, what, message);
+    fail();
+}
+
+void *harness_alloc(struct harness *h, size_t size)
+{
+    void *block = calloc(1, size ? size : 1);
+    must(h, block && h->block_count < MOST_BLOCKS, "memory");
+    h->blocks[h->block_count++] = block;
+    return block;
+}
+
+struct pt_buffer *harness_buffer(struct harness *h, const void *data, size_t size)
+{
+    must(h, h->buffer_count < MOST_BUFFERS, "one more buffer");
+    struct pt_buffer *buffer = &h->buffers[h->buffer_count];
+    must(h, h->device->ops->buffer_create(h->device, size, data, 0, buffer) == PATINA_OK, "buffer_create");
+    h->buffer_count++;
+    return buffer;
+}
+
+void *harness_read(struct harness *h, const struct pt_buffer *buffer)
+{
+    void *data = harness_alloc(h, buffer->size);
+    must(h, h->device->ops->buffer_read(h->device, buffer, 0, data, buffer->size) == PATINA_OK, "buffer_read");
+    return data;
+}
+
+void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size,
+                 struct pt_buffer *const *buffers, uint32_t count)
+{
+    int result = h->device->ops->run(h->device, kernel, arguments, size, buffers, count, NULL);
+    must(h, result == PATINA_OK, pt_kernel_names[kernel]);
+}
+
+void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element,
+                  size_t per_pixel, uint32_t width)
+{
+    int at = h->compared++;
+    must(h, at < MOST_SAVED, "one more comparison");
+    struct saved *saved = &h->baseline->saved[at];
+    size_t size = count * element;
+    if (h->first) {
+        saved->data = malloc(size ? size : 1);
+        must(h, saved->data != NULL, "memory");
+        memcpy(saved->data, data, size);
+        saved->size = size;
+        h->baseline->count = at + 1;
+        return;
+    }
+    if (at >= h->baseline->count) // the first device failed before it came here
+        return;
+    must(h, saved->size == size, "same size on every device");
+    if (!memcmp(saved->data, data, size))
+        return;
+    size_t different = 0;
+    for (size_t i = 0; i < count; i++) {
+        const char *got = (const char *)data + i * element, *expected = (const char *)saved->data + i * element;
+        if (!memcmp(got, expected, element))
+            continue;
+        if (different++ > 3)
+            continue;
+        size_t pixel = i / per_pixel;
+        uint64_t g = 0, e = 0;
+        memcpy(&g, got, element);
+        memcpy(&e, expected, element);
+        harness_fail(h, label, (int)(pixel % width), (int)(pixel / width),
+                     "element %zu: bits %016llx, %s has %016llx", i % per_pixel, (unsigned long long)g,
+                     choices[0].label, (unsigned long long)e);
+    }
+    harness_fail(h, label, 0, 0, "%zu of %zu elements are not bit-equal to %s", different, count, choices[0].label);
+}
+
+int harness_near(double got, double expected, double error)
+{
+    return isfinite(expected) ? fabs(got - expected) <= error : got == expected;
+}
+
+void harness_unsure(struct harness *h, size_t unsure, size_t pixels, double most)
+{
+    h->open += unsure;
+    h->pixels += pixels;
+    if ((double)unsure > 2.0 + most * (double)pixels)
+        harness_fail(h, "reference", 0, 0, "leaves %zu of %zu pixels open", unsure, pixels);
+}
+
+static void run_entry(void **state)
+{
+    const struct entry *entry = *state;
+    const struct slot *slot = entry->choice >= 0 ? &slots[entry->choice] : NULL;
+    if (slot && !slot->device) {
+        printf("skip %s: %s\n", choices[entry->choice].label, slot->reason);
+        skip();
+    }
+    // Static: cmocka leaves a failed test by longjmp, and the next entry frees what it left.
+    static struct harness h;
+    for (int i = 0; i < h.block_count; i++)
+        free(h.blocks[i]);
+    for (int i = 0; i < h.buffer_count; i++)
+        h.device->ops->buffer_destroy(h.device, &h.buffers[i]);
+    memset(&h, 0, sizeof h);
+    if (!entry->test)
+        return;
+    h.test = entry->test;
+    h.baseline = entry->baseline;
+    h.label = slot ? choices[entry->choice].label : "reference";
+    h.device = slot ? slot->device : NULL;
+    h.first = entry->choice <= 0;
+    entry->test->run(&h);
+    if (h.open)
+        harness_note(&h, "%zu of %zu pixels left open by float32", h.open, h.pixels);
+    if (h.failures)
+        fail_msg("%s: %s: %d failures", h.label, h.test->name, h.failures);
+}
+
+static void open_devices(const char *wanted)
+{
+    int known = !strcmp(wanted, "all");
+    for (int i = 0; i < CHOICES; i++) {
+        slots[i].wanted = i == 0 || !strcmp(wanted, "all") || !strcmp(wanted, choices[i].label);
+        known |= !strcmp(wanted, choices[i].label);
+        if (!slots[i].wanted)
+            continue;
+        patina_device_desc desc = {.struct_size = sizeof desc,
+                                   .name = choices[i].name,
+                                   .threads = choices[i].threads,
+                                   .batch = choices[i].batch};
+        if (patina_device_create(&desc, &slots[i].device) != PATINA_OK) {
+            slots[i].device = NULL;
+            patina_message(NULL, slots[i].reason, sizeof slots[i].reason);
+        }
+    }
+    if (!known) {
+        fprintf(stderr, "no such device: %s\n", wanted);
+        exit(2);
+    }
+}
+
+int harness_main(int argc, char **argv, const struct harness_case *cases, size_t count)
+{
+    const char *wanted = "all";
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--device") && i + 1 < argc) {
+            wanted = argv[++i];
+        } else {
+            fprintf(stderr, "usage: %s [--device NAME|all]\n", argv[0]);
+            return 2;
+        }
+    }
+    setvbuf(stdout, NULL, _IOLBF, 0);
+    open_devices(wanted);
+    size_t most = count * CHOICES, used = 0;
+    struct CMUnitTest *tests = calloc(most + 1, sizeof *tests);
+    struct entry *entries = calloc(most + 1, sizeof *entries);
+    struct baseline *baselines = calloc(count + 1, sizeof *baselines);
+    if (!tests || !entries || !baselines)
+        return 2;
+    for (size_t c = 0; c < count; c++) {
+        for (int i = cases[c].host ? -1 : 0; i < (cases[c].host ? 0 : CHOICES); i++) {
+            if (i >= 0 && !slots[i].wanted)
+                continue;
+            char name[160];
+            snprintf(name, sizeof name, "%s [%s]", cases[c].name, i < 0 ? "reference" : choices[i].label);
+            entries[used] = (struct entry){&cases[c], i, &baselines[c]};
+            tests[used] = (struct CMUnitTest){strdup(name), run_entry, NULL, NULL, &entries[used]};
+            used++;
+        }
+    }
+    const char *program = strrchr(argv[0], '/') ? strrchr(argv[0], '/') + 1 : argv[0];
+    int failed = _cmocka_run_group_tests(program, tests, used, NULL, NULL);
+    struct entry last = {NULL, -1, NULL};
+    void *state = &last;
+    run_entry(&state); // frees what the last case left
+    for (size_t i = 0; i < used; i++)
+        free((void *)tests[i].name);
+    for (size_t c = 0; c < count; c++)
+        for (int i = 0; i < baselines[c].count; i++)
+            free(baselines[c].saved[i].data);
+    for (int i = 0; i < CHOICES; i++)
+        patina_device_destroy(slots[i].device);
+    free(tests);
+    free(entries);
+    free(baselines);
+    return failed;
+}

@@ -1,0 +1,511 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// scatter: the least key of every pixel, where the reference says which points may and which must be there.
+#include "harness.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_INSTANCES = 4, LANES = 16 };
+
+struct cloud {
+    struct chunk_view *chunks;
+    uint32_t chunk_count, slots, points;
+    float *positions;
+    uint32_t *ids, *surface;
+};
+
+struct scene {
+    struct view_args view;
+    struct cloud clouds[MOST_INSTANCES];
+    uint32_t count;
+};
+
+// A camera: view = rotation * object + shift, screen in pixels.
+struct camera {
+    double rotation[9], shift[3];
+    double focal, center_x, center_y; // pixels at z = 1, or pixels per unit (orthographic)
+    double near_clip;                 // orthographic: z = -view.z - near
+};
+
+static void random_rotation(struct rng *rng, double m[9])
+{
+    float a[3], b[3];
+    rng_direction(rng, a);
+    rng_direction(rng, b);
+    struct ref_vec x = ref_unit(ref_vec_of(a)), y = ref_vec_of(b);
+    y = ref_unit(ref_add(y, ref_scale(x, -ref_dot(x, y))));
+    struct ref_vec z = {x.y * y.z - x.z * y.y, x.z * y.x - x.x * y.z, x.x * y.y - x.y * y.x};
+    double rows[9] = {x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z};
+    memcpy(m, rows, sizeof rows);
+}
+
+static void set_chunk(struct chunk_view *chunk, const struct view_args *view, const struct camera *camera)
+{
+    const double *r = camera->rotation, *t = camera->shift;
+    double shift[3];
+    for (int i = 0; i < 3; i++) {
+        double z = -r[6 + i];
+        chunk->row[i] = (float)(camera->focal * r[i] + (view->perspective ? camera->center_x * z : 0.0));
+        chunk->row[3 + i] = (float)(camera->focal * r[3 + i] + (view->perspective ? camera->center_y * z : 0.0));
+        chunk->row[6 + i] = (float)z;
+    }
+    shift[0] = camera->focal * t[0] + (view->perspective ? camera->center_x * -t[2] : camera->center_x);
+    shift[1] = camera->focal * t[1] + (view->perspective ? camera->center_y * -t[2] : camera->center_y);
+    shift[2] = -t[2] - (view->perspective ? 0.0 : camera->near_clip);
+    for (int i = 0; i < 3; i++) {
+        chunk->hi[i] = (float)shift[i];
+        chunk->lo[i] = (float)(shift[i] - chunk->hi[i]);
+        double eye = 0.0; // rotation^T (eye_view - shift)
+        for (int k = 0; k < 3; k++)
+            eye += r[3 * k + i] * (view->perspective ? -t[k] : k == 2 ? 1.0 : 0.0);
+        chunk->eye[i] = (float)eye;
+    }
+    chunk->eye[3] = view->perspective ? 1.0f : 0.0f;
+}
+
+// Chunks of the given sizes, all seen by one camera; positions come from the caller afterwards.
+static struct cloud *add_cloud(struct harness *h, struct rng *rng, struct scene *scene, const struct camera *camera,
+                               const uint32_t *sizes, uint32_t count, int cull, uint32_t id_base)
+{
+    struct cloud *cloud = &scene->clouds[scene->count++];
+    cloud->chunk_count = count;
+    cloud->chunks = harness_alloc(h, count * sizeof *cloud->chunks);
+    for (uint32_t c = 0; c < count; c++) {
+        struct chunk_view *chunk = &cloud->chunks[c];
+        set_chunk(chunk, &scene->view, camera);
+        chunk->first = cloud->slots;
+        chunk->count = sizes[c];
+        chunk->padded = (sizes[c] + LANES - 1) / LANES * LANES;
+        chunk->cull = cull ? 1 : 0;
+        chunk->id_base = id_base;
+        cloud->slots += chunk->padded;
+        cloud->points += sizes[c];
+    }
+    cloud->positions = harness_alloc(h, 12 * (size_t)cloud->slots);
+    cloud->ids = harness_alloc(h, 4 * (size_t)cloud->slots);
+    cloud->surface = harness_alloc(h, 4 * (size_t)cloud->points);
+    uint32_t *order = harness_alloc(h, 4 * (size_t)cloud->points), next = 0;
+    for (uint32_t i = 0; i < cloud->points; i++) {
+        uint32_t j = rng_below(rng, i + 1);
+        order[i] = order[j];
+        order[j] = i;
+        cloud->surface[i] = rng_below(rng, 8) ? (uint32_t)rng_next(rng) : PT_NORMAL_NONE;
+    }
+    for (uint32_t c = 0; c < count; c++)
+        for (uint32_t i = 0; i < sizes[c]; i++)
+            cloud->ids[cloud->chunks[c].first + i] = order[next++];
+    return cloud;
+}
+
+static float *coordinate(struct cloud *cloud, uint32_t chunk, uint32_t slot, int axis)
+{
+    const struct chunk_view *view = &cloud->chunks[chunk];
+    return cloud->positions + 3 * (size_t)view->first + (size_t)axis * view->padded + slot;
+}
+
+// Points anywhere in the cube [-size, size]^3, padding repeated.
+static void scatter_about(struct rng *rng, struct cloud *cloud, double size)
+{
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        for (uint32_t i = 0; i < cloud->chunks[c].count; i++)
+            for (int axis = 0; axis < 3; axis++)
+                *coordinate(cloud, c, i, axis) = (float)rng_range(rng, -size, size);
+}
+
+static void pad(struct cloud *cloud)
+{
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        const struct chunk_view *chunk = &cloud->chunks[c];
+        for (uint32_t i = chunk->count; i < chunk->padded; i++) {
+            for (int axis = 0; axis < 3; axis++)
+                *coordinate(cloud, c, i, axis) = *coordinate(cloud, c, chunk->count - 1, axis);
+            cloud->ids[chunk->first + i] = cloud->ids[chunk->first + chunk->count - 1];
+        }
+    }
+}
+
+static uint64_t *run_scatter(struct harness *h, struct scene *scene)
+{
+    struct pt_buffer *buffers[1 + 4 * MOST_INSTANCES];
+    size_t pixels = (size_t)scene->view.width * scene->view.height;
+    uint64_t *empty = harness_alloc(h, pixels * 8);
+    for (size_t i = 0; i < pixels; i++)
+        empty[i] = REF_EMPTY_KEY;
+    uint32_t n = 0;
+    buffers[n++] = harness_buffer(h, empty, pixels * 8);
+    for (uint32_t i = 0; i < scene->count; i++) {
+        struct cloud *cloud = &scene->clouds[i];
+        pad(cloud);
+        buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
+        buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->ids, 4 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->points);
+    }
+    struct scatter_args args = {.view = scene->view, .instances = scene->count};
+    harness_run(h, PT_KERNEL_scatter, &args, sizeof args, buffers, n);
+    uint64_t *keys = harness_read(h, buffers[0]);
+    harness_same(h, "keys", keys, pixels, 8, 1, scene->view.width);
+    return keys;
+}
+
+static int by_id(const void *a, const void *b)
+{
+    const struct ref_splat *x = a, *y = b;
+    return x->id < y->id ? -1 : x->id > y->id;
+}
+
+// Runs the scene and holds every pixel against the points that may, and those that must, be there.
+static uint64_t *check_scene(struct harness *h, struct scene *scene)
+{
+    uint64_t *keys = run_scatter(h, scene);
+    uint32_t width = scene->view.width, total = 0, n = 0, open = 0;
+    size_t pixels = (size_t)width * scene->view.height, covered = 0;
+    for (uint32_t i = 0; i < scene->count; i++)
+        total += scene->clouds[i].points;
+    struct ref_splat *splats = harness_alloc(h, (total + 1) * sizeof *splats);
+    double *farthest = harness_alloc(h, pixels * sizeof *farthest); // no result may lie behind this
+    for (size_t i = 0; i < pixels; i++)
+        farthest[i] = INFINITY;
+    for (uint32_t i = 0; i < scene->count; i++) {
+        const struct cloud *cloud = &scene->clouds[i];
+        for (uint32_t c = 0; c < cloud->chunk_count; c++)
+            for (uint32_t s = 0; s < cloud->chunks[c].count; s++)
+                splats[n++] = ref_scatter(&scene->view, &cloud->chunks[c], cloud->positions, cloud->ids,
+                                          cloud->surface, s);
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        open += splats[i].possible && !splats[i].definite;
+        if (splats[i].possible && splats[i].definite) {
+            double *at = &farthest[(size_t)splats[i].y0 * width + (size_t)splats[i].x0];
+            *at = fmin(*at, splats[i].z.hi);
+        }
+    }
+    qsort(splats, n, sizeof *splats, by_id);
+    for (size_t i = 0; i < pixels; i++) {
+        int x = (int)(i % width), y = (int)(i / width);
+        double z = ref_key_z(keys[i]);
+        covered += keys[i] != REF_EMPTY_KEY;
+        if (z > farthest[i])
+            harness_fail(h, "keys", x, y, "got z %.9g id %u, expected at most z %.9g", z, ref_key_id(keys[i]),
+                         farthest[i]);
+        if (keys[i] == REF_EMPTY_KEY)
+            continue;
+        struct ref_splat wanted = {.id = ref_key_id(keys[i])};
+        const struct ref_splat *splat = bsearch(&wanted, splats, n, sizeof *splats, by_id);
+        if (!splat)
+            harness_fail(h, "keys", x, y, "got id %u, which no point has", wanted.id);
+        else if (!splat->possible || x < splat->x0 || x > splat->x1 || y < splat->y0 || y > splat->y1)
+            harness_fail(h, "keys", x, y, "got id %u, expected it at (%d..%d, %d..%d), possible %d", wanted.id,
+                         splat->x0, splat->x1, splat->y0, splat->y1, splat->possible);
+        else if (!(z >= splat->z.lo * (1.0 - TOL_UNIT) && z <= splat->z.hi * (1.0 + TOL_UNIT)))
+            harness_fail(h, "keys", x, y, "got id %u at z %.9g, expected %.9g to %.9g", wanted.id, z, splat->z.lo,
+                         splat->z.hi);
+    }
+    harness_note(h, "%u points, %u open, %zu of %zu pixels covered", n, open, covered, pixels);
+    return keys;
+}
+
+static struct view_args window(uint32_t width, uint32_t height, int perspective, double focal)
+{
+    struct view_args view = picture_view(width, height, perspective);
+    view.ray_xs = view.ray_ys = view.footprint = (float)(1.0 / focal);
+    return view;
+}
+
+static struct camera look(struct rng *rng, const struct view_args *view, double focal, double distance)
+{
+    struct camera camera = {.focal = focal, .near_clip = view->perspective ? 0.0 : -100.0};
+    random_rotation(rng, camera.rotation);
+    camera.shift[0] = rng_range(rng, -0.1, 0.1);
+    camera.shift[1] = rng_range(rng, -0.1, 0.1);
+    camera.shift[2] = -distance;
+    camera.center_x = view->origin_x + view->width * 0.5;
+    camera.center_y = view->origin_y + view->height * 0.5;
+    return camera;
+}
+
+static const uint32_t sizes[] = {1, 15, 16, 17, 300, 1000, 31, 2};
+enum { SIZES = sizeof sizes / sizeof sizes[0] };
+
+static void random_clouds(struct harness *h, int perspective, uint32_t seed)
+{
+    struct rng rng = {seed};
+    struct scene scene = {.view = window(67, 45, perspective, perspective ? 60.0 : 20.0)};
+    for (uint32_t i = 0; i < 3; i++) {
+        struct camera camera = look(&rng, &scene.view, 1.0 / scene.view.ray_xs, 4.0);
+        // The second is mirrored, the third squeezed.
+        for (int k = 0; k < 9; k++)
+            camera.rotation[k] *= i == 1 ? -1.0 : i == 2 && k % 3 == 0 ? 0.05 : 1.0;
+        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i != 1, i * 5000), i == 0 ? 1.0 : 5.0);
+    }
+    check_scene(h, &scene);
+}
+
+static void perspective(struct harness *h)
+{
+    random_clouds(h, 1, 1);
+}
+
+static void orthographic(struct harness *h)
+{
+    random_clouds(h, 0, 2);
+}
+
+static void plane_sizes(struct harness *h)
+{
+    static const uint32_t shapes[][2] = {{1, 1}, {16384, 1}, {1, 333}, {64, 64}, {17, 2}};
+    struct rng rng = {3};
+    for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
+        double focal = shapes[i][0];
+        struct scene scene = {.view = window(shapes[i][0], shapes[i][1], 1, focal)};
+        struct camera camera = look(&rng, &scene.view, focal, 3.0);
+        for (int k = 0; k < 6; k++) // squeezed into the window's shape
+            camera.rotation[k] *= k < 3 ? 1.0 : (double)shapes[i][1] / shapes[i][0];
+        camera.shift[0] = camera.shift[1] = 0.0;
+        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 1.5);
+        check_scene(h, &scene);
+    }
+}
+
+// Guard bands reach to the left of and below the picture.
+static void negative_origin(struct harness *h)
+{
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {4};
+        struct scene scene = {.view = window(67, 45, p, p ? 60.0 : 20.0)};
+        scene.view.origin_x = scene.view.origin_y = -32;
+        struct camera camera = look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 2.0);
+        check_scene(h, &scene);
+    }
+}
+
+static void not_numbers(struct harness *h)
+{
+    static const float odd[] = {NAN, INFINITY, -INFINITY, 3e38f, -3e38f, 1e-40f, -0.0f, 0x1p31f, -0x1p31f, 0x1p32f};
+    enum { ODD = sizeof odd / sizeof odd[0] };
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {5};
+        struct scene scene = {.view = window(67, 45, p, p ? 60.0 : 20.0)};
+        struct camera camera = look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+        struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0);
+        scatter_about(&rng, cloud, 1.0);
+        for (uint32_t i = 0; i < 1000; i += 2)
+            *coordinate(cloud, 5, i, (int)rng_below(&rng, 3)) = odd[rng_below(&rng, ODD)];
+        check_scene(h, &scene);
+    }
+}
+
+// z exact in float32: boundaries belong to the view, one ulp beyond does not; whole screen positions floor to themselves.
+static void exact_borders(struct harness *h)
+{
+    static const uint32_t one[] = {8};
+    struct rng rng = {6};
+    for (int p = 0; p < 2; p++) {
+        struct scene scene = {.view = window(4, 2, p, 1.0)};
+        scene.view.origin_x = scene.view.origin_y = 0;
+        scene.view.z_near = p ? 0.5f : 0.0f;
+        scene.view.z_far = 64.0f;
+        struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = 1.0};
+        struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, one, 1, 0, 0);
+        // Slot i at screen (i % 4, i / 4) exactly.
+        const float z[8] = {scene.view.z_near, float_step(p ? 0.5f : 0x1p-126f, p ? -1 : 0), 64.0f, float_step(64.0f, 1),
+                            1.0f, 2.0f, 4.0f, 8.0f};
+        for (uint32_t i = 0; i < 8; i++) {
+            float depth = !p && i == 1 ? -z[i] : z[i]; // before the near plane
+            *coordinate(cloud, 0, i, 0) = (float)(i % 4) * (p ? depth : 1.0f);
+            *coordinate(cloud, 0, i, 1) = (float)(i / 4) * (p ? depth : 1.0f);
+            *coordinate(cloud, 0, i, 2) = -depth;
+        }
+        uint64_t *keys = run_scatter(h, &scene);
+        for (uint32_t i = 0; i < 8; i++) {
+            // rcp may round x below a whole number: only its row of zeros and z are exact in perspective.
+            int exact = !p || i % 4 == 0, drawn = i != 1 && i != 3;
+            uint64_t expected = drawn ? ref_key(z[i], cloud->ids[i]) : REF_EMPTY_KEY;
+            if ((!p || i < 4) && exact && keys[i] != expected)
+                harness_fail(h, p ? "perspective" : "orthographic", (int)(i % 4), (int)(i / 4),
+                             "got %016llx, expected %016llx", (unsigned long long)keys[i],
+                             (unsigned long long)expected);
+        }
+        check_scene(h, &scene);
+    }
+}
+
+static void camera_plane(struct harness *h)
+{
+    struct rng rng = {7};
+    struct scene scene = {.view = window(67, 45, 1, 60.0)};
+    struct camera camera = look(&rng, &scene.view, 60.0, 0.0); // in the middle of the cloud
+    struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0);
+    scatter_about(&rng, cloud, 1.0);
+    for (uint32_t i = 0; i < 500; i++) // exactly at the eye, and nearly
+        for (int axis = 0; axis < 3; axis++)
+            *coordinate(cloud, 5, i, axis) =
+                (float)(-(camera.rotation[axis] * camera.shift[0] + camera.rotation[3 + axis] * camera.shift[1] +
+                          camera.rotation[6 + axis] * camera.shift[2]) +
+                        (i ? rng_range(&rng, -1.0, 1.0) * pow(10.0, -rng_range(&rng, 0.0, 12.0)) : 0.0));
+    check_scene(h, &scene);
+    scene.view.z_near = 0x1p-126f; // the least that is not denormal
+    check_scene(h, &scene);
+}
+
+// All points share one place: the least id wins, whichever chunk, thread or lane it is in. ids up to 2^32 - 3.
+static void coincident(struct harness *h)
+{
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {8};
+        struct scene scene = {.view = window(67, 45, p, 60.0)};
+        struct camera camera = look(&rng, &scene.view, 60.0, 4.0);
+        uint32_t bases[3] = {0xFFFFFFFEu - 1382u, 70000u, 0x80000000u};
+        for (int i = 0; i < 3; i++) {
+            struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, bases[i]);
+            if (i == 0)
+                HARNESS_CHECK(h, cloud->points == 1382);
+        }
+        uint64_t *keys = check_scene(h, &scene);
+        size_t found = 0;
+        for (size_t i = 0; i < (size_t)scene.view.width * scene.view.height; i++) {
+            found += keys[i] != REF_EMPTY_KEY;
+            if (keys[i] != REF_EMPTY_KEY && ref_key_id(keys[i]) != 70000u)
+                harness_fail(h, "keys", (int)(i % 67), (int)(i / 67), "got id %u, expected 70000", ref_key_id(keys[i]));
+        }
+        HARNESS_CHECK(h, found == 1);
+        scene.clouds[1] = scene.clouds[2] = scene.clouds[0]; // the greatest ids alone
+        scene.count = 1;
+        keys = check_scene(h, &scene);
+        for (size_t i = 0; i < (size_t)scene.view.width * scene.view.height; i++)
+            if (keys[i] != REF_EMPTY_KEY && ref_key_id(keys[i]) != bases[0])
+                harness_fail(h, "keys", (int)(i % 67), (int)(i / 67), "got id %u, expected %u", ref_key_id(keys[i]),
+                             bases[0]);
+    }
+}
+
+static void depth_range(struct harness *h) // far / near = 10^7
+{
+    struct rng rng = {9};
+    struct scene scene = {.view = window(67, 45, 1, 60.0)};
+    scene.view.z_near = 1e-3f;
+    scene.view.z_far = 1e4f;
+    struct camera camera = look(&rng, &scene.view, 60.0, 0.0);
+    camera.shift[0] = camera.shift[1] = 0.0;
+    struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0);
+    for (uint32_t c = 0; c < SIZES; c++)
+        for (uint32_t i = 0; i < sizes[c]; i++) {
+            double z = pow(10.0, rng_range(&rng, -3.5, 4.5)), v[3];
+            v[0] = rng_range(&rng, -0.6, 0.6) * z;
+            v[1] = rng_range(&rng, -0.4, 0.4) * z;
+            v[2] = -z;
+            for (int a = 0; a < 3; a++)
+                *coordinate(cloud, c, i, a) =
+                    (float)(camera.rotation[a] * v[0] + camera.rotation[3 + a] * v[1] + camera.rotation[6 + a] * v[2]);
+        }
+    check_scene(h, &scene);
+}
+
+static void orthographic_scales(struct harness *h)
+{
+    static const double scales[] = {1e-6, 1e6};
+    for (int i = 0; i < 2; i++) {
+        struct rng rng = {10};
+        double focal = 67.0 / scales[i];
+        struct scene scene = {.view = window(67, 45, 0, focal)};
+        scene.view.z_far = (float)(200.0 * scales[i]); // near = -far = -100 scales
+        struct camera camera = look(&rng, &scene.view, focal, 0.0);
+        camera.near_clip = -100.0 * scales[i];
+        camera.shift[0] = camera.shift[1] = 0.0;
+        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0), 0.6 * scales[i]);
+        check_scene(h, &scene);
+    }
+}
+
+// A camera 5 10^6 away from the chunk's origin, and matrices of rank 0 to 2.
+static void far_and_flat(struct harness *h)
+{
+    struct rng rng = {11};
+    struct scene scene = {.view = window(67, 45, 1, 60.0)};
+    scene.view.z_far = 1e7f;
+    struct camera camera = look(&rng, &scene.view, 60.0 * 2e6, 5e6);
+    scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 1.0);
+    check_scene(h, &scene);
+    for (int rank = 0; rank < 3; rank++) {
+        struct scene flat = {.view = window(67, 45, 1, 60.0)};
+        struct camera view = look(&rng, &flat.view, 60.0, 4.0);
+        for (int k = 0; k < 9; k++)
+            view.rotation[k] *= k % 3 < rank;
+        scatter_about(&rng, add_cloud(h, &rng, &flat, &view, sizes, SIZES, 1, 0), 1.0);
+        check_scene(h, &flat);
+    }
+}
+
+// Facing away, edge-on to the bit, and without a normal.
+static void culling(struct harness *h)
+{
+    static const uint32_t four[] = {4};
+    struct rng rng = {12};
+    struct scene scene = {.view = window(4, 1, 0, 1.0)};
+    scene.view.origin_x = scene.view.origin_y = 0;
+    struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = 1.0};
+    struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, four, 1, 1, 0);
+    // (0,0,1) towards the viewer, (0,0,-1), (1,0,0) edge-on, none; spacing bits must not matter
+    const uint32_t words[4] = {4095u | 4095u << 13 | 7u << 26, 8190u | 8190u << 13, 8190u | 4095u << 13 | 9u << 26,
+                               PT_NORMAL_NONE | 3u << 26};
+    for (uint32_t i = 0; i < 4; i++) {
+        *coordinate(cloud, 0, i, 0) = (float)i + 0.5f;
+        *coordinate(cloud, 0, i, 1) = 0.5f;
+        *coordinate(cloud, 0, i, 2) = -3.0f;
+        cloud->surface[cloud->ids[i]] = words[i];
+    }
+    uint64_t *keys = check_scene(h, &scene);
+    for (uint32_t i = 0; i < 4; i++) {
+        uint64_t expected = i == 0 || i == 3 ? ref_key(3.0f, cloud->ids[i]) : REF_EMPTY_KEY;
+        if (keys[i] != expected)
+            harness_fail(h, "keys", (int)i, 0, "got %016llx, expected %016llx", (unsigned long long)keys[i],
+                         (unsigned long long)expected);
+    }
+}
+
+// No instance at all, and a plane that already holds something nearer.
+static void nothing(struct harness *h)
+{
+    struct scene scene = {.view = window(67, 45, 1, 60.0)};
+    uint64_t *keys = run_scatter(h, &scene);
+    for (size_t i = 0; i < (size_t)67 * 45; i++)
+        HARNESS_CHECK(h, keys[i] == REF_EMPTY_KEY);
+}
+
+// Reference alone: a point on the axis falls into the middle pixel, at its distance.
+static void sanity(struct harness *h)
+{
+    struct view_args view = window(64, 64, 1, 100.0);
+    struct chunk_view chunk = {.row = {100, 0, -48, 0, 100, -40, 0, 0, -1}, .count = 1, .padded = 1, .id_base = 5};
+    float p[3] = {0.01f, 0.01f, -2.0f};
+    uint32_t id = 1, words[2] = {0, 0};
+    struct ref_splat splat = ref_scatter(&view, &chunk, p, &id, words, 0);
+    HARNESS_CHECK(h, splat.possible && splat.definite && splat.id == 6);
+    HARNESS_CHECK(h, splat.x0 == 32 && splat.y0 == 32); // 48.5 - origin 16, 40.5 - origin 8
+    HARNESS_CHECK(h, splat.z.lo <= 2.0 && splat.z.hi >= 2.0 && splat.z.hi - splat.z.lo < 1e-5);
+    p[2] = 2.0f;
+    HARNESS_CHECK(h, !ref_scatter(&view, &chunk, p, &id, words, 0).possible);
+}
+
+int main(int argc, char **argv)
+{
+    static const struct harness_case cases[] = {
+        {"sanity", sanity, 1},
+        {"random clouds, perspective", perspective, 0},
+        {"random clouds, orthographic", orthographic, 0},
+        {"plane sizes", plane_sizes, 0},
+        {"window left of and below the picture", negative_origin, 0},
+        {"NaN, Inf and huge positions", not_numbers, 0},
+        {"z at near and far, whole screen positions", exact_borders, 0},
+        {"points at and behind the camera plane", camera_plane, 0},
+        {"coincident points, ids near 2^32 - 2", coincident, 0},
+        {"far / near = 10^7", depth_range, 0},
+        {"orthographic scales 1e-6 and 1e6, near = -far", orthographic_scales, 0},
+        {"camera 5 10^6 away, singular matrices", far_and_flat, 0},
+        {"back faces", culling, 0},
+        {"nothing to draw", nothing, 0},
+    };
+    return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
+}

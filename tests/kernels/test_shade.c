@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// shade: colours of every format, normals measured, filled, blended and estimated, Phong light.
+#include "harness.h"
+
+#include <math.h>
+#include <string.h>
+
+struct setup {
+    struct picture picture;
+    struct shade_args args;
+    void *colors;
+    size_t colors_size;
+    float *shading; // before
+};
+
+static struct setup make(struct harness *h, struct rng *rng, int perspective, enum picture_kind kind, uint32_t format)
+{
+    struct setup s = {.picture = picture_random(h, rng, picture_view(67, 45, perspective), kind, 0.4)};
+    picture_invent(&s.picture, rng, 0.7, 9);
+    struct instance_args *instance = &s.args.instance;
+    s.args.view = s.picture.view;
+    s.args.eye_z = perspective ? 0.0f : -3.0f;
+    instance->id_base = s.picture.id_base;
+    instance->id_count = (uint32_t)(s.picture.count * 3 / 4);
+    instance->has_normals = 1;
+    instance->color_format = format;
+    instance->lit = 1;
+    instance->shininess = 32;
+    instance->ambient = 0.7f;
+    instance->diffuse = 0.9f;
+    instance->specular = 0.5f;
+    s.colors_size = (size_t)instance->id_count * 12;
+    s.colors = harness_alloc(h, s.colors_size);
+    for (size_t i = 0; i < (size_t)instance->id_count * 3; i++) {
+        if (format == 1)
+            ((uint8_t *)s.colors)[i] = (uint8_t)rng_next(rng);
+        else
+            ((float *)s.colors)[i] = (float)rng_range(rng, 0.0, 1.5);
+    }
+    if (format == 1)
+        s.colors_size = ((size_t)instance->id_count * 3 + 3) / 4 * 4;
+    for (int c = 0; c < 3; c++) {
+        instance->color[c] = (float)rng_unit(rng);
+        s.args.world[c] = (float)rng_unit(rng);
+    }
+    s.args.light_count = 4;
+    for (uint32_t i = 0; i < s.args.light_count; i++) {
+        struct light_args *light = &s.args.lights[i];
+        light->type = i % 2 ? 2 : 1;
+        rng_direction(rng, light->vector);
+        for (int c = 0; c < 3; c++) {
+            light->color[c] = (float)rng_range(rng, 0.0, 4.0);
+            light->vector[c] *= i % 2 ? 3.0f : 1.0f;
+        }
+    }
+    s.shading = harness_alloc(h, s.picture.count * 16);
+    for (size_t i = 0; i < s.picture.count; i++) {
+        if (rng_below(rng, 4))
+            rng_direction(rng, s.shading + 4 * i);
+    }
+    return s;
+}
+
+static void check(struct harness *h, const struct setup *s, double most_open)
+{
+    const struct picture *picture = &s->picture;
+    size_t count = picture->count, open = 0;
+    float *unset = harness_alloc(h, count * 16);
+    for (size_t i = 0; i < count * 4; i++)
+        unset[i] = -5.0f;
+    uint32_t *words = harness_alloc(h, (size_t)s->args.instance.id_count * 4);
+    struct pt_buffer *keys = harness_buffer(h, picture->keys, count * 8);
+    struct pt_buffer *from = harness_buffer(h, picture->from, count * 4);
+    struct pt_buffer *normal = harness_buffer(h, picture->normal, count * 16);
+    struct pt_buffer *deff = harness_buffer(h, picture->deff, count * 4);
+    struct pt_buffer *surface = harness_buffer(h, words, (size_t)s->args.instance.id_count * 4);
+    struct pt_buffer *colors = harness_buffer(h, s->colors, s->colors_size);
+    struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
+    struct pt_buffer *color = harness_buffer(h, unset, count * 16);
+    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, surface, colors, shading, color);
+    const float *got = harness_read(h, color), *got_n = harness_read(h, shading);
+    struct ref_planes planes = picture_planes(picture);
+    planes.shading = s->shading;
+    planes.colors = s->colors;
+    for (size_t i = 0; i < count; i++) {
+        int x = (int)(i % picture->view.width), y = (int)(i / picture->view.width);
+        struct ref_shade expected = ref_shade(&s->args, &planes, x, y);
+        const float *c = got + 4 * i, *n = got_n + 4 * i;
+        if (!expected.written) {
+            if (memcmp(c, unset + 4 * i, 16) || memcmp(n, s->shading + 4 * i, 16))
+                harness_fail(h, "untouched", x, y, "was written");
+            continue;
+        }
+        open += (size_t)expected.unsure;
+        if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]))
+            harness_fail(h, "color", x, y, "got (%g %g %g)", c[0], c[1], c[2]);
+        if (expected.unsure || expected.singular)
+            continue;
+        for (int k = 0; k < 4; k++)
+            if (!harness_near(c[k], expected.color[k], expected.color_error[k]))
+                harness_fail(h, "color", x, y, "channel %d: got %.9g, expected %.9g +- %.2g (from %u)", k, c[k],
+                             expected.color[k], expected.color_error[k], picture->from[i]);
+        double off = ref_length(ref_add(ref_vec_of(n), ref_scale(expected.n, -1.0)));
+        if (s->args.instance.has_normals && !(off <= 2.0 * expected.normal_error))
+            harness_fail(h, "normal", x, y, "got (%.7f %.7f %.7f), expected (%.7f %.7f %.7f) +- %.2g", n[0], n[1], n[2],
+                         expected.n.x, expected.n.y, expected.n.z, 2.0 * expected.normal_error);
+    }
+    harness_unsure(h, open, count, most_open);
+}
+
+static void formats(struct harness *h)
+{
+    for (uint32_t format = 0; format < 3; format++)
+        for (uint32_t lit = 0; lit < 2; lit++) {
+            struct rng rng = {format};
+            struct setup s = make(h, &rng, 1, PICTURE_SURFACES, format);
+            s.args.instance.lit = lit;
+            check(h, &s, TOL_UNSURE_SHARE);
+        }
+}
+
+static void kinds(struct harness *h)
+{
+    for (int p = 0; p < 2; p++)
+        for (int kind = 0; kind < PICTURE_KINDS; kind++)
+            for (uint32_t refined = 0; refined < 2; refined++) {
+                struct rng rng = {(uint64_t)kind};
+                struct setup s = make(h, &rng, p, (enum picture_kind)kind, 2);
+                s.args.refined = refined;
+                check(h, &s, kind == PICTURE_GRAZING || kind == PICTURE_TIGHT ? TOL_UNSURE_HARD : TOL_UNSURE_SHARE);
+            }
+}
+
+static void estimated(struct harness *h)
+{
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {7};
+        struct setup s = make(h, &rng, p, PICTURE_SURFACES, 0);
+        s.args.instance.has_normals = 0;
+        s.args.refined = 1;
+        check(h, &s, TOL_UNSURE_SHARE);
+    }
+}
+
+static void materials(struct harness *h)
+{
+    static const struct {
+        uint32_t shininess;
+        float ambient, diffuse, specular;
+    } known[] = {{1, 0, 0, 1}, {2, 1, 1, 1}, {500, 0, 0, 1}, {32, 1, 0, 0}, {32, 0, 1, 0}, {32, 0, 0, 0}};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        struct rng rng = {8};
+        struct setup s = make(h, &rng, 1, PICTURE_SURFACES, 2);
+        s.args.instance.shininess = known[i].shininess;
+        s.args.instance.ambient = known[i].ambient;
+        s.args.instance.diffuse = known[i].diffuse;
+        s.args.instance.specular = known[i].specular;
+        check(h, &s, TOL_UNSURE_SHARE);
+    }
+}
+
+// No light, 32 lights, a light at a point, lights far away and behind.
+static void lights(struct harness *h)
+{
+    struct rng rng = {9};
+    struct setup s = make(h, &rng, 1, PICTURE_SURFACES, 2);
+    s.args.light_count = 0;
+    check(h, &s, TOL_UNSURE_SHARE);
+    s.args.light_count = PT_MAX_LIGHTS;
+    for (uint32_t i = 0; i < PT_MAX_LIGHTS; i++) {
+        struct light_args *light = &s.args.lights[i];
+        light->type = 1 + i % 2;
+        rng_direction(&rng, light->vector);
+        for (int c = 0; c < 3; c++) {
+            light->color[c] = (float)rng_unit(&rng);
+            light->vector[c] *= i % 2 ? (float)pow(10.0, rng_range(&rng, -1.0, 4.0)) : 1.0f;
+        }
+    }
+    check(h, &s, TOL_UNSURE_SHARE);
+    s.args.light_count = 1;
+    s.args.lights[0].type = 2;
+    for (size_t i = 0; i < s.picture.count; i += 97) { // exactly at a point
+        if (s.picture.keys[i] == REF_EMPTY_KEY)
+            continue;
+        struct ref_ray ray = ref_ray(&s.args.view, (int)(i % 67), (int)(i / 67));
+        double z = ref_key_z(s.picture.keys[i]);
+        s.args.lights[0].vector[0] = (float)(ray.u * z);
+        s.args.lights[0].vector[1] = (float)(ray.v * z);
+        s.args.lights[0].vector[2] = (float)-z;
+        check(h, &s, TOL_UNSURE_SHARE);
+    }
+}
+
+// Reference alone: a white wall, lit head-on by a sun of irradiance pi, is as bright as a mirror of it: 1.
+static void sanity(struct harness *h)
+{
+    uint64_t key = ref_key(2.0f, 0);
+    uint32_t from = 0;
+    float normal[4] = {0, 0, -1, 1}, deff = 0.1f; // turned away: lit all the same
+    struct shade_args args = {.view = {.width = 1, .height = 1}, .light_count = 1};
+    args.instance = (struct instance_args){
+        .id_count = 1, .has_normals = 1, .lit = 1, .shininess = 8, .diffuse = 1.0f, .color = {1, 0.5f, 0}};
+    args.lights[0] = (struct light_args){1, {(float)3.14159265358979, 0.0f, 0.0f}, {0, 0, 1}};
+    struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff};
+    struct ref_shade out = ref_shade(&args, &planes, 0, 0);
+    HARNESS_CHECK(h, fabs(out.color[0] - 1.0) < 1e-6 && out.color[1] == 0.0 && out.color[3] == 1.0);
+    args.lights[0].type = 2; // two units before the wall: a quarter
+    args.lights[0].vector[2] = 0.0f;
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.25) < 1e-6);
+    args.instance.specular = 1.0f; // the highlight doubles it
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.5) < 1e-6);
+    HARNESS_CHECK(h, fabs(ref_srgb(188) - 0.502886) < 1e-5 && ref_srgb(255) == 1.0 && ref_srgb(0) == 0.0);
+}
+
+int main(int argc, char **argv)
+{
+    static const struct harness_case cases[] = {
+        {"sanity", sanity, 1},
+        {"colour formats, lit and unlit", formats, 0},
+        {"pictures of all kinds, paper and refined", kinds, 0},
+        {"estimated normals", estimated, 0},
+        {"materials", materials, 0},
+        {"lights", lights, 0},
+    };
+    return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
+}

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Passes for the artist: linear depth, world-space normal, and where each pixel's surface was measured.
+#include "reference.h"
+#include "tolerances.h"
+
+#include <math.h>
+
+struct ref_extract ref_extract(const struct extract_args *args, const struct ref_planes *planes, int x, int y)
+{
+    uint32_t width = args->view.width, px = (uint32_t)x + args->crop_x, py = (uint32_t)y + args->crop_y;
+    size_t pixel = (size_t)py * width + px;
+    struct ref_extract out = {.depth = INFINITY};
+    if (planes->keys[pixel] == REF_EMPTY_KEY)
+        return out;
+    out.depth = ref_key_z(planes->keys[pixel]);
+    struct ref_vec n = ref_vec_of(planes->shading + 4 * pixel);
+    const float *m = args->world_from_view;
+    out.normal = ref_vec(m[0] * n.x + m[1] * n.y + m[2] * n.z, m[3] * n.x + m[4] * n.y + m[5] * n.z,
+                         m[6] * n.x + m[7] * n.y + m[8] * n.z);
+    for (int i = 0; i < 9; i++)
+        out.normal_error += TOL_ROTATE * fabs((double)m[i]); // |n| <= 1
+    uint32_t from = planes->from[pixel] & ~PT_FROM_MIXED;
+    double dx = (double)(from % width) - px, dy = (double)(from / width) - py;
+    out.source = 1.0 + sqrt(dx * dx + dy * dy);
+    if (planes->from[pixel] & PT_FROM_MIXED)
+        out.source = -out.source;
+    return out;
+}

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// [D 3.2, 3.3], SPEC 2.2: hole filling, one rule for background and for occluded pixels.
+#include "reference.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// The ring, anticlockwise from the right.
+static const int ring_x[8] = {1, 1, 0, -1, -1, -1, 0, 1};
+static const int ring_y[8] = {0, 1, 1, 1, 0, -1, -1, -1};
+
+struct phase {
+    const struct fill_args *args;
+    const float *normal, *deff;
+    struct ref_range *threshold; // by pixel: as it was before its first fill
+    unsigned char *filled;       // 0 no, 1 yes, 2 perhaps
+};
+
+struct ref_pixel ref_pixel(uint64_t key, uint32_t from)
+{
+    struct ref_pixel pixel = {ref_exactly(ref_key_z(key)), ref_key_id(key), from, 0};
+    return pixel;
+}
+
+static int is_empty(const struct ref_pixel *pixel)
+{
+    return isinf(pixel->z.lo) && isinf(pixel->z.hi);
+}
+
+static struct ref_pixel at(const struct fill_args *args, const struct ref_pixel *pixels, int x, int y)
+{
+    if (x < 0 || y < 0 || x >= (int)args->view.width || y >= (int)args->view.height)
+        return ref_pixel(REF_EMPTY_KEY, 0);
+    return pixels[(size_t)y * args->view.width + (size_t)x];
+}
+
+static struct ref_range distance(const struct phase *phase, const struct ref_pixel *pixel)
+{
+    return ref_level_distance(&phase->args->view, phase->normal, phase->deff, pixel->from, pixel->z);
+}
+
+// What a neighbour must lie before to be dark: z - d_eff, for background +inf.
+static struct ref_range threshold_of(const struct phase *phase, const struct ref_pixel *pixel)
+{
+    if (is_empty(pixel))
+        return ref_exactly(INFINITY);
+    return ref_difference(pixel->z, distance(phase, pixel));
+}
+
+// Are `run` consecutive ring neighbours all white?
+static enum ref_truth has_white_run(const struct fill_args *args, const struct ref_pixel *pixels, int x, int y,
+                                    struct ref_range threshold, int run)
+{
+    enum ref_truth white[8], found = REF_NO;
+    for (int i = 0; i < 8; i++) {
+        struct ref_pixel neighbour = at(args, pixels, x + ring_x[i], y + ring_y[i]);
+        enum ref_truth dark = neighbour.unsure ? REF_UNSURE : ref_less(neighbour.z, threshold);
+        white[i] = dark == REF_UNSURE ? REF_UNSURE : dark == REF_YES ? REF_NO : REF_YES;
+    }
+    for (int first = 0; first < 8; first++) {
+        enum ref_truth all = REF_YES;
+        for (int i = first; i < first + run; i++) {
+            if (white[i & 7] == REF_NO)
+                all = REF_NO;
+            else if (white[i & 7] == REF_UNSURE && all == REF_YES)
+                all = REF_UNSURE;
+        }
+        if (all == REF_YES)
+            return REF_YES;
+        if (all == REF_UNSURE)
+            found = REF_UNSURE;
+    }
+    return found;
+}
+
+// The neighbour's surface as this pixel would see it.
+static struct ref_range taken_depth(const struct phase *phase, const struct ref_pixel *source, int qx, int qy, int x,
+                                    int y)
+{
+    const struct view_args *view = &phase->args->view;
+    if (!phase->args->refined)
+        return source->z;
+    return ref_plane_depth(view, phase->normal + 4 * (size_t)source->from, ref_ray(view, qx, qy), source->z,
+                           ref_ray(view, x, y), distance(phase, source));
+}
+
+// Takes the least key among the neighbours. Neighbours that share it to the last bit show the same point, but as seen
+// from different pixels: the first of the ring is taken, anticlockwise from the right.
+static struct ref_pixel take_least(const struct phase *phase, const struct ref_pixel *pixels, int x, int y)
+{
+    struct ref_pixel ring[8], least = ref_pixel(REF_EMPTY_KEY, 0);
+    double bound = INFINITY;
+    for (int i = 0; i < 8; i++) {
+        ring[i] = at(phase->args, pixels, x + ring_x[i], y + ring_y[i]);
+        least.unsure |= ring[i].unsure;
+        bound = fmin(bound, ring[i].z.hi);
+    }
+    if (least.unsure)
+        return least;
+    int certain = 1, chosen = 0;
+    for (int i = 0; i < 8; i++) {
+        if (is_empty(&ring[i]) || ring[i].z.lo > bound)
+            continue;
+        if (ring[i].z.lo != bound || ring[i].z.hi != bound)
+            certain = 0; // a range reaches below the least upper end
+    }
+    for (int i = 0; i < 8; i++) {
+        if (is_empty(&ring[i]) || ring[i].z.lo > bound)
+            continue;
+        struct ref_range z = taken_depth(phase, &ring[i], x + ring_x[i], y + ring_y[i], x, y);
+        if (!chosen || (certain && ring[i].id < least.id)) {
+            least = ring[i];
+            least.z = z;
+            chosen = 1;
+        } else if (!certain && ring[i].id == least.id) {
+            least.z.lo = fmin(least.z.lo, z.lo);
+            least.z.hi = fmax(least.z.hi, z.hi);
+            least.unsure |= ring[i].from != least.from;
+        } else if (!certain) {
+            least.unsure = 1;
+        }
+    }
+    return least;
+}
+
+// One pixel of one fill.
+static struct ref_pixel fill_pixel(const struct phase *phase, const struct ref_pixel *pixels, int x, int y,
+                                   enum ref_truth *changed)
+{
+    struct ref_pixel pixel = at(phase->args, pixels, x, y);
+    *changed = REF_NO;
+    if (pixel.unsure) {
+        *changed = REF_UNSURE;
+        return pixel;
+    }
+    if (is_empty(&pixel) == (phase->args->occluded != 0))
+        return pixel;
+    enum ref_truth border = has_white_run(phase->args, pixels, x, y, threshold_of(phase, &pixel), 5);
+    if (border == REF_YES)
+        return pixel;
+    *changed = border == REF_NO ? REF_YES : REF_UNSURE;
+    if (border == REF_UNSURE) {
+        pixel.unsure = 1;
+        return pixel;
+    }
+    return take_least(phase, pixels, x, y);
+}
+
+static int fill_all(const struct phase *phase, const struct ref_pixel *before, struct ref_pixel *after)
+{
+    int changes = 0;
+    for (int y = 0; y < (int)phase->args->view.height; y++) {
+        for (int x = 0; x < (int)phase->args->view.width; x++) {
+            size_t i = (size_t)y * phase->args->view.width + (size_t)x;
+            enum ref_truth changed;
+            after[i] = fill_pixel(phase, before, x, y, &changed);
+            changes += changed != REF_NO;
+            if (changed == REF_YES && phase->filled[i] == 0) {
+                phase->filled[i] = 1;
+                phase->threshold[i] = threshold_of(phase, &before[i]);
+            } else if (changed == REF_UNSURE && phase->filled[i] == 0) {
+                phase->filled[i] = 2;
+            }
+        }
+    }
+    return changes;
+}
+
+static int unfill_all(const struct phase *phase, const struct ref_pixel *original, const struct ref_pixel *before,
+                      struct ref_pixel *after)
+{
+    int changes = 0;
+    for (int y = 0; y < (int)phase->args->view.height; y++) {
+        for (int x = 0; x < (int)phase->args->view.width; x++) {
+            size_t i = (size_t)y * phase->args->view.width + (size_t)x;
+            after[i] = before[i];
+            if (phase->filled[i] != 1)
+                continue;
+            enum ref_truth shown = has_white_run(phase->args, before, x, y, phase->threshold[i], 4);
+            if (shown == REF_UNSURE)
+                after[i].unsure = 1;
+            if (shown == REF_YES) {
+                after[i] = original[i];
+                phase->filled[i] = 0;
+            }
+            changes += shown != REF_NO;
+        }
+    }
+    return changes;
+}
+
+int ref_fill(const struct fill_args *args, const float *normal, const float *deff, struct ref_pixel *pixels)
+{
+    size_t count = (size_t)args->view.width * args->view.height;
+    struct ref_pixel *original = malloc(count * sizeof *original), *after = malloc(count * sizeof *after);
+    struct phase phase = {args, normal, deff, malloc(count * sizeof(struct ref_range)), calloc(count, 1)};
+    int ok = original && after && phase.threshold && phase.filled;
+    if (ok) {
+        memcpy(original, pixels, count * sizeof *pixels);
+        for (uint32_t i = 0, more = 1; i < args->iterations && more; i++) {
+            more = (uint32_t)fill_all(&phase, pixels, after);
+            memcpy(pixels, after, count * sizeof *pixels);
+        }
+        for (uint32_t i = 0, more = 1; i < args->unfills && more; i++) {
+            more = (uint32_t)unfill_all(&phase, original, pixels, after);
+            memcpy(pixels, after, count * sizeof *pixels);
+        }
+    }
+    free(original);
+    free(after);
+    free(phase.threshold);
+    free(phase.filled);
+    return ok;
+}

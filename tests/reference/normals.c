@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Image-space normals: a plane n.P = const is exactly linear on screen in 1/z (perspective) or z (orthographic), so the
+// plane fitted by least squares over a window gives it.
+#include "reference.h"
+#include "tolerances.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { MOST = 13 * 13 };
+
+// The pixels that take part, as offsets from the centre, f = 1/z or z relative to the centre's.
+struct samples {
+    int count;
+    int dx[MOST], dy[MOST];
+    double f[MOST];
+    double centre, greatest; // f at the centre; greatest |f| of all
+};
+
+static double linear(const struct view_args *view, double z)
+{
+    return view->perspective ? 1.0 / z : z;
+}
+
+static enum ref_truth gather(const struct normals_args *args, const struct ref_planes *planes, int x, int y,
+                             struct samples *out)
+{
+    const struct view_args *view = &args->view;
+    const struct instance_args *instance = &args->instance;
+    uint64_t key = planes->keys[(size_t)y * view->width + (size_t)x];
+    double z = ref_key_z(key);
+    uint32_t word = planes->surface[ref_key_id(key) - instance->id_base];
+    double m = ref_layer_minimum(view, instance->d_min, instance->spacing[word >> PT_SPACING_SHIFT], z);
+    int radius = (int)args->radius;
+    out->count = 0;
+    out->centre = linear(view, z);
+    out->greatest = 0.0;
+    for (int dy = -radius; dy <= radius; dy++) {
+        for (int dx = -radius; dx <= radius; dx++) {
+            int qx = x + dx, qy = y + dy;
+            if (qx < 0 || qy < 0 || qx >= (int)view->width || qy >= (int)view->height)
+                continue;
+            uint64_t neighbour = planes->keys[(size_t)qy * view->width + (size_t)qx];
+            if (neighbour == REF_EMPTY_KEY)
+                continue;
+            double step = fabs(ref_key_z(neighbour) - z), most = 4.0 * m * fmax(abs(dx), abs(dy));
+            struct ref_range threshold = {most * (1.0 - TOL_WINDOW), most * (1.0 + TOL_WINDOW)};
+            enum ref_truth taken = ref_less_equal(ref_exactly(step), threshold);
+            if (taken == REF_UNSURE)
+                return REF_UNSURE;
+            if (taken == REF_NO)
+                continue;
+            double f = linear(view, ref_key_z(neighbour));
+            out->dx[out->count] = dx;
+            out->dy[out->count] = dy;
+            out->f[out->count++] = f - out->centre;
+            out->greatest = fmax(out->greatest, fabs(f));
+        }
+    }
+    return REF_YES;
+}
+
+// f = a dx + b dy + c, and how far float32 may be off.
+struct plane {
+    double a, b, c;
+    double error_a, error_b, error_c;
+};
+
+// 0 when the samples do not span a plane; offsets are integers, so that this is exact.
+static int fit(const struct samples *s, struct plane *plane)
+{
+    int64_t n = s->count, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
+    for (int i = 0; i < s->count; i++) {
+        sx += s->dx[i];
+        sy += s->dy[i];
+        sxx += s->dx[i] * s->dx[i];
+        sxy += s->dx[i] * s->dy[i];
+        syy += s->dy[i] * s->dy[i];
+    }
+    int64_t det = n * (sxx * syy - sxy * sxy) - sx * (sx * syy - sxy * sy) + sy * (sx * sxy - sxx * sy);
+    if (s->count < 3 || det == 0)
+        return 0;
+    // The inverse of the symmetric 3 x 3 system, by cofactors.
+    double aa = (double)(n * syy - sy * sy), ab = (double)(sx * sy - n * sxy), ac = (double)(sxy * sy - sx * syy);
+    double bb = (double)(n * sxx - sx * sx), bc = (double)(sx * sxy - sxx * sy), cc = (double)(sxx * syy - sxy * sxy);
+    double d = (double)det, noise = TOL_FIT * s->greatest;
+    *plane = (struct plane){.c = s->centre, .error_c = noise};
+    for (int i = 0; i < s->count; i++) {
+        double wa = (aa * s->dx[i] + ab * s->dy[i] + ac) / d;
+        double wb = (ab * s->dx[i] + bb * s->dy[i] + bc) / d;
+        double wc = (ac * s->dx[i] + bc * s->dy[i] + cc) / d;
+        plane->a += wa * s->f[i];
+        plane->b += wb * s->f[i];
+        plane->c += wc * s->f[i];
+        plane->error_a += fabs(wa) * noise;
+        plane->error_b += fabs(wb) * noise;
+        plane->error_c += fabs(wc) * noise;
+    }
+    return 1;
+}
+
+struct ref_normal ref_normals(const struct normals_args *args, const struct ref_planes *planes, int x, int y)
+{
+    const struct view_args *view = &args->view;
+    struct samples samples;
+    struct plane plane;
+    struct ref_normal out = {.decided = gather(args, planes, x, y, &samples)};
+    if (out.decided == REF_UNSURE || !fit(&samples, &plane))
+        return out;
+    struct ref_ray ray = ref_ray(view, x, y);
+    double slope_u = plane.a / view->ray_xs, slope_v = plane.b / view->ray_ys;
+    double error_u = plane.error_a / fabs((double)view->ray_xs), error_v = plane.error_b / fabs((double)view->ray_ys);
+    struct ref_vec n, error = {error_u, error_v, 0.0};
+    if (view->perspective) { // 1/z = (n.r) / const at every ray r = (u, v, -1)
+        n = ref_vec(slope_u, slope_v, slope_u * ray.u + slope_v * ray.v - plane.c);
+        error.z = plane.error_c + error_u * fabs(ray.u) + error_v * fabs(ray.v) +
+                  TOL_FIT * (fabs(slope_u * ray.u) + fabs(slope_v * ray.v));
+    } else { // z = (n.x u + n.y v - const) / n.z
+        n = ref_vec(slope_u, slope_v, 1.0);
+    }
+    double length = ref_length(n);
+    out.error = TOL_NORMAL + ref_length(error) / length;
+    out.n = ref_scale(n, 1.0 / length);
+    double cosine = ref_dot(out.n, ref_viewer(view, ray));
+    if (cosine < 0.0)
+        out.n = ref_scale(out.n, -1.0);
+    out.either_side = fabs(cosine) <= 2.0 * out.error;
+    return out;
+}

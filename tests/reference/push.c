@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// SPEC 2.2, pull-push with depth intervals: an empty or occluded pixel takes its coarse parent's surface when the parent
+// and two of the three coarse cells next to the pixel lie before it.
+#include "reference.h"
+
+#include <math.h>
+
+// A coarse cell's depth; outside the plane: nothing there.
+static struct ref_range coarse_depth(const struct push_args *args, const uint64_t *keys, int x, int y)
+{
+    if (x < 0 || y < 0 || x >= (int)args->coarse_width || y >= (int)args->coarse_height)
+        return ref_exactly(INFINITY);
+    return ref_exactly(ref_key_z(keys[(size_t)y * args->coarse_width + (size_t)x]));
+}
+
+// "At least two of three", when some of the three are open.
+static enum ref_truth two_of(const enum ref_truth truth[3])
+{
+    int yes = 0, maybe = 0;
+    for (int i = 0; i < 3; i++) {
+        yes += truth[i] == REF_YES;
+        maybe += truth[i] != REF_NO;
+    }
+    return yes >= 2 ? REF_YES : maybe >= 2 ? REF_UNSURE : REF_NO;
+}
+
+struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_keys, const uint32_t *coarse_from,
+                          const struct ref_planes *planes, int x, int y)
+{
+    const struct view_args *view = &args->view;
+    size_t index = (size_t)y * view->width + (size_t)x;
+    struct ref_pixel pixel = ref_pixel(planes->keys[index], planes->from[index]);
+    struct ref_range threshold = ref_exactly(INFINITY);
+    if (pixel.id != PT_KEY_EMPTY_ID || !isinf(pixel.z.lo)) {
+        threshold = ref_difference(
+            pixel.z, ref_level_distance(view, planes->normal, planes->deff, pixel.from, pixel.z));
+    }
+    int px = x >> 1, py = y >> 1, sx = x & 1 ? 1 : -1, sy = y & 1 ? 1 : -1;
+    if (px >= (int)args->coarse_width || py >= (int)args->coarse_height)
+        return pixel;
+    struct ref_range parent = coarse_depth(args, coarse_keys, px, py);
+    enum ref_truth parent_before = ref_less(parent, threshold);
+    enum ref_truth before[3] = {
+        ref_less(coarse_depth(args, coarse_keys, px + sx, py), threshold),
+        ref_less(coarse_depth(args, coarse_keys, px, py + sy), threshold),
+        ref_less(coarse_depth(args, coarse_keys, px + sx, py + sy), threshold),
+    };
+    enum ref_truth around = two_of(before);
+    if (parent_before == REF_NO || around == REF_NO)
+        return pixel;
+    if (parent_before == REF_UNSURE || around == REF_UNSURE) {
+        pixel.unsure = 1;
+        return pixel;
+    }
+    size_t coarse = (size_t)py * args->coarse_width + (size_t)px;
+    struct ref_pixel taken = ref_pixel(coarse_keys[coarse], coarse_from[coarse]);
+    if (args->refined) {
+        struct view_args above = *view;
+        above.level++;
+        struct ref_range limit = ref_level_distance(&above, planes->normal, planes->deff, taken.from, taken.z);
+        taken.z = ref_plane_depth(view, planes->normal + 4 * (size_t)taken.from, ref_ray(&above, px, py), taken.z,
+                                  ref_ray(view, x, y), limit);
+    }
+    return taken;
+}

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The float64 reference: scalar, plain, written from SPEC.md and not from the kernels. One file a kernel.
+//
+// float32 decides some things otherwise than float64 would: a point on the border of two pixels, two depths d_eff apart.
+// There the reference says "unsure", or gives a range of values; everywhere else there is one answer.
+// Ranges hold every value that a correct float32 evaluation can have (tests/tolerances.h says why).
+#ifndef PT_REFERENCE_H
+#define PT_REFERENCE_H
+
+#include "kernel_args.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define REF_EMPTY_KEY 0x7F800000FFFFFFFFull
+
+struct ref_range {
+    double lo, hi;
+};
+
+struct ref_vec {
+    double x, y, z;
+};
+
+enum ref_truth { REF_NO, REF_YES, REF_UNSURE };
+
+// ---- common.c: what SPEC 1 defines for all kernels ----------------------------------------------------------------
+
+struct ref_vec ref_vec(double x, double y, double z);
+struct ref_vec ref_vec_of(const float v[3]);
+struct ref_vec ref_scale(struct ref_vec a, double s);
+struct ref_vec ref_add(struct ref_vec a, struct ref_vec b);
+double ref_dot(struct ref_vec a, struct ref_vec b);
+double ref_length(struct ref_vec a);
+struct ref_vec ref_unit(struct ref_vec a); // zero stays zero
+
+double ref_key_z(uint64_t key); // +inf when empty
+uint32_t ref_key_id(uint64_t key);
+uint64_t ref_key(float z, uint32_t id);
+
+struct ref_range ref_exactly(double value);
+enum ref_truth ref_less(struct ref_range a, struct ref_range b);       // a < b
+enum ref_truth ref_less_equal(struct ref_range a, struct ref_range b); // a <= b
+struct ref_range ref_rounded(struct ref_range exact);                  // what float32 makes of an exact value
+struct ref_range ref_difference(struct ref_range a, struct ref_range b);
+
+// A pixel's ray at the view's level: (u, v, -1) in perspective, the position (u, v) in orthographic views.
+struct ref_ray {
+    double u, v;
+    double error_u, error_v;
+};
+struct ref_ray ref_ray(const struct view_args *view, int x, int y);
+struct ref_vec ref_viewer(const struct view_args *view, struct ref_ray ray); // unit vector from the surface to the eye
+
+double ref_footprint(const struct view_args *view, double z); // width of a pixel of the view's level at z
+double ref_ulp4(double z);                                    // 4 ulp of the float32 z
+// max(d_min, K spacing, footprint, 4 ulp): d_eff without its division by the cosine.
+double ref_layer_minimum(const struct view_args *view, double d_min, double spacing, double z);
+// A pixel's own d_eff at the view's level, from the level-0 planes at its `from`.
+struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff,
+                                    uint32_t from, struct ref_range z);
+// Octahedral normal of a surface word, unit. 0 when it has none.
+int ref_decode_normal(uint32_t word, struct ref_vec *normal);
+double ref_srgb(uint8_t value); // sRGB to linear
+
+// Depth at ray p of the plane with this normal through the point at ray q and depth z, kept in [z, z + limit].
+struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q,
+                                 struct ref_range z, struct ref_ray p, struct ref_range limit);
+
+// ---- scatter.c ------------------------------------------------------------------------------------------------------
+
+// Where a point may fall, in pixels of the plane, both ends included.
+struct ref_splat {
+    uint32_t id;
+    int possible; // 0: falls nowhere
+    int definite; // falls in exactly the one pixel (x0, y0), whatever the rounding
+    int x0, y0, x1, y1;
+    struct ref_range z;
+};
+// positions, ids: of the instance; surface: by ids. slot counts from the chunk's first.
+struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
+                             const uint32_t *ids, const uint32_t *surface, uint32_t slot);
+
+// ---- one pixel of a filter --------------------------------------------------------------------------------------------
+
+// Planes of the view's size; a filter reads those that kernels.def lists.
+struct ref_planes {
+    const uint64_t *keys;
+    const uint32_t *from;
+    const float *normal, *deff, *color, *shading;
+    const uint32_t *surface; // by id - id_base
+    const void *colors;      // by id - id_base
+};
+
+// Does the key belong to the instance?
+int ref_is_of(const struct instance_args *instance, uint64_t key);
+
+struct ref_normal {
+    struct ref_vec n;       // zero: none
+    double error;           // how far each component may lie off
+    enum ref_truth decided; // REF_UNSURE: float32 may take other neighbours
+    int either_side;        // seen edge-on: may be turned either way
+};
+struct ref_normal ref_normals(const struct normals_args *args, const struct ref_planes *planes, int x, int y);
+
+struct ref_surface {
+    struct ref_vec n;
+    double normal_error;
+    double inverse; // 1 / max(|n.v|, C)
+    double inverse_error;
+    double deff, deff_error;
+    uint32_t from;
+};
+struct ref_surface ref_surface(const struct surface_args *args, const struct ref_planes *planes, int x, int y);
+
+void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y,
+              uint64_t *key, uint32_t *from);
+
+// A pixel between measured and filled: its depth may be a range, its surface may be open.
+struct ref_pixel {
+    struct ref_range z; // +inf: empty
+    uint32_t id, from;
+    int unsure; // may be anything
+};
+struct ref_pixel ref_pixel(uint64_t key, uint32_t from);
+
+struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_keys, const uint32_t *coarse_from,
+                          const struct ref_planes *planes, int x, int y);
+// A whole phase; pixels: width x height, read as the state before it, left as the state after it. 0: out of memory.
+int ref_fill(const struct fill_args *args, const float *normal, const float *deff, struct ref_pixel *pixels);
+
+struct ref_shade {
+    struct ref_vec n; // the normal that lights the pixel
+    double normal_error;
+    double color[4], color_error[4];
+    int written;  // the pixel belongs to the instance
+    int unsure;   // float32 may decide otherwise
+    int singular; // a light within rounding of the surface: only finite colours are asked for
+};
+struct ref_shade ref_shade(const struct shade_args *args, const struct ref_planes *planes, int x, int y);
+
+struct ref_color {
+    double color[4], error[4];
+    int unsure;
+    int mixed; // anti-aliasing marked the pixel
+};
+struct ref_color ref_smooth(const struct smooth_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_color ref_antialias(const struct antialias_args *args, const struct ref_planes *planes, int x, int y);
+// x, y: in the crop.
+struct ref_color ref_compose(const struct compose_args *args, const struct ref_planes *planes, int x, int y);
+
+struct ref_extract {
+    double depth; // +inf: nothing
+    struct ref_vec normal;
+    double normal_error;
+    double source;
+};
+struct ref_extract ref_extract(const struct extract_args *args, const struct ref_planes *planes, int x, int y);
+
+#endif

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "staging.h"
+
+#include <math.h>
+
+enum { REFINED = PATINA_QUALITY_REFINED, PAPERLY = PATINA_QUALITY_PAPER };
+enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF };
+enum { LIT = PATINA_LIGHTING_LIT, UNLIT = PATINA_LIGHTING_UNLIT, AUTO = PATINA_LIGHTING_AUTO };
+
+// The torus covers about a third of a picture: points / (0.6 width height) is its density a pixel, both sides counted.
+const struct staging stagings[] = {
+    {"one pixel", 1, 1, 5000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0},
+    {"small, 0.1 points a pixel", 67, 45, 180, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 1, 0},
+    {"small, 1 point a pixel", 67, 45, 1800, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0},
+    {"small, 30 points a pixel", 67, 45, 54000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, PAPERLY, CLOSED, 0, 0, 0, 0},
+    {"orthographic, paper's filters", 203, 151, 30000, POINTS_ALL, STAGE_ONE, 1, 0, LIT, PAPERLY, PAPER, 1, 1, 0, 0},
+    {"orthographic, refined", 203, 151, 6000, POINTS_NORMALS, STAGE_ONE, 1, 1, LIT, REFINED, CLOSED, 2, 0, 1, 0},
+    {"paper's filling, refined depth", 203, 151, 30000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, PAPER, 0, 0, 0, 0},
+    {"no filling, no filters", 203, 151, 20000, POINTS_ALL, STAGE_ONE, 0, 1, UNLIT, PAPERLY, OPEN, 3, 2, 0, 0},
+    {"unlit colours", 203, 151, 9000, POINTS_COLORS, STAGE_ONE, 0, 0, AUTO, REFINED, CLOSED, 0, 0, 0, 0},
+    {"normals estimated", 203, 151, 20000, POINTS_PLAIN, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0},
+    {"normals estimated, sparse, orthographic", 203, 151, 2500, POINTS_COLORS, STAGE_ONE, 1, 0, LIT, REFINED, CLOSED, 0,
+     0, 0, 0},
+    {"many instances", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0},
+    {"many instances, culled, orthographic", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 1, 1, LIT, REFINED, CLOSED, 0, 0,
+     1, 0},
+    {"many instances without normals", 203, 151, 15000, POINTS_COLORS, STAGE_MANY, 0, 1, LIT, PAPERLY, CLOSED, 0, 1, 0,
+     0},
+    {"density 0.1 to 30 in one cloud", 203, 151, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 1},
+    {"large", 1024, 768, 400000, POINTS_ALL, STAGE_MANY, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0},
+    {"large, sparse", 1024, 768, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 1, 0},
+};
+const uint32_t staging_count = sizeof stagings / sizeof stagings[0];
+
+static void add(struct stage *stage, const struct staging *staging, const double matrix[16])
+{
+    patina_cloud_style style = {.struct_size = sizeof style, .lighting = staging->lighting};
+    style.cull_back = staging->cull_back;
+    style.ambient = 0.6f;
+    style.diffuse = 0.9f;
+    style.specular = 0.4f;
+    style.shininess = 20;
+    for (int k = 0; k < 16; k++)
+        style.world_from_object[k] = matrix[k];
+    CHECK(patina_scene_add_cloud(stage->scene, stage->cloud, &style), stage->scene);
+}
+
+static void add_lights(patina_scene *scene)
+{
+    patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 2.5f};
+    sun.direction[0] = -0.4;
+    sun.direction[1] = 0.7;
+    sun.direction[2] = -0.6;
+    CHECK(patina_scene_add_light(scene, &sun), scene);
+    patina_light_desc lamp = {.struct_size = sizeof lamp, .type = PATINA_LIGHT_POINT, .power = 90.0f};
+    lamp.color[0] = 1.0f;
+    lamp.color[1] = 0.7f;
+    lamp.color[2] = 0.3f;
+    lamp.position[0] = 1.5;
+    lamp.position[1] = -1.0;
+    lamp.position[2] = 1.8;
+    CHECK(patina_scene_add_light(scene, &lamp), scene);
+}
+
+// Points of an even torus that survive a chance falling from 1 to 1/300 along x.
+static void thin_out(struct points *points)
+{
+    struct pcg random = pcg_seed(99);
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < points->count; i++) {
+        double along = (points->position[3 * i] + 1.4) / 2.8;
+        if (pcg_unit(&random) >= pow(300.0, -along))
+            continue;
+        for (int k = 0; k < 3; k++) {
+            points->position[3 * kept + k] = points->position[3 * i + k];
+            if (points->normal)
+                points->normal[3 * kept + k] = points->normal[3 * i + k];
+            if (points->color)
+                points->color[3 * kept + k] = points->color[3 * i + k];
+        }
+        kept++;
+    }
+    points->count = kept;
+}
+
+struct stage stage_build(const struct staging *staging)
+{
+    struct stage stage = {0};
+    uint64_t count = staging->stretched ? 12 * staging->points : staging->points;
+    struct points points = points_torus(count, 1.0, 0.4, staging->columns, 7);
+    if (staging->stretched)
+        thin_out(&points);
+    stage.cloud = points_upload(&points);
+    points_free(&points);
+
+    CHECK(patina_scene_create(&stage.scene), NULL);
+    const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    add(&stage, staging, identity);
+    if (staging->objects == STAGE_MANY) {
+        const double mirrored[16] = {-0.6, 0, 0, 0.9, 0, 0.6, 0, 0.8, 0, 0, 0.6, 0.5, 0, 0, 0, 1};
+        const double uneven[16] = {0.3, -0.4, 0.1, -0.8, 0.2, 0.7, 0.0, -0.7, -0.3, 0.1, 1.1, 0.3, 0, 0, 0, 1};
+        const double flat[16] = {0.5, 0, 0, 0.9, 0, 0.5, 0, -0.9, 0, 0, 0, -0.4, 0, 0, 0, 1};
+        const double point[16] = {0, 0, 0, 0.0, 0, 0, 0, -1.2, 0, 0, 0, 0.6, 0, 0, 0, 1};
+        const double far_off[16] = {1, 0, 0, 500, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+        add(&stage, staging, mirrored);
+        add(&stage, staging, uneven);
+        add(&stage, staging, flat);
+        add(&stage, staging, point);
+        add(&stage, staging, far_off);
+    }
+    add_lights(stage.scene);
+
+    const double eye[3] = {0.3, -2.7, 2.3}, target[3] = {0.0, 0.0, 0.0};
+    stage.camera = staging->orthographic
+                       ? camera_orthographic(eye, target, 3.0, staging->width, staging->height, -20.0, 20.0)
+                       : camera_perspective(eye, target, 45.8, staging->width, staging->height, 0.1, 100.0);
+    stage.settings = settings_default(staging->width, staging->height);
+    stage.settings.quality = staging->quality;
+    stage.settings.fill = staging->fill;
+    stage.settings.smooth = staging->smooth;
+    stage.settings.antialias = staging->antialias;
+    stage.settings.film_transparent = staging->film_transparent;
+    stage.settings.world_color[0] = 0.05f;
+    stage.settings.world_color[1] = 0.06f;
+    stage.settings.world_color[2] = 0.08f;
+    return stage;
+}
+
+void stage_free(struct stage *stage)
+{
+    patina_scene_destroy(stage->scene);
+    patina_cloud_destroy(stage->cloud);
+    *stage = (struct stage){0};
+}

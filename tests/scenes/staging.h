@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Scenes that must look the same whatever draws them: every device, any number of threads, whole or in crops.
+#ifndef TEST_STAGING_H
+#define TEST_STAGING_H
+
+#include "clouds.h"
+#include "support.h"
+
+enum staging_objects { STAGE_ONE, STAGE_MANY };
+
+struct staging {
+    const char *name;
+    uint32_t width, height;
+    uint64_t points;  // of the torus that the clouds sample
+    unsigned columns; // points_columns
+    enum staging_objects objects;
+    uint32_t orthographic, cull_back, lighting;
+    uint32_t quality, fill, smooth, antialias, film_transparent;
+    uint32_t stretched; // density falls by 1/300 along x: coarse levels and dense ones in one picture
+};
+
+extern const struct staging stagings[];
+extern const uint32_t staging_count;
+
+struct stage {
+    patina_cloud *cloud;
+    patina_scene *scene;
+    patina_camera camera;
+    patina_settings settings;
+};
+
+struct stage stage_build(const struct staging *staging);
+void stage_free(struct stage *stage);
+
+#endif

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A frame's life: statistics and plan as data, cancel, the last good picture, arguments that are refused (DESIGN 3, 7).
+#include "staging.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+static const struct staging *staging_named(const char *name)
+{
+    for (uint32_t i = 0; i < staging_count; i++)
+        if (!strcmp(stagings[i].name, name))
+            return &stagings[i];
+    support_die("no scene '%s'", name);
+}
+
+static patina_frame *frame_of(patina_device *device, struct stage *stage)
+{
+    CHECK(patina_scene_set_camera(stage->scene, &stage->camera), stage->scene);
+    CHECK(patina_scene_set_settings(stage->scene, &stage->settings), stage->scene);
+    patina_frame *frame = NULL;
+    CHECK(patina_frame_create(device, &frame), device);
+    return frame;
+}
+
+// ---- JSON --------------------------------------------------------------------------------------------------------
+
+static const char *json_value(const char *at);
+
+static const char *json_space(const char *at)
+{
+    return at + strspn(at, " \t\r\n");
+}
+
+static const char *json_string(const char *at)
+{
+    if (*at++ != '"')
+        support_die("JSON: no string at '%.20s'", at - 1);
+    while (*at != '"') {
+        if (!*at || (unsigned char)*at < 0x20)
+            support_die("JSON: a string does not end");
+        at += *at == '\\' ? 2 : 1;
+    }
+    return at + 1;
+}
+
+static const char *json_object(const char *at)
+{
+    at = json_space(at + 1);
+    while (*at != '}') {
+        at = json_space(json_string(at));
+        if (*at != ':')
+            support_die("JSON: no colon at '%.20s'", at);
+        at = json_space(json_value(json_space(at + 1)));
+        if (*at == ',')
+            at = json_space(at + 1);
+        else if (*at != '}')
+            support_die("JSON: no comma at '%.20s'", at);
+    }
+    return at + 1;
+}
+
+static const char *json_value(const char *at)
+{
+    if (*at == '{')
+        return json_object(at);
+    if (*at == '"')
+        return json_string(at);
+    char *end;
+    strtod(at, &end);
+    if (end == at)
+        support_die("JSON: no value at '%.20s'", at);
+    return end;
+}
+
+// Where the member's value starts in a flat search of {"outer":{"name":..}}; NULL when absent.
+static const char *json_member(const char *json, const char *outer, const char *name)
+{
+    char quoted[64];
+    snprintf(quoted, sizeof quoted, "\"%s\"", outer);
+    const char *at = strstr(json, quoted);
+    if (!at)
+        return NULL;
+    const char *start = strchr(at, '{'), *end = json_object(start);
+    snprintf(quoted, sizeof quoted, "\"%s\"", name);
+    at = strstr(start, quoted);
+    return at && at < end ? json_space(strchr(at + strlen(quoted), ':') + 1) : NULL;
+}
+
+static char *stats_text(const patina_frame *frame)
+{
+    size_t length = patina_frame_stats_json(frame, NULL, 0);
+    assert_true(length > 10);
+    char *text = malloc(length + 1), small[8];
+    assert_non_null(text);
+    assert_int_equal(patina_frame_stats_json(frame, text, length + 1), length);
+    assert_int_equal(strlen(text), length);
+    assert_int_equal(patina_frame_stats_json(frame, small, sizeof small), length); // truncated, terminated
+    assert_int_equal(strlen(small), sizeof small - 1);
+    assert_memory_equal(small, text, sizeof small - 1);
+    if (*json_space(json_object(text)))
+        support_die("JSON: text after the object");
+    return text;
+}
+
+// Every pass is either timed or left out with a reason.
+static void test_statistics(void **state)
+{
+    (void)state;
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        patina_device *device = support_device_open(support_device_name(k), 0, 0);
+        if (!device)
+            continue;
+        struct stage stage = stage_build(staging_named("small, 1 point a pixel"));
+        patina_frame *frame = frame_of(device, &stage);
+        CHECK(patina_frame_render(frame, stage.scene), frame);
+        char *full = stats_text(frame);
+        patina_frame_stats stats = {.struct_size = sizeof stats};
+        CHECK(patina_frame_get_stats(frame, &stats), frame);
+        assert_true(stats.ms > 0.0 && stats.plane_bytes > 0);
+        assert_int_equal(stats.points, 1800);
+        assert_true(stats.points_scattered <= stats.points && stats.chunks_culled <= stats.chunks);
+        static const char *const always[] = {"scatter", "surface", "fill", "shade", "smooth", "antialias"};
+        double sum = 0.0;
+        for (uint32_t i = 0; i < sizeof always / sizeof always[0]; i++) {
+            const char *value = json_member(full, "passes", always[i]);
+            if (!value)
+                support_die("pass '%s' is not in %s", always[i], full);
+            double ms = strtod(value, NULL);
+            assert_true(ms >= 0.0 && ms < 1e5);
+            sum += ms;
+        }
+        assert_true(sum <= stats.ms * 1.01 + 0.1);
+        assert_true(json_member(full, "skipped", "normals") != NULL); // the cloud has normals
+        free(full);
+
+        stage.settings.fill = PATINA_FILL_OFF;
+        stage.settings.smooth = PATINA_SMOOTH_OFF;
+        stage.settings.antialias = PATINA_ANTIALIAS_OFF;
+        CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+        CHECK(patina_frame_render(frame, stage.scene), frame);
+        char *bare = stats_text(frame);
+        if (k == 0)
+            printf("  %s\n", bare);
+        static const char *const off[] = {"fill", "smooth", "antialias"};
+        for (uint32_t i = 0; i < sizeof off / sizeof off[0]; i++) {
+            assert_true(json_member(bare, "passes", off[i]) == NULL);
+            const char *reason = json_member(bare, "skipped", off[i]);
+            if (!reason || *reason != '"' || reason[1] == '"')
+                support_die("no reason why '%s' is left out: %s", off[i], bare);
+        }
+        free(bare);
+        patina_frame_destroy(frame);
+        stage_free(&stage);
+        patina_device_destroy(device);
+    }
+}
+
+static void test_plan(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    struct stage stage = stage_build(staging_named("small, 1 point a pixel"));
+    patina_frame *frame = frame_of(device, &stage);
+    char text[4096], small[16];
+    size_t length = patina_frame_plan_text(frame, stage.scene, text, sizeof text);
+    assert_true(length > 50 && length < sizeof text);
+    assert_true(strstr(text, "scatter") && strstr(text, "fill"));
+    assert_int_equal(patina_frame_plan_text(frame, stage.scene, small, sizeof small), length);
+    assert_memory_equal(small, text, sizeof small - 1);
+    printf("%s", text);
+    uint64_t key;
+    assert_int_equal(patina_frame_read_keys(frame, &key, sizeof key), PATINA_ERROR_EMPTY); // a plan renders nothing
+    patina_frame_destroy(frame);
+    stage_free(&stage);
+    patina_device_destroy(device);
+}
+
+// ---- cancel and failure --------------------------------------------------------------------------------------------
+
+static void test_cancel_keeps_the_picture(void **state)
+{
+    (void)state;
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        patina_device *device = support_device_open(support_device_name(k), 0, 0);
+        if (!device)
+            continue;
+        struct stage stage = stage_build(staging_named("small, 30 points a pixel"));
+        patina_frame *frame = frame_of(device, &stage);
+        CHECK(patina_frame_render(frame, stage.scene), frame);
+        struct picture before = picture_read(frame);
+
+        stage.settings.width = 101; // another size, so that a half-made picture would show
+        CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+        patina_frame_cancel(frame);
+        assert_int_equal(patina_frame_render(frame, stage.scene), PATINA_ERROR_CANCELLED);
+        assert_true(strlen(support_message(frame)) > 3);
+        struct picture after = picture_read(frame);
+        assert_int_equal(after.width, before.width);
+        picture_assert_identical(&after, &before, 0, 0, "after a cancelled render");
+
+        CHECK(patina_frame_render(frame, stage.scene), frame); // the cancel is spent
+        struct picture next = picture_read(frame);
+        assert_int_equal(next.width, 101);
+        assert_true(patina_frame_progress(frame) >= 0.0f && patina_frame_progress(frame) <= 1.0f);
+        picture_free(&before);
+        picture_free(&after);
+        picture_free(&next);
+        patina_frame_destroy(frame);
+        stage_free(&stage);
+        patina_device_destroy(device);
+    }
+}
+
+struct watcher {
+    patina_frame *frame;
+    double delay, cancelled_at;
+};
+
+static void *cancel_later(void *data)
+{
+    struct watcher *watcher = data;
+    double start = now();
+    while (now() - start < watcher->delay)
+        if (patina_frame_progress(watcher->frame) > 1.0f)
+            return NULL;
+    watcher->cancelled_at = now();
+    patina_frame_cancel(watcher->frame);
+    return NULL;
+}
+
+// Cancelled from another thread at many moments: either cancelled soon, or finished; never a broken frame.
+static void test_cancel_while_running(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    struct stage stage = stage_build(staging_named("large"));
+    patina_frame *frame = frame_of(device, &stage);
+    CHECK(patina_frame_render(frame, stage.scene), frame);
+    struct picture truth = picture_read(frame);
+    double start = now();
+    CHECK(patina_frame_render(frame, stage.scene), frame);
+    double whole = now() - start, latest = 0.0;
+    uint32_t cancelled = 0;
+    for (int i = 0; i < 40; i++) {
+        struct watcher watcher = {.frame = frame, .delay = whole * i / 40.0};
+        pthread_t thread;
+        assert_int_equal(pthread_create(&thread, NULL, cancel_later, &watcher), 0);
+        int code = patina_frame_render(frame, stage.scene);
+        double end = now();
+        pthread_join(thread, NULL);
+        assert_true(code == PATINA_OK || code == PATINA_ERROR_CANCELLED);
+        if (code == PATINA_ERROR_CANCELLED) {
+            cancelled++;
+            if (end - watcher.cancelled_at > latest)
+                latest = end - watcher.cancelled_at;
+        }
+        struct picture picture = picture_read(frame);
+        picture_assert_identical(&picture, &truth, 0, 0, "after a cancel from another thread");
+        picture_free(&picture);
+        // A cancel that came after the end is for the next render: spend it.
+        int rest = patina_frame_render(frame, stage.scene);
+        assert_true(rest == PATINA_OK || rest == PATINA_ERROR_CANCELLED);
+    }
+    printf("  %.1f ms a frame; %u of 40 cancelled, at most %.1f ms late\n", 1e3 * whole, cancelled, 1e3 * latest);
+    assert_true(cancelled > 0);
+    picture_free(&truth);
+    patina_frame_destroy(frame);
+    stage_free(&stage);
+    patina_device_destroy(device);
+}
+
+static void test_refused_arguments(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    struct stage stage = stage_build(staging_named("small, 1 point a pixel"));
+    patina_frame *frame = frame_of(device, &stage);
+    float pixels[64];
+    assert_int_equal(patina_frame_read(frame, PATINA_PASS_DEPTH, pixels, sizeof pixels), PATINA_ERROR_EMPTY);
+    CHECK(patina_frame_render(frame, stage.scene), frame);
+    assert_int_equal(patina_frame_read(frame, PATINA_PASS_DEPTH, pixels, sizeof pixels), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_frame_read(frame, PATINA_PASS_COUNT, pixels, sizeof pixels), PATINA_ERROR_ARGUMENT);
+
+    // Whatever is refused leaves the scene as it was, at setting or at rendering.
+    patina_settings wrong[6];
+    for (int i = 0; i < 6; i++)
+        wrong[i] = stage.settings;
+    wrong[0].region[2] = 68; // beyond the picture
+    wrong[0].region[3] = 45;
+    wrong[1].region[0] = wrong[1].region[2] = 5; // no area
+    wrong[1].region[3] = 45;
+    wrong[2].fill = 77;
+    wrong[3].quality = 77;
+    wrong[4].smooth = 77;
+    wrong[5].antialias = 77;
+    for (int i = 0; i < 6; i++) {
+        int code = patina_scene_set_settings(stage.scene, &wrong[i]);
+        if (code == PATINA_OK)
+            code = patina_frame_render(frame, stage.scene);
+        if (code != PATINA_ERROR_ARGUMENT)
+            support_die("wrong settings %d gave %d", i, code);
+        CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+        CHECK(patina_frame_render(frame, stage.scene), frame);
+    }
+    patina_camera cameras[4];
+    for (int i = 0; i < 4; i++)
+        cameras[i] = stage.camera;
+    cameras[0].left = cameras[0].right; // no window
+    cameras[1].far_clip = 0.5 * cameras[1].near_clip;
+    cameras[2].near_clip = 0.0; // perspective needs a distance
+    for (int k = 0; k < 16; k++)
+        cameras[3].world_from_camera[k] = 0.0; // no direction
+    cameras[3].world_from_camera[15] = 1.0;
+    for (int i = 0; i < 4; i++) {
+        int code = patina_scene_set_camera(stage.scene, &cameras[i]);
+        if (code == PATINA_OK)
+            code = patina_frame_render(frame, stage.scene);
+        if (code != PATINA_ERROR_ARGUMENT)
+            support_die("wrong camera %d gave %d", i, code);
+        CHECK(patina_scene_set_camera(stage.scene, &stage.camera), stage.scene);
+        CHECK(patina_frame_render(frame, stage.scene), frame);
+    }
+    patina_frame_destroy(frame);
+    stage_free(&stage);
+    patina_device_destroy(device);
+}
+
+int main(int argc, char **argv)
+{
+    support_arguments(argc, argv);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_statistics),
+        cmocka_unit_test(test_plan),
+        cmocka_unit_test(test_cancel_keeps_the_picture),
+        cmocka_unit_test(test_cancel_while_running),
+        cmocka_unit_test(test_refused_arguments),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

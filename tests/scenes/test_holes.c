@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How much of a surface stays open, and how much too much is closed, against the density of points on screen: a disc of
+// random points that faces the camera (SPEC 2.2).
+#include "analytic.h"
+#include "clouds.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { SIZE = 288, ROUND = 4096, SEEDS = 3 };
+static const double radius = 120.0; // pixels
+
+struct row {
+    double density;
+    double open_limit, grown_limit; // percent of the disc, closed mode
+};
+
+static const struct row rows[] = {
+    {0.1, 100.0, 100.0}, {0.2, 100.0, 100.0}, {0.3, 100.0, 100.0}, {0.5, 100.0, 100.0},  {1.0, 100.0, 100.0},
+    {2.0, 100.0, 100.0}, {4.0, 100.0, 100.0}, {8.0, 100.0, 100.0}, {16.0, 100.0, 100.0}, {30.0, 100.0, 100.0},
+};
+
+struct share {
+    double open, grown; // percent
+};
+
+static struct polygon circle(const patina_camera *camera)
+{
+    double(*corner)[3] = malloc(ROUND * sizeof *corner);
+    if (!corner)
+        support_die("out of memory");
+    for (uint32_t i = 0; i < ROUND; i++) {
+        corner[i][0] = radius * cos(2.0 * M_PI * i / ROUND);
+        corner[i][1] = radius * sin(2.0 * M_PI * i / ROUND);
+        corner[i][2] = 0.0;
+    }
+    struct polygon polygon = polygon_project((const double(*)[3])corner, ROUND, camera, SIZE, SIZE);
+    free(corner);
+    return polygon;
+}
+
+static struct share measure(patina_device *device, double density, uint32_t fill, unsigned columns)
+{
+    const double eye[3] = {0.37, -0.21, 500.0}, target[3] = {0.37, -0.21, 0.0}; // one unit a pixel
+    patina_camera camera = camera_orthographic(eye, target, SIZE, SIZE, SIZE, 1.0, 1000.0);
+    patina_settings settings = settings_default(SIZE, SIZE);
+    settings.fill = fill;
+    struct polygon polygon = circle(&camera);
+    struct share share = {0};
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        struct points points = points_disc((uint64_t)(density * M_PI * radius * radius), radius, columns, seed);
+        patina_cloud *cloud = points_upload(&points);
+        points_free(&points);
+        patina_scene *scene = scene_of(cloud, NULL);
+        struct picture picture = picture_render(device, scene, &camera, &settings);
+        struct silhouette found = polygon_compare(&polygon, &picture);
+        share.open += 100.0 * (double)found.missing / (double)found.inside / SEEDS;
+        share.grown += 100.0 * (double)found.grown / found.area / SEEDS;
+        picture_free(&picture);
+        patina_scene_destroy(scene);
+        patina_cloud_destroy(cloud);
+    }
+    polygon_free(&polygon);
+    return share;
+}
+
+static void test_density(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    uint32_t failures = 0;
+    printf("  a disc of %g pixels radius, %% of it; `closed` chooses its own number of fills\n"
+           "  points/px |  none: open | paper: open  grown | closed: open  grown | without normals: open  grown\n",
+           radius);
+    for (uint32_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct row *row = &rows[i];
+        struct share none = measure(device, row->density, PATINA_FILL_OFF, POINTS_NORMALS);
+        struct share paper = measure(device, row->density, PATINA_FILL_PAPER, POINTS_NORMALS);
+        struct share closed = measure(device, row->density, PATINA_FILL_CLOSED, POINTS_NORMALS);
+        struct share plain = measure(device, row->density, PATINA_FILL_CLOSED, POINTS_PLAIN);
+        int bad = closed.open > row->open_limit || closed.grown > row->grown_limit || plain.open > row->open_limit ||
+                  plain.grown > row->grown_limit;
+        printf("  %9g | %11.4f | %11.4f %6.3f | %12.4f %6.3f | %21.4f %6.3f%s\n", row->density, none.open, paper.open,
+               paper.grown, closed.open, closed.grown, plain.open, plain.grown, bad ? "  <- beyond the limit" : "");
+        // What random points leave open is known: exp(-density). It tells that the disc is where it should be.
+        double expected = 100.0 * exp(-row->density);
+        assert_true(fabs(none.open - expected) < 0.05 * expected + 0.05);
+        failures += (uint32_t)bad;
+    }
+    assert_int_equal(failures, 0);
+    patina_device_destroy(device);
+}
+
+int main(int argc, char **argv)
+{
+    support_arguments(argc, argv);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_density)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Sphere, torus and plane against their exact picture: coverage, depth, normal and Lambert colour. Not against another
+// implementation of ours: against the surface that the points were drawn from.
+#include "analytic.h"
+#include "clouds.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { SIZE = 384 };
+
+struct bounds {
+    double iou;                       // at least
+    double inner_holes, outer_growth; // at most, percent
+    double depth_rms, depth_p999;     // spacings
+    double normal_mean;               // degrees
+    double color_rms;                 // share of white
+};
+
+struct scenario {
+    const char *name;
+    enum analytic_kind kind;
+    double density; // points a pixel where the surface faces the camera; on the plane, everywhere
+    int orthographic;
+    unsigned columns;
+    uint32_t quality;
+    struct bounds bounds;
+};
+
+#define ANY                                                                                                            \
+    {                                                                                                                  \
+        0.0, 100.0, 100.0, 1e9, 1e9, 180.0, 10.0                                                                       \
+    }
+
+static const struct scenario scenarios[] = {
+    {"sphere", ANALYTIC_SPHERE, 0.3, 0, POINTS_NORMALS, 0, ANY},
+    {"sphere", ANALYTIC_SPHERE, 1.0, 0, POINTS_NORMALS, 0, ANY},
+    {"sphere", ANALYTIC_SPHERE, 4.0, 0, POINTS_NORMALS, 0, ANY},
+    {"sphere, paper's depth", ANALYTIC_SPHERE, 1.0, 0, POINTS_NORMALS, PATINA_QUALITY_PAPER, ANY},
+    {"sphere, orthographic", ANALYTIC_SPHERE, 1.0, 1, POINTS_NORMALS, 0, ANY},
+    {"sphere without normals", ANALYTIC_SPHERE, 1.0, 0, POINTS_PLAIN, 0, ANY},
+    {"torus", ANALYTIC_TORUS, 0.3, 0, POINTS_NORMALS, 0, ANY},
+    {"torus", ANALYTIC_TORUS, 1.0, 0, POINTS_NORMALS, 0, ANY},
+    {"torus", ANALYTIC_TORUS, 4.0, 0, POINTS_NORMALS, 0, ANY},
+    {"torus, paper's depth", ANALYTIC_TORUS, 1.0, 0, POINTS_NORMALS, PATINA_QUALITY_PAPER, ANY},
+    {"torus, orthographic", ANALYTIC_TORUS, 1.0, 1, POINTS_NORMALS, 0, ANY},
+    {"torus without normals", ANALYTIC_TORUS, 4.0, 0, POINTS_PLAIN, 0, ANY},
+    {"plane at 60 degrees", ANALYTIC_RECTANGLE, 0.3, 0, POINTS_NORMALS, 0, ANY},
+    {"plane at 60 degrees", ANALYTIC_RECTANGLE, 1.0, 0, POINTS_NORMALS, 0, ANY},
+    {"plane at 60 degrees", ANALYTIC_RECTANGLE, 4.0, 0, POINTS_NORMALS, 0, ANY},
+    {"plane, paper's depth", ANALYTIC_RECTANGLE, 1.0, 0, POINTS_NORMALS, PATINA_QUALITY_PAPER, ANY},
+    {"plane, orthographic", ANALYTIC_RECTANGLE, 1.0, 1, POINTS_NORMALS, 0, ANY},
+    {"plane without normals", ANALYTIC_RECTANGLE, 1.0, 0, POINTS_PLAIN, 0, ANY},
+};
+
+static const double sun_towards[3] = {0.36, -0.48, 0.8};
+
+struct setting {
+    struct analytic_shape shape;
+    struct points points;
+    patina_camera camera;
+    double spacing; // 1 / sqrt(points per area), world units
+};
+
+static struct setting prepare(const struct scenario *scenario)
+{
+    struct setting set;
+    double a = 1.0, b = 0.4, area;
+    double pixel = 3.4 / SIZE; // world units at the target
+    double distance = 6.0;
+    if (scenario->kind == ANALYTIC_SPHERE) {
+        area = area_sphere(a);
+    } else if (scenario->kind == ANALYTIC_TORUS) {
+        area = area_torus(a, b);
+    } else {
+        a = b = 1.8;
+        area = a * b;
+    }
+    double facing = scenario->kind == ANALYTIC_RECTANGLE ? 0.5 : 1.0; // cosine of the plane's tilt
+    uint64_t count = (uint64_t)(scenario->density * area * facing / (pixel * pixel));
+    set.shape = analytic_shape(scenario->kind, a, b);
+    set.spacing = sqrt(area / (double)count);
+    if (scenario->kind == ANALYTIC_SPHERE)
+        set.points = points_sphere(count, a, scenario->columns, 21);
+    else if (scenario->kind == ANALYTIC_TORUS)
+        set.points = points_torus(count, a, b, scenario->columns, 22);
+    else
+        set.points = points_rectangle(count, a, b, scenario->columns, 23);
+    double elevation = scenario->kind == ANALYTIC_RECTANGLE ? 30.0 : 40.0; // above the horizon
+    double high = sin(elevation * M_PI / 180.0), across = cos(elevation * M_PI / 180.0);
+    const double eye[3] = {0.3 * distance * across, -0.9539392 * distance * across, distance * high};
+    const double target[3] = {0.0, 0.0, 0.0};
+    set.camera = scenario->orthographic ? camera_orthographic(eye, target, 3.4, SIZE, SIZE, -10.0, 20.0)
+                                        : camera_perspective(eye, target, 2.0 * atan(1.7 / distance) * 180.0 / M_PI,
+                                                             SIZE, SIZE, 0.1, 100.0);
+    return set;
+}
+
+static struct analytic_error measure(patina_device *device, const struct scenario *scenario)
+{
+    struct setting set = prepare(scenario);
+    patina_cloud *cloud = points_upload(&set.points);
+    points_free(&set.points);
+    patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT};
+    patina_scene *scene = scene_of(cloud, &style);
+    patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = (float)M_PI};
+    for (int k = 0; k < 3; k++)
+        sun.direction[k] = -sun_towards[k];
+    CHECK(patina_scene_add_light(scene, &sun), scene);
+    patina_settings settings = settings_default(SIZE, SIZE);
+    settings.film_transparent = 1;
+    settings.quality = scenario->quality;
+    struct picture picture = picture_render(device, scene, &set.camera, &settings);
+    struct analytic_hit *truth = analytic_picture(&set.shape, &set.camera, SIZE, SIZE);
+    // A sun of pi W/m2 shows a Lambert surface that faces it in its own colour, 0.8.
+    struct analytic_error error = analytic_compare(&picture, truth, set.spacing, sun_towards, 0.8);
+    free(truth);
+    picture_free(&picture);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+    return error;
+}
+
+static int within(const struct analytic_error *error, const struct bounds *bounds)
+{
+    return error->iou >= bounds->iou && 100.0 * error->inner_holes <= bounds->inner_holes &&
+           100.0 * error->outer_growth <= bounds->outer_growth && error->depth_rms <= bounds->depth_rms &&
+           error->depth_p999 <= bounds->depth_p999 && error->normal_mean <= bounds->normal_mean &&
+           error->color_rms <= bounds->color_rms;
+}
+
+static void test_known_shapes(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    uint32_t failures = 0;
+    printf(
+        "  %dx%d; holes and growth in %% of the truth's pixels (inner, outer: a pixel away from its border); depth in\n"
+        "  spacings, normals in degrees, colour as a share of white, all where the truth covers the 3x3 around\n"
+        "  shape                   pts/px |    IoU |  holes  inner | growth  outer | depth rms  p99.9 | normal mean  "
+        "p99 | colour rms   p99\n",
+        SIZE, SIZE);
+    for (uint32_t i = 0; i < sizeof scenarios / sizeof scenarios[0]; i++) {
+        const struct scenario *scenario = &scenarios[i];
+        struct analytic_error error = measure(device, scenario);
+        int good = within(&error, &scenario->bounds);
+        printf("  %-23s %6g | %.4f | %6.3f %6.4f | %6.3f %6.4f | %9.4f %6.3f | %11.3f %6.2f | %9.4f %6.4f%s\n",
+               scenario->name, scenario->density, error.iou, 100.0 * error.holes, 100.0 * error.inner_holes,
+               100.0 * error.growth, 100.0 * error.outer_growth, error.depth_rms, error.depth_p999, error.normal_mean,
+               error.normal_p99, error.color_rms, error.color_p99, good ? "" : "  <- beyond its bounds");
+        failures += (uint32_t)!good;
+    }
+    assert_int_equal(failures, 0);
+    patina_device_destroy(device);
+}
+
+int main(int argc, char **argv)
+{
+    support_arguments(argc, argv);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known_shapes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,365 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line, from outside: test_cli.py PATH_OF_PATINA. Needs Python's own library only."""
+import json
+import math
+import os
+import random
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import zlib
+from pathlib import Path
+
+PATINA = str(Path(sys.argv[1] if len(sys.argv) > 1 else "build/out/release/patina").resolve())
+FOLDER = Path()  # a temporary one, set by main
+
+
+def run(*arguments, code=0):
+    done = subprocess.run([PATINA, *map(str, arguments)], capture_output=True, text=True, cwd=FOLDER, timeout=300)
+    assert done.returncode == code, f"{arguments}: exit {done.returncode}, expected {code}: {done.stderr}{done.stdout}"
+    return done
+
+
+def read_png(path):
+    """(width, height, channels, rows from the top); 8-bit, not interlaced."""
+    data = (FOLDER / path).read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, packed = 8, b""
+    while at < len(data):
+        (size,), kind = struct.unpack(">I", data[at:at + 4]), data[at + 4:at + 8]
+        body = data[at + 8:at + 8 + size]
+        if kind == b"IHDR":
+            width, height, depth, color = struct.unpack(">IIBB", body[:10])
+        elif kind == b"IDAT":
+            packed += body
+        at += size + 12
+    assert depth == 8 and color in (2, 6)
+    channels = 3 if color == 2 else 4
+    raw, stride, rows, above = zlib.decompress(packed), width * channels, [], bytes(width * channels)
+    for y in range(height):
+        kind, row = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+        for x in range(stride):
+            a = row[x - channels] if x >= channels else 0
+            b, c = above[x], above[x - channels] if x >= channels else 0
+            p = a + b - c
+            nearest = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+            row[x] = (row[x] + (0, a, b, (a + b) // 2, nearest)[kind]) & 255
+        rows.append([tuple(row[x:x + channels]) for x in range(0, stride, channels)])
+        above = row
+    return width, height, channels, rows
+
+
+def write_ply(name, points, colors=None, normals=None, kind="float"):
+    with open(FOLDER / name, "w", encoding="ascii") as file:
+        file.write(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n")
+        file.write("".join(f"property {kind} {axis}\n" for axis in "xyz"))
+        if normals:
+            file.write("".join(f"property float n{axis}\n" for axis in "xyz"))
+        if colors:
+            file.write("".join(f"property uchar {channel}\n" for channel in ("red", "green", "blue")))
+        file.write("end_header\n")
+        for i, point in enumerate(points):
+            row = [*point, *(normals[i] if normals else ()), *(colors[i] if colors else ())]
+            file.write(" ".join(map(str, row)) + "\n")
+    return name
+
+
+def wall(name, color, count=120):
+    """A square of 2 x 2 in the plane y = 0, upright, `color(x, z)`."""
+    step = 2 / (count - 1)
+    points = [(x * step - 1, 0.0, z * step - 1) for x in range(count) for z in range(count)]
+    return write_ply(name, points, [color(x, z) for x, _, z in points], [(0, -1, 0)] * len(points))
+
+
+def ball(name, count=20000, origin=(0, 0, 0), kind="float", colors=None):
+    points, normals = [], []
+    for i in range(count):
+        z, angle = 1 - (2 * i + 1) / count, i * math.pi * (3 - math.sqrt(5))
+        r = math.sqrt(1 - z * z)
+        normal = (r * math.cos(angle), r * math.sin(angle), z)
+        normals.append(tuple(round(v, 6) for v in normal))
+        points.append(tuple(v + o for v, o in zip(normal, origin)))
+    return write_ply(name, points, colors, normals, kind)
+
+
+FRONT = ("--look", "0,-6,0,0,0,0,30", "--size", "64x64")
+
+
+# ---- wrong use -----------------------------------------------------------------------------------------------------
+
+def test_help_and_version():
+    assert "patina render" in run("help").stdout
+    assert run("--help").stdout == run("help").stdout
+    assert run("version").stdout.startswith("patina ")
+    assert "patina render" in run(code=2).stderr
+
+
+def test_wrong_use_is_told():
+    ball("use.ply", 100)
+    for arguments in (["paint"], ["info"], ["info", "a", "b"], ["convert", "a"], ["render"], ["render", "use.ply"],
+                      ["render", "use.ply", "-o"], ["render", "use.ply", "-o", "x.png", "--nonsense"],
+                      ["render", "use.ply", "-o", "x.png", "--size", "10"],
+                      ["render", "use.ply", "-o", "x.png", "--size", "0x5"],
+                      ["render", "use.ply", "-o", "x.png", "--size", "10x10y"],
+                      ["render", "use.ply", "-o", "x.png", "--size", "-1x10"],
+                      ["render", "use.ply", "-o", "x.png", "--quality", "best"],
+                      ["render", "use.ply", "-o", "x.png", "--fill", "close"],
+                      ["render", "use.ply", "-o", "x.png", "--camera", "10"],
+                      ["render", "use.ply", "-o", "x.png", "--camera", "10,95"],
+                      ["render", "use.ply", "-o", "x.png", "--camera", "10,nan"],
+                      ["render", "use.ply", "-o", "x.png", "--look", "1,1,1,1,1,1"],
+                      ["render", "use.ply", "-o", "x.png", "--region", "5,5,5,9"],
+                      ["render", "use.ply", "-o", "x.png", "--threads", "-1"],
+                      ["render", "use.ply", "-o", "x.png", "--repeat", "0"],
+                      ["render", "use.ply", "-o", "x.png", "--stats", "xml"],
+                      ["render", "use.ply", "-o", "x.png", "--background", "1,1"]):
+        done = run(*arguments, code=2)
+        assert done.stderr.startswith("patina: ") and not done.stdout, arguments
+    assert not (FOLDER / "x.png").exists()
+
+
+def test_missing_and_broken_files():
+    (FOLDER / "broken.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                                       "property float y\nproperty float z\nend_header\n1 2 3\n4 five 6\n7 8 9\n")
+    for arguments in (["info"], ["render", "-o", "x.png"], ["convert", "x.ply"]):
+        for name in ("nothing.ply", "broken.ply"):
+            done = run(arguments[0], name, *arguments[1:], code=1)
+            assert name in done.stderr and not done.stdout, done.stderr
+    assert "line" in run("info", "broken.ply", code=1).stderr
+    assert not (FOLDER / "x.png").exists() and not (FOLDER / "x.ply").exists()
+
+
+def test_unwritable_output():
+    ball("unwritable.ply", 100)
+    assert "no/such" in run("render", "unwritable.ply", "-o", "no/such/x.png", code=1).stderr
+    run("convert", "unwritable.ply", "no/such/x.ply", code=1)
+
+
+def test_unknown_device():
+    ball("device.ply", 100)
+    assert "abacus" in run("render", "device.ply", "-o", "x.png", "--device", "abacus", code=1).stderr
+
+
+# ---- info and convert ----------------------------------------------------------------------------------------------
+
+def test_info():
+    text = run("info", ball("info.ply", 5000)).stdout
+    lines = {line.split()[0]: line.split()[1:] for line in text.splitlines() if line.strip() and line[0] != " "}
+    assert lines["points"] == ["5000"] and lines["format"] == ["PLY", "ascii"] and lines["normals"] == ["yes"]
+    assert lines["colours"] == ["no"]
+    assert 0.01 < float(lines["spacing"][0]) < 0.2  # sqrt(4 pi / 5000) = 0.05
+
+
+def test_info_of_an_empty_cloud():
+    assert "points      0" in run("info", write_ply("empty.ply", [])).stdout
+
+
+def test_convert_keeps_the_cloud():
+    generator = random.Random(1)
+    colors = [tuple(generator.randrange(256) for _ in range(3)) for _ in range(3000)]
+    ball("ascii.ply", 3000, colors=colors)
+    run("convert", "ascii.ply", "binary.ply")
+    before, after = run("info", "ascii.ply").stdout.splitlines(), run("info", "binary.ply").stdout.splitlines()
+    assert after[0].endswith("binary_little_endian") and before[1:] == after[1:]
+    for name in ("ascii", "binary"):
+        run("render", f"{name}.ply", "-o", f"{name}.png", "--size", "100x80")
+    assert (FOLDER / "ascii.png").read_bytes() == (FOLDER / "binary.png").read_bytes()
+
+
+def test_convert_keeps_a_survey_origin():
+    ball("survey.ply", 2000, (451234.5, 5012345.25, 1200), "double")
+    run("convert", "survey.ply", "survey2.ply")
+    a, b = run("info", "survey.ply").stdout.splitlines(), run("info", "survey2.ply").stdout.splitlines()
+    assert [line for line in a if line.startswith("origin")]
+    same = ("points", "box", "size", "normals")
+    assert [line for line in a if line.startswith(same)] == [line for line in b if line.startswith(same)]
+
+
+# ---- pictures ------------------------------------------------------------------------------------------------------
+
+def test_default_picture():
+    ball("default.ply")
+    assert "default.png" in run("render", "default.ply", "-o", "default.png").stderr
+    width, height, channels, rows = read_png("default.png")
+    assert (width, height, channels) == (1024, 1024, 3)
+    assert rows[0][0] == (63, 63, 63)  # linear 0.05
+    covered = sum(pixel != (63, 63, 63) for row in rows for pixel in row) / (width * height)
+    assert 0.2 < covered < 0.9, covered  # framed
+    middle = rows[512][512]
+    assert max(middle) > 100, middle  # lit
+
+
+def test_colors_are_kept_and_rows_are_upright():
+    wall("wall.ply", lambda x, z: (200, 30, 60) if z > 0 else (10, 120, 255))
+    run("render", "wall.ply", "-o", "wall.png", *FRONT, "--smooth", "off")
+    width, height, channels, rows = read_png("wall.png")
+    assert (width, height, channels) == (64, 64, 3)
+    assert rows[20][32] == (200, 30, 60) and rows[43][32] == (10, 120, 255), (rows[20][32], rows[43][32])
+    run("render", "wall.ply", "-o", "lit.png", *FRONT, "--smooth", "off", "--lit")
+    assert read_png("lit.png")[3][20][32] != (200, 30, 60)
+
+
+def test_transparent_film_is_not_premultiplied():
+    wall("film.ply", lambda x, z: (200, 100, 50))
+    run("render", "film.ply", "-o", "film.png", *FRONT, "--transparent")
+    _, _, channels, rows = read_png("film.png")
+    assert channels == 4 and rows[0][0][3] == 0 and rows[32][32] == (200, 100, 50, 255)
+    partial = [pixel for row in rows for pixel in row if 0 < pixel[3] < 255]
+    for pixel in partial:  # an edge is as orange as the middle
+        assert all(abs(a - b) <= 3 for a, b in zip(pixel, (200, 100, 50))), pixel
+
+
+def test_background():
+    ball("background.ply", 500)
+    run("render", "background.ply", "-o", "background.png", "--size", "32x32", "--background", "1,0.2140411,0")
+    assert read_png("background.png")[3][0][0] == (255, 127, 0)
+
+
+def test_ortho_width():
+    wall("ortho.ply", lambda x, z: (255, 255, 255))
+    run("render", "ortho.ply", "-o", "ortho.png", "--look", "0,-6,0,0,0,0", "--ortho", "4", "--size", "80x40",
+        "--background", "0,0,0", "--antialias", "off")
+    rows = read_png("ortho.png")[3]
+    wide = sum(pixel == (255, 255, 255) for pixel in rows[20])
+    assert abs(wide - 40) <= 2, wide  # 2 of 4 units in 80 pixels
+    assert all(pixel == (255, 255, 255) for pixel in rows[0][30:50])  # 2 units high
+
+
+def test_look_turns_with_its_target():
+    write_ply("point.ply", [(3, 1, 2)] * 4, [(255, 0, 0)] * 4)
+    for look in ("0,0,0,3,1,2", "3,1,9,3,1,2", "3,1,-9,3,1,2"):
+        run("render", "point.ply", "-o", "point.png", "--look", look, "--size", "33x33", "--antialias", "off")
+        rows = read_png("point.png")[3]
+        red = [(x, y) for y, row in enumerate(rows) for x, pixel in enumerate(row) if pixel[0] > 200]
+        assert red and all(abs(x - 16) <= 1 and abs(y - 16) <= 1 for x, y in red), (look, red)
+
+
+def test_region_is_a_crop():
+    ball("region.ply")
+    view = ("--size", "90x70", "--camera", "20,30")
+    run("render", "region.ply", "-o", "whole.png", *view)
+    run("render", "region.ply", "-o", "part.png", *view, "--region", "31,12,66,57")
+    whole, part = read_png("whole.png"), read_png("part.png")
+    assert part[:2] == (35, 45)
+    assert part[3] == [row[31:66] for row in whole[3][70 - 57:70 - 12]]
+
+
+def test_choices_change_the_picture():
+    ball("choices.ply", 3000)
+    seen = {}
+    base = ("render", "choices.ply", "-o", "choice.png", "--size", "200x200")
+    for choice in ((), ("--quality", "paper"), ("--fill", "off"), ("--fill", "paper"), ("--smooth", "off"),
+                   ("--smooth", "box"), ("--antialias", "off"), ("--unlit",), ("--camera", "80,10"),
+                   ("--camera", "30,40,20"), ("--ortho", "3"), ("--fill", "paper", "--iterations", "3")):
+        run(*base, *choice)
+        picture = (FOLDER / "choice.png").read_bytes()
+        assert picture not in seen, (choice, seen[picture])
+        seen[picture] = choice
+
+
+def test_several_files():
+    wall("left.ply", lambda x, z: (255, 0, 0))
+    write_ply("right.ply", [(0.5 + x * 0.01, -1, z * 0.01) for x in range(40) for z in range(-20, 20)], [(0, 255, 0)] * 1600)
+    done = run("render", "left.ply", "right.ply", "-o", "both.png", *FRONT)
+    assert str(120 * 120 + 1600) in done.stderr
+    colors = {pixel for row in read_png("both.png")[3] for pixel in row}
+    assert (255, 0, 0) in colors and (0, 255, 0) in colors
+
+
+def test_empty_cloud_is_background():
+    write_ply("void.ply", [])
+    run("render", "void.ply", "-o", "void.png", "--size", "16x16")
+    assert {pixel for row in read_png("void.png")[3] for pixel in row} == {(63, 63, 63)}
+
+
+def test_threads_batches_and_levels_agree():
+    ball("same.ply", 50000)
+    base = ("render", "same.ply", "-o", "same.png", "--size", "301x203")
+    run(*base, "--device", "cpu", "--threads", "1")
+    first = (FOLDER / "same.png").read_bytes()
+    for choice in (("--threads", "2"), ("--threads", "7"), ("--batch", "1"), ("--threads", "3", "--batch", "13"),
+                   ("--device", "cpu-scalar")):
+        run(*base, *(() if "--device" in choice else ("--device", "cpu")), *choice)
+        assert (FOLDER / "same.png").read_bytes() == first, choice
+
+
+# ---- numbers -------------------------------------------------------------------------------------------------------
+
+def test_stats():
+    ball("stats.ply")
+    done = run("render", "stats.ply", "--stats", "json", "--repeat", "5", "--size", "320x200", "--device", "cpu")
+    stats = json.loads(done.stdout)
+    assert {"device", "points", "width", "height", "ms_median", "ms_min", "ms_max", "passes", "skipped",
+            "peak_mb"} <= stats.keys()
+    assert stats["points"] == 20000 and (stats["width"], stats["height"]) == (320, 200)
+    assert stats["device"].startswith("cpu") and stats["peak_mb"] > 1
+    assert 0 < stats["ms_min"] <= stats["ms_median"] <= stats["ms_max"]
+    assert stats["passes"] and all(isinstance(ms, float) and ms >= 0 for ms in stats["passes"].values())
+    assert "scatter" in stats["passes"]
+    assert sum(stats["passes"].values()) < 3 * stats["ms_max"] + 1
+    assert all(isinstance(reason, str) and reason for reason in stats["skipped"].values())
+
+
+def test_skipped_passes_have_reasons():
+    ball("skipped.ply", 500)
+    stats = json.loads(run("render", "skipped.ply", "--stats", "json", "--smooth", "off", "--antialias", "off").stdout)
+    assert {"smooth", "antialias"} <= stats["skipped"].keys(), stats
+
+
+def test_plan():
+    ball("plan.ply", 500)
+    text = run("render", "plan.ply", "--dump-plan").stdout
+    assert "scatter" in text and len(text.splitlines()) > 3
+    done = run("render", "plan.ply", "--dump-plan", "--stats", "json")
+    json.loads(done.stdout)
+    assert "scatter" in done.stderr
+
+
+def test_planes():
+    ball("planes.ply", 500)
+    (FOLDER / "planes").mkdir()
+    run("render", "planes.ply", "--dump-planes", "planes", "--size", "40x30")
+    files = sorted(path.name for path in (FOLDER / "planes").iterdir())
+    assert any(name.endswith(".txt") for name in files) and len(files) >= 4, files
+    run("render", "planes.ply", "--dump-planes", "no/such/folder", code=1)
+
+
+def test_interrupt():
+    ball("interrupt.ply")
+    process = subprocess.Popen([PATINA, "render", "interrupt.ply", "--repeat", "100000"], cwd=FOLDER,
+                               stderr=subprocess.PIPE)
+    time.sleep(1)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 130 and b"cancelled" in error, (process.returncode, error)
+
+
+def main():
+    global FOLDER
+    passed, failed = 0, 0
+    tests = [(name, test) for name, test in globals().items() if name.startswith("test_")]
+    wanted = sys.argv[2:]
+    with tempfile.TemporaryDirectory() as folder:
+        FOLDER = Path(folder)
+        for name, test in tests:
+            if wanted and name not in wanted:
+                continue
+            try:
+                test()
+                passed += 1
+            except Exception:  # a test's failure is one line of the sum, whatever it is
+                print(f"FAILED {name}")
+                traceback.print_exc(file=sys.stdout)
+                failed += 1
+    print(f"{passed} passed, {failed} failed, 0 skipped")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    os.environ.pop("PATINA_SHADER_DIR", None)
+    sys.exit(main())
