@@ -6,7 +6,9 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { ESTIMATE_RADIUS = 3 }; // of image-space normals after filling: 7 x 7, noise of half a spacing tilts them 5 degrees
+// Radius of the window for image-space normals: two spacings, at least 3 pixels so that a point's place within its pixel
+// averages out, at most 16 (beyond, points are too far apart on screen for a surface to be seen anyway).
+enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16 };
 
 static const struct {
     uint32_t bytes, levels;
@@ -142,9 +144,9 @@ static void plan_surface(struct builder *builder, uint32_t i)
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     if (!instance->args.has_normals) {
-        double wanted = ceil(1.5 * plan->spacing_px);
+        double wanted = ceil(2.0 * plan->spacing_px);
         struct normals_args args = { .view = view_of(plan, instance, 0), .instance = instance->args };
-        args.radius = wanted < 2.0 ? 2 : wanted > 6.0 ? 6 : (uint32_t)wanted;
+        args.radius = wanted < ESTIMATE_LEAST ? ESTIMATE_LEAST : wanted > ESTIMATE_MOST ? ESTIMATE_MOST : (uint32_t)wanted;
         REASON(ADD(builder, normals, args,
                    { plane(PT_PLANE_KEYS, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0) }),
                "instance %u has no normals: estimated from the depth of %u x %u pixels", i, 2 * args.radius + 1,
@@ -254,14 +256,6 @@ static void plan_shade(struct builder *builder, uint32_t i)
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     uint32_t margin = (plan->iterations + 2) << plan->levels;
-    if (!instance->args.has_normals) {
-        struct normals_args estimate = { .view = view_of(plan, instance, margin),
-                                         .instance = instance->args,
-                                         .radius = ESTIMATE_RADIUS };
-        REASON(ADD(builder, normals, estimate,
-                   { plane(PT_PLANE_KEYS, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_SHADING, 0) }),
-               "instance %u has no normals: estimated again where holes are filled now", i);
-    }
     struct shade_args args = { .view = view_of(plan, instance, margin),
                                .instance = instance->args,
                                .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED };

@@ -313,10 +313,10 @@ static void choose_filling(const patina_settings *settings, struct pt_plan *plan
 static uint32_t round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
 
 // How far, in pixels, anything can carry influence: fills and un-fills of both phases and the push at every level, the
-// window of normals (6 before and 3 after filling), the blend of normals (9), smoothing and anti-aliasing.
+// window of estimated normals (16), the blend of normals (9), smoothing and anti-aliasing.
 static uint32_t reach_of(const struct pt_plan *plan)
 {
-    uint32_t reach = 6 + 3 + 9 + 1 + 1;
+    uint32_t reach = 16 + 9 + 1 + 1;
     for (uint32_t level = 0; level <= plan->levels; level++)
         reach += (4 * plan->iterations + 3) << level;
     return reach;

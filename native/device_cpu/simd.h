@@ -294,15 +294,20 @@ static inline void vf_decode_normal(vi word, vf n[3])
     n[2] = z;
 }
 
-// Rays of PT_LANES pixels from (x, y) on.
-static inline void vf_ray(const struct view_args *view, uint32_t x, uint32_t y, vf ray[2])
+// Rays of PT_LANES pixels of row y.
+static inline void vf_ray_at(const struct view_args *view, vi x, uint32_t y, vf ray[2])
 {
     const vf half = vf_set(0.5f), scale = vf_set((float)(1u << view->level));
-    vi first = vi_set((uint32_t)((view->origin_x >> view->level) + (int32_t)x));
-    vf px = (vi_convert(vi_add(first, vi_lanes())) + half) * scale;
+    vf px = (vi_convert(vi_add(vi_set((uint32_t)(view->origin_x >> view->level)), x)) + half) * scale;
     vf py = (vf_set((float)((view->origin_y >> view->level) + (int32_t)y)) + half) * scale;
     ray[0] = vf_set(view->ray_x0) + vf_set(view->ray_xs) * px;
     ray[1] = vf_set(view->ray_y0) + vf_set(view->ray_ys) * py;
+}
+
+// ... from (x, y) on.
+static inline void vf_ray(const struct view_args *view, uint32_t x, uint32_t y, vf ray[2])
+{
+    vf_ray_at(view, vi_add(vi_set(x), vi_lanes()), y, ray);
 }
 
 static inline vf vf_cosine(const struct view_args *view, const vf n[3], const vf ray[2])

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "device_gl.h"
 
+#include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -87,6 +88,7 @@ static int close_context(struct pt_gl_device *d, void *unused)
         for (int i = 0; i < PT_GL_SCRATCH_COUNT; i++)
             d->gl.DeleteBuffers(1, &d->scratch[i].name);
         d->gl.DeleteBuffers(1, &d->arguments);
+        d->gl.DeleteBuffers(1, &d->srgb);
         d->gl.Finish();
     }
     d->context_ops->destroy(d->context);
@@ -151,6 +153,20 @@ static int is_software(const char *renderer)
     return 0;
 }
 
+// The values that the CPU device uses: float64, cut to float32.
+static void make_srgb_table(struct pt_gl_device *d)
+{
+    float table[256];
+    for (int i = 0; i < 256; i++) {
+        double c = i / 255.0;
+        table[i] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+    }
+    d->gl.GenBuffers(1, &d->srgb);
+    d->gl.BindBuffer(GL_UNIFORM_BUFFER, d->srgb);
+    d->gl.BufferData(GL_UNIFORM_BUFFER, sizeof table, table, GL_STATIC_DRAW);
+    d->gl.BindBufferBase(GL_UNIFORM_BUFFER, 0, d->srgb);
+}
+
 static int open_context(struct pt_gl_device *d, void *unused)
 {
     (void)unused;
@@ -183,6 +199,7 @@ static int open_context(struct pt_gl_device *d, void *unused)
     d->block_size = (uint64_t)block > SIZE_MAX ? SIZE_MAX : (size_t)block;
     d->alignment = alignment > 4 ? (size_t)alignment : 4;
     d->gl.GenBuffers(1, &d->arguments);
+    make_srgb_table(d);
     info->key64 = (uint32_t)pt_gl_key64_works(d);
     return pt_gl_check(d, "opening the device");
 }

@@ -48,6 +48,8 @@ struct pt_gl_device {
     size_t block_size; // greatest storage block
     size_t alignment;  // of a block's offset in its buffer
     GLuint arguments;
+    GLuint srgb;    // uniform block: linear values of the 256 sRGB bytes
+    uint32_t stamp; // fill: of the current step
     GLuint programs[PT_KERNEL_COUNT][PT_GL_VARIANTS];
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
 };
@@ -75,8 +77,7 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 // scatter.c, fill.c
 int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
                   uint32_t count, const atomic_int *cancel);
-int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers,
-               const atomic_int *cancel);
+int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);
 
 // selftest.c
 // Whether 64-bit atomics of this driver give what the CPU says; 0 too where the driver has none.

@@ -59,17 +59,30 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
     return PATINA_OK;
 }
 
-// Workgroups that cover the kernel's pixels; every argument struct begins with its view.
-static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const struct view_args *view)
+// The pixels that a kernel runs over: view.rect, with which every argument struct begins, or the crop that it writes.
+static void extent(enum pt_kernel kernel, const void *arguments, uint32_t *width, uint32_t *height)
+{
+    const struct view_args *view = arguments;
+    *width = view->rect[2] > view->rect[0] ? view->rect[2] - view->rect[0] : 0;
+    *height = view->rect[3] > view->rect[1] ? view->rect[3] - view->rect[1] : 0;
+    if (kernel == PT_KERNEL_compose) {
+        *width = ((const struct compose_args *)arguments)->crop_width;
+        *height = ((const struct compose_args *)arguments)->crop_height;
+    } else if (kernel == PT_KERNEL_extract) {
+        *width = ((const struct extract_args *)arguments)->crop_width;
+        *height = ((const struct extract_args *)arguments)->crop_height;
+    }
+}
+
+static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments)
 {
     GLint group[3] = {1, 1, 1};
+    uint32_t width, height;
     int result = pt_gl_kernel_program(d, kernel, 0, "");
     if (result != PATINA_OK)
         return result;
-    if (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1])
-        return PATINA_OK;
     d->gl.GetProgramiv(d->programs[kernel][0], GL_COMPUTE_WORK_GROUP_SIZE, group);
-    uint32_t width = view->rect[2] - view->rect[0], height = view->rect[3] - view->rect[1];
+    extent(kernel, arguments, &width, &height);
     return pt_gl_dispatch(d, kernel, 0, (width + (uint32_t)group[0] - 1) / (uint32_t)group[0],
                           (height + (uint32_t)group[1] - 1) / (uint32_t)group[1]);
 }
@@ -92,6 +105,6 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
             return result;
     }
     if (kernel == PT_KERNEL_fill)
-        return pt_gl_fill(d, arguments, buffers, cancel);
+        return pt_gl_fill(d, arguments, cancel);
     return run_filter(d, kernel, arguments);
 }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 enum {
-    SLICES = 4,         // workgroups that share a chunk: 4096 points are too many for one where cores abound
+    SLICES = 16,        // workgroups that share a chunk on a GPU: 4096 points are too many for one where cores abound
     LONG_RUN = 4096,    // chunks between two looks at cancel
 };
 
@@ -41,7 +41,8 @@ static int run_batch(struct pt_gl_device *d, const struct instance_buffers *b, c
             return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
         d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_scatter][pass], 0, batch->first_chunk + done);
         d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_scatter][pass], 1, (GLuint)batch->first_slot);
-        result = pt_gl_dispatch(d, PT_KERNEL_scatter, pass, groups, SLICES);
+        // llvmpipe: 1M points in 21 ms with one, 27 ms with 4: setting a chunk up costs more than idle lanes.
+        result = pt_gl_dispatch(d, PT_KERNEL_scatter, pass, groups, d->base.info.hardware ? SLICES : 1);
     }
     return result;
 }

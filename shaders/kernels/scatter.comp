@@ -45,6 +45,7 @@ void main()
     vec4 eye = vec4(chunk.eye[0], chunk.eye[1], chunk.eye[2], chunk.eye[3]);
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
+    bool cull = chunk.cull != 0u;
     uint base = chunk.first - first_slot;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
 
@@ -77,9 +78,12 @@ void main()
             continue;
 #endif
         // 4. back faces, then the least key
-        uint id = ids[base + i];
-        if (chunk.cull != 0u && faces_away(surface[id], eye, p))
-            continue;
+        uint id = 0u;
+        if (cull || PASS != 0) {
+            id = ids[base + i];
+            if (cull && faces_away(surface[id], eye, p))
+                continue;
+        }
 #if PASS == 0
         atomicMin(keys[2u * pixel + 1u], z_bits);
 #elif PASS == 1

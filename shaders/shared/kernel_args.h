@@ -73,11 +73,12 @@ struct instance_args {
     float spacing[PT_NO_SPACINGS]; // local spacing by class, world units
 };
 
-// normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals.
+// normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Taken are pixels with
+// |z_q - z| <= max(d, 4 footprint(z) max(|dx|, |dy|)), d = d_eff facing the viewer.
 struct normals_args {
     struct view_args view;
     struct instance_args instance;
-    uint32_t radius; // of the window, 1..6
+    uint32_t radius; // of the window, 1..16
 };
 
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff; from = the pixel itself.

@@ -69,13 +69,8 @@ static void gather_normals(const struct shade_args *args, const struct pt_cpu_ca
 {
     const struct view_args *view = &args->view;
     const float *normals = pt_cpu_data(call, 2);
-    float *shading = pt_cpu_data(call, 6);
     float column[3][PT_LANES];
     uint32_t from[PT_LANES];
-    if (!args->instance.has_normals) { // estimated after filling
-        vf_load4(shading + 4 * p->at, p->n);
-        return;
-    }
     vi_store(from, p->from, vm_first(PT_LANES));
     for (uint32_t i = 0; i < PT_LANES; i++) {
         float n[3] = { 0.0f, 0.0f, 0.0f };
@@ -190,8 +185,7 @@ static void shade_pixels(const struct shade_args *args, const struct pt_cpu_call
     // 2. its colour and normal
     gather_albedo(args, pt_cpu_data(call, 5), &p);
     gather_normals(args, call, &p);
-    if (instance->has_normals)
-        vf_store4(shading + 4 * p.at, p.n[0], p.n[1], p.n[2], vf_zero(), p.lanes);
+    vf_store4(shading + 4 * p.at, p.n[0], p.n[1], p.n[2], vf_zero(), p.lanes);
     // 3. light
     vf color[3] = { p.albedo[0], p.albedo[1], p.albedo[2] };
     if (instance->lit)

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// compose: colour over the background, into the crop; twin of native/device_cpu/kernels/compose.c
+#version 430 core
+#include "lib/math.glsl"
+
+layout(local_size_x = 32, local_size_y = 8) in;
+
+layout(std430, binding = 0) readonly buffer arguments_block { compose_args args; };
+layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = 2) readonly buffer color_block { vec4 color[]; };
+layout(std430, binding = 3) writeonly buffer combined_block { vec4 combined[]; };
+
+void main()
+{
+    uint width = args.view.width, crop_x = args.crop_x, crop_y = args.crop_y;
+    uint crop_width = args.crop_width, crop_height = args.crop_height;
+    vec4 background = vec4(args.background[0], args.background[1], args.background[2], args.background[3]);
+    uint x = gl_GlobalInvocationID.x, y = gl_GlobalInvocationID.y;
+    if (x >= crop_width || y >= crop_height)
+        return;
+    uint at = (crop_y + y) * width + crop_x + x;
+    precise vec4 result = background;
+    if (keys[at].y != PT_KEY_EMPTY_Z) {
+        vec4 c = color[at];
+        result = c + (1.0 - c.w) * background;
+    }
+    combined[y * crop_width + x] = result;
+}

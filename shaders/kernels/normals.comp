@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// normals: image-space normals of points that have none; twin of native/device_cpu/kernels/normals.c
+//
+// A plane is linear in the picture as 1/z (perspective) or z (orthographic). Least squares over the window's pixels that
+// can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
+#version 430 core
+#include "lib/math.glsl"
+
+layout(local_size_x = 32, local_size_y = 8) in;
+
+layout(std430, binding = 0) readonly buffer arguments_block { normals_args args; };
+layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
+
+struct window_sums {
+    float n, x, y, xx, xy, yy, w, xw, yw;
+};
+
+float linear_depth(view_args view, float z) { return view.perspective != 0u ? pt_rcp(z) : z; }
+
+// 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32.
+window_sums gather(view_args view, int radius, int x, int y, float z, float w, float tolerance)
+{
+    precise window_sums s = window_sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (int dy = -radius; dy <= radius; dy++)
+        for (int dx = -radius; dx <= radius; dx++) {
+            int qx = x + dx, qy = y + dy;
+            if (qx < 0 || qy < 0 || qx >= int(view.width) || qy >= int(view.height))
+                continue;
+            float zq = pt_float(keys[uint(qy) * view.width + uint(qx)].y);
+            precise float apart = zq - z;
+            precise float most = tolerance * float(max(abs(dx), abs(dy)));
+            if (!(pt_abs(apart) <= most))
+                continue; // another surface, or nothing
+            float fx = float(dx), fy = float(dy);
+            precise float dw = linear_depth(view, zq) - w;
+            s.n += 1.0;
+            s.x += fx;
+            s.y += fy;
+            s.xx += fx * fx;
+            s.xy += fx * fy;
+            s.yy += fy * fy;
+            s.w += dw;
+            s.xw = s.xw + fx * dw;
+            s.yw = s.yw + fy * dw;
+        }
+    return s;
+}
+
+// 2. to 4. The normal from the sums; zero where they hold none.
+vec3 fit(view_args view, window_sums s, float w, vec2 ray)
+{
+    // 2. Normal equations about the mean, all times n.
+    precise float xx = s.n * s.xx - s.x * s.x, xy = s.n * s.xy - s.x * s.y, yy = s.n * s.yy - s.y * s.y;
+    precise float xw = s.n * s.xw - s.x * s.w, yw = s.n * s.yw - s.y * s.w;
+    precise float det = xx * yy - xy * xy;
+    if (!(det > 0.5)) // an exact integer: 0 when the pixels lie on a line
+        return vec3(0.0);
+    float inverse = pt_rcp(det);
+    precise float a = (yy * xw - xy * yw) * inverse, b = (xx * yw - xy * xw) * inverse;
+    // 3. w at the pixel, and the plane's normal from dw/dx = a, dw/dy = b a pixel
+    precise vec3 n;
+    n.x = a * view.ray_ys;
+    n.y = b * view.ray_xs;
+    if (view.perspective != 0u) {
+        precise float c = w + (s.w - (a * s.x + b * s.y)) * pt_rcp(s.n);
+        n.z = (n.x * ray.x + n.y * ray.y) - c * (view.ray_xs * view.ray_ys);
+    } else {
+        n.z = view.ray_xs * view.ray_ys;
+    }
+    // 4. unit, towards the viewer: n . (u, v, -1) < 0
+    float largest = pt_max(pt_max(pt_abs(n.x), pt_abs(n.y)), pt_abs(n.z));
+    if (!(largest > 1e-30 && largest < 1e30))
+        return vec3(0.0);
+    n = n * pt_rcp(largest);
+    float scale = pt_rsqrt(pt_dot(n, n));
+    if (view.perspective == 0u)
+        ray = vec2(0.0);
+    precise float facing = (n.x * ray.x + n.y * ray.y) - n.z;
+    if (facing > 0.0)
+        scale = -scale;
+    precise vec3 unit = n * scale;
+    return unit;
+}
+
+void main()
+{
+    view_args view = args.view;
+    uint id_base = args.instance.id_base, id_count = args.instance.id_count;
+    float d_min = args.instance.d_min;
+    int radius = int(args.radius);
+    uint x = view.rect[0] + gl_GlobalInvocationID.x, y = view.rect[1] + gl_GlobalInvocationID.y;
+    if (x >= view.rect[2] || y >= view.rect[3])
+        return;
+    uint at = y * view.width + x;
+    uvec2 key = keys[at];
+    uint id = key.x - id_base;
+    if (key.y == PT_KEY_EMPTY_Z || id >= id_count)
+        return;
+    float z = pt_float(key.y), w = linear_depth(view, z);
+    float spacing = args.instance.spacing[surface[id] >> PT_SPACING_SHIFT];
+    precise float tolerance = 4.0 * pt_layer_distance(view, d_min, spacing, z, 1.0);
+    window_sums s = gather(view, radius, int(x), int(y), z, w, tolerance);
+    normals[at] = vec4(fit(view, s, w, pt_ray(view, int(x), int(y))), 0.0);
+}

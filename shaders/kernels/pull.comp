@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// pull: 2 x 2 -> 1, the least key: what a scatter at half the resolution gives. SPEC 2.2; twin of
+// native/device_cpu/kernels/pull.c
+#version 430 core
+#include "lib/math.glsl"
+
+layout(local_size_x = 32, local_size_y = 8) in;
+
+layout(std430, binding = 0) readonly buffer arguments_block { pull_args args; };
+layout(std430, binding = 1) readonly buffer fine_keys_block { uvec2 fine_keys[]; };
+layout(std430, binding = 2) readonly buffer fine_from_block { uint fine_from[]; };
+layout(std430, binding = 3) writeonly buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = 4) writeonly buffer from_block { uint from[]; };
+
+void main()
+{
+    uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
+    uint width = args.view.width, fine_width = args.fine_width, fine_height = args.fine_height;
+    uint x = rect.x + gl_GlobalInvocationID.x, y = rect.y + gl_GlobalInvocationID.y;
+    if (x >= rect.z || y >= rect.w)
+        return;
+    uint best = 2u * y * fine_width + 2u * x;
+    uvec2 key = fine_keys[best];
+    for (uint child = 1u; child < 4u; child++) {
+        uint fx = 2u * x + (child & 1u), fy = 2u * y + (child >> 1);
+        uint at = fy * fine_width + fx;
+        if (fx < fine_width && fy < fine_height && pt_key_less(fine_keys[at], key)) {
+            best = at;
+            key = fine_keys[at];
+        }
+    }
+    keys[y * width + x] = key;
+    from[y * width + x] = fine_from[best];
+}
