@@ -276,16 +276,15 @@ static enum pt_plane plan_image_filters(struct builder *builder)
     static const char *const names[3] = { "alleviated Gaussian", "Gaussian", "box" };
     struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
-    enum pt_plane color = PT_PLANE_COLOR_A, other = PT_PLANE_COLOR_B;
+    enum pt_plane color = PT_PLANE_COLOR_A;
     if (settings->smooth != PATINA_SMOOTH_OFF) {
         const float *w = weights[settings->smooth];
         struct smooth_args args = { .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2] };
         REASON(ADD(builder, smooth, args,
                    { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
-                     plane(other, 0) }),
+                     plane(PT_PLANE_COLOR_B, 0) }),
                "%s, 3 x 3", names[settings->smooth]);
         color = PT_PLANE_COLOR_B;
-        other = PT_PLANE_COLOR_A;
     } else {
         skip(builder, "smooth", "switched off in the settings");
     }
@@ -295,10 +294,9 @@ static enum pt_plane plan_image_filters(struct builder *builder)
     }
     struct antialias_args args = { .view = plan->view, .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS };
     REASON(ADD(builder, antialias, args,
-               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
-                 plane(other, 0) }),
+               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0) }),
            args.layers ? "edges of background and layers" : "edges of background");
-    return other;
+    return color;
 }
 
 static void plan_output(struct builder *builder, enum pt_plane color)

@@ -35,30 +35,4 @@ static inline int pt_rows(const struct pt_cpu_call *call, const struct view_args
 
 static inline uint32_t pt_lanes_left(uint32_t x, uint32_t end) { return end - x < PT_LANES ? end - x : PT_LANES; }
 
-// xyz of PT_LANES float4 pixels.
-static inline void vf_load4(const float *pixels, vf out[3])
-{
-    float column[3][PT_LANES];
-    for (int i = 0; i < PT_LANES; i++)
-        for (int k = 0; k < 3; k++)
-            column[k][i] = pixels[4 * i + k];
-    for (int k = 0; k < 3; k++)
-        out[k] = vf_load(column[k]);
-}
-
-// Stores float4 pixels; bit i of lanes: pixel i is written.
-static inline void vf_store4(float *pixels, vf x, vf y, vf z, vf w, uint32_t lanes)
-{
-    float column[4][PT_LANES];
-    vf_store(column[0], x, vm_first(PT_LANES));
-    vf_store(column[1], y, vm_first(PT_LANES));
-    vf_store(column[2], z, vm_first(PT_LANES));
-    vf_store(column[3], w, vm_first(PT_LANES));
-    for (; lanes; lanes &= lanes - 1) {
-        int i = __builtin_ctz(lanes);
-        for (int k = 0; k < 4; k++)
-            pixels[4 * i + k] = column[k][i];
-    }
-}
-
 #endif

@@ -69,6 +69,23 @@ static inline vm vm_or(vm a, vm b) { return a | b; }
 static inline vm vm_not(vm a) { return (vm)~a; }
 static inline void vf_store(float *p, vf a, vm m) { _mm512_mask_storeu_ps(p, m, a); }
 static inline void vi_store(void *p, vi a, vm m) { _mm512_mask_storeu_epi32(p, m, a); }
+static inline vf vf_load_every_fourth(const float *p) // float4 pixels 0, 4, 8, 12
+{
+    __m512 a = _mm512_insertf32x4(_mm512_castps128_ps512(_mm_loadu_ps(p)), _mm_loadu_ps(p + 16), 1);
+    return _mm512_insertf32x4(_mm512_insertf32x4(a, _mm_loadu_ps(p + 32), 2), _mm_loadu_ps(p + 48), 3);
+}
+static inline void vf_store_every_fourth(float *p, vf a, uint32_t lanes) // bits 0, 4, 8, 12 of lanes
+{
+    if (lanes & 1u)
+        _mm_storeu_ps(p, _mm512_castps512_ps128(a));
+    if (lanes >> 4 & 1u)
+        _mm_storeu_ps(p + 16, _mm512_extractf32x4_ps(a, 1));
+    if (lanes >> 8 & 1u)
+        _mm_storeu_ps(p + 32, _mm512_extractf32x4_ps(a, 2));
+    if (lanes >> 12 & 1u)
+        _mm_storeu_ps(p + 48, _mm512_extractf32x4_ps(a, 3));
+}
+#define PT_VECTOR(name) _mm512_##name
 
 #elif defined(PT_ISA_AVX2)
 
@@ -125,6 +142,15 @@ static inline vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
 static inline vm vm_not(vm a) { return _mm256_xor_si256(a, _mm256_set1_epi32(-1)); }
 static inline void vf_store(float *p, vf a, vm m) { _mm256_maskstore_ps(p, m, a); }
 static inline void vi_store(void *p, vi a, vm m) { _mm256_maskstore_epi32(p, m, a); }
+static inline vf vf_load_every_fourth(const float *p) { return _mm256_set_m128(_mm_loadu_ps(p + 16), _mm_loadu_ps(p)); }
+static inline void vf_store_every_fourth(float *p, vf a, uint32_t lanes)
+{
+    if (lanes & 1u)
+        _mm_storeu_ps(p, _mm256_castps256_ps128(a));
+    if (lanes >> 4 & 1u)
+        _mm_storeu_ps(p + 16, _mm256_extractf128_ps(a, 1));
+}
+#define PT_VECTOR(name) _mm256_##name
 
 #elif defined(PT_ISA_SSE42)
 
@@ -197,6 +223,13 @@ static inline void vi_store(void *p, vi a, vm m)
             memcpy((char *)p + 4 * k, &value[k], 4);
 }
 static inline void vf_store(float *p, vf a, vm m) { vi_store(p, vf_bits(a), m); }
+static inline vf vf_load_every_fourth(const float *p) { return _mm_loadu_ps(p); }
+static inline void vf_store_every_fourth(float *p, vf a, uint32_t lanes)
+{
+    if (lanes & 1u)
+        _mm_storeu_ps(p, a);
+}
+#define PT_VECTOR(name) _mm_##name
 
 #else // scalar: the same kernels, a lane at a time
 
@@ -251,6 +284,56 @@ static inline void vi_store(void *p, vi a, vm m)
         memcpy(p, &a, 4);
 }
 
+#endif
+
+// Bytes at base + i: the word that starts there (three bytes beyond the last may be read).
+#if defined(PT_ISA_AVX512)
+static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m)
+{
+    return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, base, 1);
+}
+#elif defined(PT_ISA_AVX2)
+static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m)
+{
+    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), (const int *)(const void *)base, i, m, 1);
+}
+#elif defined(PT_ISA_SSE42)
+static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return sse_gather((const char *)base, i, m, 1); }
+#else
+static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return m ? vi_load(base + i) : 0; }
+#endif
+
+// PT_LANES float4 pixels <-> four vectors; bit i of lanes: pixel i is written.
+#if PT_LANES > 1
+static inline void vf_transpose(vf r[4]) // 4 x 4 within each quarter
+{
+    vf a = PT_VECTOR(unpacklo_ps)(r[0], r[1]), b = PT_VECTOR(unpacklo_ps)(r[2], r[3]);
+    vf c = PT_VECTOR(unpackhi_ps)(r[0], r[1]), d = PT_VECTOR(unpackhi_ps)(r[2], r[3]);
+    r[0] = PT_VECTOR(shuffle_ps)(a, b, 0x44);
+    r[1] = PT_VECTOR(shuffle_ps)(a, b, 0xEE);
+    r[2] = PT_VECTOR(shuffle_ps)(c, d, 0x44);
+    r[3] = PT_VECTOR(shuffle_ps)(c, d, 0xEE);
+}
+static inline void vf_load4(const float *pixels, vf out[4])
+{
+    for (int k = 0; k < 4; k++)
+        out[k] = vf_load_every_fourth(pixels + 4 * k);
+    vf_transpose(out);
+}
+static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
+{
+    vf r[4] = { in[0], in[1], in[2], in[3] };
+    vf_transpose(r);
+    for (int k = 0; k < 4; k++)
+        vf_store_every_fourth(pixels + 4 * k, r[k], lanes >> k);
+}
+#else
+static inline void vf_load4(const float *pixels, vf out[4]) { memcpy(out, pixels, 16); }
+static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
+{
+    if (lanes)
+        memcpy(pixels, in, 16);
+}
 #endif
 
 // ---- the rest is the same for every level ---------------------------------------------------------------------------

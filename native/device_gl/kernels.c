@@ -19,8 +19,8 @@ int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t off
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
                           "%s: a buffer of %zu bytes; this OpenGL driver's shaders reach %zu at most", what, size,
                           d->block_size);
-    d->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, name, (GLintptr)offset,
-                          (GLsizeiptr)((size + 15) & ~(size_t)15));
+    size_t padded = size ? (size + 15) & ~(size_t)15 : 16; // as buffers are made
+    d->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, name, (GLintptr)offset, (GLsizeiptr)padded);
     return PATINA_OK;
 }
 

@@ -421,9 +421,10 @@ static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32
 
 // ---- create --------------------------------------------------------------------------------------------------------
 
-static size_t color_bytes(enum pt_color_format format)
+static size_t color_bytes(const struct patina_cloud *cloud)
 {
-    return format == PT_COLOR_SRGB8 ? 3 : format == PT_COLOR_FLOAT ? 12 : 0;
+    static const uint32_t bytes[] = { [PT_COLOR_NONE] = 0, [PT_COLOR_SRGB8] = 3, [PT_COLOR_FLOAT] = 12 };
+    return cloud->info.count * bytes[cloud->color_format] + 4; // kernels read bytes as words
 }
 
 static int allocate(struct patina_cloud *cloud, uint64_t drawn)
@@ -435,7 +436,7 @@ static int allocate(struct patina_cloud *cloud, uint64_t drawn)
     cloud->positions = pt_pages_alloc(cloud->slots * 12);
     cloud->ids = pt_pages_alloc(cloud->slots * 4);
     cloud->surface = pt_pages_alloc(cloud->info.count * 4);
-    cloud->colors = cloud->color_format ? pt_pages_alloc(cloud->info.count * color_bytes(cloud->color_format)) : NULL;
+    cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
     if (!cloud->chunks || !cloud->positions || !cloud->ids || !cloud->surface ||
         (cloud->color_format && !cloud->colors))
         return PATINA_ERROR_MEMORY;
@@ -445,7 +446,7 @@ static int allocate(struct patina_cloud *cloud, uint64_t drawn)
         chunk->count = c < full ? PT_CHUNK_POINTS : (uint32_t)rest;
         chunk->padded = c < full ? PT_CHUNK_POINTS : (uint32_t)(cloud->slots - full * PT_CHUNK_POINTS);
     }
-    cloud->info.bytes = cloud->slots * 16 + cloud->info.count * (4 + color_bytes(cloud->color_format)) +
+    cloud->info.bytes = cloud->slots * 16 + cloud->info.count * 4 + (cloud->colors ? color_bytes(cloud) : 0) +
                         cloud->chunk_count * sizeof *cloud->chunks;
     return PATINA_OK;
 }
@@ -524,8 +525,8 @@ static int check_desc(patina_cloud_desc *desc)
     int error;
     if (desc->count && !desc->position.data)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "position: no data for %llu points", (unsigned long long)desc->count);
-    if (desc->count > 0xFFFFFFFEull)
-        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "a cloud of %llu points: at most 4294967294 fit",
+    if (desc->count > 0x7FFFFFFFull) // gathers take signed indices
+        return pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "a cloud of %llu points: at most 2147483647 fit, split it",
                        (unsigned long long)desc->count);
     if (!finite3(desc->origin))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "origin: not finite");
@@ -601,7 +602,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_pages_free(cloud->positions, cloud->slots * 12);
     pt_pages_free(cloud->ids, cloud->slots * 4);
     pt_pages_free(cloud->surface, cloud->info.count * 4);
-    pt_pages_free(cloud->colors, cloud->info.count * color_bytes(cloud->color_format));
+    pt_pages_free(cloud->colors, color_bytes(cloud));
     free(cloud->chunks);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);

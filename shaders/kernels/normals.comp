@@ -19,8 +19,9 @@ struct window_sums {
 
 float linear_depth(view_args view, float z) { return view.perspective != 0u ? pt_rcp(z) : z; }
 
-// 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32.
-window_sums gather(view_args view, int radius, int x, int y, float z, float w, float tolerance)
+// 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32. A pixel of the same surface:
+// |z_q - z| <= max(distance, slope * max(|dx|, |dy|)).
+window_sums gather(view_args view, int radius, int x, int y, float z, float w, float distance_limit, float slope)
 {
     precise window_sums s = window_sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (int dy = -radius; dy <= radius; dy++)
@@ -30,18 +31,18 @@ window_sums gather(view_args view, int radius, int x, int y, float z, float w, f
                 continue;
             float zq = pt_float(keys[uint(qy) * view.width + uint(qx)].y);
             precise float apart = zq - z;
-            precise float most = tolerance * float(max(abs(dx), abs(dy)));
-            if (!(pt_abs(apart) <= most))
+            precise float reach = slope * float(max(abs(dx), abs(dy)));
+            if (!(pt_abs(apart) <= pt_max(distance_limit, reach)))
                 continue; // another surface, or nothing
             float fx = float(dx), fy = float(dy);
             precise float dw = linear_depth(view, zq) - w;
-            s.n += 1.0;
-            s.x += fx;
-            s.y += fy;
-            s.xx += fx * fx;
-            s.xy += fx * fy;
-            s.yy += fy * fy;
-            s.w += dw;
+            s.n = s.n + 1.0;
+            s.x = s.x + fx;
+            s.y = s.y + fy;
+            s.xx = s.xx + fx * fx;
+            s.xy = s.xy + fx * fy;
+            s.yy = s.yy + fy * fy;
+            s.w = s.w + dw;
             s.xw = s.xw + fx * dw;
             s.yw = s.yw + fy * dw;
         }
@@ -51,37 +52,31 @@ window_sums gather(view_args view, int radius, int x, int y, float z, float w, f
 // 2. to 4. The normal from the sums; zero where they hold none.
 vec3 fit(view_args view, window_sums s, float w, vec2 ray)
 {
-    // 2. Normal equations about the mean, all times n.
+    // 2. Normal equations about the mean, all times n: slopes a, b of w and its value at the pixel. det is an exact
+    // integer (in float32 up to a rounding): 0 when the pixels lie on a line.
     precise float xx = s.n * s.xx - s.x * s.x, xy = s.n * s.xy - s.x * s.y, yy = s.n * s.yy - s.y * s.y;
     precise float xw = s.n * s.xw - s.x * s.w, yw = s.n * s.yw - s.y * s.w;
     precise float det = xx * yy - xy * xy;
-    if (!(det > 0.5)) // an exact integer: 0 when the pixels lie on a line
-        return vec3(0.0);
-    float inverse = pt_rcp(det);
-    precise float a = (yy * xw - xy * yw) * inverse, b = (xx * yw - xy * xw) * inverse;
-    // 3. w at the pixel, and the plane's normal from dw/dx = a, dw/dy = b a pixel
-    precise vec3 n;
-    n.x = a * view.ray_ys;
-    n.y = b * view.ray_xs;
-    if (view.perspective != 0u) {
-        precise float c = w + (s.w - (a * s.x + b * s.y)) * pt_rcp(s.n);
-        n.z = (n.x * ray.x + n.y * ray.y) - c * (view.ray_xs * view.ray_ys);
-    } else {
-        n.z = view.ray_xs * view.ray_ys;
-    }
-    // 4. unit, towards the viewer: n . (u, v, -1) < 0
-    float largest = pt_max(pt_max(pt_abs(n.x), pt_abs(n.y)), pt_abs(n.z));
-    if (!(largest > 1e-30 && largest < 1e30))
-        return vec3(0.0);
-    n = n * pt_rcp(largest);
-    float scale = pt_rsqrt(pt_dot(n, n));
-    if (view.perspective == 0u)
+    float inverse = pt_rcp(pt_max(det, 0.5));
+    precise float a = (yy * xw - xy * yw) * inverse;
+    precise float b = (xx * yw - xy * xw) * inverse;
+    precise float c = w + (s.w - (a * s.x + b * s.y)) * pt_rcp(pt_max(s.n, 1.0));
+    // 3. the plane's normal from dw/dx = a, dw/dy = b a pixel
+    precise vec3 n = vec3(a * view.ray_ys, b * view.ray_xs, view.ray_xs * view.ray_ys);
+    if (view.perspective != 0u)
+        n.z = (n.x * ray.x + n.y * ray.y) - c * n.z;
+    else
         ray = vec2(0.0);
+    // 4. unit, towards the viewer: n . (u, v, -1) < 0. Largest component first, so that no square over- or underflows.
+    float largest = pt_max(pt_max(pt_abs(n.x), pt_abs(n.y)), pt_abs(n.z));
+    bool found = 0.5 < det && 1e-30 < largest && largest < 1e30;
+    n = n * pt_rcp(found ? largest : 1.0);
+    float scale = pt_rsqrt(pt_dot(n, n));
     precise float facing = (n.x * ray.x + n.y * ray.y) - n.z;
-    if (facing > 0.0)
+    if (0.0 < facing)
         scale = -scale;
     precise vec3 unit = n * scale;
-    return unit;
+    return found ? unit : vec3(0.0);
 }
 
 void main()
@@ -100,7 +95,8 @@ void main()
         return;
     float z = pt_float(key.y), w = linear_depth(view, z);
     float spacing = args.instance.spacing[surface[id] >> PT_SPACING_SHIFT];
-    precise float tolerance = 4.0 * pt_layer_distance(view, d_min, spacing, z, 1.0);
-    window_sums s = gather(view, radius, int(x), int(y), z, w, tolerance);
+    float distance_limit = pt_layer_distance(view, d_min, spacing, z, 1.0);
+    precise float slope = 4.0 * pt_footprint(view, z); // 76 degrees
+    window_sums s = gather(view, radius, int(x), int(y), z, w, distance_limit, slope);
     normals[at] = vec4(fit(view, s, w, pt_ray(view, int(x), int(y))), 0.0);
 }

@@ -14,7 +14,7 @@ layout(std430, binding = 3) readonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = 4) readonly buffer deff_block { float deff[]; };
 layout(std430, binding = 5) readonly buffer surface_block { uint surface[]; };
 layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; };
-layout(std430, binding = 7) buffer shading_block { vec4 shading[]; };
+layout(std430, binding = 7) writeonly buffer shading_block { vec4 shading[]; };
 layout(std430, binding = 8) writeonly buffer color_block { vec4 color[]; };
 
 struct pixel {
@@ -63,10 +63,8 @@ vec3 blend_normal(view_args view, pixel p)
     return n;
 }
 
-vec3 gather_normal(view_args view, bool has_normals, bool refined, pixel p)
+vec3 gather_normal(view_args view, bool refined, pixel p)
 {
-    if (!has_normals) // estimated after filling
-        return shading[p.at].xyz;
     vec3 n = normals[p.from].xyz;
     if (refined && p.from != p.at) {
         vec3 blend = blend_normal(view, p);
@@ -139,7 +137,7 @@ void main()
     view_args view = args.view;
     uint id_base = args.instance.id_base, id_count = args.instance.id_count, format = args.instance.color_format;
     uint shininess = args.instance.shininess, light_count = args.light_count;
-    bool has_normals = args.instance.has_normals != 0u, lit = args.instance.lit != 0u, refined = args.refined != 0u;
+    bool lit = args.instance.lit != 0u, refined = args.refined != 0u;
     vec3 factors = vec3(args.instance.ambient, args.instance.diffuse, args.instance.specular);
     vec3 style = vec3(args.instance.color[0], args.instance.color[1], args.instance.color[2]);
     vec3 world = vec3(args.world[0], args.world[1], args.world[2]);
@@ -161,9 +159,8 @@ void main()
     p.ray = pt_ray(view, int(p.x), int(p.y));
     // 2. its colour and normal
     p.albedo = gather_albedo(format, style, p.id);
-    p.n = gather_normal(view, has_normals, refined, p);
-    if (has_normals)
-        shading[p.at] = vec4(p.n, 0.0);
+    p.n = gather_normal(view, refined, p);
+    shading[p.at] = vec4(p.n, 0.0);
     // 3. light
     vec3 c = p.albedo;
     if (lit)

@@ -53,7 +53,7 @@ void main()
         unit = vec3(0.0, 0.0, 1.0);
         if (view.perspective != 0u) {
             float r = pt_ray_rsqrt(ray);
-            unit = vec3((0.0 - ray.x) * r, (0.0 - ray.y) * r, r);
+            unit = vec3(pt_negate(ray.x) * r, pt_negate(ray.y) * r, r);
         }
     } else {
         inverse = pt_rcp(pt_max(pt_cosine(view, unit, ray), PT_COSINE_FLOOR));

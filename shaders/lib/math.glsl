@@ -13,6 +13,9 @@ float pt_max(float a, float b) { return a > b ? a : b; }
 float pt_min(float a, float b) { return a < b ? a : b; }
 float pt_abs(float x) { return pt_float(pt_bits(x) & 0x7FFFFFFFu); }
 
+// 0 - x, whose zero is +0. Written out: Mesa makes -x of the difference, precise or not.
+float pt_negate(float x) { return x == 0.0 ? 0.0 : -x; }
+
 // 1 / x for normal x > 0, within 2 ulp: an integer seed (5% off) and three Newton steps.
 float pt_rcp(float x)
 {

@@ -5,23 +5,39 @@
 // an edge pixel's true coverage is below 1: for a straight edge at 0 degrees (k = 1) it is uniform in 0..1, mean 1/2; at
 // 45 degrees the outermost pixels (k = 2) cover t^2/2, mean 1/6. Both are met by coverage = 5/6 - k/3, floored at 1/6 so
 // that lone pixels stay visible.
+//
+// Edges are few: their new colours are listed by bands of rows and applied when every pixel has been looked at.
 #include "device_cpu/rows.h"
 
-static void antialias_pixel(const struct antialias_args *args, const struct pt_cpu_call *call, uint32_t x, uint32_t y)
+enum { BAND_ROWS = 16 };
+
+struct edge {
+    float color[4];
+    uint32_t pixel;
+};
+
+struct antialias {
+    const struct pt_cpu_call *call;
+    const struct antialias_args *args;
+    struct edge *edges;
+    uint32_t *counts; // per band
+    size_t band_edges;
+};
+
+static const int8_t cross[4][2] = { { 1, 0 }, { 0, 1 }, { -1, 0 }, { 0, -1 } };
+
+// The new colour of the pixel, or 0 when it is no edge: vectors look past the plane's sides, this does not.
+static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struct edge *edge)
 {
-    static const int8_t cross[4][2] = { { 1, 0 }, { 0, 1 }, { -1, 0 }, { 0, -1 } };
-    const struct view_args *view = &args->view;
-    const uint64_t *keys = pt_cpu_data(call, 0);
-    uint32_t *from = pt_cpu_data(call, 1);
-    const float *deff = pt_cpu_data(call, 2), *colors = pt_cpu_data(call, 3);
-    size_t at = (size_t)y * view->width + x;
-    float *out = (float *)pt_cpu_data(call, 4) + 4 * at, far_color[4] = { 0.0f, 0.0f, 0.0f, 0.0f }, far_count = 0.0f;
-    uint32_t z_bits = (uint32_t)(keys[at] >> 32);
-    memcpy(out, colors + 4 * at, 16);
-    if (z_bits == PT_KEY_EMPTY_Z)
-        return;
-    float empty = pt_float(PT_KEY_EMPTY_Z);
-    float limit = args->layers ? pt_float(z_bits) + deff[from[at] & ~PT_FROM_MIXED] : empty;
+    const struct view_args *view = &job->args->view;
+    const uint64_t *keys = pt_cpu_data(job->call, 0);
+    const uint32_t *from = pt_cpu_data(job->call, 1);
+    const float *deff = pt_cpu_data(job->call, 2), *colors = pt_cpu_data(job->call, 3);
+    const float empty = pt_float(PT_KEY_EMPTY_Z);
+    uint32_t at = y * view->width + x;
+    float sum[4] = { 0.0f, 0.0f, 0.0f, 0.0f }, count = 0.0f, limit = empty;
+    if (job->args->layers)
+        limit = pt_float((uint32_t)(keys[at] >> 32)) + deff[from[at] & ~PT_FROM_MIXED];
     for (int i = 0; i < 4; i++) {
         uint32_t qx = x + (uint32_t)cross[i][0], qy = y + (uint32_t)cross[i][1];
         if (qx >= view->width || qy >= view->height)
@@ -30,29 +46,94 @@ static void antialias_pixel(const struct antialias_args *args, const struct pt_c
         float z = pt_float((uint32_t)(keys[q] >> 32));
         if (!(z > limit || z == empty))
             continue;
-        far_count += 1.0f;
-        for (int k = 0; k < 4 && z < empty; k++)
-            far_color[k] = far_color[k] + colors[4 * q + (size_t)k];
+        count += 1.0f;
+        for (size_t k = 0; k < 4 && z < empty; k++)
+            sum[k] = sum[k] + colors[4 * q + k];
     }
-    if (!(far_count > 0.0f))
-        return;
-    float coverage = pt_max((float)(5.0 / 6.0) - far_count * (float)(1.0 / 3.0), (float)(1.0 / 6.0));
-    float share = (1.0f - coverage) * pt_rcp(far_count);
-    for (int k = 0; k < 4; k++)
-        out[k] = colors[4 * at + (size_t)k] * coverage + far_color[k] * share;
-    from[at] |= PT_FROM_MIXED;
+    if (!(count > 0.0f))
+        return 0;
+    float coverage = pt_max((float)(5.0 / 6.0) - count * (float)(1.0 / 3.0), (float)(1.0 / 6.0));
+    float share = (1.0f - coverage) * pt_rcp(count);
+    edge->pixel = at;
+    for (size_t k = 0; k < 4; k++)
+        edge->color[k] = colors[4 * (size_t)at + k] * coverage + sum[k] * share;
+    return 1;
 }
 
-static void antialias_row(void *context, uint32_t y)
+// Which of PT_LANES pixels may be edges.
+static uint32_t look(const struct antialias *job, uint32_t x, uint32_t y, uint32_t lanes)
 {
-    const struct pt_cpu_call *call = context;
-    const struct antialias_args *args = call->arguments;
-    for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x++)
-        antialias_pixel(args, call, x, y);
+    const struct view_args *view = &job->args->view;
+    size_t at = (size_t)y * view->width + x;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(job->call, 0) + at;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), z = vi_float(vi_load_z(keys));
+    vm some = vm_and(vm_first(lanes), vf_lt(z, empty));
+    if (!vm_bits(some))
+        return 0;
+    vf limit = empty;
+    if (job->args->layers) {
+        vi from = vi_and(vi_load((const uint32_t *)pt_cpu_data(job->call, 1) + at), vi_set(~PT_FROM_MIXED));
+        limit = z + vf_gather(pt_cpu_data(job->call, 2), from, some);
+    }
+    vf far = z; // the farthest of the four
+    for (int i = 0; i < 4; i++) {
+        int64_t offset = cross[i][1] * (int64_t)view->width + cross[i][0];
+        if (y + (uint32_t)cross[i][1] < view->height && (at || offset >= 0))
+            far = vf_max(far, vi_float(vi_load_z(keys + offset)));
+    }
+    vm edge = vm_or(vf_lt(limit, far), vf_le(empty, far));
+    return vm_bits(vm_and(some, edge));
+}
+
+static void look_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct antialias *job = context;
+    const uint32_t *rect = job->args->view.rect;
+    (void)thread;
+    for (uint32_t band = begin; band < end && !pt_cpu_cancelled(job->call); band++) {
+        struct edge *list = job->edges + band * job->band_edges;
+        uint32_t count = 0, first = rect[1] + band * BAND_ROWS;
+        for (uint32_t y = first; y < first + BAND_ROWS && y < rect[3]; y++)
+            for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
+                uint32_t bits = look(job, x, y, pt_lanes_left(x, rect[2]));
+                for (; bits; bits &= bits - 1)
+                    count += (uint32_t)edge_color(job, x + (uint32_t)__builtin_ctz(bits), y, &list[count]);
+            }
+        job->counts[band] = count;
+    }
+}
+
+static void apply_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct antialias *job = context;
+    uint32_t *from = pt_cpu_data(job->call, 1);
+    float *colors = pt_cpu_data(job->call, 3);
+    (void)thread;
+    for (uint32_t band = begin; band < end; band++)
+        for (uint32_t i = 0; i < job->counts[band]; i++) {
+            const struct edge *edge = &job->edges[band * job->band_edges + i];
+            memcpy(colors + 4 * (size_t)edge->pixel, edge->color, sizeof edge->color);
+            from[edge->pixel] |= PT_FROM_MIXED;
+        }
 }
 
 int PT_KERNEL_ENTRY(antialias)(const struct pt_cpu_call *call)
 {
     const struct antialias_args *args = call->arguments;
-    return pt_rows(call, &args->view, antialias_row);
+    const uint32_t *rect = args->view.rect;
+    struct antialias job = { .call = call, .args = args };
+    if (rect[0] >= rect[2] || rect[1] >= rect[3])
+        return PATINA_OK;
+    uint32_t bands = (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS;
+    job.band_edges = (size_t)(rect[2] - rect[0]) * BAND_ROWS;
+    job.edges = pt_cpu_scratch(call, 2, bands * job.band_edges * sizeof *job.edges);
+    job.counts = pt_cpu_scratch(call, 1, bands * sizeof *job.counts);
+    if (!job.edges || !job.counts)
+        return PATINA_ERROR_MEMORY;
+    memset(job.counts, 0, bands * sizeof *job.counts);
+    pt_parallel(call->pool, bands, 1, look_bands, &job);
+    if (pt_cpu_cancelled(call))
+        return PATINA_ERROR_CANCELLED;
+    pt_parallel(call->pool, bands, 4, apply_bands, &job);
+    return PATINA_OK;
 }

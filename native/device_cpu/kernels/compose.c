@@ -6,19 +6,26 @@ static void compose_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
     const struct compose_args *args = call->arguments;
-    const uint64_t *keys = pt_cpu_data(call, 0);
-    const float *colors = pt_cpu_data(call, 1);
     size_t row = (size_t)(args->crop_y + y) * args->view.width + args->crop_x;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
+    const float *colors = (const float *)pt_cpu_data(call, 1) + 4 * row;
     float *out = (float *)pt_cpu_data(call, 2) + 4 * (size_t)y * args->crop_width;
-    for (uint32_t x = 0; x < args->crop_width; x++, out += 4) {
-        if ((uint32_t)(keys[row + x] >> 32) == PT_KEY_EMPTY_Z) {
-            memcpy(out, args->background, 16);
+    vf background[4];
+    for (int k = 0; k < 4; k++)
+        background[k] = vf_set(args->background[k]);
+    for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
+        uint32_t lanes = vm_bits(vm_first(pt_lanes_left(x, args->crop_width)));
+        vm some = vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z)));
+        vf color[4];
+        if (!(vm_bits(some) & lanes)) {
+            vf_store4(out + 4 * (size_t)x, background, lanes);
             continue;
         }
-        const float *color = colors + 4 * (row + x);
-        float through = 1.0f - color[3];
+        vf_load4(colors + 4 * (size_t)x, color);
+        vf through = vf_set(1.0f) - color[3];
         for (int k = 0; k < 4; k++)
-            out[k] = color[k] + through * args->background[k];
+            color[k] = vf_select(some, color[k] + through * background[k], background[k]);
+        vf_store4(out + 4 * (size_t)x, color, lanes);
     }
 }
 

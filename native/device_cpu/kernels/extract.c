@@ -3,38 +3,76 @@
 // is scan and what is invention); twin of shaders/kernels/extract.comp
 #include "device_cpu/rows.h"
 
-static float source_value(const struct view_args *view, uint32_t from, uint32_t x, uint32_t y)
+// 1 measured, 1 + distance filled, negative when anti-aliasing mixed the colour.
+static void extract_source(const struct extract_args *args, const uint64_t *keys, const uint32_t *from, uint32_t y,
+                           float *out)
 {
-    uint32_t source = from & ~PT_FROM_MIXED;
-    float dx = (float)((int32_t)(source % view->width) - (int32_t)x);
-    float dy = (float)((int32_t)(source / view->width) - (int32_t)y);
-    float square = dx * dx + dy * dy;
-    float value = square > 0.0f ? 1.0f + square * pt_rsqrt(square) : 1.0f;
-    return from & PT_FROM_MIXED ? -value : value;
+    const struct view_args *view = &args->view;
+    uint32_t row = (args->crop_y + y) * view->width + args->crop_x;
+    for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
+        vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
+        vm some = vm_and(lanes, vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
+        vi word = vi_load(from + x), source = vi_and(word, vi_set(~PT_FROM_MIXED));
+        vm mixed = vm_not(vi_eq(word, source));
+        vm measured = vi_eq(source, vi_add(vi_set(row + x), vi_lanes()));
+        vf value = vf_select(mixed, vf_set(-1.0f), vf_set(1.0f));
+        vf_store(out + x, vf_select(some, value, vf_zero()), lanes);
+        for (uint32_t bits = vm_bits(vm_and(some, vm_not(measured))); bits; bits &= bits - 1) {
+            uint32_t i = x + (uint32_t)__builtin_ctz(bits), at = from[i] & ~PT_FROM_MIXED;
+            float dx = (float)((int32_t)(at % view->width) - (int32_t)(args->crop_x + i));
+            float dy = (float)((int32_t)(at / view->width) - (int32_t)(args->crop_y + y));
+            float square = dx * dx + dy * dy, distance = 1.0f + square * pt_rsqrt(square);
+            out[i] = from[i] & PT_FROM_MIXED ? -distance : distance;
+        }
+    }
+}
+
+// Pixels of three floats: each store's fourth float is overwritten by the next pixel's first; the last is stored apart.
+static void store_normals(const vf n[4], float *out, uint32_t count)
+{
+    float pixels[4 * PT_LANES];
+    vf_store4(pixels, n, vm_bits(vm_first(PT_LANES)));
+    for (uint32_t i = 0; i + 1 < count; i++)
+        memcpy(out + 3 * i, pixels + 4 * i, 16);
+    memcpy(out + 3 * (count - 1), pixels + 4 * (count - 1), 12);
+}
+
+static void extract_normal(const struct extract_args *args, const uint64_t *keys, const float *shading, float *out)
+{
+    const float *m = args->world_from_view;
+    for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
+        uint32_t count = pt_lanes_left(x, args->crop_width);
+        vm some = vm_and(vm_first(count), vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
+        vf n[4], world[4];
+        if (!vm_bits(some)) {
+            memset(out + 3 * (size_t)x, 0, 12 * count);
+            continue;
+        }
+        vf_load4(shading + 4 * (size_t)x, n);
+        for (int k = 0; k < 3; k++) {
+            vf sum = (vf_set(m[3 * k]) * n[0] + vf_set(m[3 * k + 1]) * n[1]) + vf_set(m[3 * k + 2]) * n[2];
+            world[k] = vf_select(some, sum, vf_zero());
+        }
+        world[3] = vf_zero();
+        store_normals(world, out + 3 * (size_t)x, count);
+    }
 }
 
 static void extract_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
     const struct extract_args *args = call->arguments;
-    const uint64_t *keys = pt_cpu_data(call, 0);
-    const uint32_t *from = pt_cpu_data(call, 1);
-    const float *shading = pt_cpu_data(call, 2), *m = args->world_from_view;
-    float *depth = pt_cpu_data(call, 3), *normal = pt_cpu_data(call, 4), *source = pt_cpu_data(call, 5);
     size_t row = (size_t)(args->crop_y + y) * args->view.width + args->crop_x, out = (size_t)y * args->crop_width;
-    for (uint32_t x = 0; x < args->crop_width; x++) {
-        uint32_t z_bits = (uint32_t)(keys[row + x] >> 32);
-        int some = z_bits != PT_KEY_EMPTY_Z;
-        const float *n = shading + 4 * (row + x);
-        if (args->depth)
-            depth[out + x] = pt_float(z_bits);
-        for (size_t k = 0; args->normal && k < 3; k++)
-            normal[3 * (out + x) + k] =
-                some ? (m[3 * k] * n[0] + m[3 * k + 1] * n[1]) + m[3 * k + 2] * n[2] : 0.0f;
-        if (args->source)
-            source[out + x] =
-                some ? source_value(&args->view, from[row + x], args->crop_x + x, args->crop_y + y) : 0.0f;
-    }
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
+    float *depth = (float *)pt_cpu_data(call, 3) + out;
+    for (uint32_t x = 0; args->depth && x < args->crop_width; x += PT_LANES)
+        vf_store(depth + x, vi_float(vi_load_z(keys + x)), vm_first(pt_lanes_left(x, args->crop_width)));
+    if (args->normal)
+        extract_normal(args, keys, (const float *)pt_cpu_data(call, 2) + 4 * row,
+                       (float *)pt_cpu_data(call, 4) + 3 * out);
+    if (args->source)
+        extract_source(args, keys, (const uint32_t *)pt_cpu_data(call, 1) + row, y,
+                       (float *)pt_cpu_data(call, 5) + out);
 }
 
 int PT_KERNEL_ENTRY(extract)(const struct pt_cpu_call *call)

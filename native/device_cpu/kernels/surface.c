@@ -20,7 +20,7 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
                                              vm_not(vi_eq(z_bits, vi_set(PT_KEY_EMPTY_Z)))));
     if (!vm_bits(ours))
         return;
-    vf z = vi_float(z_bits), ray[2], n[3];
+    vf z = vi_float(z_bits), ray[2], n[4];
     vf_ray(view, x, y, ray);
     vi word = vi_gather(pt_cpu_data(call, 1), id, ours);
     vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), ours);
@@ -52,7 +52,8 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     // 4. cosine and layer distance
     vf inverse = vf_rcp(vf_max(vf_cosine(view, n, ray), vf_set(PT_COSINE_FLOOR)));
     inverse = vf_select(none, vf_set(1.0f), inverse);
-    vf_store4(normals + 4 * at, n[0], n[1], n[2], inverse, vm_bits(ours));
+    n[3] = inverse;
+    vf_store4(normals + 4 * at, n, vm_bits(ours));
     vf_store(deff + at, vf_layer_distance(view, instance->d_min, spacing, z, inverse), ours);
     vi_store(from + at, vi_add(vi_set((uint32_t)at), vi_lanes()), ours);
 }
