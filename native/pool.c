@@ -6,7 +6,9 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 
-enum { MAX_THREADS = 256 };
+// A frame is a few dozen short parallel steps: waking a sleeping thread costs 50 us each time, so both sides look for
+// work a while (some 30 us) before they sleep. Not where threads outnumber cores.
+enum { MAX_THREADS = 256, SPINS = 2000 };
 
 struct job {
     pt_work *work;
@@ -20,8 +22,9 @@ struct pt_pool {
     pthread_mutex_t caller; // one pt_parallel at a time
     pthread_cond_t wake, done;
     struct job *job;
-    uint64_t generation;
-    uint32_t running; // helpers still in the current job
+    _Atomic uint64_t generation;
+    atomic_uint running; // helpers still in the current job
+    uint32_t spins;
     uint32_t threads, batch;
     int quit;
     pthread_t helpers[MAX_THREADS];
@@ -44,14 +47,25 @@ static void take_part(struct job *job, uint32_t thread)
     }
 }
 
+static void pause_a_moment(void)
+{
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#else
+    sched_yield();
+#endif
+}
+
 static void *helper_main(void *argument)
 {
     struct helper_start start = *(struct helper_start *)argument;
     free(argument);
     struct pt_pool *pool = start.pool;
     uint64_t seen = 0;
-    pthread_mutex_lock(&pool->lock);
     for (;;) {
+        for (uint32_t i = 0; i < pool->spins && atomic_load_explicit(&pool->generation, memory_order_acquire) == seen; i++)
+            pause_a_moment();
+        pthread_mutex_lock(&pool->lock);
         while (!pool->quit && pool->generation == seen)
             pthread_cond_wait(&pool->wake, &pool->lock);
         if (pool->quit)
@@ -61,8 +75,9 @@ static void *helper_main(void *argument)
         pthread_mutex_unlock(&pool->lock);
         take_part(job, start.thread);
         pthread_mutex_lock(&pool->lock);
-        if (--pool->running == 0)
+        if (atomic_fetch_sub(&pool->running, 1) == 1)
             pthread_cond_signal(&pool->done);
+        pthread_mutex_unlock(&pool->lock);
     }
     pthread_mutex_unlock(&pool->lock);
     return NULL;
@@ -85,6 +100,7 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
     if (pool->threads > MAX_THREADS)
         pool->threads = MAX_THREADS;
     pool->batch = batch;
+    pool->spins = pool->threads <= core_count() ? SPINS : 0;
     pthread_mutex_init(&pool->lock, NULL);
     pthread_mutex_init(&pool->caller, NULL);
     pthread_cond_init(&pool->wake, NULL);
@@ -147,6 +163,8 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
         pthread_cond_broadcast(&pool->wake);
         pthread_mutex_unlock(&pool->lock);
         take_part(&job, 0);
+        for (uint32_t i = 0; i < pool->spins && atomic_load_explicit(&pool->running, memory_order_acquire); i++)
+            pause_a_moment();
         pthread_mutex_lock(&pool->lock);
         while (pool->running)
             pthread_cond_wait(&pool->done, &pool->lock);

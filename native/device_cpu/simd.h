@@ -265,7 +265,10 @@ static inline vi vi_shr(vi a, int n) { return a >> n; }
 static inline vm vi_eq(vi a, vi b) { return a == b; }
 static inline vm vi_lt_unsigned(vi a, vi b) { return a < b; }
 static inline vi vi_gather(const void *base, vi i, vm m) { return m ? vi_load((const char *)base + (size_t)i * 4) : 0; }
-static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return m ? (uint32_t)(keys[i] >> 32) : 0; }
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m)
+{
+    return m ? vi_load((const char *)keys + 8 * (size_t)i + 4) : 0;
+}
 static inline vi vi_load_z(const uint64_t *keys) { return (uint32_t)(*keys >> 32); }
 static inline vi vi_load_id(const uint64_t *keys) { return (uint32_t)*keys; }
 static inline uint32_t vm_bits(vm m) { return m; }
@@ -338,6 +341,11 @@ static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 
 // ---- the rest is the same for every level ---------------------------------------------------------------------------
 
+static inline vi vi_gather_id(const uint64_t *keys, vi i, vm m) // lower words of keys
+{
+    return vi_gather_z((const uint64_t *)(const void *)((const char *)keys - 4), i, m);
+}
+static inline vi vi_select(vm m, vi a, vi b) { return vf_bits(vf_select(m, vi_float(a), vi_float(b))); }
 static inline vf vf_gather(const float *base, vi i, vm m) { return vi_float(vi_gather(base, i, m)); }
 static inline vf vf_abs(vf a) { return vi_float(vi_and(vf_bits(a), vi_set(0x7FFFFFFFu))); }
 static inline vf vf_zero(void) { return vf_set(0.0f); }
@@ -377,20 +385,20 @@ static inline void vf_decode_normal(vi word, vf n[3])
     n[2] = z;
 }
 
-// Rays of PT_LANES pixels of row y.
-static inline void vf_ray_at(const struct view_args *view, vi x, uint32_t y, vf ray[2])
+// Rays of the pixels (x, y).
+static inline void vf_ray_of(const struct view_args *view, vi x, vi y, vf ray[2])
 {
     const vf half = vf_set(0.5f), scale = vf_set((float)(1u << view->level));
     vf px = (vi_convert(vi_add(vi_set((uint32_t)(view->origin_x >> view->level)), x)) + half) * scale;
-    vf py = (vf_set((float)((view->origin_y >> view->level) + (int32_t)y)) + half) * scale;
+    vf py = (vi_convert(vi_add(vi_set((uint32_t)(view->origin_y >> view->level)), y)) + half) * scale;
     ray[0] = vf_set(view->ray_x0) + vf_set(view->ray_xs) * px;
     ray[1] = vf_set(view->ray_y0) + vf_set(view->ray_ys) * py;
 }
 
-// ... from (x, y) on.
+// Rays of PT_LANES pixels from (x, y) on.
 static inline void vf_ray(const struct view_args *view, uint32_t x, uint32_t y, vf ray[2])
 {
-    vf_ray_at(view, vi_add(vi_set(x), vi_lanes()), y, ray);
+    vf_ray_of(view, vi_add(vi_set(x), vi_lanes()), vi_set(y), ray);
 }
 
 static inline vf vf_cosine(const struct view_args *view, const vf n[3], const vf ray[2])

@@ -87,6 +87,9 @@ static int close_context(struct pt_gl_device *d, void *unused)
                 d->gl.DeleteProgram(d->programs[k][v]);
         for (int i = 0; i < PT_GL_SCRATCH_COUNT; i++)
             d->gl.DeleteBuffers(1, &d->scratch[i].name);
+        for (int i = 0; i < 2; i++)
+            d->gl.DeleteProgram(d->tile_programs[i]);
+        d->gl.DeleteTextures(PT_GL_TEXTURES, d->textures);
         d->gl.DeleteBuffers(1, &d->arguments);
         d->gl.DeleteBuffers(1, &d->srgb);
         d->gl.Finish();
@@ -186,10 +189,11 @@ static int open_context(struct pt_gl_device *d, void *unused)
     info->hardware = !is_software(info->description);
 
     GLint64 block = 0;
-    GLint blocks = 0, alignment = 0;
+    GLint blocks = 0, alignment = 0, texels = 0;
     d->gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &block);
     d->gl.GetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
     d->gl.GetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
+    d->gl.GetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
     int result = pt_gl_check(d, "reading the driver's limits");
     if (result != PATINA_OK)
         return result;
@@ -198,7 +202,9 @@ static int open_context(struct pt_gl_device *d, void *unused)
                           info->description, blocks, PT_GL_BINDINGS);
     d->block_size = (uint64_t)block > SIZE_MAX ? SIZE_MAX : (size_t)block;
     d->alignment = alignment > 4 ? (size_t)alignment : 4;
+    d->texels = texels > 0 ? (size_t)texels : 0;
     d->gl.GenBuffers(1, &d->arguments);
+    d->gl.GenTextures(PT_GL_TEXTURES, d->textures);
     make_srgb_table(d);
     info->key64 = (uint32_t)pt_gl_key64_works(d);
     return pt_gl_check(d, "opening the device");
@@ -218,6 +224,7 @@ struct buffer_call {
 static int create_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
+    pt_gl_tiles_forget(d);
     const GladGLContext *gl = &d->gl;
     size_t padded = (b->size + 15) & ~(size_t)15; // shaders read whole words and vectors
     GLuint name = 0;
@@ -242,6 +249,7 @@ static int create_buffer(struct pt_gl_device *d, void *context)
 static int destroy_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
+    pt_gl_tiles_forget(d);
     if (!d->lost) // a lost context has taken its buffers along
         d->gl.DeleteBuffers(1, &b->buffer->name);
     return PATINA_OK;
@@ -250,6 +258,7 @@ static int destroy_buffer(struct pt_gl_device *d, void *context)
 static int write_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
+    pt_gl_tiles_forget(d);
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);
     d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, (GLintptr)b->offset, (GLsizeiptr)b->size, b->source);
     return pt_gl_check(d, "writing a buffer");
@@ -267,6 +276,7 @@ static int read_buffer(struct pt_gl_device *d, void *context)
 static int fill_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
+    pt_gl_tiles_forget(d);
     uint32_t words[2] = {(uint32_t)b->pattern, (uint32_t)(b->pattern >> 32)};
     d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);

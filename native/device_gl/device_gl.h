@@ -9,8 +9,10 @@
 #include "glad/gl.h"
 
 enum {
-    PT_GL_VARIANTS = 4,  // programs of one kernel: passes, or 64-bit atomics
-    PT_GL_BINDINGS = 12, // storage blocks a kernel may use: its arguments, its buffers, scratch
+    PT_GL_VARIANTS = 8,       // programs of one kernel: its passes and special cases
+    PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
+    PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
+    PT_GL_TEXTURES = 2,       // float4 planes that a kernel reads as textures
 };
 
 // Memory that kernels keep between runs; grows, never shrinks.
@@ -21,11 +23,31 @@ struct pt_gl_scratch {
 
 enum pt_gl_scratch_use {
     PT_GL_SCRATCH_COUNTERS,
-    PT_GL_SCRATCH_CHANGED, // fill: this iteration's changes
-    PT_GL_SCRATCH_SAVED,   // fill: pixels as they were before the phase
-    PT_GL_SCRATCH_FILLED,  // fill: a bit for each pixel filled in this phase
-    PT_GL_SCRATCH_TILES,   // fill: tiles that the next iteration must look at
+    PT_GL_SCRATCH_PIXELS,      // fill: this step's changes; shade: filled pixels
+    PT_GL_SCRATCH_SAVED,       // fill: pixels as they were before the phase
+    PT_GL_SCRATCH_FILLED,      // fill: a bit for each pixel filled in this phase
+    PT_GL_SCRATCH_STAMPS,      // fill: the step for which a tile was listed last
+    PT_GL_SCRATCH_WOKEN,       // fill: tiles that the next step has to look at
+    PT_GL_SCRATCH_TILES,       // what each tile holds
+    PT_GL_SCRATCH_TILE_LISTS,
+    PT_GL_SCRATCH_TILE_COUNTS,
     PT_GL_SCRATCH_COUNT
+};
+
+enum pt_gl_tile_list {
+    PT_GL_TILES_POINTS,  // with a point in them
+    PT_GL_TILES_NOTHING, // without
+    PT_GL_TILES_RIM,     // with an empty pixel, and a point in them or in a tile beside them
+};
+
+// Lists of the tiles of one key plane, valid until somebody writes keys.
+struct pt_gl_tiles {
+    int valid;
+    GLuint keys;
+    uint32_t width, rect[4];
+    uint32_t columns, rows;
+    uint32_t count[3];
+    size_t stride; // entries from list to list
 };
 
 struct pt_gl_call;
@@ -47,10 +69,14 @@ struct pt_gl_device {
     char message[512];
     size_t block_size; // greatest storage block
     size_t alignment;  // of a block's offset in its buffer
+    size_t texels;     // in a buffer texture
     GLuint arguments;
     GLuint srgb;    // uniform block: linear values of the 256 sRGB bytes
     uint32_t stamp; // fill: of the current step
     GLuint programs[PT_KERNEL_COUNT][PT_GL_VARIANTS];
+    GLuint tile_programs[2];
+    GLuint textures[PT_GL_TEXTURES];
+    struct pt_gl_tiles tiles;
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
 };
 
@@ -74,10 +100,21 @@ int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t varia
 // At least `size` bytes; keeps the first `keep` bytes when it has to grow.
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep);
 
-// scatter.c, fill.c
+// tiles.c
+// Lists the tiles of a key plane, unless the lists at hand are still good.
+int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const struct view_args *view);
+void pt_gl_tiles_forget(struct pt_gl_device *d); // keys changed
+int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list);
+// A workgroup for each of `count` tiles of the list bound at PT_GL_BINDING_TILES.
+int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count);
+// A grid of at least `count` workgroups, within every driver's limits.
+void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
+
+// scatter.c, fill.c, shade.c: kernels of several dispatches. The filters find their buffers bound and tiles listed.
 int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
                   uint32_t count, const atomic_int *cancel);
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);
+int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
 
 // selftest.c
 // Whether 64-bit atomics of this driver give what the CPU says; 0 too where the driver has none.

@@ -1,30 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// fill's runner: pairs of dispatches, decide and apply, then mark and restore, each until nothing changes. Reading the
-// count back between them is what lets a phase stop early and lists be no longer than needed.
+// fill's runner: find, decide and apply, then mark and restore, each until nothing changes. Reading the counts back
+// between them is what lets a phase stop early, and keeps lists and dispatches no longer than needed.
 #include "device_gl.h"
 
 enum {
-    TILE_X = 32, // as in fill.comp
-    TILE_Y = 8,
-    ENTRY_GROUP = 64,
+    ENTRY_GROUP = 64, // as in fill.comp
     CHANGE_SIZE = 20, // struct change
     SAVED_SIZE = 24,  // struct saved_pixel
-    GROUPS_IN_ROW = 16384,
     LEAST_ENTRIES = 1 << 16,
 };
 
-enum step { DECIDE, APPLY, MARK, RESTORE };
+enum program { FIND_EMPTY, FIND_OCCLUDED, DECIDE, APPLY, MARK, RESTORE };
 
 struct counters {
-    uint32_t changed, saved;
+    uint32_t changed, saved, woken;
 };
 
 struct fill {
     struct pt_gl_device *d;
     const struct fill_args *args;
     const atomic_int *cancel;
-    uint32_t tiles_x, tiles_y;
-    uint32_t first;
+    enum program find;
+    int first; // the phase's first step looks at every tile that can hold a pixel to fill
     struct counters counters;
 };
 
@@ -32,31 +29,43 @@ static int bind_scratch(struct fill *f, uint32_t binding, enum pt_gl_scratch_use
 {
     int result = pt_gl_scratch(f->d, use, size, keep);
     const struct pt_gl_scratch *scratch = &f->d->scratch[use];
-    return result == PATINA_OK ? pt_gl_bind(f->d, binding, scratch->name, 0, scratch->size, "fill") : result;
+    size_t bound = scratch->size < f->d->block_size ? scratch->size : f->d->block_size & ~(size_t)15;
+    return result == PATINA_OK ? pt_gl_bind(f->d, binding, scratch->name, 0, size > bound ? size : bound, "fill") : result;
 }
 
-static size_t least(size_t count) { return count > LEAST_ENTRIES ? count : LEAST_ENTRIES; }
+static int programs(struct fill *f)
+{
+    static const char *const definitions[] = {"#define STEP 0\n#define OCCLUDED 0\n",
+                                              "#define STEP 0\n#define OCCLUDED 1\n",
+                                              "#define STEP 1\n",
+                                              "#define STEP 2\n",
+                                              "#define STEP 3\n",
+                                              "#define STEP 4\n"};
+    int result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, f->find, definitions[f->find]);
+    for (uint32_t p = DECIDE; p <= (f->args->unfills ? RESTORE : APPLY) && result == PATINA_OK; p++)
+        result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, p, definitions[p]);
+    return result;
+}
 
 static int prepare(struct fill *f)
 {
-    static const char *const definitions[] = {"#define STEP 0\n", "#define STEP 1\n", "#define STEP 2\n",
-                                              "#define STEP 3\n"};
     const struct view_args *view = &f->args->view;
     const GladGLContext *gl = &f->d->gl;
-    int result = PATINA_OK;
-    for (uint32_t s = 0; s < (f->args->unfills ? 4 : 2) && result == PATINA_OK; s++)
-        result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, s, definitions[s]);
     size_t bits = ((size_t)view->width * view->height + 31) / 32 * 4;
+    size_t tiles = (size_t)f->d->tiles.columns * f->d->tiles.rows * 4;
+    int result = programs(f);
     if (result == PATINA_OK)
         result = bind_scratch(f, 5, PT_GL_SCRATCH_COUNTERS, sizeof f->counters, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 6, PT_GL_SCRATCH_CHANGED, least(0) * CHANGE_SIZE, 0);
+        result = bind_scratch(f, 6, PT_GL_SCRATCH_PIXELS, LEAST_ENTRIES * CHANGE_SIZE, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, f->args->unfills ? least(0) * SAVED_SIZE : 16, 0);
+        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, f->args->unfills ? LEAST_ENTRIES * SAVED_SIZE : 16, 0);
     if (result == PATINA_OK)
         result = bind_scratch(f, 8, PT_GL_SCRATCH_FILLED, f->args->unfills ? bits : 16, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 9, PT_GL_SCRATCH_TILES, (size_t)f->tiles_x * f->tiles_y * 4, 0);
+        result = bind_scratch(f, 9, PT_GL_SCRATCH_STAMPS, tiles, 0);
+    if (result == PATINA_OK)
+        result = bind_scratch(f, 10, PT_GL_SCRATCH_WOKEN, tiles, 0);
     if (result != PATINA_OK || !f->args->unfills)
         return result;
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_FILLED].name);
@@ -64,11 +73,10 @@ static int prepare(struct fill *f)
     return pt_gl_check(f->d, "preparing to fill holes");
 }
 
-static int write_counters(struct fill *f)
+static void write_counters(struct fill *f)
 {
     f->d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_COUNTERS].name);
     f->d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof f->counters, &f->counters);
-    return PATINA_OK;
 }
 
 static int read_counters(struct fill *f)
@@ -78,40 +86,43 @@ static int read_counters(struct fill *f)
     return pt_gl_check(f->d, "counting filled pixels");
 }
 
-static int dispatch(struct fill *f, enum step step, uint32_t entries, uint32_t groups_x, uint32_t groups_y)
+static int dispatch_entries(struct fill *f, enum program p, uint32_t entries)
 {
-    const GladGLContext *gl = &f->d->gl;
-    GLuint program = f->d->programs[PT_KERNEL_fill][step];
-    if (step == DECIDE || step == APPLY) {
-        gl->ProgramUniform1ui(program, 0, f->d->stamp);
-        gl->ProgramUniform1ui(program, 3, f->tiles_x);
+    GLuint program = f->d->programs[PT_KERNEL_fill][p];
+    uint32_t x, y;
+    pt_gl_grid((entries + ENTRY_GROUP - 1) / ENTRY_GROUP, &x, &y);
+    f->d->gl.ProgramUniform1ui(program, 0, entries);
+    if (p == APPLY) {
+        f->d->gl.ProgramUniform1ui(program, 1, f->d->stamp);
+        f->d->gl.ProgramUniform1ui(program, 2, f->d->tiles.columns);
     }
-    if (step == DECIDE)
-        gl->ProgramUniform1ui(program, 1, f->first);
-    gl->ProgramUniform1ui(program, 2, entries);
-    return pt_gl_dispatch(f->d, PT_KERNEL_fill, step, groups_x, groups_y);
+    return pt_gl_dispatch(f->d, PT_KERNEL_fill, p, x, y);
 }
 
-static int dispatch_entries(struct fill *f, enum step step, uint32_t entries)
+static int find_once(struct fill *f, uint32_t woken)
 {
-    uint32_t groups = (entries + ENTRY_GROUP - 1) / ENTRY_GROUP;
-    uint32_t x = groups < GROUPS_IN_ROW ? groups : GROUPS_IN_ROW;
-    return dispatch(f, step, entries, x, x ? (groups + x - 1) / x : 0);
+    if (f->first)
+        return pt_gl_dispatch_tiles(f->d, PT_KERNEL_fill, f->find,
+                                    f->find == FIND_EMPTY ? PT_GL_TILES_RIM : PT_GL_TILES_POINTS);
+    int result = bind_scratch(f, PT_GL_BINDING_TILES, PT_GL_SCRATCH_WOKEN, woken * (size_t)4, 0);
+    return result == PATINA_OK ? pt_gl_dispatch_list(f->d, PT_KERNEL_fill, f->find, woken) : result;
 }
 
-// Decides until the list holds all that is to change; counters.changed says how many.
-static int decide(struct fill *f)
+// Until the list holds all that is to change; counters.changed says how many.
+static int find(struct fill *f)
 {
+    uint32_t woken = f->counters.woken;
     for (;;) {
-        uint32_t room = (uint32_t)(f->d->scratch[PT_GL_SCRATCH_CHANGED].size / CHANGE_SIZE);
-        f->counters.changed = 0;
+        uint32_t room = (uint32_t)(f->d->scratch[PT_GL_SCRATCH_PIXELS].size / CHANGE_SIZE);
+        f->counters.changed = f->counters.woken = 0;
         write_counters(f);
-        int result = dispatch(f, DECIDE, room, f->tiles_x, f->tiles_y);
+        f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][f->find], 0, room);
+        int result = find_once(f, woken);
         if (result == PATINA_OK)
             result = read_counters(f);
         if (result != PATINA_OK || f->counters.changed <= room)
             return result;
-        result = bind_scratch(f, 6, PT_GL_SCRATCH_CHANGED, (size_t)f->counters.changed * CHANGE_SIZE, 0);
+        result = bind_scratch(f, 6, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.changed * CHANGE_SIZE, 0);
         if (result != PATINA_OK)
             return result;
     }
@@ -119,22 +130,21 @@ static int decide(struct fill *f)
 
 static int fill_step(struct fill *f)
 {
-    int result = decide(f);
+    int result = find(f);
+    uint32_t changed = f->counters.changed;
     f->first = 0;
     f->d->stamp++;
-    if (result != PATINA_OK || !f->counters.changed)
+    if (result != PATINA_OK || !changed)
         return result;
+    pt_gl_tiles_forget(f->d);
     if (f->args->unfills)
-        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED,
-                              ((size_t)f->counters.saved + f->counters.changed) * SAVED_SIZE,
+        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, ((size_t)f->counters.saved + changed) * SAVED_SIZE,
                               (size_t)f->counters.saved * SAVED_SIZE);
     if (result == PATINA_OK)
-        result = dispatch_entries(f, APPLY, f->counters.changed);
-    uint32_t changed = f->counters.changed;
-    if (result == PATINA_OK && f->args->unfills)
-        result = read_counters(f);
-    f->counters.changed = changed;
-    return result;
+        result = dispatch_entries(f, DECIDE, changed);
+    if (result == PATINA_OK)
+        result = dispatch_entries(f, APPLY, changed);
+    return result == PATINA_OK ? read_counters(f) : result;
 }
 
 static int unfill_step(struct fill *f)
@@ -162,13 +172,10 @@ static int repeat(struct fill *f, int (*step)(struct fill *), uint32_t most)
 
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel)
 {
-    const uint32_t *rect = args->view.rect;
-    if (rect[2] <= rect[0] || rect[3] <= rect[1])
+    struct fill f = {
+        .d = d, .args = args, .cancel = cancel, .find = args->occluded ? FIND_OCCLUDED : FIND_EMPTY, .first = 1};
+    if (!d->tiles.count[PT_GL_TILES_POINTS] && !d->tiles.count[PT_GL_TILES_RIM])
         return PATINA_OK;
-    struct fill f = {.d = d, .args = args, .cancel = cancel, .first = 1};
-    f.tiles_x = (rect[2] - rect[0] + TILE_X - 1) / TILE_X;
-    f.tiles_y = (rect[3] - rect[1] + TILE_Y - 1) / TILE_Y;
-    d->stamp++;
     int result = prepare(&f);
     if (result == PATINA_OK)
         result = repeat(&f, fill_step, args->iterations);

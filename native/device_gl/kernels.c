@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Running a kernel: bind its arguments and buffers, one dispatch over view.rect. scatter and fill have their own runners.
+// Running a kernel: bind its arguments and buffers, one dispatch over view.rect. Some have their own runners.
 #include "device_gl.h"
 
 #include <stdio.h>
@@ -29,7 +29,8 @@ int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t varia
     if (x && y) {
         d->gl.UseProgram(d->programs[kernel][variant]);
         d->gl.DispatchCompute(x, y, 1);
-        d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+        d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
+                            GL_TEXTURE_FETCH_BARRIER_BIT);
     }
     return pt_gl_check(d, pt_kernel_names[kernel]);
 }
@@ -59,43 +60,78 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
     return PATINA_OK;
 }
 
-// The pixels that a kernel runs over: view.rect, with which every argument struct begins, or the crop that it writes.
-static void extent(enum pt_kernel kernel, const void *arguments, uint32_t *width, uint32_t *height)
+// float4 planes that shaders read as buffer textures: llvmpipe fetches a texel in the time of one word of a block.
+// Numbers of buffers in kernels.def, from 1; 0: none.
+static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
+    [PT_KERNEL_surface] = {3},   [PT_KERNEL_fill] = {3},      [PT_KERNEL_push] = {5},    [PT_KERNEL_shade] = {3, 7},
+    [PT_KERNEL_smooth] = {4},    [PT_KERNEL_antialias] = {4}, [PT_KERNEL_compose] = {2}, [PT_KERNEL_extract] = {3},
+};
+
+static int bind_textures(struct pt_gl_device *d, enum pt_kernel kernel, struct pt_buffer *const *buffers,
+                         uint32_t count)
 {
-    const struct view_args *view = arguments;
-    *width = view->rect[2] > view->rect[0] ? view->rect[2] - view->rect[0] : 0;
-    *height = view->rect[3] > view->rect[1] ? view->rect[3] - view->rect[1] : 0;
-    if (kernel == PT_KERNEL_compose) {
-        *width = ((const struct compose_args *)arguments)->crop_width;
-        *height = ((const struct compose_args *)arguments)->crop_height;
-    } else if (kernel == PT_KERNEL_extract) {
-        *width = ((const struct extract_args *)arguments)->crop_width;
-        *height = ((const struct extract_args *)arguments)->crop_height;
+    for (uint32_t unit = 0; unit < PT_GL_TEXTURES; unit++) {
+        uint32_t number = textures[kernel][unit];
+        if (!number || number > count || !buffers[number - 1] || !buffers[number - 1]->name)
+            continue;
+        size_t texels = buffers[number - 1]->size / 16;
+        if (texels > d->texels)
+            return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
+                              "%s: a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most",
+                              pt_kernel_names[kernel], texels, d->texels);
+        d->gl.ActiveTexture(GL_TEXTURE0 + unit);
+        d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
+        d->gl.TexBuffer(GL_TEXTURE_BUFFER, GL_RGBA32F, buffers[number - 1]->name);
     }
+    return PATINA_OK;
 }
 
-static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments)
+// Filters that visit listed tiles only. The others write every pixel, or are rare.
+static int tiled(enum pt_kernel kernel)
+{
+    return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_fill ||
+           kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias;
+}
+
+static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
+                    uint32_t width, uint32_t height)
 {
     GLint group[3] = {1, 1, 1};
-    uint32_t width, height;
-    int result = pt_gl_kernel_program(d, kernel, 0, "");
+    int result = pt_gl_kernel_program(d, kernel, variant, definitions);
     if (result != PATINA_OK)
         return result;
-    d->gl.GetProgramiv(d->programs[kernel][0], GL_COMPUTE_WORK_GROUP_SIZE, group);
-    extent(kernel, arguments, &width, &height);
-    return pt_gl_dispatch(d, kernel, 0, (width + (uint32_t)group[0] - 1) / (uint32_t)group[0],
+    d->gl.GetProgramiv(d->programs[kernel][variant], GL_COMPUTE_WORK_GROUP_SIZE, group);
+    return pt_gl_dispatch(d, kernel, variant, (width + (uint32_t)group[0] - 1) / (uint32_t)group[0],
                           (height + (uint32_t)group[1] - 1) / (uint32_t)group[1]);
 }
 
-int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, size_t argument_size,
-              struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
+static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
 {
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->arguments);
-    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)((argument_size + 15) & ~(size_t)15), NULL, GL_STREAM_DRAW);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)argument_size, arguments);
-    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
-    if (kernel == PT_KERNEL_scatter)
-        return pt_gl_scatter(d, arguments, buffers, count, cancel);
+    static const char *const definitions[] = {"#define PLANE 0\n", "#define PLANE 1\n", "#define PLANE 2\n"};
+    const uint32_t asked[] = {args->depth, args->normal, args->source};
+    int result = PATINA_OK;
+    for (uint32_t i = 0; i < 3 && result == PATINA_OK; i++)
+        if (asked[i])
+            result = run_over(d, PT_KERNEL_extract, i, definitions[i], args->crop_width, args->crop_height);
+    return result;
+}
+
+// Only tiles with points in them; `elsewhere`: a second program for the others.
+static int run_tiles(struct pt_gl_device *d, enum pt_kernel kernel, int elsewhere)
+{
+    int result = pt_gl_kernel_program(d, kernel, 0, "#define NOTHING 0\n");
+    if (result == PATINA_OK && elsewhere)
+        result = pt_gl_kernel_program(d, kernel, 1, "#define NOTHING 1\n");
+    if (result == PATINA_OK)
+        result = pt_gl_dispatch_tiles(d, kernel, 0, PT_GL_TILES_POINTS);
+    if (result == PATINA_OK && elsewhere)
+        result = pt_gl_dispatch_tiles(d, kernel, 1, PT_GL_TILES_NOTHING);
+    return result;
+}
+
+static int bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t argument_size,
+                        struct pt_buffer *const *buffers, uint32_t count)
+{
     for (uint32_t i = 0; i < count; i++) {
         // A buffer that a kernel may do without (colors, a pass that nobody asked for) is missing: any other stands in.
         int missing = !buffers[i] || !buffers[i]->name;
@@ -104,7 +140,47 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
         if (result != PATINA_OK)
             return result;
     }
-    if (kernel == PT_KERNEL_fill)
-        return pt_gl_fill(d, arguments, cancel);
-    return run_filter(d, kernel, arguments);
+    return bind_textures(d, kernel, buffers, count);
+}
+
+static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, const atomic_int *cancel)
+{
+    const struct view_args *view = arguments; // every argument struct begins with its view
+    switch (kernel) {
+    case PT_KERNEL_fill: return pt_gl_fill(d, arguments, cancel);
+    case PT_KERNEL_shade: return pt_gl_shade(d, arguments);
+    case PT_KERNEL_normals:
+    case PT_KERNEL_surface: return run_tiles(d, kernel, 0);
+    case PT_KERNEL_smooth:
+    case PT_KERNEL_antialias: return run_tiles(d, kernel, 1);
+    case PT_KERNEL_compose: {
+        const struct compose_args *args = arguments;
+        return run_over(d, kernel, 0, "", args->crop_width, args->crop_height);
+    }
+    case PT_KERNEL_extract: return run_extract(d, arguments);
+    default:
+        pt_gl_tiles_forget(d); // pull and push write keys
+        return run_over(d, kernel, 0, "", view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);
+    }
+}
+
+int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, size_t argument_size,
+              struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
+{
+    const struct view_args *view = arguments;
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->arguments);
+    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)((argument_size + 15) & ~(size_t)15), NULL, GL_STREAM_DRAW);
+    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)argument_size, arguments);
+    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
+    if (kernel == PT_KERNEL_scatter) {
+        pt_gl_tiles_forget(d);
+        return pt_gl_scatter(d, arguments, buffers, count, cancel);
+    }
+    int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_extract;
+    if (!crops && (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1]))
+        return PATINA_OK;
+    int result = tiled(kernel) ? pt_gl_tiles(d, buffers[0], view) : PATINA_OK;
+    if (result == PATINA_OK)
+        result = bind_buffers(d, kernel, argument_size, buffers, count);
+    return result == PATINA_OK ? run_filter(d, kernel, arguments, cancel) : result;
 }

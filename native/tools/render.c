@@ -156,7 +156,7 @@ static int measure(struct job *job)
     int code = times ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (int i = 1; i <= job->options.repeat && !code; i++) {
         patina_camera camera;
-        code = set_view(job, i, &camera);
+        code = tool_cancelled() ? PATINA_ERROR_CANCELLED : set_view(job, i, &camera);
         const double start = now_ms();
         if (!code)
             code = patina_frame_render(job->frame, job->scene);

@@ -2,8 +2,9 @@
 // fill: one phase of hole filling. [D 3.2, 3.3] with the rule of SPEC 2.2; twin of shaders/kernels/fill.comp
 //
 // A step first decides from the state before it, then applies: what changes is listed by bands of rows, so the planes are
-// never copied. 64 pixels are decided at once: vector compares give eight masks of dark neighbours, five bit operations
-// a mask find the runs. Entries stay listed with the pixel's state before the phase: un-filling walks the lists alone.
+// never copied. 64 pixels are decided at once: vector compares give eight masks of dark neighbours, four bit operations a
+// mask find the runs. Entries stay listed with the pixel's state before the phase: un-filling walks the lists alone.
+// A step looks only where the one before it changed something.
 #include "device_cpu/cpu.h"
 #include "device_cpu/simd.h"
 
@@ -13,10 +14,11 @@ enum { BAND_ROWS = 16, RING = 8, PAD = 64 };
 static const int8_t ring_x[RING] = { 1, 1, 0, -1, -1, -1, 0, 1 };
 static const int8_t ring_y[RING] = { 0, 1, 1, 1, 0, -1, -1, -1 };
 
-struct entry {
-    uint64_t key, old_key; // after this step; before the phase
-    uint32_t pixel, from, old_from;
-    float threshold; // before the phase: a neighbour nearer than this is dark
+// The entries of a band, as columns.
+struct entries {
+    uint64_t *key, *old_key; // after this step; before the phase
+    uint32_t *x, *y, *from, *old_from;
+    float *threshold; // before the phase: a neighbour nearer than this is dark
 };
 
 struct fill {
@@ -26,37 +28,47 @@ struct fill {
     uint64_t *keys;
     uint32_t *from;
     const float *normals, *deff;
-    uint64_t *filled;  // a bit a pixel: filled in this phase
-    size_t words;      // of `filled` in a row
-    struct entry *entries;
-    uint32_t *kept, *listed; // per band: entries of earlier steps; with those of this step
+    uint64_t *filled;        // a bit a pixel: filled in this phase
+    uint8_t *dirty, *touched; // a byte a word of `filled`: changed by the last step; by this one
+    size_t words;            // in a row
+    struct entries entries;  // of all bands
     size_t band_entries;
-    float *rows;       // per thread: three rows of z and one of thresholds, padded by PAD on both sides
-    size_t row_stride; // floats
+    uint32_t *kept, *listed; // per band: entries of earlier steps; with those of this step
+    float *rows;             // per thread: three rows of z and one of thresholds, padded by PAD on both sides
+    size_t row_stride;       // floats
+    int first;               // the phase's first step looks everywhere
     atomic_uint changed;
 };
-
-static struct entry *band_list(const struct fill *fill, uint32_t band)
-{
-    return fill->entries + band * fill->band_entries;
-}
 
 static uint32_t bands(const struct fill *fill)
 {
     return (fill->view->rect[3] - fill->view->rect[1] + BAND_ROWS - 1) / BAND_ROWS;
 }
 
-static float z_at(const struct fill *fill, int32_t x, int32_t y) // outside the plane: nothing
+static void band_rows(const struct fill *fill, uint32_t band, uint32_t *first, uint32_t *last)
 {
-    if (x < 0 || y < 0 || x >= (int32_t)fill->view->width || y >= (int32_t)fill->view->height)
-        return pt_float(PT_KEY_EMPTY_Z);
-    return pt_float((uint32_t)(fill->keys[(size_t)y * fill->view->width + (size_t)x] >> 32));
+    *first = fill->view->rect[1] + band * BAND_ROWS;
+    *last = *first + BAND_ROWS < fill->view->rect[3] ? *first + BAND_ROWS : fill->view->rect[3];
 }
 
-static float own_distance(const struct fill *fill, uint32_t from, float z)
+// Whether the last step changed anything in rows first - 1 .. last, or in the given word and those beside it.
+static int rows_dirty(const struct fill *fill, uint32_t first, uint32_t last)
 {
-    return pt_level_distance(fill->view, fill->deff[from], fill->normals[4 * (size_t)from + 3], z);
+    size_t begin = first ? first - 1 : 0, end = last < fill->view->height ? last + 1 : last;
+    return memchr(fill->dirty + begin * fill->words, 1, (end - begin) * fill->words) != NULL;
 }
+
+static int word_dirty(const struct fill *fill, size_t word, uint32_t y)
+{
+    uint32_t begin = y ? y - 1 : 0, end = y + 1 < fill->view->height ? y + 1 : y, any = 0;
+    for (size_t row = begin; row <= end; row++) {
+        const uint8_t *at = fill->dirty + row * fill->words + word;
+        any |= at[0] | (word ? at[-1] : 0u) | (word + 1 < fill->words ? at[1] : 0u);
+    }
+    return any != 0;
+}
+
+// ---- deciding ------------------------------------------------------------------------------------------------------------
 
 // 1. z of row y, +inf beyond its ends and beyond the plane.
 static void load_z(const struct fill *fill, int32_t y, float *row)
@@ -75,41 +87,41 @@ static void load_z(const struct fill *fill, int32_t y, float *row)
         row[x] = row[PAD + width + x] = empty;
 }
 
+// d_eff at this level of pixels whose surface comes from `source`.
+static vf own_distance(const struct fill *fill, vi source, vf z, vm lanes)
+{
+    vf d = vf_gather(fill->deff, source, lanes);
+    if (fill->view->level) {
+        vf inverse = vf_gather(fill->normals, vi_add(vi_mul(source, vi_set(4)), vi_set(3)), lanes);
+        d = vf_max(d, vf_footprint(fill->view, z) * inverse);
+    }
+    return d;
+}
+
 // 2. Thresholds of 64 pixels from x on, and which of them are candidates.
 static uint64_t load_thresholds(const struct fill *fill, uint32_t x, uint32_t y, const float *z_row, float *thresholds)
 {
-    const struct view_args *view = fill->view;
     uint64_t candidates = 0;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    const uint32_t *from = fill->from + (size_t)y * view->width + x;
+    const uint32_t *from = fill->from + (size_t)y * fill->view->width + x;
     for (uint32_t i = 0; i < 64; i += PT_LANES) {
-        vf z = vf_load(z_row + PAD + x + i);
-        vm some = vf_lt(z, empty);
-        if (!fill->args->occluded) {
-            candidates |= (uint64_t)vm_bits(vm_not(some)) << i;
-            vf_store(thresholds + i, empty, vm_first(PT_LANES));
-            continue;
-        }
-        vf t = z;
-        if (vm_bits(some)) {
-            vi source = vi_load(from + i);
-            vf d = vf_gather(fill->deff, source, some);
-            if (view->level) {
-                vi w = vi_add(vi_mul(source, vi_set(4)), vi_set(3));
-                d = vf_max(d, vf_footprint(view, z) * vf_gather(fill->normals, w, some));
-            }
-            t = z - d;
-        }
+        vf t = vf_load(z_row + PAD + x + i);
+        vm asked = vf_lt(t, empty);
+        if (!fill->args->occluded)
+            asked = vm_not(asked);
+        else if (vm_bits(asked))
+            t = t - own_distance(fill, vi_load(from + i), t, asked);
         vf_store(thresholds + i, t, vm_first(PT_LANES));
-        candidates |= (uint64_t)vm_bits(some) << i;
+        candidates |= (uint64_t)vm_bits(asked) << i;
     }
-    return candidates;
+    uint32_t left = fill->view->width - x;
+    return left < 64 ? candidates & ((1ull << left) - 1) : candidates;
 }
 
 // 3. Which of the candidates have no five consecutive white ring neighbours.
-static uint64_t decide(const float *const rows[3], const float *thresholds, uint32_t x, uint64_t candidates)
+static uint64_t not_border(const float *const rows[3], const float *thresholds, uint32_t x, uint64_t candidates)
 {
-    uint64_t white[RING + 4];
+    uint64_t white[RING + 4], border = 0;
     for (int d = 0; d < RING; d++) {
         const float *neighbour = rows[1 + ring_y[d]] + PAD + x + ring_x[d];
         uint64_t dark = 0;
@@ -117,7 +129,6 @@ static uint64_t decide(const float *const rows[3], const float *thresholds, uint
             dark |= (uint64_t)vm_bits(vf_lt(vf_load(neighbour + i), vf_load(thresholds + i))) << i;
         white[d] = ~dark;
     }
-    uint64_t border = 0;
     for (int d = 0; d < 4; d++)
         white[RING + d] = white[d];
     for (int d = 0; d < RING; d++)
@@ -125,118 +136,214 @@ static uint64_t decide(const float *const rows[3], const float *thresholds, uint
     return candidates & ~border;
 }
 
-// 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
-static struct entry source_of(const struct fill *fill, uint32_t x, uint32_t y, float threshold)
+// Index of neighbour d of the pixels (x, y), and which of them the plane holds.
+static vi neighbour_of(const struct view_args *view, vi x, vi y, int d, vm lanes, vm *inside)
+{
+    vi qx = vi_add(x, vi_set((uint32_t)(int32_t)ring_x[d])), qy = vi_add(y, vi_set((uint32_t)(int32_t)ring_y[d]));
+    *inside = vm_and(lanes, vm_and(vi_lt_unsigned(qx, vi_set(view->width)), vi_lt_unsigned(qy, vi_set(view->height))));
+    return vi_add(vi_mul(qy, vi_set(view->width)), qx);
+}
+
+// The plane's depth at ray_p: twin of pt_plane_depth.
+static vf plane_depth(const struct view_args *view, const vf n[3], const vf ray_q[2], vf z_q, const vf ray_p[2], vf limit)
+{
+    const vf zero = vf_zero(), one = vf_set(1.0f);
+    vf z = z_q;
+    if (view->perspective) {
+        vf dot_q = (n[0] * ray_q[0] + n[1] * ray_q[1]) - n[2], dot_p = (n[0] * ray_p[0] + n[1] * ray_p[1]) - n[2];
+        vf sign = vf_select(vf_lt(dot_p, zero), vf_set(-1.0f), one), size = vf_abs(dot_p);
+        vm good = vf_lt(vf_set(1e-6f), size);
+        vf r = vf_rcp(vf_select(good, size, one));
+        z = vf_select(good, (z_q * (dot_q * sign)) * r, z);
+    } else {
+        vf sign = vf_select(vf_lt(n[2], zero), vf_set(-1.0f), one), size = vf_abs(n[2]);
+        vm good = vf_lt(vf_set(1e-6f), size);
+        vf r = vf_rcp(vf_select(good, size, one));
+        vf rise = (n[0] * (ray_p[0] - ray_q[0]) + n[1] * (ray_p[1] - ray_q[1])) * sign;
+        z = vf_select(good, z_q + rise * r, z);
+    }
+    return vf_min(vf_max(z, z_q), z_q + limit);
+}
+
+struct chosen { // pixels to fill, PT_LANES at a time
+    uint32_t x[PT_LANES], y[PT_LANES], count;
+    float threshold[PT_LANES];
+};
+
+// 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel. Appends to the band's list.
+static void list_chosen(const struct fill *fill, struct chosen *chosen, size_t at)
 {
     const struct view_args *view = fill->view;
-    uint32_t pixel = y * view->width + x, best = pixel;
-    struct entry entry = { .key = UINT64_MAX, .pixel = pixel, .threshold = threshold };
+    const struct entries *e = &fill->entries;
+    vm lanes = vm_first(chosen->count);
+    vi x = vi_load(chosen->x), y = vi_load(chosen->y);
+    vi best_z = vi_set(UINT32_MAX), best_id = vi_set(UINT32_MAX), qx = x, qy = y;
     for (int d = 0; d < RING; d++) {
-        int32_t nx = (int32_t)x + ring_x[d], ny = (int32_t)y + ring_y[d];
-        if (nx < 0 || ny < 0 || nx >= (int32_t)view->width || ny >= (int32_t)view->height)
-            continue;
-        uint32_t at = (uint32_t)ny * view->width + (uint32_t)nx;
-        if (fill->keys[at] < entry.key) {
-            entry.key = fill->keys[at];
-            best = at;
-        }
+        vm inside;
+        vi q = neighbour_of(view, x, y, d, lanes, &inside);
+        vi z = vi_gather_z(fill->keys, q, inside), id = vi_gather_id(fill->keys, q, inside);
+        vm less = vm_or(vi_lt_unsigned(z, best_z), vm_and(vi_eq(z, best_z), vi_lt_unsigned(id, best_id)));
+        less = vm_and(less, inside);
+        best_z = vi_select(less, z, best_z);
+        best_id = vi_select(less, id, best_id);
+        qx = vi_select(less, vi_add(x, vi_set((uint32_t)(int32_t)ring_x[d])), qx);
+        qy = vi_select(less, vi_add(y, vi_set((uint32_t)(int32_t)ring_y[d])), qy);
     }
-    entry.from = fill->from[best];
+    vi source = vi_gather(fill->from, vi_add(vi_mul(qy, vi_set(view->width)), qx), lanes);
+    vf z = vi_float(best_z);
     if (fill->args->refined) {
-        float ray_p[2], ray_q[2], z = pt_float((uint32_t)(entry.key >> 32));
-        pt_ray(view, (int32_t)x, (int32_t)y, ray_p);
-        pt_ray(view, (int32_t)(best % view->width), (int32_t)(best / view->width), ray_q);
-        z = pt_plane_depth(view, fill->normals + 4 * (size_t)entry.from, ray_q, z, ray_p,
-                           own_distance(fill, entry.from, z));
-        entry.key = (uint64_t)pt_bits(z) << 32 | (uint32_t)entry.key;
+        vf n[3], ray_p[2], ray_q[2];
+        for (uint32_t k = 0; k < 3; k++)
+            n[k] = vf_gather(fill->normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes);
+        vf_ray_of(view, x, y, ray_p);
+        vf_ray_of(view, qx, qy, ray_q);
+        z = plane_depth(view, n, ray_q, z, ray_p, own_distance(fill, source, z, lanes));
     }
-    return entry;
+    uint32_t zs[PT_LANES], ids[PT_LANES], sources[PT_LANES];
+    vi_store(zs, vf_bits(z), vm_first(PT_LANES));
+    vi_store(ids, best_id, vm_first(PT_LANES));
+    vi_store(sources, source, vm_first(PT_LANES));
+    for (uint32_t i = 0; i < chosen->count; i++, at++) {
+        e->key[at] = (uint64_t)zs[i] << 32 | ids[i];
+        e->from[at] = sources[i];
+        e->x[at] = chosen->x[i];
+        e->y[at] = chosen->y[i];
+        e->threshold[at] = chosen->threshold[i];
+    }
+    chosen->count = 0;
 }
 
 static void decide_band(struct fill *fill, uint32_t band, uint32_t thread)
 {
-    const uint32_t *rect = fill->view->rect;
-    uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
     float *rows = fill->rows + thread * 4 * fill->row_stride, *thresholds = rows + 3 * fill->row_stride;
-    struct entry *list = band_list(fill, band);
-    uint32_t count = fill->kept[band];
-    load_z(fill, (int32_t)first - 1, rows);
-    load_z(fill, (int32_t)first, rows + fill->row_stride);
+    uint32_t first, last, count = fill->kept[band];
+    size_t base = band * fill->band_entries;
+    int32_t held[3] = { INT32_MIN, INT32_MIN, INT32_MIN }; // which row each slot of the ring holds
+    struct chosen chosen = { .count = 0 };
+    band_rows(fill, band, &first, &last);
+    memset(fill->touched + first * fill->words, 0, (last - first) * fill->words);
+    fill->listed[band] = count;
+    if (!fill->first && !rows_dirty(fill, first, last))
+        return;
     for (uint32_t y = first; y < last; y++) {
         const float *around[3];
-        for (uint32_t k = 0; k < 3; k++)
-            around[k] = rows + (y - first + k) % 3 * fill->row_stride;
-        load_z(fill, (int32_t)y + 1, rows + (y - first + 2) % 3 * fill->row_stride);
-        for (uint32_t x = rect[0] & ~63u; x < rect[2]; x += 64) {
-            uint64_t candidates = load_thresholds(fill, x, y, around[1], thresholds);
-            uint32_t left = fill->view->width - x;
-            if (left < 64)
-                candidates &= (1ull << left) - 1;
-            if (!candidates)
+        if (!fill->first && !rows_dirty(fill, y, y + 1))
+            continue;
+        for (int32_t k = 0; k < 3; k++) {
+            int32_t row = (int32_t)y - 1 + k, slot = (row + 3) % 3;
+            around[k] = rows + (size_t)slot * fill->row_stride;
+            if (held[slot] != row)
+                load_z(fill, row, rows + (size_t)slot * fill->row_stride);
+            held[slot] = row;
+        }
+        for (uint32_t x = fill->view->rect[0] & ~63u; x < fill->view->rect[2]; x += 64) {
+            if (!fill->first && !word_dirty(fill, x / 64, y))
                 continue;
-            uint64_t fills = decide(around, thresholds, x, candidates);
+            uint64_t fills = load_thresholds(fill, x, y, around[1], thresholds);
+            if (fills)
+                fills = not_border(around, thresholds, x, fills);
             for (; fills; fills &= fills - 1) {
                 uint32_t i = (uint32_t)__builtin_ctzll(fills);
-                list[count++] = source_of(fill, x + i, y, thresholds[i]);
+                chosen.x[chosen.count] = x + i;
+                chosen.y[chosen.count] = y;
+                chosen.threshold[chosen.count++] = thresholds[i];
+                count++;
+                if (chosen.count == PT_LANES)
+                    list_chosen(fill, &chosen, base + count - PT_LANES);
             }
         }
     }
+    if (chosen.count)
+        list_chosen(fill, &chosen, base + count - chosen.count);
     fill->listed[band] = count;
 }
 
-static void apply_band(struct fill *fill, uint32_t band)
+static void note_change(struct fill *fill, uint32_t changed)
 {
-    struct entry *list = band_list(fill, band);
-    uint32_t keep = fill->kept[band], changed = fill->listed[band] - keep;
-    for (uint32_t i = keep; i < fill->listed[band]; i++) {
-        struct entry entry = list[i];
-        uint32_t x = entry.pixel % fill->view->width, y = entry.pixel / fill->view->width;
-        uint64_t *word = &fill->filled[y * fill->words + x / 64], bit = 1ull << x % 64;
-        entry.old_key = fill->keys[entry.pixel];
-        entry.old_from = fill->from[entry.pixel];
-        fill->keys[entry.pixel] = entry.key;
-        fill->from[entry.pixel] = entry.from;
-        if (*word & bit)
-            continue; // filled before in this phase: that entry knows the state before it
-        *word |= bit;
-        list[keep++] = entry;
-    }
-    fill->kept[band] = keep;
     if (changed)
         atomic_fetch_add_explicit(&fill->changed, changed, memory_order_relaxed);
 }
 
-// 5. Un-filling: an entry whose pixel shows four consecutive white cells is marked ...
+static void apply_band(struct fill *fill, uint32_t band)
+{
+    const struct entries *e = &fill->entries;
+    size_t base = band * fill->band_entries, keep = base + fill->kept[band], end = base + fill->listed[band];
+    note_change(fill, fill->listed[band] - fill->kept[band]);
+    for (size_t i = keep; i < end; i++) {
+        size_t pixel = (size_t)e->y[i] * fill->view->width + e->x[i], word = e->y[i] * fill->words + e->x[i] / 64;
+        uint64_t bit = 1ull << e->x[i] % 64, old_key = fill->keys[pixel];
+        uint32_t old_from = fill->from[pixel];
+        fill->touched[word] = 1;
+        fill->keys[pixel] = e->key[i];
+        fill->from[pixel] = e->from[i];
+        if (fill->filled[word] & bit)
+            continue; // filled before in this phase: that entry knows the state before it
+        fill->filled[word] |= bit;
+        e->x[keep] = e->x[i];
+        e->y[keep] = e->y[i];
+        e->threshold[keep] = e->threshold[i];
+        e->old_key[keep] = old_key;
+        e->old_from[keep++] = old_from;
+    }
+    fill->kept[band] = (uint32_t)(keep - base);
+}
+
+// ---- un-filling ----------------------------------------------------------------------------------------------------------
+
+// An entry whose pixel shows four consecutive white cells is marked (its `from` has no other use any more) ...
 static void mark_band(struct fill *fill, uint32_t band)
 {
-    struct entry *list = band_list(fill, band);
-    for (uint32_t i = 0; i < fill->kept[band]; i++) {
-        int32_t x = (int32_t)(list[i].pixel % fill->view->width), y = (int32_t)(list[i].pixel / fill->view->width);
-        uint32_t white = 0;
-        for (int d = 0; d < RING; d++)
-            white |= (uint32_t) !(z_at(fill, x + ring_x[d], y + ring_y[d]) < list[i].threshold) << d;
-        list[i].key = pt_four_white(white); // of no other use any more
+    const struct entries *e = &fill->entries;
+    size_t base = band * fill->band_entries, end = base + fill->kept[band];
+    uint32_t first, last;
+    band_rows(fill, band, &first, &last);
+    memset(fill->touched + first * fill->words, 0, (last - first) * fill->words);
+    fill->listed[band] = 0;
+    if (!fill->first && !rows_dirty(fill, first, last))
+        return;
+    for (size_t i = base; i < end; i += PT_LANES) {
+        vm lanes = vm_first(end - i < PT_LANES ? (uint32_t)(end - i) : PT_LANES);
+        vi x = vi_load(e->x + i), y = vi_load(e->y + i), white = vi_set(0);
+        vf threshold = vf_load(e->threshold + i);
+        for (int d = 0; d < RING; d++) {
+            vm inside;
+            vi q = neighbour_of(fill->view, x, y, d, lanes, &inside);
+            vm dark = vm_and(inside, vf_lt(vi_float(vi_gather_z(fill->keys, q, inside)), threshold));
+            white = vi_or(white, vi_select(dark, vi_set(0), vi_set(0x101u << d))); // twice: runs wrap round
+        }
+        vi run = vi_and(vi_and(white, vi_shr(white, 1)), vi_and(vi_shr(white, 2), vi_shr(white, 3)));
+        vm marked = vm_and(lanes, vm_not(vi_eq(vi_and(run, vi_set(255)), vi_set(0))));
+        vi_store(e->from + i, vi_select(marked, vi_set(1), vi_set(0)), lanes);
+        fill->listed[band] |= vm_bits(marked);
     }
 }
 
 // ... and gets back what it was before the phase.
 static void restore_band(struct fill *fill, uint32_t band)
 {
-    struct entry *list = band_list(fill, band);
-    uint32_t keep = 0;
-    for (uint32_t i = 0; i < fill->kept[band]; i++) {
-        if (!list[i].key) {
-            list[keep++] = list[i];
+    const struct entries *e = &fill->entries;
+    size_t base = band * fill->band_entries, end = base + fill->kept[band], keep = base;
+    if (!fill->listed[band])
+        return;
+    for (size_t i = base; i < end; i++) {
+        if (e->from[i]) {
+            size_t pixel = (size_t)e->y[i] * fill->view->width + e->x[i];
+            fill->keys[pixel] = e->old_key[i];
+            fill->from[pixel] = e->old_from[i];
+            fill->touched[e->y[i] * fill->words + e->x[i] / 64] = 1;
             continue;
         }
-        fill->keys[list[i].pixel] = list[i].old_key;
-        fill->from[list[i].pixel] = list[i].old_from;
+        e->x[keep] = e->x[i];
+        e->y[keep] = e->y[i];
+        e->threshold[keep] = e->threshold[i];
+        e->old_key[keep] = e->old_key[i];
+        e->old_from[keep++] = e->old_from[i];
     }
-    uint32_t changed = fill->kept[band] - keep;
-    fill->kept[band] = keep;
-    if (changed)
-        atomic_fetch_add_explicit(&fill->changed, changed, memory_order_relaxed);
+    note_change(fill, (uint32_t)(end - keep));
+    fill->kept[band] = (uint32_t)(keep - base);
 }
+
+// ---- steps -------------------------------------------------------------------------------------------------------------
 
 enum step { DECIDE, APPLY, MARK, RESTORE };
 
@@ -266,33 +373,49 @@ static void run_step(struct fill *fill, enum step step)
 // Repeats the pair of steps until nothing changes, `most` times at the most.
 static void repeat(struct fill *fill, enum step look, enum step act, uint32_t most)
 {
+    fill->first = 1;
     for (uint32_t i = 0; i < most && !pt_cpu_cancelled(fill->call); i++) {
         atomic_store_explicit(&fill->changed, 0, memory_order_relaxed);
         run_step(fill, look);
         run_step(fill, act);
         if (!atomic_load_explicit(&fill->changed, memory_order_relaxed))
             return;
+        uint8_t *swap = fill->dirty;
+        fill->dirty = fill->touched;
+        fill->touched = swap;
+        fill->first = 0;
     }
 }
 
 static int allocate(struct fill *fill)
 {
     const struct view_args *view = fill->view;
+    struct entries *e = &fill->entries;
     size_t threads = pt_pool_threads(fill->call->pool), count = bands(fill);
     fill->words = (view->width + 63) / 64;
     fill->band_entries = (size_t)view->width * BAND_ROWS;
     fill->row_stride = view->width + 2 * PAD;
-    size_t filled = fill->words * view->height * 8, rows = threads * 4 * fill->row_stride * 4;
-    fill->entries = pt_cpu_scratch(fill->call, 2, count * fill->band_entries * sizeof *fill->entries);
-    uint8_t *memory = pt_cpu_scratch(fill->call, 1, filled + rows + count * 8);
-    if (!fill->entries || !memory)
+    size_t words = fill->words * view->height, room = count * fill->band_entries + PT_LANES;
+    size_t rows = threads * 4 * fill->row_stride;
+    uint8_t *lists = pt_cpu_scratch(fill->call, 2, room * 36);
+    uint8_t *memory = pt_cpu_scratch(fill->call, 1, words * 10 + rows * 4 + count * 8);
+    if (!lists || !memory)
         return PATINA_ERROR_MEMORY;
+    e->key = (uint64_t *)lists;
+    e->old_key = e->key + room;
+    e->x = (uint32_t *)(e->old_key + room);
+    e->y = e->x + room;
+    e->from = e->y + room;
+    e->old_from = e->from + room;
+    e->threshold = (float *)(e->old_from + room);
     fill->filled = (uint64_t *)memory;
-    fill->rows = (float *)(memory + filled);
-    fill->kept = (uint32_t *)(memory + filled + rows);
+    fill->rows = (float *)(fill->filled + words);
+    fill->kept = (uint32_t *)(fill->rows + rows);
     fill->listed = fill->kept + count;
-    memset(fill->filled, 0, filled);
-    memset(fill->kept, 0, count * 8);
+    fill->dirty = (uint8_t *)(fill->listed + count);
+    fill->touched = fill->dirty + words;
+    memset(fill->filled, 0, words * 8);
+    memset(fill->kept, 0, count * 8 + words * 2);
     return PATINA_OK;
 }
 

@@ -107,7 +107,7 @@ static void normal_pixels(const struct normals_args *args, const struct pt_cpu_c
     n[1] = b * vf_set(view->ray_xs);
     n[2] = vf_set(view->ray_xs * view->ray_ys);
     if (view->perspective) {
-        vf_ray_at(view, center.x, y, ray);
+        vf_ray_of(view, center.x, center.y, ray);
         n[2] = (n[0] * ray[0] + n[1] * ray[1]) - c * n[2];
     }
     // 4. unit, towards the viewer: n . (u, v, -1) < 0. Largest component first, so that no square over- or underflows.

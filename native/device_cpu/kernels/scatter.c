@@ -36,16 +36,40 @@ static inline void store_least(struct target target, uint32_t pixel, uint64_t ke
         ;
 }
 
-static int faces_away(const struct chunk_view *chunk, const float *positions, uint32_t i, uint32_t word)
+// Points of a chunk that wait for their surface words: those lie in file order, so each is a cache miss of its own (40% of
+// a frame's scatter before they were fetched ahead).
+enum { QUEUE = 64 };
+
+struct queue {
+    uint32_t count, slot[QUEUE + PT_LANES], id[QUEUE + PT_LANES], pixel[QUEUE + PT_LANES], z[QUEUE + PT_LANES];
+};
+
+// Which of PT_LANES waiting points face away.
+static uint32_t faces_away(const struct chunk_view *chunk, const float *positions, const uint32_t *surface,
+                           const struct queue *queue, uint32_t at, vm lanes)
 {
-    float n[3];
-    if ((word & PT_NORMAL_BITS) == PT_NORMAL_NONE)
-        return 0;
-    pt_decode_normal(word, n);
-    float x = chunk->eye[0] - chunk->eye[3] * positions[i];
-    float y = chunk->eye[1] - chunk->eye[3] * positions[chunk->padded + i];
-    float z = chunk->eye[2] - chunk->eye[3] * positions[2 * chunk->padded + i];
-    return (n[0] * x + n[1] * y) + n[2] * z <= 0.0f;
+    vi slot = vi_load(queue->slot + at), word = vi_gather(surface, vi_load(queue->id + at), lanes);
+    vf n[3], v[3];
+    vf_decode_normal(word, n);
+    for (uint32_t k = 0; k < 3; k++)
+        v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * vf_gather(positions + k * chunk->padded, slot, lanes);
+    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
+    return vm_bits(vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE)))));
+}
+
+static void drain(const struct chunk_view *chunk, const float *positions, const uint32_t *surface, struct queue *queue,
+                  struct target target)
+{
+    for (uint32_t at = 0; at < queue->count; at += PT_LANES) {
+        uint32_t left = queue->count - at < PT_LANES ? queue->count - at : PT_LANES;
+        vm lanes = vm_first(left);
+        uint32_t draw = vm_bits(lanes) & ~faces_away(chunk, positions, surface, queue, at, lanes);
+        for (; draw; draw &= draw - 1) {
+            uint32_t k = at + (uint32_t)__builtin_ctz(draw);
+            store_least(target, queue->pixel[k], (uint64_t)queue->z[k] << 32 | (uint32_t)(chunk->id_base + queue->id[k]));
+        }
+    }
+    queue->count = 0;
 }
 
 static inline vf transform(const struct chunk_view *chunk, int row, vf x, vf y, vf z)
@@ -65,6 +89,7 @@ static void scatter_chunk(const struct view_args *view, const struct chunk_view 
     const vf bottom = vf_set((float)view->origin_y), top = vf_set((float)(view->origin_y + (int32_t)view->height));
     const vi origin_x = vi_set((uint32_t)view->origin_x), origin_y = vi_set((uint32_t)view->origin_y);
     const vi width = vi_set(view->width);
+    struct queue queue = { .count = 0 };
 
     for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
         // 1. project
@@ -89,17 +114,29 @@ static void scatter_chunk(const struct view_args *view, const struct chunk_view 
         uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z_bits))));
         if (!nearer)
             continue;
-        // 4. back faces, then the least key
+        // 4. the least key, back faces first
         uint32_t pixels[PT_LANES], zs[PT_LANES];
         vi_store(pixels, pixel, vm_first(PT_LANES));
         vi_store(zs, z_bits, vm_first(PT_LANES));
-        for (; nearer; nearer &= nearer - 1) {
-            uint32_t k = (uint32_t)__builtin_ctz(nearer), id = ids[i + k];
-            if (chunk->cull && faces_away(chunk, positions, i + k, surface[id]))
-                continue;
-            store_least(target, pixels[k], (uint64_t)zs[k] << 32 | (uint32_t)(chunk->id_base + id));
+        if (!chunk->cull) {
+            for (; nearer; nearer &= nearer - 1) {
+                uint32_t k = (uint32_t)__builtin_ctz(nearer);
+                store_least(target, pixels[k], (uint64_t)zs[k] << 32 | (uint32_t)(chunk->id_base + ids[i + k]));
+            }
+            continue;
         }
+        for (; nearer; nearer &= nearer - 1, queue.count++) {
+            uint32_t k = (uint32_t)__builtin_ctz(nearer);
+            queue.slot[queue.count] = i + k;
+            queue.id[queue.count] = ids[i + k];
+            queue.pixel[queue.count] = pixels[k];
+            queue.z[queue.count] = zs[k];
+            __builtin_prefetch(surface + ids[i + k]);
+        }
+        if (queue.count >= QUEUE - PT_LANES)
+            drain(chunk, positions, surface, &queue, target);
     }
+    drain(chunk, positions, surface, &queue, target);
 }
 
 static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which tiles of a key plane hold points: filters visit no others. The lists last as long as the keys do not change.
+#include "device_gl.h"
+
+#include <string.h>
+
+enum { TILE_X = 32, TILE_Y = 8, GROUP = 32, LISTS = 3, GROUPS_IN_ROW = 16384 }; // as in lib/tiles.glsl
+
+void pt_gl_tiles_forget(struct pt_gl_device *d) { d->tiles.valid = 0; }
+
+void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y)
+{
+    *x = count < GROUPS_IN_ROW ? count : GROUPS_IN_ROW;
+    *y = *x ? (count + *x - 1) / *x : 0;
+}
+
+static int programs(struct pt_gl_device *d)
+{
+    static const char *const definitions[] = {"#define STEP 0\n", "#define STEP 1\n"};
+    int result = PATINA_OK;
+    for (int i = 0; i < 2 && result == PATINA_OK; i++)
+        if (!d->tile_programs[i])
+            result = pt_gl_program(d, "lib/tile_lists.glsl", definitions[i], &d->tile_programs[i]);
+    return result;
+}
+
+static int room(struct pt_gl_device *d, struct pt_gl_tiles *t)
+{
+    size_t tiles = (size_t)t->columns * t->rows;
+    t->stride = (tiles + 63) & ~(size_t)63; // a list begins where a block may begin
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_TILES, tiles * 4, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_scratch(d, PT_GL_SCRATCH_TILE_LISTS, LISTS * t->stride * 4, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_scratch(d, PT_GL_SCRATCH_TILE_COUNTS, sizeof t->count, 0);
+    return result;
+}
+
+static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
+{
+    static const uint32_t none[LISTS];
+    const GladGLContext *gl = &d->gl;
+    const struct pt_gl_scratch *s = d->scratch;
+    size_t tiles = (size_t)t->columns * t->rows;
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILE_COUNTS].name);
+    gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILES].name);
+    gl->ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)(tiles * 4), GL_RED_INTEGER, GL_UNSIGNED_INT,
+                           NULL);
+    int result = pt_gl_bind(d, 2, s[PT_GL_SCRATCH_TILES].name, 0, tiles * 4, "tiles");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 3, s[PT_GL_SCRATCH_TILE_LISTS].name, 0, LISTS * t->stride * 4, "tiles");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 4, s[PT_GL_SCRATCH_TILE_COUNTS].name, 0, sizeof none, "tiles");
+    if (result != PATINA_OK)
+        return result;
+    for (int i = 0; i < 2; i++) {
+        GLuint program = d->tile_programs[i], x = t->columns, y = t->rows;
+        gl->ProgramUniform4ui(program, 0, t->rect[0], t->rect[1], t->rect[2], t->rect[3]);
+        gl->ProgramUniform1ui(program, 1, t->width);
+        gl->ProgramUniform2ui(program, 2, t->columns, t->rows);
+        gl->ProgramUniform1ui(program, 3, (GLuint)t->stride);
+        if (i == 1)
+            pt_gl_grid((uint32_t)((tiles + GROUP - 1) / GROUP), &x, &y);
+        gl->UseProgram(program);
+        gl->DispatchCompute(x, y, 1);
+        gl->MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    }
+    gl->BindBuffer(GL_COPY_READ_BUFFER, s[PT_GL_SCRATCH_TILE_COUNTS].name);
+    gl->GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof t->count, t->count);
+    return pt_gl_check(d, "looking for tiles with points");
+}
+
+int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const struct view_args *view)
+{
+    struct pt_gl_tiles *t = &d->tiles;
+    if (t->valid && t->keys == keys->name && t->width == view->width && !memcmp(t->rect, view->rect, sizeof t->rect))
+        return PATINA_OK;
+    *t = (struct pt_gl_tiles){.keys = keys->name, .width = view->width};
+    memcpy(t->rect, view->rect, sizeof t->rect);
+    if (t->rect[2] <= t->rect[0] || t->rect[3] <= t->rect[1])
+        return PATINA_OK;
+    t->columns = (t->rect[2] - t->rect[0] + TILE_X - 1) / TILE_X;
+    t->rows = (t->rect[3] - t->rect[1] + TILE_Y - 1) / TILE_Y;
+    int result = programs(d);
+    if (result == PATINA_OK)
+        result = room(d, t);
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 1, keys->name, 0, keys->size, "tiles");
+    if (result == PATINA_OK)
+        result = build(d, t);
+    t->valid = result == PATINA_OK;
+    return result;
+}
+
+int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list)
+{
+    const struct pt_gl_tiles *t = &d->tiles;
+    if (!t->count[list])
+        return PATINA_OK;
+    int result = pt_gl_bind(d, PT_GL_BINDING_TILES, d->scratch[PT_GL_SCRATCH_TILE_LISTS].name, list * t->stride * 4,
+                            t->count[list] * (size_t)4, "tiles");
+    return result == PATINA_OK ? pt_gl_dispatch_list(d, kernel, variant, t->count[list]) : result;
+}
+
+int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count)
+{
+    GLuint program = d->programs[kernel][variant];
+    uint32_t x, y;
+    pt_gl_grid(count, &x, &y);
+    d->gl.ProgramUniform1ui(program, 14, count);
+    d->gl.ProgramUniform1ui(program, 15, d->tiles.columns);
+    return pt_gl_dispatch(d, kernel, variant, x, y);
+}
