@@ -29,7 +29,7 @@
 // |n . r| of a unit normal below which a pixel's ray is parallel to the tangent plane: the dot product's own error
 // (about 2e-7) times ten, so that the extrapolated depth would be off by a tenth; any depth in the clamp is admitted.
 #define TOL_PARALLEL 2e-6
-// 4 m max(|dx|, |dy|) against |z_q - z_p|: up to three products, one difference; share of the threshold.
+// 4 footprint max(|dx|, |dy|) against |z_q - z_p|: up to three products, one difference; share of the threshold.
 #define TOL_WINDOW (6.0 * TOL_UNIT)
 
 // ---- how far values may lie off ---------------------------------------------------------------------------------
@@ -41,6 +41,8 @@
 #define TOL_LAYER (18.0 * TOL_UNIT)
 // Least squares: each 1/z is off by 5 units, the sums of products by a few more; times the exact gain of the fit.
 #define TOL_FIT (12.0 * TOL_UNIT)
+// Normal equations about the mean: each product of two sums 1, their difference 1, sums of up to 33 x 33 terms a few.
+#define TOL_SOLVE (6.0 * TOL_UNIT)
 // A fit is compared only where its own error bound is below this (radians): beyond it float32 holds no normal.
 #define TOL_FIT_LIMIT 0.05
 // Sum of up to 17 x 17 weighted normals: at most 289 roundings of partial sums, in practice their square root (17), with

@@ -35,7 +35,7 @@ foreach(folder kernels unit scenes hard)
             OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests/${folder})
         if(name STREQUAL test_example) # the public header and the shared library alone, as a stranger's program
             target_compile_options(${target} PRIVATE ${TEST_WARNINGS} -Wpedantic -U_GNU_SOURCE)
-            target_link_libraries(${target} PRIVATE patina_shared)
+            target_link_libraries(${target} PRIVATE patina_shared m)
         else()
             target_include_directories(${target} PRIVATE ${TESTS}/${folder})
             if(SUPPORT_SOURCES)

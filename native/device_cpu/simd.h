@@ -32,6 +32,7 @@ static inline vf vf_select(vm m, vf a, vf b) { return _mm512_mask_blend_ps(m, b,
 static inline vi vf_bits(vf a) { return _mm512_castps_si512(a); }
 static inline vf vi_float(vi a) { return _mm512_castsi512_ps(a); }
 static inline vi vf_int(vf a) { return _mm512_cvttps_epi32(a); }
+static inline vf vf_floor(vf a) { return _mm512_roundscale_ps(a, 9); }
 static inline vf vi_convert(vi a) { return _mm512_cvtepi32_ps(a); }
 static inline vi vi_load(const void *p) { return _mm512_loadu_si512(p); }
 static inline vi vi_set(uint32_t x) { return _mm512_set1_epi32((int)x); }
@@ -64,6 +65,7 @@ static inline vi vi_load_id(const uint64_t *keys)
 }
 static inline uint32_t vm_bits(vm m) { return m; }
 static inline vm vm_first(uint32_t n) { return (vm)((1u << n) - 1u); }
+static inline vm vm_of_bits(uint32_t bits) { return (vm)bits; }
 static inline vm vm_and(vm a, vm b) { return a & b; }
 static inline vm vm_or(vm a, vm b) { return a | b; }
 static inline vm vm_not(vm a) { return (vm)~a; }
@@ -103,6 +105,7 @@ static inline vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm
 static inline vi vf_bits(vf a) { return _mm256_castps_si256(a); }
 static inline vf vi_float(vi a) { return _mm256_castsi256_ps(a); }
 static inline vi vf_int(vf a) { return _mm256_cvttps_epi32(a); }
+static inline vf vf_floor(vf a) { return _mm256_floor_ps(a); }
 static inline vf vi_convert(vi a) { return _mm256_cvtepi32_ps(a); }
 static inline vi vi_load(const void *p) { return _mm256_loadu_si256(p); }
 static inline vi vi_set(uint32_t x) { return _mm256_set1_epi32((int)x); }
@@ -137,6 +140,11 @@ static inline vi vi_load_z(const uint64_t *keys) { return avx2_words(keys, 1); }
 static inline vi vi_load_id(const uint64_t *keys) { return avx2_words(keys, 0); }
 static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
 static inline vm vm_first(uint32_t n) { return _mm256_cmpgt_epi32(_mm256_set1_epi32((int)n), vi_lanes()); }
+static inline vm vm_of_bits(uint32_t bits)
+{
+    const vi each = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    return _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32((int)bits), each), each);
+}
 static inline vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
 static inline vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
 static inline vm vm_not(vm a) { return _mm256_xor_si256(a, _mm256_set1_epi32(-1)); }
@@ -168,6 +176,7 @@ static inline vf vf_select(vm m, vf a, vf b) { return _mm_blendv_ps(b, a, _mm_ca
 static inline vi vf_bits(vf a) { return _mm_castps_si128(a); }
 static inline vf vi_float(vi a) { return _mm_castsi128_ps(a); }
 static inline vi vf_int(vf a) { return _mm_cvttps_epi32(a); }
+static inline vf vf_floor(vf a) { return _mm_floor_ps(a); }
 static inline vf vi_convert(vi a) { return _mm_cvtepi32_ps(a); }
 static inline vi vi_load(const void *p) { return _mm_loadu_si128(p); }
 static inline vi vi_set(uint32_t x) { return _mm_set1_epi32((int)x); }
@@ -207,6 +216,11 @@ static inline vi vi_load_id(const uint64_t *keys)
     return _mm_castps_si128(_mm_shuffle_ps(a, b, 0x88));
 }
 static inline vm vm_first(uint32_t n) { return _mm_cmpgt_epi32(_mm_set1_epi32((int)n), vi_lanes()); }
+static inline vm vm_of_bits(uint32_t bits)
+{
+    const vi each = _mm_setr_epi32(1, 2, 4, 8);
+    return _mm_cmpeq_epi32(_mm_and_si128(_mm_set1_epi32((int)bits), each), each);
+}
 static inline vm vm_and(vm a, vm b) { return _mm_and_si128(a, b); }
 static inline vm vm_or(vm a, vm b) { return _mm_or_si128(a, b); }
 static inline vm vm_not(vm a) { return _mm_xor_si128(a, _mm_set1_epi32(-1)); }
@@ -248,6 +262,11 @@ static inline vi vf_bits(vf a) { return pt_bits(a); }
 static inline vf vi_float(vi a) { return pt_float(a); }
 static inline vi vf_int(vf a) { return a >= -2147483648.0f && a < 2147483648.0f ? (uint32_t)(int32_t)a : 0x80000000u; }
 static inline vf vi_convert(vi a) { return (float)(int32_t)a; }
+static inline vf vf_floor(vf a)
+{
+    float whole = (float)(int32_t)vf_int(a); // within int32, as pixels are
+    return a < whole ? whole - 1.0f : whole;
+}
 static inline vi vi_load(const void *p)
 {
     vi x;
@@ -273,6 +292,7 @@ static inline vi vi_load_z(const uint64_t *keys) { return (uint32_t)(*keys >> 32
 static inline vi vi_load_id(const uint64_t *keys) { return (uint32_t)*keys; }
 static inline uint32_t vm_bits(vm m) { return m; }
 static inline vm vm_first(uint32_t n) { return n > 0; }
+static inline vm vm_of_bits(uint32_t bits) { return bits & 1u; }
 static inline vm vm_and(vm a, vm b) { return a & b; }
 static inline vm vm_or(vm a, vm b) { return a | b; }
 static inline vm vm_not(vm a) { return !a; }
@@ -323,6 +343,18 @@ static inline void vf_load4(const float *pixels, vf out[4])
         out[k] = vf_load_every_fourth(pixels + 4 * k);
     vf_transpose(out);
 }
+// All PT_LANES pixels past the caches; pixels must lie on a multiple of 16 bytes.
+static inline void vf_stream4(float *pixels, const vf in[4])
+{
+    vf r[4] = { in[0], in[1], in[2], in[3] };
+    vf_transpose(r);
+    for (int k = 0; k < 4; k++) {
+        float rows[PT_LANES];
+        memcpy(rows, &r[k], sizeof rows);
+        for (int i = 0; i < PT_LANES; i += 4)
+            _mm_stream_ps(pixels + 4 * (k + i), _mm_loadu_ps(rows + i));
+    }
+}
 static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 {
     vf r[4] = { in[0], in[1], in[2], in[3] };
@@ -332,6 +364,7 @@ static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 }
 #else
 static inline void vf_load4(const float *pixels, vf out[4]) { memcpy(out, pixels, 16); }
+static inline void vf_stream4(float *pixels, const vf in[4]) { memcpy(pixels, in, 16); }
 static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 {
     if (lanes)

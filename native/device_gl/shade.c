@@ -58,7 +58,7 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
         }
         lights[i][3] = (GLfloat)light->type;
     }
-    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][colors], 0, 2 * PT_MAX_LIGHTS, &lights[0][0]);
+    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][colors], 16, 2 * PT_MAX_LIGHTS, &lights[0][0]);
 }
 
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)

@@ -7,8 +7,8 @@ layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { compose_args args; };
 layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 2) readonly buffer color_block { vec4 color[]; };
 layout(std430, binding = 3) writeonly buffer combined_block { vec4 combined[]; };
+layout(binding = 0) uniform samplerBuffer color;
 
 void main()
 {
@@ -19,10 +19,7 @@ void main()
     if (x >= crop_width || y >= crop_height)
         return;
     uint at = (crop_y + y) * width + crop_x + x;
-    precise vec4 result = background;
-    if (keys[at].y != PT_KEY_EMPTY_Z) {
-        vec4 c = color[at];
-        result = c + (1.0 - c.w) * background;
-    }
-    combined[y * crop_width + x] = result;
+    vec4 c = texelFetch(color, int(at));
+    precise vec4 over = c + (1.0 - c.w) * background;
+    combined[y * crop_width + x] = keys[at].y == PT_KEY_EMPTY_Z ? background : over;
 }

@@ -9,10 +9,10 @@ layout(local_size_x = 32, local_size_y = 8) in;
 layout(std430, binding = 0) readonly buffer arguments_block { extract_args args; };
 layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) readonly buffer from_block { uint from[]; };
-layout(std430, binding = 3) readonly buffer shading_block { vec4 shading[]; };
 layout(std430, binding = 4) writeonly buffer depth_block { float depth[]; };
 layout(std430, binding = 5) writeonly buffer normal_block { float normal[]; }; // 3 a pixel
 layout(std430, binding = 6) writeonly buffer source_block { float source[]; };
+layout(binding = 0) uniform samplerBuffer shading;
 
 float source_value(uint width, uint word, uint x, uint y)
 {
@@ -24,32 +24,32 @@ float source_value(uint width, uint word, uint x, uint y)
     return (word & PT_FROM_MIXED) != 0u ? -value : value;
 }
 
+// A dispatch for each plane that is asked for.
 void main()
 {
     uint width = args.view.width, crop_x = args.crop_x, crop_y = args.crop_y;
     uint crop_width = args.crop_width, crop_height = args.crop_height;
-    bool wants_depth = args.depth != 0u, wants_normal = args.normal != 0u, wants_source = args.source != 0u;
+#if PLANE == 1
     vec3 row_x = vec3(args.world_from_view[0], args.world_from_view[1], args.world_from_view[2]);
     vec3 row_y = vec3(args.world_from_view[3], args.world_from_view[4], args.world_from_view[5]);
     vec3 row_z = vec3(args.world_from_view[6], args.world_from_view[7], args.world_from_view[8]);
+#endif
     uint x = gl_GlobalInvocationID.x, y = gl_GlobalInvocationID.y;
     if (x >= crop_width || y >= crop_height)
         return;
     uint at = (crop_y + y) * width + crop_x + x, to = y * crop_width + x;
     uint z_bits = keys[at].y;
     bool some = z_bits != PT_KEY_EMPTY_Z;
-    if (wants_depth)
-        depth[to] = pt_float(z_bits);
-    if (wants_normal) {
-        vec3 n = vec3(0.0);
-        if (some) {
-            vec3 v = shading[at].xyz;
-            n = vec3(pt_dot(row_x, v), pt_dot(row_y, v), pt_dot(row_z, v));
-        }
-        normal[3u * to] = n.x;
-        normal[3u * to + 1u] = n.y;
-        normal[3u * to + 2u] = n.z;
-    }
-    if (wants_source)
-        source[to] = some ? source_value(width, from[at], crop_x + x, crop_y + y) : 0.0;
+#if PLANE == 0
+    depth[to] = pt_float(z_bits);
+#elif PLANE == 1
+    vec3 v = texelFetch(shading, int(at)).xyz;
+    vec3 n = some ? vec3(pt_dot(row_x, v), pt_dot(row_y, v), pt_dot(row_z, v)) : vec3(0.0);
+    normal[3u * to] = n.x;
+    normal[3u * to + 1u] = n.y;
+    normal[3u * to + 2u] = n.z;
+#else
+    uint word = some ? from[at] : at;
+    source[to] = some ? source_value(width, word, crop_x + x, crop_y + y) : 0.0;
+#endif
 }

@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // fill: one phase of hole filling. [D 3.2, 3.3] with the rule of SPEC 2.2; twin of native/device_cpu/kernels/fill.c
 //
-// A step first decides from the state before it, then applies: what changes is listed, so the planes are never copied.
-// Tiles whose reach did not change are skipped. Entries stay listed with the pixel's state before the phase: un-filling
-// walks that list alone. The order within lists depends on scheduling; a pixel is in a list once, so it never shows.
-//   STEP 0: decide, a tile a workgroup;   STEP 1: apply, an entry an invocation;   STEP 2: mark;   STEP 3: restore
+// A step first decides from the state before it, then applies: what changes is listed, so the planes are never copied,
+// and only tiles within reach of a change are looked at again. Entries stay listed with the pixel's state before the
+// phase: un-filling walks that list alone. The order within lists depends on scheduling; a pixel is in a list once, so
+// it never shows.
+//   STEP 0: find the pixels to fill;   STEP 1: what they become;   STEP 2: apply;   STEP 3: mark;   STEP 4: restore
 #version 430 core
 #include "lib/math.glsl"
-
-#define TILE_X 32
-#define TILE_Y 8
-
 #if STEP == 0
-layout(local_size_x = TILE_X, local_size_y = TILE_Y) in;
+#include "lib/tiles.glsl"
 #else
 layout(local_size_x = 64) in;
 #endif
@@ -31,92 +28,81 @@ struct saved_pixel { // as it was before the phase
 layout(std430, binding = 0) readonly buffer arguments_block { fill_args args; };
 layout(std430, binding = 1) buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) buffer from_block { uint from[]; };
-layout(std430, binding = 3) readonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = 4) readonly buffer deff_block { float deff[]; };
-layout(std430, binding = 5) buffer counters_block { uint changed_count, saved_count; };
+layout(std430, binding = 5) buffer counters_block { uint changed_count, saved_count, woken_count; };
 layout(std430, binding = 6) buffer changed_block { change changed[]; };
 layout(std430, binding = 7) buffer saved_block { saved_pixel saved[]; };
 layout(std430, binding = 8) buffer filled_block { uint filled[]; }; // a bit a pixel: filled in this phase
-layout(std430, binding = 9) buffer tiles_block { uint tiles[]; };   // the step in which the tile has to be looked at
+layout(std430, binding = 9) buffer stamps_block { uint stamps[]; }; // a word a tile: the step it was listed for last
+layout(std430, binding = 10) buffer woken_block { uint woken[]; };  // tiles for the next step
+layout(binding = 0) uniform samplerBuffer normals;
 
-layout(location = 0) uniform uint stamp;   // of this step
-layout(location = 1) uniform uint first;   // 1: the phase's first step looks at every tile
-layout(location = 2) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
-layout(location = 3) uniform uint tiles_x; // in a row
+layout(location = 0) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
+layout(location = 1) uniform uint stamp;   // of this step
+layout(location = 2) uniform uint columns; // tiles in a row
 
-const uint NO_PIXEL = 0xFFFFFFFFu;
 // The ring, anticlockwise from east.
 const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(1, 1), ivec2(0, 1), ivec2(-1, 1), ivec2(-1, 0), ivec2(-1, -1),
                                ivec2(0, -1), ivec2(1, -1));
 
-// Which of the ring are white: not nearer than the threshold. Outside the plane: nothing, hence white.
-uint white_ring(int width, int height, int x, int y, float threshold)
+// Outside the plane: nothing.
+float z_at(ivec2 size, int x, int y)
 {
-    uint white = 0u;
-    for (int d = 0; d < 8; d++) {
-        int nx = x + ring[d].x, ny = y + ring[d].y;
-        float z = pt_float(PT_KEY_EMPTY_Z);
-        if (nx >= 0 && ny >= 0 && nx < width && ny < height)
-            z = pt_float(keys[uint(ny * width + nx)].y);
-        white |= uint(!(z < threshold)) << d;
-    }
-    return white;
+    bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
+    float z = pt_float(keys[inside ? uint(y * size.x + x) : 0u].y);
+    return inside ? z : pt_float(PT_KEY_EMPTY_Z);
+}
+
+float own_distance(view_args view, uint source, float z)
+{
+    return pt_level_distance(view, deff[source], texelFetch(normals, int(source)).w, z);
 }
 
 #if STEP == 0
 
-float own_distance(view_args view, uint source, float z)
+// 2. Threshold of a pixel, and whether it is a candidate at all.
+bool candidate(view_args view, uint pixel, float z, out float threshold)
 {
-    float inverse = view.level != 0u ? normals[source].w : 1.0;
-    return pt_level_distance(view, deff[source], inverse, z);
+    float empty = pt_float(PT_KEY_EMPTY_Z);
+    threshold = empty;
+#if OCCLUDED
+    bool some = z < empty;
+    precise float t = z - own_distance(view, some ? from[pixel] : 0u, z);
+    threshold = t;
+    return some;
+#else
+    return !(z < empty);
+#endif
 }
 
 void main()
 {
     view_args view = args.view;
-    bool occluded = args.occluded != 0u, refined = args.refined != 0u;
-    if (first == 0u && tiles[gl_WorkGroupID.y * tiles_x + gl_WorkGroupID.x] != stamp)
-        return;
-    uint ux = view.rect[0] + gl_GlobalInvocationID.x, uy = view.rect[1] + gl_GlobalInvocationID.y;
-    if (ux >= view.rect[2] || uy >= view.rect[3])
-        return;
-    int x = int(ux), y = int(uy), width = int(view.width), height = int(view.height);
-    uint pixel = uy * view.width + ux;
-
-    // 1. z
-    uint z_bits = keys[pixel].y;
-    if ((z_bits == PT_KEY_EMPTY_Z) == occluded)
-        return;
-    // 2. threshold
-    precise float threshold = pt_float(z_bits);
-    if (occluded)
-        threshold = threshold - own_distance(view, from[pixel], threshold);
-    // 3. five consecutive white ring neighbours: a true border
-    if (pt_five_white(white_ring(width, height, x, y, threshold)))
-        return;
-    // 4. the least key among the neighbours; refined: its surface's tangent plane at this pixel
-    uvec2 key = uvec2(0xFFFFFFFFu);
-    ivec2 best = ivec2(x, y);
-    for (int d = 0; d < 8; d++) {
-        int nx = x + ring[d].x, ny = y + ring[d].y;
-        if (nx < 0 || ny < 0 || nx >= width || ny >= height)
-            continue;
-        uvec2 other = keys[uint(ny * width + nx)];
-        if (pt_key_less(other, key)) {
-            key = other;
-            best = ivec2(nx, ny);
-        }
+    ivec2 size = ivec2(view.width, view.height);
+    uvec2 column = pt_tile_column(view);
+    uint end = pt_tile_end(view, column), fills = 0u;
+    int x = int(column.x), y = int(column.y);
+    // 1. z of three rows, sliding upwards
+    vec3 below = vec3(z_at(size, x - 1, y - 1), z_at(size, x, y - 1), z_at(size, x + 1, y - 1));
+    vec3 row = vec3(z_at(size, x - 1, y), z_at(size, x, y), z_at(size, x + 1, y));
+    for (uint i = 0u; i < PT_TILE_Y; i++, y++) {
+        vec3 above = vec3(z_at(size, x - 1, y + 1), z_at(size, x, y + 1), z_at(size, x + 1, y + 1));
+        float t;
+        bool fill = uint(y) < end && candidate(view, uint(y * size.x + x), row.y, t);
+        // 3. white: not nearer than the threshold; five consecutive ones: a true border
+        uint white = uint(!(row.z < t)) | uint(!(above.z < t)) << 1 | uint(!(above.y < t)) << 2 |
+                     uint(!(above.x < t)) << 3 | uint(!(row.x < t)) << 4 | uint(!(below.x < t)) << 5 |
+                     uint(!(below.y < t)) << 6 | uint(!(below.z < t)) << 7;
+        fills |= uint(fill && !pt_five_white(white)) << i;
+        below = row;
+        row = above;
     }
-    uint source = from[uint(best.y * width + best.x)];
-    if (refined) {
-        float z = pt_float(key.y);
-        z = pt_plane_depth(view, normals[source].xyz, pt_ray(view, best.x, best.y), z, pt_ray(view, x, y),
-                           own_distance(view, source, z));
-        key.y = pt_bits(z);
-    }
-    uint at = atomicAdd(changed_count, 1u);
-    if (at < entries) // else the list is made larger and the step repeated: nothing has changed yet
-        changed[at] = change(pixel, key.x, key.y, source, threshold);
+    if (fills == 0u)
+        return;
+    uint at = atomicAdd(changed_count, uint(bitCount(fills)));
+    for (; fills != 0u; fills &= fills - 1u, at++)
+        if (at < entries) // else the list is made larger and the step repeated: nothing has changed yet
+            changed[at].pixel = (column.y + uint(findLSB(fills))) * view.width + column.x;
 }
 
 #else
@@ -128,14 +114,55 @@ uint entry_index()
 
 #if STEP == 1
 
-// The tiles that a change at this pixel concerns look again in the next step.
+// 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
+void main()
+{
+    view_args view = args.view;
+    bool refined = args.refined != 0u, occluded = args.occluded != 0u;
+    ivec2 size = ivec2(view.width, view.height);
+    uint index = entry_index();
+    if (index >= entries)
+        return;
+    uint pixel = changed[index].pixel;
+    int x = int(pixel % view.width), y = int(pixel / view.width);
+    uvec2 key = uvec2(0xFFFFFFFFu);
+    ivec2 best = ivec2(x, y);
+    for (int d = 0; d < 8; d++) {
+        ivec2 at = ivec2(x, y) + ring[d];
+        if (at.x < 0 || at.y < 0 || at.x >= size.x || at.y >= size.y)
+            continue;
+        uvec2 other = keys[uint(at.y * size.x + at.x)];
+        if (pt_key_less(other, key)) {
+            key = other;
+            best = at;
+        }
+    }
+    uint source = from[uint(best.y * size.x + best.x)];
+    if (refined) {
+        float z = pt_float(key.y);
+        z = pt_plane_depth(view, texelFetch(normals, int(source)).xyz, pt_ray(view, best.x, best.y), z,
+                           pt_ray(view, x, y), own_distance(view, source, z));
+        key.y = pt_bits(z);
+    }
+    precise float threshold = pt_float(keys[pixel].y);
+    if (occluded)
+        threshold = threshold - own_distance(view, from[pixel], threshold);
+    changed[index] = change(pixel, key.x, key.y, source, threshold);
+}
+
+#elif STEP == 2
+
+// The tiles that a change at this pixel concerns are listed for the next step, each once.
 void wake_tiles(uvec4 rect, uint x, uint y)
 {
-    uvec2 low = uvec2(max(x, rect.x + 1u) - 1u - rect.x, max(y, rect.y + 1u) - 1u - rect.y) / uvec2(TILE_X, TILE_Y);
-    uvec2 high = uvec2(min(x + 1u, rect.z - 1u) - rect.x, min(y + 1u, rect.w - 1u) - rect.y) / uvec2(TILE_X, TILE_Y);
+    uvec2 low = uvec2(max(x, rect.x + 1u) - 1u - rect.x, max(y, rect.y + 1u) - 1u - rect.y) / uvec2(32u, 8u);
+    uvec2 high = uvec2(min(x + 1u, rect.z - 1u) - rect.x, min(y + 1u, rect.w - 1u) - rect.y) / uvec2(32u, 8u);
     for (uint ty = low.y; ty <= high.y; ty++)
-        for (uint tx = low.x; tx <= high.x; tx++)
-            tiles[ty * tiles_x + tx] = stamp;
+        for (uint tx = low.x; tx <= high.x; tx++) {
+            uint tile = ty * columns + tx;
+            if (stamps[tile] != stamp && atomicExchange(stamps[tile], stamp) != stamp)
+                woken[atomicAdd(woken_count, 1u)] = tile;
+        }
 }
 
 void main()
@@ -158,17 +185,24 @@ void main()
         saved[atomicAdd(saved_count, 1u)] = saved_pixel(c.pixel, old_key.x, old_key.y, old_from, c.threshold, 0u);
 }
 
-#elif STEP == 2
+#else
+
+const uint NO_PIXEL = 0xFFFFFFFFu;
+
+#if STEP == 3
 
 // 5. Un-filling: an entry whose pixel shows four consecutive white cells is marked ...
 void main()
 {
-    int width = int(args.view.width), height = int(args.view.height);
+    ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
     if (index >= entries || saved[index].pixel == NO_PIXEL)
         return;
-    int pixel = int(saved[index].pixel);
-    uint white = white_ring(width, height, pixel % width, pixel / width, saved[index].threshold);
+    int pixel = int(saved[index].pixel), x = pixel % size.x, y = pixel / size.x;
+    float threshold = saved[index].threshold;
+    uint white = 0u;
+    for (int d = 0; d < 8; d++)
+        white |= uint(!(z_at(size, x + ring[d].x, y + ring[d].y) < threshold)) << d;
     saved[index].restore = uint(pt_four_white(white));
 }
 
@@ -187,5 +221,6 @@ void main()
     atomicAdd(changed_count, 1u);
 }
 
+#endif
 #endif
 #endif

@@ -5,8 +5,7 @@
 // can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
 #version 430 core
 #include "lib/math.glsl"
-
-layout(local_size_x = 32, local_size_y = 8) in;
+#include "lib/tiles.glsl"
 
 layout(std430, binding = 0) readonly buffer arguments_block { normals_args args; };
 layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
@@ -79,15 +78,8 @@ vec3 fit(view_args view, window_sums s, float w, vec2 ray)
     return found ? unit : vec3(0.0);
 }
 
-void main()
+void normal_pixel(view_args view, int radius, uint id_base, uint id_count, float d_min, uint x, uint y)
 {
-    view_args view = args.view;
-    uint id_base = args.instance.id_base, id_count = args.instance.id_count;
-    float d_min = args.instance.d_min;
-    int radius = int(args.radius);
-    uint x = view.rect[0] + gl_GlobalInvocationID.x, y = view.rect[1] + gl_GlobalInvocationID.y;
-    if (x >= view.rect[2] || y >= view.rect[3])
-        return;
     uint at = y * view.width + x;
     uvec2 key = keys[at];
     uint id = key.x - id_base;
@@ -99,4 +91,15 @@ void main()
     precise float slope = 4.0 * pt_footprint(view, z); // 76 degrees
     window_sums s = gather(view, radius, int(x), int(y), z, w, distance_limit, slope);
     normals[at] = vec4(fit(view, s, w, pt_ray(view, int(x), int(y))), 0.0);
+}
+
+void main()
+{
+    view_args view = args.view;
+    uint id_base = args.instance.id_base, id_count = args.instance.id_count;
+    float d_min = args.instance.d_min;
+    int radius = int(args.radius);
+    uvec2 column = pt_tile_column(view);
+    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
+        normal_pixel(view, radius, id_base, id_count, d_min, column.x, y);
 }

@@ -11,8 +11,8 @@ layout(std430, binding = 1) readonly buffer coarse_keys_block { uvec2 coarse_key
 layout(std430, binding = 2) readonly buffer coarse_from_block { uint coarse_from[]; };
 layout(std430, binding = 3) buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 4) buffer from_block { uint from[]; };
-layout(std430, binding = 5) readonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = 6) readonly buffer deff_block { float deff[]; };
+layout(binding = 0) uniform samplerBuffer normals;
 
 float coarse_z(ivec2 size, int x, int y)
 {
@@ -35,7 +35,7 @@ void main()
     precise float t = pt_float(keys[at].y);
     if (t < pt_float(PT_KEY_EMPTY_Z)) {
         uint own = from[at];
-        t = t - pt_level_distance(view, deff[own], normals[own].w, t);
+        t = t - pt_level_distance(view, deff[own], texelFetch(normals, int(own)).w, t);
     }
     // 2. the parent and the three coarse cells on this pixel's side
     int px = int(x >> 1), py = int(y >> 1), sx = (x & 1u) != 0u ? 1 : -1, sy = (y & 1u) != 0u ? 1 : -1;
@@ -53,7 +53,7 @@ void main()
         view_args coarse = view;
         coarse.level++;
         vec2 ray_p = pt_ray(view, int(x), int(y)), ray_q = pt_ray(coarse, px, py);
-        vec4 normal = normals[source];
+        vec4 normal = texelFetch(normals, int(source));
         float limit = pt_level_distance(coarse, deff[source], normal.w, z);
         z = pt_plane_depth(view, normal.xyz, ray_q, z, ray_p, limit);
     }

@@ -65,7 +65,7 @@ void main()
         if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
             continue;
         // 3. early depth test; the sign bit of -0 is dropped
-        uint pixel = uint(int(y) - view.origin_y) * view.width + uint(int(x) - view.origin_x);
+        uint pixel = uint(int(floor(y)) - view.origin_y) * view.width + uint(int(floor(x)) - view.origin_x);
         uint z_bits = pt_bits(z) & 0x7FFFFFFFu;
 #if PASS == 0
         if (keys[2u * pixel + 1u] <= z_bits)

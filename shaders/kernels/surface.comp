@@ -2,64 +2,72 @@
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/surface.c
 #version 430 core
 #include "lib/math.glsl"
-
-layout(local_size_x = 16, local_size_y = 8) in;
+#include "lib/tiles.glsl"
 
 layout(std430, binding = 0) readonly buffer arguments_block { surface_args args; };
 layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 3) buffer normals_block { vec4 normals[]; };
+layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = 4) writeonly buffer deff_block { float deff[]; };
 layout(std430, binding = 5) writeonly buffer from_block { uint from[]; };
+layout(binding = 0) uniform samplerBuffer estimates; // the normal plane too
 
-void main()
+struct instance_part {
+    uint id_base, id_count;
+    bool has_normals;
+    float d_min;
+    vec3 rows[3]; // of the normal matrix
+};
+
+void surface_pixel(view_args view, instance_part instance, uint x, uint y)
 {
-    view_args view = args.view;
-    uint x = view.rect[0] + gl_GlobalInvocationID.x, y = view.rect[1] + gl_GlobalInvocationID.y;
-    if (x >= view.rect[2] || y >= view.rect[3])
-        return;
     uint at = y * view.width + x;
-
     // 1. the point
     uvec2 key = keys[at];
-    uint id = key.x - args.instance.id_base;
-    if (id >= args.instance.id_count || key.y == PT_KEY_EMPTY_Z)
+    uint id = key.x - instance.id_base;
+    if (id >= instance.id_count || key.y == PT_KEY_EMPTY_Z)
         return;
     float z = pt_float(key.y);
     vec2 ray = pt_ray(view, int(x), int(y));
     uint word = surface[id];
     float spacing = args.instance.spacing[word >> PT_SPACING_SHIFT];
     // 2. its normal, in view space: the cloud's, or the estimate that the normal plane holds
-    bool none = false;
-    vec3 n;
-    if (args.instance.has_normals != 0u) {
-        vec3 o = pt_decode_normal(word);
-        n = vec3(pt_dot(vec3(args.instance.normal_matrix[0], args.instance.normal_matrix[1],
-                             args.instance.normal_matrix[2]), o),
-                 pt_dot(vec3(args.instance.normal_matrix[3], args.instance.normal_matrix[4],
-                             args.instance.normal_matrix[5]), o),
-                 pt_dot(vec3(args.instance.normal_matrix[6], args.instance.normal_matrix[7],
-                             args.instance.normal_matrix[8]), o));
-        none = (word & PT_NORMAL_BITS) == PT_NORMAL_NONE;
-    } else {
-        n = normals[at].xyz;
+    vec3 object = pt_decode_normal(word);
+    vec3 n = vec3(pt_dot(instance.rows[0], object), pt_dot(instance.rows[1], object), pt_dot(instance.rows[2], object));
+    bool none = (word & PT_NORMAL_BITS) == PT_NORMAL_NONE;
+    if (!instance.has_normals) {
+        n = texelFetch(estimates, int(at)).xyz;
+        none = false;
     }
     float square = pt_dot(n, n);
     none = none || !(1e-30 <= square);
     precise vec3 unit = n * pt_rsqrt(square);
     // 3. without one: towards the viewer
-    float inverse = 1.0;
-    if (none) {
-        unit = vec3(0.0, 0.0, 1.0);
-        if (view.perspective != 0u) {
-            float r = pt_ray_rsqrt(ray);
-            unit = vec3(pt_negate(ray.x) * r, pt_negate(ray.y) * r, r);
-        }
-    } else {
-        inverse = pt_rcp(pt_max(pt_cosine(view, unit, ray), PT_COSINE_FLOOR));
-    }
+    float r = pt_ray_rsqrt(ray);
+    precise vec3 towards = vec3(pt_negate(ray.x) * r, pt_negate(ray.y) * r, r);
+    if (view.perspective == 0u)
+        towards = vec3(0.0, 0.0, 1.0);
+    unit = none ? towards : unit;
     // 4. cosine and layer distance
+    float inverse = pt_rcp(pt_max(pt_cosine(view, unit, ray), PT_COSINE_FLOOR));
+    inverse = none ? 1.0 : inverse;
     normals[at] = vec4(unit, inverse);
-    deff[at] = pt_layer_distance(view, args.instance.d_min, spacing, z, inverse);
+    deff[at] = pt_layer_distance(view, instance.d_min, spacing, z, inverse);
     from[at] = at;
+}
+
+void main()
+{
+    view_args view = args.view;
+    instance_part instance;
+    instance.id_base = args.instance.id_base;
+    instance.id_count = args.instance.id_count;
+    instance.has_normals = args.instance.has_normals != 0u;
+    instance.d_min = args.instance.d_min;
+    for (int i = 0; i < 3; i++)
+        instance.rows[i] = vec3(args.instance.normal_matrix[3 * i], args.instance.normal_matrix[3 * i + 1],
+                                args.instance.normal_matrix[3 * i + 2]);
+    uvec2 column = pt_tile_column(view);
+    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
+        surface_pixel(view, instance, column.x, y);
 }

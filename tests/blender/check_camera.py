@@ -132,6 +132,12 @@ def test_scaled_camera():
     check_projection(scene)
 
 
+def test_mirrored_camera():
+    scene = new_scene()
+    tilted(scene, (-1.0, 1.0, 1.0))
+    check_projection(scene)
+
+
 def test_shift():
     for x, y in ((0.3, 0.0), (0.0, -0.4), (-0.25, 0.35)):
         scene = new_scene()

@@ -52,7 +52,8 @@ static void test_two_surfaces(void **state)
                 if (fill == PATINA_FILL_OFF)
                     assert_true(other == 1.0f);
                 else
-                    assert_true(other == 2.0f && key_id(key) != 40 && key_z(key) == 1.0f);
+                    // all eight neighbours lie at z = 1: the least id is the one below and left
+                    assert_true(other > 2.414f && other < 2.415f && key_id(key) == 30 && key_z(key) == 1.0f);
             }
         patina_device_destroy(device);
     }

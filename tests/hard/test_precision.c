@@ -116,24 +116,39 @@ static void test_far_box(void **state)
     patina_cloud_destroy(cloud);
 }
 
-// Draws points without filling and holds every pixel against float64.
-static struct measured draw(patina_device *device, const double *world, uint64_t count, const patina_camera *camera,
-                            uint32_t width, uint32_t height, double margin, const char *what)
+// Draws points without filling and holds every pixel against float64. parts: clouds that share the points evenly.
+static struct measured draw_parts(patina_device *device, const double *world, uint64_t count, uint32_t parts,
+                                  const patina_camera *camera, uint32_t width, uint32_t height, double margin,
+                                  const char *what)
 {
-    patina_cloud *cloud = upload_doubles(world, count);
-    patina_scene *scene = scene_of(cloud, NULL);
+    patina_cloud *clouds[16];
+    patina_scene *scene = NULL;
+    CHECK(patina_scene_create(&scene), NULL);
+    uint64_t share = count / parts;
+    for (uint32_t i = 0; i < parts; i++) {
+        clouds[i] = upload_doubles(world + 3 * share * i, share);
+        CHECK(patina_scene_add_cloud(scene, clouds[i], NULL), scene);
+    }
     patina_settings settings = settings_default(width, height);
     settings.fill = PATINA_FILL_OFF;
     struct picture picture = picture_render(device, scene, camera, &settings);
     measured_assert_sane(&picture, what);
-    struct measured result = measured_compare(&picture, world, count, camera, margin);
+    struct measured result = measured_compare(&picture, world, share * parts, camera, margin);
     printf("  %-44s %8llu pixels, z off by %.2e (%.2e of z), late by %.2e, stray %.1e px, missed %llu\n", what,
            (unsigned long long)result.pixels, result.z_error, result.z_share, result.z_late, result.stray,
            (unsigned long long)result.missed);
     picture_free(&picture);
     patina_scene_destroy(scene);
-    patina_cloud_destroy(cloud);
+    for (uint32_t i = 0; i < parts; i++)
+        patina_cloud_destroy(clouds[i]);
     assert_int_equal(result.impossible, 0);
+    return result;
+}
+
+static struct measured draw(patina_device *device, const double *world, uint64_t count, const patina_camera *camera,
+                            uint32_t width, uint32_t height, double margin, const char *what)
+{
+    struct measured result = draw_parts(device, world, count, 1, camera, width, height, margin, what);
     assert_int_equal(result.missed, 0);
     return result;
 }
@@ -154,27 +169,28 @@ static void test_sixteen_kilometres(void **state)
                                  : pcg_between(&random, -8000, 8000);
         world[3 * i + 2] = dense ? floor(pcg_between(&random, 0, 100)) * 0.001 : pcg_between(&random, 0, 40);
     }
+    // No view reaches beyond z = 16384: there a float32 holds every other millimetre only.
     static const struct {
         const char *name;
         double eye[3], target[3], window; // window 0: perspective, 60 degrees
     } views[] = {
         {"16 km, perspective from above", {10.0, -20.0, 15000.0}, {0, 0, 0}, 0},
-        {"16 km, perspective from a corner", {-8100.0, -8100.0, 900.0}, {0, 0, 0}, 0},
+        {"16 km, perspective from the edge", {-8100.0, 0.0, 900.0}, {0, 0, 0}, 0},
+        {"16 km, perspective from a corner", {-8100.0, -8100.0, 900.0}, {-3000, -3000, 0}, 0},
         {"16 km, orthographic from above", {0.0, 0.0, 8000.0}, {0, 0, 0}, 16500.0},
         {"16 km, orthographic from the side", {-3.0, -8000.0, 2000.0}, {0, 0, 0}, 16500.0},
         {"16 km, the patch alone", {7980.0, 7980.0, 9.0}, {7992.0, 7992.0, 0}, 0},
-        {"16 km, the patch from the other end", {-7000.0, -7000.0, 2000.0}, {7992.0, 7992.0, 0}, 10.0},
+        {"16 km, the patch from the other side", {-7900.0, 7992.0, 2000.0}, {7992.0, 7992.0, 0}, 10.0},
     };
     for (uint32_t i = 0; i < sizeof views / sizeof views[0]; i++) {
         patina_camera camera = views[i].window > 0.0
                                    ? camera_orthographic(views[i].eye, views[i].target, views[i].window, 512, 512, 0.0,
                                                          40000.0)
-                                   : camera_perspective(views[i].eye, views[i].target, 60.0, 512, 512, 1.0, 40000.0);
+                                   : camera_perspective(views[i].eye, views[i].target, 60.0, 512, 512, 1.0, 16384.0);
         struct measured result = draw(device, world, count, &camera, 512, 512, 0.01, views[i].name);
         assert_true(result.pixels > 100);
         assert_true(result.z_error <= 0.001);
-        // The last view shows 2 cm a pixel from 22 km: there a float32 screen position holds a pixel only if it is
-        // made from differences. Everywhere a point stays within a hundredth of its pixel.
+        // The last view shows 2 cm a pixel from 16 km; everywhere a point stays within a hundredth of its pixel.
         assert_true(result.stray <= 0.01);
         assert_true(result.z_late <= 0.002);
     }
@@ -182,26 +198,51 @@ static void test_sixteen_kilometres(void **state)
     patina_device_destroy(device);
 }
 
+// Seven decades of distance in one view. As seven clouds every point is as exact as float32 is; in one cloud a point can
+// only be as exact as 2^-24 of its chunk's extent, which is printed.
 static void test_far_over_near(void **state)
 {
     (void)state;
+    enum { PARTS = 8, SHARE = 4000 };
     patina_device *device = support_device_first();
-    uint64_t count = 30000;
-    double *world = doubles(count);
+    double *world = doubles(PARTS * SHARE);
     struct pcg random = pcg_seed(41);
-    for (uint64_t i = 0; i < count; i++) { // distances spread evenly over seven decades, and beyond both clips
-        double z = pow(10.0, pcg_between(&random, -3.2, 4.2));
+    for (uint64_t i = 0; i < PARTS * SHARE; i++) {
+        double z = pow(10.0, -3.5 + (double)(i / SHARE) + pcg_unit(&random)); // beyond both clips too
         world[3 * i] = z * pcg_between(&random, -0.6, 0.6);
         world[3 * i + 1] = z * pcg_between(&random, -0.6, 0.6);
         world[3 * i + 2] = -z;
     }
     const double eye[3] = {0, 0, 0}, target[3] = {0, 0, -1};
     patina_camera camera = camera_perspective(eye, target, 53.13, 256, 256, 1e-3, 1e4);
-    struct measured result = draw(device, world, count, &camera, 256, 256, 1e-3, "far / near = 10^7");
+    struct measured result = draw_parts(device, world, PARTS * SHARE, PARTS, &camera, 256, 256, 1e-3,
+                                        "far / near = 10^7, a cloud a decade");
     assert_true(result.pixels > 15000);
-    // Points of one chunk lie near one another in space, not in the ratio of distances: next to the eye the error is
-    // that of the chunk's size. A chunk's offsets hold 2^-24 of its extent.
-    assert_true(result.z_error <= 1e-3);
+    assert_int_equal(result.missed, 0);
+    assert_true(result.z_share <= 8e-6); // 24 bits of ten times z, and the product's roundings
+    assert_true(result.stray <= 1e-3);
+    draw_parts(device, world, PARTS * SHARE, 1, &camera, 256, 256, 1e-3, "far / near = 10^7, one cloud (a figure)");
+    free(world);
+    patina_device_destroy(device);
+}
+
+// One stray point a thousand kilometres away does not cost the others their digits.
+static void test_outlier(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    uint64_t count = 30000;
+    double *world = doubles(count);
+    struct points points = points_sphere(count, 1.0, POINTS_PLAIN, 45);
+    for (uint64_t i = 0; i < 3 * count; i++)
+        world[i] = (double)points.position[i];
+    points_free(&points);
+    world[3 * 777] = 1e6;
+    const double eye[3] = {0.0, -4.0, 1.0}, target[3] = {0, 0, 0};
+    patina_camera camera = camera_perspective(eye, target, 40.0, 256, 256, 0.1, 100.0);
+    struct measured result = draw_parts(device, world, count, 1, &camera, 256, 256, 1e-3, "a point 1000 km away");
+    assert_int_equal(result.missed, 0);
+    assert_true(result.z_error <= 1e-5);
     assert_true(result.stray <= 0.01);
     free(world);
     patina_device_destroy(device);
@@ -269,9 +310,13 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_far_from_origin),     cmocka_unit_test(test_far_box),
-        cmocka_unit_test(test_sixteen_kilometres),  cmocka_unit_test(test_far_over_near),
-        cmocka_unit_test(test_orthographic_scales), cmocka_unit_test(test_camera_plane),
+        cmocka_unit_test(test_far_from_origin),
+        cmocka_unit_test(test_far_box),
+        cmocka_unit_test(test_sixteen_kilometres),
+        cmocka_unit_test(test_far_over_near),
+        cmocka_unit_test(test_outlier),
+        cmocka_unit_test(test_orthographic_scales),
+        cmocka_unit_test(test_camera_plane),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

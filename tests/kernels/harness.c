@@ -12,14 +12,14 @@
 
 enum { MOST_BUFFERS = 2048, MOST_BLOCKS = 8192, MOST_SAVED = 1024, MOST_PRINTED = 6 };
 
-// The devices of `all`. Threads and batches must not show: one CPU device runs with odd ones.
+// The devices of `all`. Threads, batches and lack of memory must not show: the CPU devices differ in all of them.
 static const struct device_choice {
-    const char *label, *name;
+    const char *name;
     uint32_t threads, batch;
+    uint64_t memory_cap; // 1 byte: threads share one key plane
 } choices[] = {
-    {"cpu-scalar", "cpu-scalar", 1, 0}, {"cpu", "cpu", 3, 1},         {"cpu-sse42", "cpu-sse42", 2, 0},
-    {"cpu-avx2", "cpu-avx2", 7, 3},     {"cpu-avx512", "cpu-avx512", 1, 0}, {"gl-egl", "gl-egl", 0, 0},
-    {"gl-osmesa", "gl-osmesa", 0, 0},
+    {"cpu-scalar", 1, 0, 0}, {"cpu", 3, 1, 0},    {"cpu-sse42", 2, 0, 0}, {"cpu-avx2", 7, 3, 1},
+    {"cpu-avx512", 1, 0, 0}, {"gl-egl", 0, 0, 0}, {"gl-osmesa", 0, 0, 0},
 };
 enum { CHOICES = sizeof choices / sizeof choices[0] };
 
@@ -161,11 +161,10 @@ void harness_same(struct harness *h, const char *label, const void *data, size_t
         uint64_t g = 0, e = 0;
         memcpy(&g, got, element);
         memcpy(&e, expected, element);
-        harness_fail(h, label, (int)(pixel % width), (int)(pixel / width),
-                     "element %zu: bits %016llx, %s has %016llx", i % per_pixel, (unsigned long long)g,
-                     choices[0].label, (unsigned long long)e);
+        harness_fail(h, label, (int)(pixel % width), (int)(pixel / width), "element %zu: bits %016llx, %s has %016llx",
+                     i % per_pixel, (unsigned long long)g, choices[0].name, (unsigned long long)e);
     }
-    harness_fail(h, label, 0, 0, "%zu of %zu elements are not bit-equal to %s", different, count, choices[0].label);
+    harness_fail(h, label, 0, 0, "%zu of %zu elements are not bit-equal to %s", different, count, choices[0].name);
 }
 
 int harness_near(double got, double expected, double error)
@@ -186,7 +185,7 @@ static void run_entry(void **state)
     const struct entry *entry = *state;
     const struct slot *slot = entry->choice >= 0 ? &slots[entry->choice] : NULL;
     if (slot && !slot->device) {
-        printf("skip %s: %s\n", choices[entry->choice].label, slot->reason);
+        printf("skip %s: %s\n", choices[entry->choice].name, slot->reason);
         skip();
     }
     // Static: cmocka leaves a failed test by longjmp, and the next entry frees what it left.
@@ -200,7 +199,7 @@ static void run_entry(void **state)
         return;
     h.test = entry->test;
     h.baseline = entry->baseline;
-    h.label = slot ? choices[entry->choice].label : "reference";
+    h.label = slot ? choices[entry->choice].name : "reference";
     h.device = slot ? slot->device : NULL;
     h.first = entry->choice <= 0;
     entry->test->run(&h);
@@ -214,14 +213,15 @@ static void open_devices(const char *wanted)
 {
     int known = !strcmp(wanted, "all");
     for (int i = 0; i < CHOICES; i++) {
-        slots[i].wanted = i == 0 || !strcmp(wanted, "all") || !strcmp(wanted, choices[i].label);
-        known |= !strcmp(wanted, choices[i].label);
+        slots[i].wanted = i == 0 || !strcmp(wanted, "all") || !strcmp(wanted, choices[i].name);
+        known |= !strcmp(wanted, choices[i].name);
         if (!slots[i].wanted)
             continue;
         patina_device_desc desc = {.struct_size = sizeof desc,
                                    .name = choices[i].name,
                                    .threads = choices[i].threads,
-                                   .batch = choices[i].batch};
+                                   .batch = choices[i].batch,
+                                   .memory_cap = choices[i].memory_cap};
         if (patina_device_create(&desc, &slots[i].device) != PATINA_OK) {
             slots[i].device = NULL;
             patina_message(NULL, slots[i].reason, sizeof slots[i].reason);
@@ -257,7 +257,7 @@ int harness_main(int argc, char **argv, const struct harness_case *cases, size_t
             if (i >= 0 && !slots[i].wanted)
                 continue;
             char name[160];
-            snprintf(name, sizeof name, "%s [%s]", cases[c].name, i < 0 ? "reference" : choices[i].label);
+            snprintf(name, sizeof name, "%s [%s]", cases[c].name, i < 0 ? "reference" : choices[i].name);
             entries[used] = (struct entry){&cases[c], i, &baselines[c]};
             tests[used] = (struct CMUnitTest){strdup(name), run_entry, NULL, NULL, &entries[used]};
             used++;

@@ -31,7 +31,7 @@ void *harness_read(struct harness *h, const struct pt_buffer *buffer);
 void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size,
                  struct pt_buffer *const *buffers, uint32_t count);
 #define HARNESS_RUN(h, name, arguments, ...)                                                                           \
-    harness_run(h, PT_KERNEL_##name, arguments, sizeof *(arguments), (struct pt_buffer *const[]){__VA_ARGS__},          \
+    harness_run(h, PT_KERNEL_##name, arguments, sizeof *(arguments), (struct pt_buffer *const[]){__VA_ARGS__},         \
                 sizeof((struct pt_buffer *const[]){__VA_ARGS__}) / sizeof(struct pt_buffer *))
 
 // Prints "DEVICE: case: label pixel (x, y): message"; the case fails at its end. Says so only a few times a case.

@@ -51,6 +51,10 @@ struct view_args picture_view(uint32_t width, uint32_t height, int perspective)
 {
     struct view_args view = {.width = width, .height = height, .origin_x = 16, .origin_y = 8};
     double full_width = width + 40.0, full_height = height + 24.0; // the window lies in a larger picture
+    if (!perspective) {                                            // a guard band left of and below the picture
+        view.origin_x = -16;
+        view.origin_y = -8;
+    }
     double step = (perspective ? 0.9 : 6.0) / fmax(full_width, full_height);
     view.perspective = perspective ? 1 : 0;
     view.z_near = perspective ? 0.1f : 0.0f;
@@ -143,6 +147,7 @@ struct picture picture_random(struct harness *h, struct rng *rng, struct view_ar
     }
     for (size_t i = 0; i < count; i++) {
         out.keys[i] = REF_EMPTY_KEY;
+        out.from[i] = 0xFFFFFFF0u; // undefined there: nobody may follow it
         if (rng_unit(rng) >= density)
             continue;
         struct ref_ray ray = ref_ray(&out.view, (int)(i % view.width), (int)(i / view.width));
@@ -174,8 +179,8 @@ void picture_invent(struct picture *picture, struct rng *rng, double share, int 
             int dx = (int)rng_below(rng, (uint32_t)(2 * reach + 1)) - reach;
             int dy = (int)rng_below(rng, (uint32_t)(2 * reach + 1)) - reach;
             double coin = rng_unit(rng), step = rng_range(rng, 0.0, 0.5);
-            if (picture->keys[pixel] != REF_EMPTY_KEY || coin >= share || x + dx < 0 || x + dx >= width ||
-                y + dy < 0 || y + dy >= height)
+            if (picture->keys[pixel] != REF_EMPTY_KEY || coin >= share || x + dx < 0 || x + dx >= width || y + dy < 0 ||
+                y + dy >= height)
                 continue;
             size_t source = (size_t)((y + dy) * width + x + dx);
             if (picture->keys[source] == REF_EMPTY_KEY || picture->from[source] != source)

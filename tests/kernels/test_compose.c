@@ -40,7 +40,8 @@ static void backgrounds(struct harness *h)
             for (size_t i = 0; i < picture.count; i++) { // edges: premultiplied by what they cover; empty: anything
                 float alpha = rng_below(&rng, 3) ? 1.0f : (float)rng_unit(&rng);
                 for (size_t k = 0; k < 4; k++)
-                    picture.color[4 * i + k] = picture.keys[i] == REF_EMPTY_KEY ? NAN : picture.color[4 * i + k] * alpha;
+                    picture.color[4 * i + k] = picture.keys[i] == REF_EMPTY_KEY ? NAN
+                                                                                : picture.color[4 * i + k] * alpha;
             }
             check(h, &picture, crops[c], colors[b]);
         }
@@ -52,8 +53,7 @@ static void shapes(struct harness *h)
     static const float background[4] = {0.5f, 0.25f, 0.125f, 1.0f};
     for (size_t s = 0; s < 3; s++) {
         struct rng rng = {s};
-        struct picture picture =
-            picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_FLAT, 0.5);
+        struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_FLAT, 0.5);
         const uint32_t crop[4] = {0, 0, sizes[s][0], sizes[s][1]};
         check(h, &picture, crop, background);
     }

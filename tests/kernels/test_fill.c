@@ -63,7 +63,10 @@ static void both_phases(struct harness *h, struct picture *picture, uint32_t lev
     // Extrapolated depths that nearly agree: made to be undecidable.
     int hard = refined && picture->kind != PICTURE_SURFACES && picture->kind != PICTURE_NOISE;
     double most_open = hard ? TOL_UNSURE_HARD : TOL_UNSURE_SHARE;
-    struct fill_args args = {.view = picture->view, .iterations = iterations, .unfills = unfills, .refined = refined,
+    struct fill_args args = {.view = picture->view,
+                             .iterations = iterations,
+                             .unfills = unfills,
+                             .refined = refined,
                              .base_width = picture->view.width};
     uint64_t *keys = picture->keys;
     uint32_t *from = picture->from;
@@ -106,8 +109,8 @@ static void levels(struct harness *h)
         for (int p = 0; p < 2; p++)
             for (int kind = 0; kind < PICTURE_KINDS; kind++) {
                 struct rng rng = {level * 100 + (uint64_t)kind};
-                struct picture picture =
-                    picture_random(h, &rng, picture_view(133, 90, p), (enum picture_kind)kind, 0.08);
+                struct picture picture = picture_random(h, &rng, picture_view(133, 90, p), (enum picture_kind)kind,
+                                                        0.08);
                 both_phases(h, &picture, level, 2, 2, p ? 1 : 0);
             }
 }
@@ -162,8 +165,7 @@ static void every_ring(struct harness *h)
             if (occluded)
                 picture.keys[centre] = ref_key(9.0f, picture.id_base + (uint32_t)centre);
         }
-        struct fill_args args = {.view = picture.view, .occluded = occluded, .iterations = 1,
-                                 .base_width = width};
+        struct fill_args args = {.view = picture.view, .occluded = occluded, .iterations = 1, .base_width = width};
         struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
         for (int ring = 0; ring < 256; ring++) {
             size_t centre = (size_t)(ring / SIDE * STEP + 2) * width + (size_t)(ring % SIDE * STEP + 2);

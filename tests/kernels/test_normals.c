@@ -9,7 +9,8 @@ static struct normals_args arguments(const struct picture *picture, uint32_t rad
 {
     struct normals_args args = {.view = picture->view, .radius = radius};
     args.instance.id_base = picture->id_base;
-    args.instance.id_count = (uint32_t)(picture->count * 3 / 4); // the rest belongs to somebody else, and counts as neighbour
+    args.instance.id_count = (uint32_t)(picture->count * 3 /
+                                        4); // the rest belongs to somebody else, and counts as neighbour
     for (int i = 0; i < PT_NO_SPACINGS; i++)
         args.instance.spacing[i] = (float)(1e-4 * pow(1.2, i));
     return args;
@@ -27,7 +28,8 @@ static float *run(struct harness *h, const struct picture *picture, const struct
                   const uint32_t *words, const float *before)
 {
     struct pt_buffer *keys = harness_buffer(h, picture->keys, picture->count * 8);
-    struct pt_buffer *surface = harness_buffer(h, words, (size_t)(args->instance.id_count + !args->instance.id_count) * 4);
+    struct pt_buffer *surface = harness_buffer(h, words,
+                                               (size_t)(args->instance.id_count + !args->instance.id_count) * 4);
     struct pt_buffer *normal = harness_buffer(h, before, picture->count * 16);
     HARNESS_RUN(h, normals, args, keys, surface, normal);
     float *got = harness_read(h, normal);
@@ -67,8 +69,8 @@ static void check(struct harness *h, const struct picture *picture, const struct
             continue;
         }
         if (!harness_near(length, 1.0, TOL_NORMAL))
-            harness_fail(h, "normal", x, y, "got (%g %g %g) of length %.9g, expected (%g %g %g)", n[0], n[1], n[2], length,
-                         expected.n.x, expected.n.y, expected.n.z);
+            harness_fail(h, "normal", x, y, "got (%g %g %g) of length %.9g, expected (%g %g %g)", n[0], n[1], n[2],
+                         length, expected.n.x, expected.n.y, expected.n.z);
         if (expected.error > TOL_FIT_LIMIT) {
             rough++;
             continue;
@@ -92,9 +94,9 @@ static void kinds(struct harness *h)
         for (int kind = 0; kind < PICTURE_KINDS; kind++)
             for (size_t d = 0; d < 3; d++) {
                 struct rng rng = {(uint64_t)(p * 1000 + kind * 10) + d};
-                struct picture picture =
-                    picture_random(h, &rng, picture_view(45, 29, p), (enum picture_kind)kind, densities[d]);
-                struct normals_args args = arguments(&picture, 1 + rng_below(&rng, 6));
+                struct picture picture = picture_random(h, &rng, picture_view(45, 29, p), (enum picture_kind)kind,
+                                                        densities[d]);
+                struct normals_args args = arguments(&picture, d == 0 ? 16 : 1 + rng_below(&rng, 6));
                 check(h, &picture, &args, words_without(h, &rng, args.instance.id_count));
             }
 }
@@ -104,9 +106,9 @@ static void shapes(struct harness *h)
     static const uint32_t sizes[][2] = {{1, 1}, {1, 40}, {2000, 1}, {2, 2}, {64, 3}};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; s++) {
         struct rng rng = {s};
-        struct picture picture =
-            picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES, 0.9);
-        struct normals_args args = arguments(&picture, 6);
+        struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES,
+                                                0.9);
+        struct normals_args args = arguments(&picture, 16);
         args.instance.id_count = (uint32_t)picture.count;
         check(h, &picture, &args, words_without(h, &rng, picture.count));
     }
@@ -122,10 +124,10 @@ static void lines(struct harness *h)
         for (int y = 0; y < 32; y++)
             for (int x = 0; x < 32; x++) {
                 int on = (x - 16) * slopes[s][1] == (y - 16) * slopes[s][0];
-                picture.keys[y * 32 + x] = on ? ref_key((float)(5.0 + 0.001 * x), picture.id_base + (uint32_t)(y * 32 + x))
-                                              : REF_EMPTY_KEY;
+                picture.keys[y * 32 + x] =
+                    on ? ref_key((float)(5.0 + 0.001 * x), picture.id_base + (uint32_t)(y * 32 + x)) : REF_EMPTY_KEY;
             }
-        struct normals_args args = arguments(&picture, 6);
+        struct normals_args args = arguments(&picture, 16);
         args.instance.id_count = (uint32_t)picture.count;
         args.instance.d_min = 10.0f;
         check(h, &picture, &args, words_without(h, &rng, picture.count));

@@ -54,8 +54,8 @@ static void levels(struct harness *h)
 
 static void sanity(struct harness *h)
 {
-    const uint64_t keys[6] = {ref_key(2.0f, 1), ref_key(2.0f, 0), ref_key(1.0f, 9), REF_EMPTY_KEY, REF_EMPTY_KEY,
-                              REF_EMPTY_KEY};
+    const uint64_t keys[6] = {ref_key(2.0f, 1), ref_key(2.0f, 0), ref_key(1.0f, 9),
+                              REF_EMPTY_KEY,    REF_EMPTY_KEY,    REF_EMPTY_KEY};
     const uint32_t from[6] = {0, 1, 2, 3, 4, 5};
     struct pull_args args = {.fine_width = 3, .fine_height = 2};
     uint64_t key;

@@ -91,7 +91,7 @@ static void shapes(struct harness *h)
 // Reference alone: parent and two of three, no less.
 static void sanity(struct harness *h)
 {
-    uint32_t from[4] = {0, 0, 0, 0}, coarse_from[9] = {0};
+    uint32_t from[36] = {0}, coarse_from[9] = {0};
     uint64_t fine[36], coarse[9];
     float normal[4] = {0, 0, 1, 1}, deff[1] = {0.0f};
     for (int cells = 0; cells < 16; cells++) { // parent, horizontal, vertical, diagonal

@@ -113,13 +113,13 @@ static void estimated(struct harness *h)
 static void matrices(struct harness *h)
 {
     static const float special[][9] = {
-        {0},                                       // zero scale
-        {-1, 0, 0, 0, 1, 0, 0, 0, 1},              // mirrored
-        {1e-6f, 0, 0, 0, 1e-6f, 0, 0, 0, 1e-6f},   // tiny
-        {1e6f, 0, 0, 0, 1e6f, 0, 0, 0, 1e6f},      // huge
-        {1, 0, 0, 0, 1, 0, 0, 0, 0},               // flat: n.v -> 0
-        {1, 0, 0, 0, 1, 0, 0, 0, 1e-3f},           // nearly flat
-        {0, 0, 0, 0, 0, 0, 1, 1, 1},               // rank 1
+        {0},                                     // zero scale
+        {-1, 0, 0, 0, 1, 0, 0, 0, 1},            // mirrored
+        {1e-6f, 0, 0, 0, 1e-6f, 0, 0, 0, 1e-6f}, // tiny
+        {1e6f, 0, 0, 0, 1e6f, 0, 0, 0, 1e6f},    // huge
+        {1, 0, 0, 0, 1, 0, 0, 0, 0},             // flat: n.v -> 0
+        {1, 0, 0, 0, 1, 0, 0, 0, 1e-3f},         // nearly flat
+        {0, 0, 0, 0, 0, 0, 1, 1, 1},             // rank 1
     };
     struct rng rng = {3};
     for (int p = 0; p < 2; p++)

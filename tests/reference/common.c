@@ -139,8 +139,8 @@ double ref_layer_minimum(const struct view_args *view, double d_min, double spac
     return fmax(fmax(d, ref_footprint(view, z)), ref_ulp4(z));
 }
 
-struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff,
-                                    uint32_t from, struct ref_range z)
+struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff, uint32_t from,
+                                    struct ref_range z)
 {
     struct ref_range d = ref_exactly(deff[from]);
     if (view->level) {
@@ -203,8 +203,8 @@ static struct ref_range orthographic_plane(const float n[3], struct ref_ray q, s
                                            int *open)
 {
     double du = p.u - q.u, dv = p.v - q.v;
-    double error = 2.0 * TOL_DOT * (fabs(n[0] * du) + fabs(n[1] * dv)) +
-                   fabs((double)n[0]) * (p.error_u + q.error_u) + fabs((double)n[1]) * (p.error_v + q.error_v);
+    double error = 2.0 * TOL_DOT * (fabs(n[0] * du) + fabs(n[1] * dv)) + fabs((double)n[0]) * (p.error_u + q.error_u) +
+                   fabs((double)n[1]) * (p.error_v + q.error_v);
     if (fabs((double)n[2]) <= TOL_PARALLEL) {
         *open = 1;
         return z;

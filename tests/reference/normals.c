@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST = 13 * 13 };
+enum { MOST = 33 * 33 };
 
 // The pixels that take part, as offsets from the centre, f = 1/z or z relative to the centre's.
 struct samples {
@@ -43,7 +43,9 @@ static enum ref_truth gather(const struct normals_args *args, const struct ref_p
             uint64_t neighbour = planes->keys[(size_t)qy * view->width + (size_t)qx];
             if (neighbour == REF_EMPTY_KEY)
                 continue;
-            double step = fabs(ref_key_z(neighbour) - z), most = 4.0 * m * fmax(abs(dx), abs(dy));
+            // The same surface: within a layer distance, or no steeper than four pixels' width a pixel.
+            double step = fabs(ref_key_z(neighbour) - z);
+            double most = fmax(m, 4.0 * ref_footprint(view, z) * fmax(abs(dx), abs(dy)));
             struct ref_range threshold = {most * (1.0 - TOL_WINDOW), most * (1.0 + TOL_WINDOW)};
             enum ref_truth taken = ref_less_equal(ref_exactly(step), threshold);
             if (taken == REF_UNSURE)
@@ -83,7 +85,7 @@ static int fit(const struct samples *s, struct plane *plane)
     // The inverse of the symmetric 3 x 3 system, by cofactors.
     double aa = (double)(n * syy - sy * sy), ab = (double)(sx * sy - n * sxy), ac = (double)(sxy * sy - sx * syy);
     double bb = (double)(n * sxx - sx * sx), bc = (double)(sx * sxy - sxx * sy), cc = (double)(sxx * syy - sxy * sxy);
-    double d = (double)det, noise = TOL_FIT * s->greatest;
+    double d = (double)det, noise = TOL_FIT * s->greatest, xf = 0.0, yf = 0.0, abs_f = 0.0;
     *plane = (struct plane){.c = s->centre, .error_c = noise};
     for (int i = 0; i < s->count; i++) {
         double wa = (aa * s->dx[i] + ab * s->dy[i] + ac) / d;
@@ -95,7 +97,16 @@ static int fit(const struct samples *s, struct plane *plane)
         plane->error_a += fabs(wa) * noise;
         plane->error_b += fabs(wb) * noise;
         plane->error_c += fabs(wc) * noise;
+        xf += fabs(s->dx[i] * s->f[i]);
+        yf += fabs(s->dy[i] * s->f[i]);
+        abs_f += fabs(s->f[i]);
     }
+    // Normal equations about the mean: what cancels in them, in a window that is nearly a line, is lost.
+    double size = n * d, lost_x = n * xf + fabs((double)sx) * abs_f, lost_y = n * yf + fabs((double)sy) * abs_f;
+    double narrow = TOL_SOLVE * (aa * bb + ab * ab) / size;
+    plane->error_a += TOL_SOLVE * (aa * lost_x + fabs(ab) * lost_y) / size + narrow * fabs(plane->a);
+    plane->error_b += TOL_SOLVE * (bb * lost_y + fabs(ab) * lost_x) / size + narrow * fabs(plane->b);
+    plane->error_c += (plane->error_a * fabs((double)sx) + plane->error_b * fabs((double)sy)) / n;
     return 1;
 }
 

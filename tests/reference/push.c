@@ -32,8 +32,8 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
     struct ref_pixel pixel = ref_pixel(planes->keys[index], planes->from[index]);
     struct ref_range threshold = ref_exactly(INFINITY);
     if (pixel.id != PT_KEY_EMPTY_ID || !isinf(pixel.z.lo)) {
-        threshold = ref_difference(
-            pixel.z, ref_level_distance(view, planes->normal, planes->deff, pixel.from, pixel.z));
+        threshold = ref_difference(pixel.z,
+                                   ref_level_distance(view, planes->normal, planes->deff, pixel.from, pixel.z));
     }
     int px = x >> 1, py = y >> 1, sx = x & 1 ? 1 : -1, sy = y & 1 ? 1 : -1;
     if (px >= (int)args->coarse_width || py >= (int)args->coarse_height)

@@ -57,8 +57,8 @@ double ref_ulp4(double z);                                    // 4 ulp of the fl
 // max(d_min, K spacing, footprint, 4 ulp): d_eff without its division by the cosine.
 double ref_layer_minimum(const struct view_args *view, double d_min, double spacing, double z);
 // A pixel's own d_eff at the view's level, from the level-0 planes at its `from`.
-struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff,
-                                    uint32_t from, struct ref_range z);
+struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff, uint32_t from,
+                                    struct ref_range z);
 // Octahedral normal of a surface word, unit. 0 when it has none.
 int ref_decode_normal(uint32_t word, struct ref_vec *normal);
 double ref_srgb(uint8_t value); // sRGB to linear

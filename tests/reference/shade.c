@@ -9,7 +9,11 @@
 
 #define PI 3.14159265358979323846
 
-enum { POINT_LIGHT = 2 }; // patina_light_type
+enum {
+    POINT_LIGHT = 2,  // patina_light_type
+    BLEND_BEYOND = 0, // normals are blended as far as the source, and so many pixels more,
+    BLEND_MOST = 8,   // but no farther than this
+};
 
 static void albedo_of(const struct instance_args *instance, const struct ref_planes *planes, uint32_t id,
                       double albedo[3])
@@ -30,7 +34,7 @@ static void blend(const struct view_args *view, const struct ref_planes *planes,
     uint32_t from = planes->from[pixel];
     int fx = (int)(from % view->width), fy = (int)(from / view->width);
     int distance = abs(fx - x) > abs(fy - y) ? abs(fx - x) : abs(fy - y);
-    int radius = distance + 1 < 8 ? distance + 1 : 8;
+    int radius = distance + BLEND_BEYOND < BLEND_MOST ? distance + BLEND_BEYOND : BLEND_MOST;
     double z = ref_key_z(planes->keys[pixel]), weights = 0.0;
     struct ref_range d = ref_level_distance(view, planes->normal, planes->deff, from, ref_exactly(z));
     struct ref_vec sum = {0.0, 0.0, 0.0};
@@ -60,18 +64,11 @@ static void blend(const struct view_args *view, const struct ref_planes *planes,
     out->normal_error = TOL_BLEND * weights / length;
 }
 
+// Clouds without normals have their estimates in the normal plane, like any other.
 static void normal_of(const struct shade_args *args, const struct ref_planes *planes, int x, int y,
-                      struct ref_vec viewer, struct ref_shade *out)
+                      struct ref_shade *out)
 {
     size_t pixel = (size_t)y * args->view.width + (size_t)x, from = planes->from[pixel];
-    if (!args->instance.has_normals) {
-        out->n = ref_vec_of(planes->shading + 4 * pixel);
-        if (ref_length(out->n) == 0.0) {
-            out->n = viewer;
-            out->normal_error = TOL_NORMAL;
-        }
-        return;
-    }
     out->n = ref_vec_of(planes->normal + 4 * from);
     if (args->refined && from != pixel)
         blend(&args->view, planes, x, y, out);
@@ -112,7 +109,7 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     struct ref_vec viewer = ref_viewer(view, ray);
     double albedo[3], z = ref_key_z(key);
     albedo_of(instance, planes, ref_key_id(key) - instance->id_base, albedo);
-    normal_of(args, planes, x, y, viewer, &out);
+    normal_of(args, planes, x, y, &out);
     out.color[3] = 1.0;
     for (int c = 0; c < 3; c++) {
         out.color[c] = albedo[c];
@@ -128,8 +125,8 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     out.unsure |= fabs(facing) <= out.normal_error + TOL_NORMAL && args->light_count > 0;
     struct ref_vec position = view->perspective ? ref_vec(ray.u * z, ray.v * z, -z)
                                                 : ref_vec(ray.u, ray.v, -z - args->eye_z);
-    double position_error = 4.0 * TOL_UNIT * (fabs(position.x) + fabs(position.y) + fabs(position.z) +
-                                              fabs((double)args->eye_z)) +
+    double position_error = 4.0 * TOL_UNIT *
+                                (fabs(position.x) + fabs(position.y) + fabs(position.z) + fabs((double)args->eye_z)) +
                             (ray.error_u + ray.error_v) * (view->perspective ? z : 1.0);
     double light[3], loose[3];
     for (int c = 0; c < 3; c++) {
@@ -148,7 +145,8 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
         struct ref_vec reflected = ref_add(ref_scale(n, 2.0 * cosine), ref_scale(l, -1.0));
         double shine = fmax(ref_dot(reflected, viewer), 0.0), off = TOL_REFLECT + 3.0 * error;
         double highlight = cosine > 0.0 ? instance->specular * pow(shine, instance->shininess) : 0.0;
-        double steep = instance->specular * instance->shininess * pow(fmin(shine + off, 1.0), instance->shininess - 1.0);
+        double steep = instance->specular * instance->shininess *
+                       pow(fmin(shine + off, 1.0), instance->shininess - 1.0);
         // At the terminator the highlight is switched on or off by the last bit.
         if (fabs(cosine) <= error + TOL_NORMAL && instance->specular * pow(shine + off, instance->shininess) > 1e-7)
             out.unsure = 1;

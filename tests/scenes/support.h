@@ -69,12 +69,13 @@ uint32_t key_id(uint64_t key);
 
 patina_settings settings_default(uint32_t width, uint32_t height);
 struct picture picture_read(const patina_frame *frame);
+struct picture picture_read_passes(const patina_frame *frame); // keys stay NULL
 // Sets camera and settings, renders in a fresh frame and reads everything.
 struct picture picture_render(patina_device *device, patina_scene *scene, const patina_camera *camera,
                               const patina_settings *settings);
 void picture_free(struct picture *picture);
 uint64_t picture_count(const struct picture *picture); // pixels that are not empty
-// Whole pictures, or a crop of `whole` at (x, y) against `part`; fail with the first pixel that differs.
+// (keys only where both have them) Whole pictures, or a crop of `whole` at (x, y) against `part`; fail with the first pixel that differs.
 void picture_assert_identical(const struct picture *part, const struct picture *whole, uint32_t x, uint32_t y,
                               const char *what);
 

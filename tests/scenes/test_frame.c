@@ -204,9 +204,17 @@ static void test_cancel_keeps_the_picture(void **state)
         patina_frame_cancel(frame);
         assert_int_equal(patina_frame_render(frame, stage.scene), PATINA_ERROR_CANCELLED);
         assert_true(strlen(support_message(frame)) > 3);
-        struct picture after = picture_read(frame);
+        struct picture after = picture_read_passes(frame);
         assert_int_equal(after.width, before.width);
         picture_assert_identical(&after, &before, 0, 0, "after a cancelled render");
+        // Keys are a render's own working plane: gone with it, or still the old picture's; never half-made ones.
+        uint64_t *keys = malloc((size_t)before.width * before.height * sizeof *keys);
+        assert_non_null(keys);
+        int code = patina_frame_read_keys(frame, keys, (size_t)before.width * before.height * sizeof *keys);
+        assert_true(
+            code == PATINA_ERROR_EMPTY ||
+            (code == PATINA_OK && !memcmp(keys, before.keys, (size_t)before.width * before.height * sizeof *keys)));
+        free(keys);
 
         CHECK(patina_frame_render(frame, stage.scene), frame); // the cancel is spent
         struct picture next = picture_read(frame);
@@ -264,7 +272,7 @@ static void test_cancel_while_running(void **state)
             if (end - watcher.cancelled_at > latest)
                 latest = end - watcher.cancelled_at;
         }
-        struct picture picture = picture_read(frame);
+        struct picture picture = picture_read_passes(frame);
         picture_assert_identical(&picture, &truth, 0, 0, "after a cancel from another thread");
         picture_free(&picture);
         // A cancel that came after the end is for the next render: spend it.

@@ -89,6 +89,13 @@ static void measure(uint64_t count, unsigned columns, int doubles, double rest_l
 static void test_bytes_a_point(void **state)
 {
     (void)state;
+#if defined(__SANITIZE_ADDRESS__)
+    skip(); // its shadow and quarantine are anonymous memory too
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+    skip();
+#endif
+#endif
     if (!anonymous_bytes())
         skip();
     measure(200000, POINTS_ALL, 0, 25.0, 60.0); // warms allocator and threads up; small clouds round up

@@ -19,6 +19,13 @@ static double now(void)
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
+static double processor_seconds(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
 static int ascending(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -30,16 +37,19 @@ static void test_time(void **state)
 {
     (void)state;
     struct points points = points_torus(1000000, 1.0, 0.4, POINTS_ALL, 6);
-    double seconds[7];
+    double seconds[7], work[7];
     for (int i = 0; i < 7; i++) {
-        double start = now();
+        double start = now(), spent = processor_seconds();
         patina_cloud *cloud = points_upload(&points);
         seconds[i] = now() - start;
+        work[i] = processor_seconds() - spent;
         patina_cloud_destroy(cloud);
     }
     qsort(seconds, 7, sizeof *seconds, ascending);
-    printf("  1000000 random points with normals and colours: %.3f s (%.3f to %.3f) on %ld processors\n", seconds[3],
-           seconds[0], seconds[6], sysconf(_SC_NPROCESSORS_ONLN));
+    qsort(work, 7, sizeof *work, ascending);
+    printf(
+        "  1000000 random points with normals and colours: %.3f s (%.3f to %.3f) on %ld processors, %.3f s of work\n",
+        seconds[3], seconds[0], seconds[6], sysconf(_SC_NPROCESSORS_ONLN), work[3]);
     points_free(&points);
 }
 
@@ -246,9 +256,6 @@ static void test_refused(void **state)
     bad = good;
     bad.struct_size = 8;
     refuse(bad, "a descriptor that is cut off");
-    bad = good;
-    bad.position.stride = 4;
-    refuse(bad, "a stride shorter than a row");
     points_free(&points);
 }
 

@@ -78,8 +78,11 @@ static uint32_t look(const struct antialias *job, uint32_t x, uint32_t y, uint32
     vf far = z; // the farthest of the four
     for (int i = 0; i < 4; i++) {
         int64_t offset = cross[i][1] * (int64_t)view->width + cross[i][0];
-        if (y + (uint32_t)cross[i][1] < view->height && (at || offset >= 0))
-            far = vf_max(far, vi_float(vi_load_z(keys + offset)));
+        if (y + (uint32_t)cross[i][1] >= view->height)
+            continue;
+        if (!at && offset < 0)
+            return vm_bits(some); // nothing may be read before the plane
+        far = vf_max(far, vi_float(vi_load_z(keys + offset)));
     }
     vm edge = vm_or(vf_lt(limit, far), vf_le(empty, far));
     return vm_bits(vm_and(some, edge));

@@ -17,15 +17,17 @@ static void compose_row(void *context, uint32_t y)
         uint32_t lanes = vm_bits(vm_first(pt_lanes_left(x, args->crop_width)));
         vm some = vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z)));
         vf color[4];
-        if (!(vm_bits(some) & lanes)) {
-            vf_store4(out + 4 * (size_t)x, background, lanes);
-            continue;
-        }
-        vf_load4(colors + 4 * (size_t)x, color);
+        if (vm_bits(some) & lanes)
+            vf_load4(colors + 4 * (size_t)x, color);
+        else
+            memcpy(color, background, sizeof color);
         vf through = vf_set(1.0f) - color[3];
         for (int k = 0; k < 4; k++)
             color[k] = vf_select(some, color[k] + through * background[k], background[k]);
-        vf_store4(out + 4 * (size_t)x, color, lanes);
+        if (args->crop_width - x >= PT_LANES) // the picture is read later, by others
+            vf_stream4(out + 4 * (size_t)x, color);
+        else
+            vf_store4(out + 4 * (size_t)x, color, lanes);
     }
 }
 

@@ -393,7 +393,7 @@ static int allocate(struct fill *fill)
     struct entries *e = &fill->entries;
     size_t threads = pt_pool_threads(fill->call->pool), count = bands(fill);
     fill->words = (view->width + 63) / 64;
-    fill->band_entries = (size_t)view->width * BAND_ROWS;
+    fill->band_entries = 2 * (size_t)view->width * BAND_ROWS; // every pixel may be kept, and be filled again in this step
     fill->row_stride = view->width + 2 * PAD;
     size_t words = fill->words * view->height, room = count * fill->band_entries + PT_LANES;
     size_t rows = threads * 4 * fill->row_stride;

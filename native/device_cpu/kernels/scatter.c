@@ -108,7 +108,8 @@ static void scatter_chunk(const struct view_args *view, const struct chunk_view 
         if (!vm_bits(inside))
             continue;
         // 3. early depth test; the sign bit of -0 is dropped
-        vi pixel = vi_add(vi_mul(vi_sub(vf_int(y), origin_y), width), vi_sub(vf_int(x), origin_x));
+        vi column = vi_sub(vf_int(vf_floor(x)), origin_x), row = vi_sub(vf_int(vf_floor(y)), origin_y);
+        vi pixel = vi_add(vi_mul(row, width), column);
         vi z_bits = vi_and(vf_bits(z), vi_set(0x7FFFFFFFu));
         vi stored = vi_gather_z(target.keys, pixel, inside);
         uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z_bits))));
@@ -156,21 +157,22 @@ static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
     }
 }
 
-// Merges the private planes into the shared one, and leaves them empty for the next run.
+// Merges the private planes into the shared one, and leaves them empty for the next run. Without branches: half the pixels
+// would mispredict.
 static void merge_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct scatter *scatter = context;
-    size_t width = scatter->args->view.width;
+    const struct view_args *view = &scatter->args->view;
     (void)thread;
-    for (uint32_t t = 1; t < pt_pool_threads(scatter->call->pool); t++) {
-        uint64_t *private = scatter->private + (t - 1) * scatter->plane;
-        for (size_t i = begin * width; i < end * width; i++)
-            if (private[i] != KEY_EMPTY) {
-                if (private[i] < scatter->keys[i])
-                    scatter->keys[i] = private[i];
-                private[i] = KEY_EMPTY;
+    for (uint32_t t = 1; t < pt_pool_threads(scatter->call->pool); t++)
+        for (size_t y = view->rect[1] + begin; y < view->rect[1] + end; y++) {
+            uint64_t *restrict private = scatter->private + (t - 1) * scatter->plane + y * view->width;
+            uint64_t *restrict keys = scatter->keys + y * view->width;
+            for (size_t x = view->rect[0]; x < view->rect[2]; x++) {
+                keys[x] = private[x] < keys[x] ? private[x] : keys[x];
+                private[x] = KEY_EMPTY;
             }
-    }
+        }
 }
 
 static void clear_keys(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -207,6 +209,6 @@ int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
     }
     pt_parallel(call->pool, chunks, 4, scatter_chunks, &scatter);
     if (scatter.private)
-        pt_parallel(call->pool, args->view.height, 16, merge_rows, &scatter);
+        pt_parallel(call->pool, args->view.rect[3] - args->view.rect[1], 16, merge_rows, &scatter);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

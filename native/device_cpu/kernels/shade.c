@@ -14,23 +14,110 @@ struct pixels { // PT_LANES of them
 };
 
 // ---- 1. normals of filled pixels, refined ------------------------------------------------------------------------------
+//
+// Measured neighbours of the same layer, as far as the pixel it was filled from, weighted by 1 / (1 + distance^2); the
+// source's own normal where there are none. Most pixels are filled from next door: those take their taps from a ring of
+// three rows with separate vectors, the others gather.
 
-struct filled { // the filled pixels of a row, PT_LANES at a time
+enum { BAND_ROWS = 32, PAD = 16, CHANNELS = 4 }; // z of measured pixels (else +inf), normal
+
+struct shade {
+    const struct pt_cpu_call *call;
+    const struct shade_args *args;
+    float *rows;   // per thread: 3 rows x CHANNELS
+    size_t stride; // floats of one channel of a row
+};
+
+struct filled { // PT_LANES of them
     uint32_t x[PT_LANES], from[PT_LANES], count;
 };
 
-// Measured neighbours of the same layer, as far as the pixel it was filled from, weighted by 1 / (1 + distance^2); the
-// source's own normal where there are none.
-static void blend_normals(const struct shade_args *args, const struct pt_cpu_call *call, const struct filled *filled,
-                          uint32_t y)
+static float *channel(const struct shade *shade, float *rows, uint32_t row, uint32_t index)
 {
-    const struct view_args *view = &args->view;
-    const uint64_t *keys = pt_cpu_data(call, 0);
-    const uint32_t *from = pt_cpu_data(call, 1);
-    const float *normals = pt_cpu_data(call, 2);
+    return rows + (row * CHANNELS + index) * shade->stride + PAD;
+}
+
+// The rectangle's columns and one more on both sides.
+static void load_row(const struct shade *shade, float *rows, uint32_t slot, int32_t y)
+{
+    const struct view_args *view = &shade->args->view;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    uint32_t first = view->rect[0] ? view->rect[0] - 1 : 0, last = view->rect[2] < view->width ? view->rect[2] + 1 : view->width;
+    int32_t shift = (int32_t)view->rect[0];
+    float *out[CHANNELS];
+    for (uint32_t k = 0; k < CHANNELS; k++)
+        out[k] = channel(shade, rows, slot, k) - shift; // indexed by x
+    for (int32_t x = shift - PAD; x < (int32_t)view->rect[2] + PAD; x += PT_LANES)
+        vf_store(out[0] + x, empty, vm_first(PT_LANES));
+    if (y < 0 || y >= (int32_t)view->height)
+        return;
+    size_t row = (size_t)y * view->width;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + row;
+    const uint32_t *from = (const uint32_t *)pt_cpu_data(shade->call, 1) + row;
+    const float *normals = (const float *)pt_cpu_data(shade->call, 2) + 4 * row;
+    for (uint32_t x = first; x < last; x += PT_LANES) {
+        vm lanes = vm_first(pt_lanes_left(x, last));
+        vi self = vi_add(vi_set((uint32_t)row + x), vi_lanes());
+        vm measured = vm_and(lanes, vi_eq(vi_and(vi_load(from + x), vi_set(~PT_FROM_MIXED)), self));
+        if (!vm_bits(measured))
+            continue;
+        vf n[4];
+        vf_load4(normals + 4 * (size_t)x, n);
+        vf_store(out[0] + x, vf_select(measured, vi_float(vi_load_z(keys + x)), empty), lanes);
+        for (uint32_t k = 0; k < 3; k++)
+            vf_store(out[1 + k] + x, n[k], lanes);
+    }
+}
+
+// The blend, or where it is nothing the source's own; then into the shading plane.
+static void finish_blend(const struct shade *shade, vf n[4], vi source, vm lanes)
+{
+    const float *normals = pt_cpu_data(shade->call, 2);
+    vf square = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
+    vm blended = vf_lt(vf_set(1e-12f), square);
+    vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
+    for (int k = 0; k < 3; k++)
+        n[k] = n[k] * scale;
+    if (vm_bits(vm_and(lanes, vm_not(blended))))
+        for (uint32_t k = 0; k < 3; k++)
+            n[k] = vf_select(blended, n[k], vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes));
+    n[3] = vf_zero();
+}
+
+static void blend_near(const struct shade *shade, float *const around[3], uint32_t x, uint32_t y, uint32_t near)
+{
+    const struct view_args *view = &shade->args->view;
+    size_t at = (size_t)y * view->width + x, column = x - view->rect[0];
+    vi source = vi_and(vi_load((const uint32_t *)pt_cpu_data(shade->call, 1) + at), vi_set(~PT_FROM_MIXED));
+    vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(shade->call, 0) + at));
+    vm lanes = vm_of_bits(near);
+    vf limit = vf_gather(pt_cpu_data(shade->call, 3), source, lanes);
+    vf n[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
+    for (int dy = -1; dy <= 1; dy++)
+        for (int dx = -1; dx <= 1; dx++) {
+            const float *tap = around[1 + dy] + column + dx;
+            vm take = vm_and(lanes, vf_le(vf_abs(vf_load(tap) - z), limit));
+            vf weight = vf_set(pt_rcp((float)(1 + dx * dx + dy * dy)));
+            for (size_t k = 0; k < 3; k++)
+                n[k] = n[k] + vf_select(take, vf_load(tap + (1 + k) * shade->stride), vf_zero()) * weight;
+        }
+    finish_blend(shade, n, source, lanes);
+    vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * at, n, near);
+}
+
+static void blend_far(const struct shade *shade, struct filled *filled, uint32_t y)
+{
+    const struct view_args *view = &shade->args->view;
+    const uint64_t *keys = pt_cpu_data(shade->call, 0);
+    const uint32_t *from = pt_cpu_data(shade->call, 1);
+    const float *normals = pt_cpu_data(shade->call, 2);
     uint32_t reach[PT_LANES] = { 0 }, most = 1;
     vm ours = vm_first(filled->count);
-    for (uint32_t i = 0; i < filled->count; i++) {
+    for (uint32_t i = 0; i < PT_LANES; i++) {
+        if (i >= filled->count) {
+            filled->x[i] = filled->from[i] = 0;
+            continue;
+        }
         uint32_t dx = (uint32_t)abs((int32_t)(filled->from[i] % view->width) - (int32_t)filled->x[i]);
         uint32_t dy = (uint32_t)abs((int32_t)(filled->from[i] / view->width) - (int32_t)y);
         reach[i] = dx > dy ? dx : dy;
@@ -39,7 +126,7 @@ static void blend_normals(const struct shade_args *args, const struct pt_cpu_cal
     }
     vi x = vi_load(filled->x), source = vi_load(filled->from), radius = vi_load(reach);
     vi pixel = vi_add(x, vi_set(y * view->width));
-    vf z = vi_float(vi_gather_z(keys, pixel, ours)), limit = vf_gather(pt_cpu_data(call, 3), source, ours);
+    vf z = vi_float(vi_gather_z(keys, pixel, ours)), limit = vf_gather(pt_cpu_data(shade->call, 3), source, ours);
     vf n[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
     for (int32_t dy = -(int32_t)most; dy <= (int32_t)most; dy++)
         for (int32_t dx = -(int32_t)most; dx <= (int32_t)most; dx++) {
@@ -55,51 +142,52 @@ static void blend_normals(const struct shade_args *args, const struct pt_cpu_cal
             if (!vm_bits(take))
                 continue;
             vf weight = vf_set(pt_rcp((float)(1 + dx * dx + dy * dy)));
-            vi word = vi_mul(q, vi_set(4));
             for (uint32_t k = 0; k < 3; k++)
-                n[k] = n[k] + vf_gather(normals, vi_add(word, vi_set(k)), take) * weight;
+                n[k] = n[k] + vf_gather(normals, vi_add(vi_mul(q, vi_set(4)), vi_set(k)), take) * weight;
         }
-    vf square = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
-    vm blended = vf_lt(vf_set(1e-12f), square);
-    vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
-    vi word = vi_mul(source, vi_set(4));
-    for (uint32_t k = 0; k < 3; k++)
-        n[k] = vf_select(blended, n[k] * scale, vf_gather(normals, vi_add(word, vi_set(k)), ours));
-    float out[4][PT_LANES], *shading = pt_cpu_data(call, 6);
+    finish_blend(shade, n, source, ours);
+    float out[4][PT_LANES], *shading = pt_cpu_data(shade->call, 6);
     for (int k = 0; k < 4; k++)
         vf_store(out[k], n[k], vm_first(PT_LANES));
     for (uint32_t i = 0; i < filled->count; i++)
         for (int k = 0; k < 4; k++)
             shading[4 * ((size_t)y * view->width + filled->x[i]) + (size_t)k] = out[k][i];
+    filled->count = 0;
 }
 
-static void blend_row(const struct shade_args *args, const struct pt_cpu_call *call, uint32_t y)
+static void blend_row(const struct shade *shade, float *const around[3], uint32_t y)
 {
-    const struct view_args *view = &args->view;
-    const struct instance_args *instance = &args->instance;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + (size_t)y * view->width;
-    const uint32_t *from = (const uint32_t *)pt_cpu_data(call, 1) + (size_t)y * view->width;
+    const struct view_args *view = &shade->args->view;
+    const struct instance_args *instance = &shade->args->instance;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * view->width;
+    const uint32_t *from = (const uint32_t *)pt_cpu_data(shade->call, 1) + (size_t)y * view->width;
+    const vi width = vi_set(view->width);
     struct filled filled = { .count = 0 };
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         vi z = vi_load_z(keys + x), id = vi_sub(vi_load_id(keys + x), vi_set(instance->id_base));
-        vi self = vi_add(vi_set(y * view->width + x), vi_lanes());
+        vi self = vi_add(vi_set(y * view->width + x), vi_lanes()), source = vi_and(vi_load(from + x), vi_set(~PT_FROM_MIXED));
         vm ours = vm_and(vm_and(vm_first(pt_lanes_left(x, view->rect[2])), vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z)))),
                          vi_lt_unsigned(id, vi_set(instance->id_count)));
-        uint32_t bits = vm_bits(vm_and(ours, vm_not(vi_eq(vi_and(vi_load(from + x), vi_set(~PT_FROM_MIXED)), self))));
-        for (; bits; bits &= bits - 1) {
-            uint32_t i = x + (uint32_t)__builtin_ctz(bits);
+        vm other = vm_and(ours, vm_not(vi_eq(source, self)));
+        if (!vm_bits(other))
+            continue;
+        // next door: source - self is -1, 0 or 1 plus -width, 0 or width
+        vm near = vi_lt_unsigned(vi_add(vi_sub(source, self), vi_set(1)), vi_set(3));
+        near = vm_or(near, vi_lt_unsigned(vi_add(vi_sub(vi_add(source, width), self), vi_set(1)), vi_set(3)));
+        near = vm_or(near, vi_lt_unsigned(vi_add(vi_sub(vi_sub(source, width), self), vi_set(1)), vi_set(3)));
+        uint32_t bits = vm_bits(vm_and(other, near)), rest = vm_bits(vm_and(other, vm_not(near)));
+        if (bits)
+            blend_near(shade, around, x, y, bits);
+        for (; rest; rest &= rest - 1) {
+            uint32_t i = x + (uint32_t)__builtin_ctz(rest);
             filled.x[filled.count] = i;
             filled.from[filled.count++] = from[i] & ~PT_FROM_MIXED;
-            if (filled.count < PT_LANES)
-                continue;
-            blend_normals(args, call, &filled, y);
-            filled.count = 0;
+            if (filled.count == PT_LANES)
+                blend_far(shade, &filled, y);
         }
     }
-    for (uint32_t i = filled.count; i < PT_LANES; i++)
-        filled.x[i] = filled.from[i] = 0;
     if (filled.count)
-        blend_normals(args, call, &filled, y);
+        blend_far(shade, &filled, y);
 }
 
 // ---- 2. colour and normal ----------------------------------------------------------------------------------------------
@@ -265,18 +353,47 @@ static void shade_pixels(const struct shade_args *args, const struct pt_cpu_call
     vf_store4((float *)pt_cpu_data(call, 7) + 4 * p.at, color, vm_bits(p.ours));
 }
 
-static void shade_row(void *context, uint32_t y)
+static void shade_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
-    const struct pt_cpu_call *call = context;
-    const struct shade_args *args = call->arguments;
-    if (args->refined)
-        blend_row(args, call, y);
-    for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x += PT_LANES)
-        shade_pixels(args, call, x, y, pt_lanes_left(x, args->view.rect[2]));
+    const struct shade *shade = context;
+    const struct shade_args *args = shade->args;
+    const uint32_t *rect = args->view.rect;
+    static const uint32_t color_bytes[] = { 0, 3, 12 };
+    float *rows = shade->rows + thread * 3 * CHANNELS * shade->stride;
+    for (uint32_t band = begin; band < end && !pt_cpu_cancelled(shade->call); band++) {
+        uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
+        for (uint32_t k = 0; args->refined && k < 2; k++)
+            load_row(shade, rows, k, (int32_t)(first + k) - 1);
+        for (uint32_t y = first; y < last; y++) {
+            const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * args->view.width;
+            float *around[3];
+            for (uint32_t k = 0; k < 3; k++)
+                around[k] = channel(shade, rows, (y - first + k) % 3, 0);
+            if (args->refined) {
+                load_row(shade, rows, (y - first + 2) % 3, (int32_t)y + 1);
+                blend_row(shade, around, y);
+            }
+            for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
+                if (args->instance.color_format)
+                    pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 5),
+                                   color_bytes[args->instance.color_format]);
+                shade_pixels(args, shade->call, x, y, pt_lanes_left(x, rect[2]));
+            }
+        }
+    }
 }
 
 int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
 {
     const struct shade_args *args = call->arguments;
-    return pt_rows(call, &args->view, shade_row);
+    const uint32_t *rect = args->view.rect;
+    struct shade shade = { .call = call, .args = args };
+    if (rect[0] >= rect[2] || rect[1] >= rect[3])
+        return PATINA_OK;
+    shade.stride = rect[2] - rect[0] + 4 * PAD;
+    shade.rows = pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * 3 * CHANNELS * shade.stride * sizeof(float));
+    if (!shade.rows)
+        return PATINA_ERROR_MEMORY;
+    pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, shade_bands, &shade);
+    return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

@@ -62,8 +62,11 @@ static void surface_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
     const struct surface_args *args = call->arguments;
-    for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x += PT_LANES)
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + (size_t)y * args->view.width;
+    for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x += PT_LANES) {
+        pt_fetch_ahead(keys, x + 4 * PT_LANES, args->view.rect[2], &args->instance, pt_cpu_data(call, 1), 4);
         surface_pixels(args, call, x, y, pt_lanes_left(x, args->view.rect[2]));
+    }
 }
 
 int PT_KERNEL_ENTRY(surface)(const struct pt_cpu_call *call)

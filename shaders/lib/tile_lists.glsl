@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Makes the lists of tiles that filters walk (lib/tiles.glsl, native/device_gl/tiles.c).
+//   STEP 0: what each tile holds, an invocation a column of it;   STEP 1: the lists, an invocation a tile
+#version 430 core
+#include "shared/kernel_args.h"
+
+#define HOLDS_POINTS 1u
+#define HOLDS_NOTHING 2u
+#define TILE_Y 8u
+
+layout(local_size_x = 32) in;
+
+layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = 2) buffer tiles_block { uint tiles[]; };
+layout(std430, binding = 3) buffer lists_block { uint lists[]; };  // three of `stride`
+layout(std430, binding = 4) buffer counts_block { uint counts[]; }; // 0: with points, 1: without, 2: with a hole's rim
+
+layout(location = 0) uniform uvec4 rect;
+layout(location = 1) uniform uint width;
+layout(location = 2) uniform uvec2 size; // in tiles
+layout(location = 3) uniform uint stride;
+
+#if STEP == 0
+
+void main()
+{
+    uint x = min(rect.x + gl_GlobalInvocationID.x, rect.z - 1u), y = rect.y + gl_WorkGroupID.y * TILE_Y;
+    uint holds = 0u, end = min(y + TILE_Y, rect.w);
+    for (; y < end; y++)
+        holds |= keys[y * width + x].y != PT_KEY_EMPTY_Z ? HOLDS_POINTS : HOLDS_NOTHING;
+    atomicOr(tiles[gl_WorkGroupID.y * size.x + gl_WorkGroupID.x], holds);
+}
+
+#else
+
+void main()
+{
+    uint tile = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    if (tile >= size.x * size.y)
+        return;
+    int tx = int(tile % size.x), ty = int(tile / size.x);
+    uint holds = tiles[tile], around = 0u;
+    for (int y = ty - 1; y <= ty + 1; y++)
+        for (int x = tx - 1; x <= tx + 1; x++) // beyond the rectangle: unknown
+            around |= x < 0 || y < 0 || x >= int(size.x) || y >= int(size.y) ? HOLDS_POINTS
+                                                                            : tiles[uint(y) * size.x + uint(x)];
+    uint list = (holds & HOLDS_POINTS) != 0u ? 0u : 1u;
+    lists[list * stride + atomicAdd(counts[list], 1u)] = tile;
+    if ((holds & HOLDS_NOTHING) != 0u && (around & HOLDS_POINTS) != 0u)
+        lists[2u * stride + atomicAdd(counts[2], 1u)] = tile;
+}
+
+#endif

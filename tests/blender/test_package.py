@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Installs the packed add-on as a user does, renders with it, removes it again. After build/package:
+
+    blender -b --factory-startup --python-exit-code 1 --python tests/blender/test_package.py
+    python tests/blender/test_package.py        (with the bpy module)
+
+BLENDER_USER_SCRIPTS, _CONFIG and _EXTENSIONS must name throwaway folders, PATINA_LIBRARY must not be set.
+"""
+import math
+import os
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+import bpy
+import addon_utils  # is there once bpy is
+
+ROOT = Path(__file__).resolve().parents[2]
+LEGACY = bpy.app.version < (4, 2, 0)
+MODULE = "patina" if LEGACY else "bl_ext.user_default.patina"
+
+
+def package():
+    zips = sorted((ROOT / "build/out/packages").glob("patina-*.zip"))
+    zips = [path for path in zips if path.stem.endswith("-legacy") == LEGACY]
+    assert len(zips) == 1, f"run build/package first: {zips}"
+    return str(zips[0])
+
+
+def folder():
+    return Path(sys.modules[MODULE].__file__).resolve().parent
+
+
+def test_install():
+    assert "PATINA_LIBRARY" not in os.environ
+    for kind in ("SCRIPTS", "CONFIG", "EXTENSIONS"):
+        assert Path(os.environ[f"BLENDER_USER_{kind}"]).is_dir(), f"BLENDER_USER_{kind} names no folder"
+    if LEGACY:
+        assert bpy.ops.preferences.addon_install(filepath=package()) == {"FINISHED"}
+        assert bpy.ops.preferences.addon_enable(module=MODULE) == {"FINISHED"}
+    else:
+        done = bpy.ops.extensions.package_install_files(filepath=package(), repo="user_default", enable_on_install=True)
+        assert done == {"FINISHED"}, done
+    assert addon_utils.check(MODULE)[1], "not enabled"
+    inside = os.environ["BLENDER_USER_SCRIPTS" if LEGACY else "BLENDER_USER_EXTENSIONS"]
+    assert Path(inside).resolve() in folder().parents, folder()
+    assert (folder() / "LICENSE").is_file()
+
+
+def test_render():
+    scene = bpy.context.scene
+    for item in list(bpy.data.objects):
+        bpy.data.objects.remove(item)
+    turn = math.pi * (3 - math.sqrt(5))
+    heights = [1 - (2 * i + 1) / 20000 for i in range(20000)]
+    ball = [(math.sqrt(1 - z * z) * math.cos(i * turn), math.sqrt(1 - z * z) * math.sin(i * turn), z)
+            for i, z in enumerate(heights)]
+    mesh = bpy.data.meshes.new("ball")
+    mesh.from_pydata(ball, [], [])
+    scene.collection.objects.link(bpy.data.objects.new("ball", mesh))
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.location, camera.rotation_euler = (0, -5, 0), (math.pi / 2, 0, 0)
+    scene.collection.objects.link(camera)
+    sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 3, (math.pi / 3, 0, 0)
+    scene.collection.objects.link(sun)
+
+    scene.camera, scene.render.engine = camera, "PATINA"
+    scene.render.resolution_x = scene.render.resolution_y = 96
+    scene.render.resolution_percentage = 100
+    scene.render.film_transparent = True
+    scene.render.image_settings.file_format, scene.render.image_settings.color_mode = "PNG", "RGBA"
+    with tempfile.TemporaryDirectory() as output:
+        scene.render.filepath = str(Path(output) / "ball.png")
+        assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
+        image = bpy.data.images.load(scene.render.filepath)
+        assert tuple(image.size) == (96, 96)
+        pixels = image.pixels[:]
+    alpha = pixels[3::4]
+    middle = 4 * (48 * 96 + 48)
+    assert alpha[0] == 0 and alpha[48 * 96 + 48] == 1, (alpha[0], alpha[48 * 96 + 48])
+    assert pixels[middle] > 0.2, pixels[middle:middle + 4]
+    share = sum(a > 0.5 for a in alpha) / len(alpha)
+    across = (96 * camera.data.lens / camera.data.sensor_width) / math.sqrt(5 * 5 - 1)  # radius of the outline, pixels
+    assert abs(share - math.pi * across ** 2 / 96 ** 2) < 0.02, (share, math.pi * across ** 2 / 96 ** 2)
+    with open("/proc/self/maps", encoding="utf-8") as maps:
+        loaded = {line.split()[-1] for line in maps if "libpatina" in line}
+    assert loaded == {str(folder() / "lib/libpatina.so")}, loaded
+
+
+def test_remove():
+    place = folder()
+    if LEGACY:
+        assert bpy.ops.preferences.addon_disable(module=MODULE) == {"FINISHED"}
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(window=window, area=window.screen.areas[0]):  # which the operator redraws
+            assert bpy.ops.preferences.addon_remove(module=MODULE) == {"FINISHED"}
+    else:
+        done = bpy.ops.extensions.package_uninstall(repo_directory=str(place.parent), pkg_id="patina")
+        assert done == {"FINISHED"}, done
+    assert not addon_utils.check(MODULE)[1]
+    assert not place.exists(), place
+
+
+def main():
+    passed = failed = 0
+    for test in (test_install, test_render, test_remove):
+        try:
+            test()
+            passed += 1
+            print(f"ok {test.__name__}", flush=True)
+        except Exception:  # a test's failure is one line of the sum, whatever it is
+            failed += 1
+            print(f"FAILED {test.__name__}", flush=True)
+            traceback.print_exc(file=sys.stdout)
+    print(f"{passed} passed, {failed} failed, 0 skipped", flush=True)
+    return 1 if failed else 0
+
+
+code = main()
+sys.stdout.flush()
+os._exit(code)  # the bpy module may hang in its own clean-up
