@@ -23,7 +23,8 @@ struct pt_gl_scratch {
 
 enum pt_gl_scratch_use {
     PT_GL_SCRATCH_COUNTERS,
-    PT_GL_SCRATCH_PIXELS,      // fill: this step's changes; shade: filled pixels
+    PT_GL_SCRATCH_PIXELS,      // fill: this step's changes; shade: filled pixels; antialias: edges
+    PT_GL_SCRATCH_COLORS,      // antialias: of edges
     PT_GL_SCRATCH_SAVED,       // fill: pixels as they were before the phase
     PT_GL_SCRATCH_FILLED,      // fill: a bit for each pixel filled in this phase
     PT_GL_SCRATCH_STAMPS,      // fill: the step for which a tile was listed last
@@ -35,9 +36,8 @@ enum pt_gl_scratch_use {
 };
 
 enum pt_gl_tile_list {
-    PT_GL_TILES_POINTS,  // with a point in them
-    PT_GL_TILES_NOTHING, // without
-    PT_GL_TILES_RIM,     // with an empty pixel, and a point in them or in a tile beside them
+    PT_GL_TILES_POINTS, // with a point in them
+    PT_GL_TILES_RIM,    // with an empty pixel, and a point in them or in a tile beside them
 };
 
 // Lists of the tiles of one key plane, valid until somebody writes keys.
@@ -46,7 +46,7 @@ struct pt_gl_tiles {
     GLuint keys;
     uint32_t width, rect[4];
     uint32_t columns, rows;
-    uint32_t count[3];
+    uint32_t count[2];
     size_t stride; // entries from list to list
 };
 
@@ -110,11 +110,12 @@ int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t 
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 
-// scatter.c, fill.c, shade.c: kernels of several dispatches. The filters find their buffers bound and tiles listed.
+// scatter.c, fill.c, pixels.c: kernels of several dispatches. The filters find their buffers bound and tiles listed.
 int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
                   uint32_t count, const atomic_int *cancel);
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
+int pt_gl_antialias(struct pt_gl_device *d);
 
 // selftest.c
 // Whether 64-bit atomics of this driver give what the CPU says; 0 too where the driver has none.

@@ -116,17 +116,11 @@ static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
     return result;
 }
 
-// Only tiles with points in them; `elsewhere`: a second program for the others.
-static int run_tiles(struct pt_gl_device *d, enum pt_kernel kernel, int elsewhere)
+// Only tiles with points in them.
+static int run_tiles(struct pt_gl_device *d, enum pt_kernel kernel)
 {
-    int result = pt_gl_kernel_program(d, kernel, 0, "#define NOTHING 0\n");
-    if (result == PATINA_OK && elsewhere)
-        result = pt_gl_kernel_program(d, kernel, 1, "#define NOTHING 1\n");
-    if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, kernel, 0, PT_GL_TILES_POINTS);
-    if (result == PATINA_OK && elsewhere)
-        result = pt_gl_dispatch_tiles(d, kernel, 1, PT_GL_TILES_NOTHING);
-    return result;
+    int result = pt_gl_kernel_program(d, kernel, 0, "");
+    return result == PATINA_OK ? pt_gl_dispatch_tiles(d, kernel, 0, PT_GL_TILES_POINTS) : result;
 }
 
 static int bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t argument_size,
@@ -149,10 +143,10 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     switch (kernel) {
     case PT_KERNEL_fill: return pt_gl_fill(d, arguments, cancel);
     case PT_KERNEL_shade: return pt_gl_shade(d, arguments);
+    case PT_KERNEL_antialias: return pt_gl_antialias(d);
     case PT_KERNEL_normals:
-    case PT_KERNEL_surface: return run_tiles(d, kernel, 0);
-    case PT_KERNEL_smooth:
-    case PT_KERNEL_antialias: return run_tiles(d, kernel, 1);
+    case PT_KERNEL_surface:
+    case PT_KERNEL_smooth: return run_tiles(d, kernel);
     case PT_KERNEL_compose: {
         const struct compose_args *args = arguments;
         return run_over(d, kernel, 0, "", args->crop_width, args->crop_height);

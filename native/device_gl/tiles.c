@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-enum { TILE_X = 32, TILE_Y = 8, GROUP = 32, LISTS = 3, GROUPS_IN_ROW = 16384 }; // as in lib/tiles.glsl
+enum { TILE_X = 32, TILE_Y = 8, GROUP = 32, LISTS = 2, GROUPS_IN_ROW = 16384 }; // as in lib/tiles.glsl
 
 void pt_gl_tiles_forget(struct pt_gl_device *d) { d->tiles.valid = 0; }
 

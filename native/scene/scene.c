@@ -185,28 +185,55 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
 
 // ---- a camera that frames the scene -----------------------------------------------------------------------------------
 
-// World-space box of all instances; 0 when there is nothing.
-static int scene_box(const patina_scene *scene, double lower[3], double upper[3])
+// Calls back with the eight world-space corners of every chunk's box: closer to the points than the cloud's own box.
+typedef void corner_work(void *context, const double corner[3]);
+
+static void each_corner(const patina_scene *scene, corner_work *work, void *context)
 {
-    int some = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++) {
-        const patina_cloud_info *info = &scene->instances[i].cloud->info;
-        double linear[9], translation[3];
+        const patina_cloud *cloud = scene->instances[i].cloud;
+        double linear[9], translation[3], p[3], q[3];
         pt_split_matrix(scene->instances[i].style.world_from_object, linear, translation);
-        for (int corner = 0; corner < 8 && info->drawn; corner++) {
-            double p[3], q[3];
-            for (int k = 0; k < 3; k++)
-                p[k] = corner >> k & 1 ? info->box_max[k] : info->box_min[k];
-            pt_apply(linear, p, q);
-            for (int k = 0; k < 3; k++) {
-                q[k] += translation[k];
-                lower[k] = some ? fmin(lower[k], q[k]) : q[k];
-                upper[k] = some ? fmax(upper[k], q[k]) : q[k];
+        for (uint32_t c = 0; c < cloud->chunk_count; c++)
+            for (int corner = 0; corner < 8; corner++) {
+                const struct pt_chunk *chunk = &cloud->chunks[c];
+                for (int k = 0; k < 3; k++)
+                    p[k] = chunk->origin[k] + (double)(corner >> k & 1 ? chunk->box_max[k] : chunk->box_min[k]);
+                pt_apply(linear, p, q);
+                for (int k = 0; k < 3; k++)
+                    q[k] += translation[k];
+                work(context, q);
             }
-            some = 1;
-        }
     }
-    return some;
+}
+
+struct framing {
+    int some;
+    double lower[3], upper[3], center[3];
+    const double *x, *y, *z; // the camera's axes
+    double half_x, half_y, distance, radius;
+};
+
+static void grow_box(void *context, const double corner[3])
+{
+    struct framing *f = context;
+    for (int k = 0; k < 3; k++) {
+        f->lower[k] = f->some ? fmin(f->lower[k], corner[k]) : corner[k];
+        f->upper[k] = f->some ? fmax(f->upper[k], corner[k]) : corner[k];
+    }
+    f->some = 1;
+}
+
+// The nearest place from which the corner is in view, with 4% of air.
+static void step_back(void *context, const double corner[3])
+{
+    struct framing *f = context;
+    double p[3];
+    for (int k = 0; k < 3; k++)
+        p[k] = corner[k] - f->center[k];
+    f->distance = fmax(f->distance, pt_dot(p, f->z) + 1.04 * fabs(pt_dot(p, f->x)) / f->half_x);
+    f->distance = fmax(f->distance, pt_dot(p, f->z) + 1.04 * fabs(pt_dot(p, f->y)) / f->half_y);
+    f->radius = fmax(f->radius, sqrt(pt_dot(p, p)));
 }
 
 int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
@@ -215,41 +242,30 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
     if (!scene || !camera || camera->struct_size != sizeof *camera || !isfinite(azimuth + elevation + fov_degrees))
         return fail(scene, "patina_scene_frame_camera: bad arguments");
     const double degree = 3.14159265358979323846 / 180.0;
-    double lower[3] = { -1, -1, -1 }, upper[3] = { 1, 1, 1 }, center[3];
-    scene_box(scene, lower, upper);
     double ca = cos(azimuth * degree), sa = sin(azimuth * degree);
     double ce = cos(elevation * degree), se = sin(elevation * degree);
     const double x[3] = { ca, sa, 0.0 }, y[3] = { -sa * se, ca * se, ce }, z[3] = { sa * ce, -ca * ce, se };
     double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
-    double half_y = tan(0.5 * fov * degree);
-    double half_x = half_y * scene->settings.width / scene->settings.height, distance = 0.0, extent = 0.0;
-    for (int k = 0; k < 3; k++) {
-        center[k] = 0.5 * (lower[k] + upper[k]);
-        extent = fmax(extent, upper[k] - lower[k]);
-    }
-    // the nearest place from which every corner of the box is in view, with 4% of air
-    for (int corner = 0; corner < 8; corner++) {
-        double p[3];
-        for (int k = 0; k < 3; k++)
-            p[k] = (corner >> k & 1 ? upper[k] : lower[k]) - center[k];
-        distance = fmax(distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, x)) / half_x);
-        distance = fmax(distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, y)) / half_y);
-    }
-    if (!(distance > 0.0))
-        distance = 1.0; // a single point
-    double reach = extent > 0.0 ? 1.75 * extent : distance;
+    struct framing framing = { .x = x, .y = y, .z = z, .half_y = tan(0.5 * fov * degree) };
+    framing.half_x = framing.half_y * scene->settings.width / scene->settings.height;
+    each_corner(scene, grow_box, &framing);
+    for (int k = 0; k < 3; k++)
+        framing.center[k] = 0.5 * (framing.lower[k] + framing.upper[k]);
+    each_corner(scene, step_back, &framing);
+    double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
+    double reach = framing.radius > 0.0 ? 1.01 * framing.radius : distance;
     *camera = (patina_camera){ .struct_size = sizeof *camera,
-                               .left = -half_x,
-                               .right = half_x,
-                               .bottom = -half_y,
-                               .top = half_y,
+                               .left = -framing.half_x,
+                               .right = framing.half_x,
+                               .bottom = -framing.half_y,
+                               .top = framing.half_y,
                                .near_clip = fmax(distance - reach, 1e-3 * distance),
                                .far_clip = distance + reach };
     for (int k = 0; k < 3; k++) {
         camera->world_from_camera[4 * k] = x[k];
         camera->world_from_camera[4 * k + 1] = y[k];
         camera->world_from_camera[4 * k + 2] = z[k];
-        camera->world_from_camera[4 * k + 3] = center[k] + distance * z[k];
+        camera->world_from_camera[4 * k + 3] = framing.center[k] + distance * z[k];
     }
     camera->world_from_camera[15] = 1.0;
     return PATINA_OK;

@@ -5,52 +5,58 @@
 // an edge pixel's true coverage is below 1: for a straight edge at 0 degrees (k = 1) it is uniform in 0..1, mean 1/2; at
 // 45 degrees the outermost pixels (k = 2) cover t^2/2, mean 1/6. Both are met by coverage = 5/6 - k/3, floored at 1/6 so
 // that lone pixels stay visible.
+//
+// Edges are few: they are listed, their new colours made, and applied when every pixel has been looked at.
+//   STEP 0: find;   STEP 1: mix, an edge an invocation;   STEP 2: apply
 #version 430 core
 #include "lib/math.glsl"
+#if STEP == 0
 #include "lib/tiles.glsl"
+#else
+layout(local_size_x = 64) in;
+#endif
 
 layout(std430, binding = 0) readonly buffer arguments_block { antialias_args args; };
 layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) buffer from_block { uint from[]; };
 layout(std430, binding = 3) readonly buffer deff_block { float deff[]; };
-layout(std430, binding = 5) writeonly buffer result_block { vec4 result[]; };
-layout(binding = 0) uniform samplerBuffer color;
+layout(std430, binding = 4) writeonly buffer color_block { vec4 color[]; };
+layout(std430, binding = 5) buffer counters_block { uint edge_count; };
+layout(std430, binding = 6) buffer edges_block { uint edges[]; };
+layout(std430, binding = 7) buffer mixed_block { vec4 mixed[]; };
+layout(binding = 0) uniform samplerBuffer old_color; // the colour plane too
 
 const ivec2 cross_offsets[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
 
-// NOTHING 1: for the tiles without points.
-vec4 antialias_pixel(ivec2 size, bool layers, int x, int y)
+// Neighbour i of a pixel; its own index for one outside the plane: unknown, no edge.
+uint neighbour(ivec2 size, int x, int y, int i)
 {
-    int at = y * size.x + x;
-    vec4 own = texelFetch(color, at);
-#if !NOTHING
-    uint z_bits = keys[at].y;
-    float empty = pt_float(PT_KEY_EMPTY_Z);
-    bool some = z_bits != PT_KEY_EMPTY_Z;
-    uint source = some ? from[at] : 0u;
-    precise float limit = pt_float(z_bits) + deff[source & ~PT_FROM_MIXED];
-    limit = layers && some ? limit : empty;
-    precise vec4 far_color = vec4(0.0);
-    float far_count = 0.0;
-    for (int i = 0; i < 4; i++) {
-        int qx = x + cross_offsets[i].x, qy = y + cross_offsets[i].y;
-        bool inside = qx >= 0 && qy >= 0 && qx < size.x && qy < size.y; // outside: unknown, no edge
-        int q = inside ? qy * size.x + qx : at;
-        float z = pt_float(keys[q].y);
-        bool far = some && inside && (z > limit || z == empty);
-        precise vec4 more = far_color + texelFetch(color, q);
-        far_color = far && z < empty ? more : far_color;
-        far_count += far ? 1.0 : 0.0;
-    }
-    if (far_count > 0.0) {
-        precise float coverage = pt_max(0.833333313465 - far_count * 0.333333343267, 0.166666671634); // 5/6, 1/3, 1/6
-        precise float share = (1.0 - coverage) * pt_rcp(far_count);
-        precise vec4 mixed = own * coverage + far_color * share;
-        own = mixed;
-        from[at] = source | PT_FROM_MIXED;
-    }
-#endif
-    return own;
+    int qx = x + cross_offsets[i].x, qy = y + cross_offsets[i].y;
+    bool inside = qx >= 0 && qy >= 0 && qx < size.x && qy < size.y;
+    return inside ? uint(qy * size.x + qx) : uint(y * size.x + x);
+}
+
+// Beyond this a neighbour is on another layer.
+float step_limit(bool layers, uint at, uint z_bits)
+{
+    precise float limit = pt_float(z_bits) + deff[from[at] & ~PT_FROM_MIXED];
+    return layers ? limit : pt_float(PT_KEY_EMPTY_Z);
+}
+
+bool is_far(float z, float limit) { return z > limit || z == pt_float(PT_KEY_EMPTY_Z); }
+
+#if STEP == 0
+
+bool is_edge(ivec2 size, bool layers, int x, int y)
+{
+    uint at = uint(y * size.x + x), z_bits = keys[at].y;
+    if (z_bits == PT_KEY_EMPTY_Z)
+        return false;
+    float limit = step_limit(layers, at, z_bits);
+    bool edge = false;
+    for (int i = 0; i < 4; i++)
+        edge = is_far(pt_float(keys[neighbour(size, x, y, i)].y), limit) || edge;
+    return edge;
 }
 
 void main()
@@ -59,6 +65,64 @@ void main()
     bool layers = args.layers != 0u;
     ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
-        result[y * view.width + column.x] = antialias_pixel(size, layers, int(column.x), int(y));
+    uint found = 0u, y = column.y, end = pt_tile_end(view, column);
+    for (uint i = 0u; y + i < end; i++)
+        found |= uint(is_edge(size, layers, int(column.x), int(y + i))) << i;
+    if (found == 0u)
+        return;
+    uint at = atomicAdd(edge_count, uint(bitCount(found)));
+    for (; found != 0u; found &= found - 1u, at++)
+        edges[at] = (y + uint(findLSB(found))) * view.width + column.x;
 }
+
+#else
+
+layout(location = 0) uniform uint entries;
+
+uint entry_index()
+{
+    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+}
+
+#if STEP == 1
+
+void main()
+{
+    bool layers = args.layers != 0u;
+    ivec2 size = ivec2(args.view.width, args.view.height);
+    uint index = entry_index();
+    if (index >= entries)
+        return;
+    uint at = edges[index], z_bits = keys[at].y;
+    float limit = step_limit(layers, at, z_bits);
+    precise vec4 sum = vec4(0.0);
+    float count = 0.0;
+    for (int i = 0; i < 4; i++) {
+        uint q = neighbour(size, int(at) % size.x, int(at) / size.x, i);
+        float z = pt_float(keys[q].y);
+        if (!is_far(z, limit))
+            continue;
+        count += 1.0;
+        if (z < pt_float(PT_KEY_EMPTY_Z))
+            sum = sum + texelFetch(old_color, int(q));
+    }
+    precise float coverage = pt_max(0.833333313465 - count * 0.333333343267, 0.166666671634); // 5/6, 1/3, 1/6
+    precise float share = (1.0 - coverage) * pt_rcp(count);
+    precise vec4 mix_color = texelFetch(old_color, int(at)) * coverage + sum * share;
+    mixed[index] = mix_color;
+}
+
+#else
+
+void main()
+{
+    uint index = entry_index();
+    if (index >= entries)
+        return;
+    uint at = edges[index];
+    color[at] = mixed[index];
+    from[at] |= PT_FROM_MIXED;
+}
+
+#endif
+#endif

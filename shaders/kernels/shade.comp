@@ -54,8 +54,8 @@ void main()
 
 layout(location = 0) uniform uint entries;
 
-// The normal of a filled pixel, refined: measured neighbours of its layer, weighted by 1 / (1 + distance^2), as far as
-// the pixel it was filled from. Zero when there is none.
+// The normal of a filled pixel, refined: measured neighbours of the same layer, as far as the pixel it was filled from,
+// weighted by 1 / (1 + distance^2); the source's own normal where there are none.
 vec3 blend_normal(view_args view, int x, int y, float z, uint source)
 {
     int width = int(view.width), height = int(view.height);

@@ -12,43 +12,38 @@ layout(std430, binding = 3) readonly buffer deff_block { float deff[]; };
 layout(std430, binding = 5) writeonly buffer result_block { vec4 result[]; };
 layout(binding = 0) uniform samplerBuffer color;
 
-// NOTHING 1: for the tiles without points.
-vec4 smooth_pixel(ivec2 size, vec3 weights_of, int x, int y)
+void smooth_pixel(uvec4 rect, uint width, vec3 weights_of, uint x, uint y)
 {
-#if NOTHING
-    return vec4(0.0);
-#else
-    int at = y * size.x + x;
+    uint at = y * width + x;
     uint z_bits = keys[at].y;
-    float z = pt_float(z_bits);
-    bool empty = z_bits == PT_KEY_EMPTY_Z;
-    float limit = empty ? 0.0 : deff[empty ? 0u : from[at] & ~PT_FROM_MIXED];
+    if (z_bits == PT_KEY_EMPTY_Z)
+        return; // nothing reads the colour of an empty pixel
+    float z = pt_float(z_bits), limit = deff[from[at] & ~PT_FROM_MIXED];
     precise vec3 sum = vec3(0.0);
     precise float weights = 0.0;
     for (int dy = -1; dy <= 1; dy++)
         for (int dx = -1; dx <= 1; dx++) {
-            int qx = x + dx, qy = y + dy;
-            bool inside = qx >= 0 && qy >= 0 && qx < size.x && qy < size.y;
-            int q = inside ? qy * size.x + qx : at;
+            uint qx = x + uint(dx), qy = y + uint(dy); // -1 wraps to beyond the rectangle
+            bool inside = qx >= rect.x && qy >= rect.y && qx < rect.z && qy < rect.w;
+            uint q = inside ? qy * width + qx : at;
             precise float apart = pt_float(keys[q].y) - z;
-            bool taken = inside && pt_abs(apart) <= limit; // else nothing there, or another layer
+            bool same = inside && pt_abs(apart) <= limit; // else another layer, or nothing
             float weight = dx != 0 && dy != 0 ? weights_of.z : dx != 0 || dy != 0 ? weights_of.y : weights_of.x;
-            precise float weights_more = weights + weight;
-            precise vec3 sum_more = sum + texelFetch(color, q).xyz * weight;
-            weights = taken ? weights_more : weights;
-            sum = taken ? sum_more : sum;
+            precise float more_weights = weights + weight;
+            precise vec3 more = sum + texelFetch(color, int(q)).xyz * weight;
+            weights = same ? more_weights : weights;
+            sum = same ? more : sum; // what an empty pixel's colour holds is anything, NaN too
         }
     precise vec3 mean = sum * pt_rcp(weights);
-    return empty ? vec4(0.0) : vec4(mean, 1.0);
-#endif
+    result[at] = vec4(mean, 1.0);
 }
 
 void main()
 {
     view_args view = args.view;
+    uvec4 rect = uvec4(view.rect[0], view.rect[1], view.rect[2], view.rect[3]);
     vec3 weights = vec3(args.center, args.edge, args.corner);
-    ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
     for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
-        result[y * view.width + column.x] = smooth_pixel(size, weights, int(column.x), int(y));
+        smooth_pixel(rect, view.width, weights, column.x, y);
 }

@@ -12,8 +12,8 @@ layout(local_size_x = 32) in;
 
 layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) buffer tiles_block { uint tiles[]; };
-layout(std430, binding = 3) buffer lists_block { uint lists[]; };  // three of `stride`
-layout(std430, binding = 4) buffer counts_block { uint counts[]; }; // 0: with points, 1: without, 2: with a hole's rim
+layout(std430, binding = 3) buffer lists_block { uint lists[]; };   // two of `stride`
+layout(std430, binding = 4) buffer counts_block { uint counts[]; }; // 0: with points, 1: with a hole's rim
 
 layout(location = 0) uniform uvec4 rect;
 layout(location = 1) uniform uint width;
@@ -44,10 +44,10 @@ void main()
         for (int x = tx - 1; x <= tx + 1; x++) // beyond the rectangle: unknown
             around |= x < 0 || y < 0 || x >= int(size.x) || y >= int(size.y) ? HOLDS_POINTS
                                                                             : tiles[uint(y) * size.x + uint(x)];
-    uint list = (holds & HOLDS_POINTS) != 0u ? 0u : 1u;
-    lists[list * stride + atomicAdd(counts[list], 1u)] = tile;
+    if ((holds & HOLDS_POINTS) != 0u)
+        lists[atomicAdd(counts[0], 1u)] = tile;
     if ((holds & HOLDS_NOTHING) != 0u && (around & HOLDS_POINTS) != 0u)
-        lists[2u * stride + atomicAdd(counts[2], 1u)] = tile;
+        lists[stride + atomicAdd(counts[1], 1u)] = tile;
 }
 
 #endif

@@ -103,13 +103,14 @@ def plot(result: dict[str, Any], path: Path) -> None:
 
     labels = [f"{name_of(r)}\n{_count(r['points'])} {r['quality']}" for r in rows]
     bottom = [0.0] * len(rows)
+    right.set_prop_cycle(color=plt.get_cmap("tab20").colors)
     for name in dict.fromkeys(name for r in rows for name in r["passes"]):
         share = [100.0 * r["passes"].get(name, 0.0) / r["ms_median"] for r in rows]
         right.bar(labels, share, bottom=bottom, label=name)
         bottom = [b + s for b, s in zip(bottom, share)]
     right.set(ylabel="% of the frame", title="Where the time goes", ylim=(0, 105))
     right.tick_params(axis="x", labelsize=7, rotation=60)
-    right.legend(fontsize=7, ncol=2)
+    right.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     figure.suptitle(f"{result['processor']}, {result['cores']} cores, {result['date']}", fontsize=10)
     figure.tight_layout()
     figure.savefig(path, dpi=110)

@@ -143,7 +143,8 @@ static void test_huge_positions(void **state)
     patina_camera camera = usual_camera(67, 45);
     patina_settings settings = settings_default(67, 45);
     picture = draw(scene, &camera, &settings, "huge float64 positions");
-    printf("  one point at the origin among eight at 10^300: %llu pixels\n", (unsigned long long)picture_count(&picture));
+    printf("  one point at the origin among eight at 10^300: %llu pixels\n",
+           (unsigned long long)picture_count(&picture));
     picture_free(&picture);
     patina_scene_destroy(scene);
     patina_cloud_destroy(cloud);

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Runners of kernels that pick out a few pixels: a pass over tiles lists them, the costly part walks the list densely.
+// (llvmpipe runs all lanes of a vector when one of them needs it.)
+#include "device_gl.h"
+
+enum { TILE_PIXELS = 256, GROUP = 64 };
+
+// Room for as many pixels as the tiles hold; counts from nothing. Both bound.
+static int prepare_list(struct pt_gl_device *d, uint32_t counter_binding, uint32_t list_binding)
+{
+    static const uint32_t none;
+    size_t size = (size_t)d->tiles.count[PT_GL_TILES_POINTS] * TILE_PIXELS * 4;
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_COUNTERS, sizeof none, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_scratch(d, PT_GL_SCRATCH_PIXELS, size, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, counter_binding, d->scratch[PT_GL_SCRATCH_COUNTERS].name, 0, sizeof none, "a list");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, list_binding, d->scratch[PT_GL_SCRATCH_PIXELS].name, 0, size, "a list");
+    if (result != PATINA_OK)
+        return result;
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_COUNTERS].name);
+    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, &none);
+    return PATINA_OK;
+}
+
+static uint32_t list_length(struct pt_gl_device *d)
+{
+    uint32_t count = 0;
+    d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_COUNTERS].name);
+    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof count, &count);
+    return count;
+}
+
+static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count)
+{
+    uint32_t x, y;
+    pt_gl_grid((count + GROUP - 1) / GROUP, &x, &y);
+    d->gl.ProgramUniform1ui(d->programs[kernel][variant], 0, count);
+    return pt_gl_dispatch(d, kernel, variant, x, y);
+}
+
+// ---- shade -----------------------------------------------------------------------------------------------------
+
+enum { NORMALS = 0, BLEND = 1, COLORS = 2 };
+
+static int shade_programs(struct pt_gl_device *d, const struct shade_args *args, uint32_t colors)
+{
+    static const char *const definitions[] = {"#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 0\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 1\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 0\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 1\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 0\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 1\n"};
+    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, NORMALS, "#define STEP 0\n");
+    if (result == PATINA_OK && args->refined)
+        result = pt_gl_kernel_program(d, PT_KERNEL_shade, BLEND, "#define STEP 1\n");
+    if (result == PATINA_OK)
+        result = pt_gl_kernel_program(d, PT_KERNEL_shade, colors, definitions[colors - COLORS]);
+    return result;
+}
+
+// In a uniform array: read once for all lanes, where a block would be read once a lane.
+static void set_lights(struct pt_gl_device *d, const struct shade_args *args, uint32_t colors)
+{
+    GLfloat lights[PT_MAX_LIGHTS][8] = {{0}};
+    for (uint32_t i = 0; i < args->light_count && i < PT_MAX_LIGHTS; i++) {
+        const struct light_args *light = &args->lights[i];
+        for (int k = 0; k < 3; k++) {
+            lights[i][k] = light->color[k];
+            lights[i][4 + k] = light->vector[k];
+        }
+        lights[i][3] = (GLfloat)light->type;
+    }
+    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][colors], 16, 2 * PT_MAX_LIGHTS, &lights[0][0]);
+}
+
+int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
+{
+    uint32_t colors = COLORS + 2 * (args->instance.color_format % 3) + (args->instance.lit != 0);
+    if (!d->tiles.count[PT_GL_TILES_POINTS])
+        return PATINA_OK;
+    int result = shade_programs(d, args, colors);
+    if (result == PATINA_OK)
+        result = prepare_list(d, 9, 10);
+    if (result == PATINA_OK)
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, NORMALS, PT_GL_TILES_POINTS);
+    if (result == PATINA_OK && args->refined)
+        result = dispatch_list(d, PT_KERNEL_shade, BLEND, list_length(d));
+    if (result == PATINA_OK && args->instance.lit)
+        set_lights(d, args, colors);
+    return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, colors, PT_GL_TILES_POINTS) : result;
+}
+
+// ---- antialias -------------------------------------------------------------------------------------------------
+
+enum { FIND = 0, MIX = 1, APPLY = 2 };
+
+int pt_gl_antialias(struct pt_gl_device *d)
+{
+    static const char *const definitions[] = {"#define STEP 0\n", "#define STEP 1\n", "#define STEP 2\n"};
+    int result = PATINA_OK;
+    if (!d->tiles.count[PT_GL_TILES_POINTS])
+        return PATINA_OK;
+    for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++)
+        result = pt_gl_kernel_program(d, PT_KERNEL_antialias, step, definitions[step]);
+    if (result == PATINA_OK)
+        result = prepare_list(d, 5, 6);
+    if (result == PATINA_OK)
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, FIND, PT_GL_TILES_POINTS);
+    if (result != PATINA_OK)
+        return result;
+    uint32_t count = list_length(d);
+    result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, (size_t)count * 16, 0);
+    if (result == PATINA_OK && count)
+        result = pt_gl_bind(d, 7, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
+    if (result == PATINA_OK)
+        result = dispatch_list(d, PT_KERNEL_antialias, MIX, count);
+    if (result == PATINA_OK)
+        result = dispatch_list(d, PT_KERNEL_antialias, APPLY, count);
+    return result;
+}
