@@ -52,6 +52,7 @@ struct patina_device {
     struct pt_handle handle;
     const struct pt_device_ops *ops;
     patina_device_info info;
+    uint64_t memory_cap; // bytes of planes a frame may hold; 0: no limit
 };
 
 // Constructors; each returns PATINA_ERROR_UNSUPPORTED with the reason at the thread when it cannot be had.

@@ -31,6 +31,15 @@ static double milliseconds(void)
 
 // ---- planes ------------------------------------------------------------------------------------------------------------
 
+static uint64_t plane_total(const struct patina_frame *frame)
+{
+    uint64_t total = 0;
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int level = 0; level < PT_LEVELS; level++)
+            total += frame->planes[p][level].size;
+    return total;
+}
+
 static int ensure_plane(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which, uint32_t level)
 {
     struct pt_buffer *plane = &frame->planes[which][level];
@@ -40,6 +49,11 @@ static int ensure_plane(struct patina_frame *frame, const struct pt_plan *plan, 
     if (plane->size == bytes && (plane->data || plane->name))
         return PATINA_OK;
     frame->device->ops->buffer_destroy(frame->device, plane);
+    uint64_t held = plane_total(frame), cap = frame->device->memory_cap;
+    if (cap && held + bytes > cap)
+        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY,
+                       "the planes of a %u x %u picture take more than the %llu MB allowed: render it in regions",
+                       plan->crop[2], plan->crop[3], (unsigned long long)(cap >> 20));
     int error = frame->device->ops->buffer_create(frame->device, bytes, NULL, 0, plane);
     if (error)
         return pt_fail_again(&frame->handle, error);
@@ -168,9 +182,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .chunks = plan->chunks,
                                          .chunks_culled = plan->chunks_culled,
                                          .ms = ms };
-    for (int p = 0; p < PT_PLANE_COUNT; p++)
-        for (int level = 0; level < PT_LEVELS; level++)
-            frame->stats.plane_bytes += frame->planes[p][level].size;
+    frame->stats.plane_bytes = plane_total(frame);
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
     frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;

@@ -20,11 +20,10 @@ struct pt_cpu_call {
     uint32_t buffer_count;
     struct pt_pool *pool;
     const atomic_int *cancel;  // may be NULL
-    uint64_t memory_cap;       // for private planes
     struct pt_cpu_scratch *scratch; // [PT_CPU_SCRATCHES], kept between calls
 };
 
-enum { PT_CPU_SCRATCHES = 4 };
+enum { PT_CPU_SCRATCHES = 2 };
 
 // Scratch memory of at least `size` bytes, contents undefined, grown if need be. NULL when memory lacks.
 void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size);

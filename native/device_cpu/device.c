@@ -13,7 +13,6 @@ struct cpu_device {
     struct patina_device base;
     pt_cpu_kernel *const *kernels; // [PT_KERNEL_COUNT]
     struct pt_pool *pool;
-    uint64_t memory_cap;
     struct pt_cpu_scratch scratch[PT_CPU_SCRATCHES];
 };
 
@@ -170,7 +169,6 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
                                       .buffer_count = buffer_count,
                                       .pool = cpu->pool,
                                       .cancel = cancel,
-                                      .memory_cap = cpu->memory_cap,
                                       .scratch = cpu->scratch };
     (void)argument_size;
     int error = cpu->kernels[kernel](&call);
@@ -246,7 +244,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *level, stru
     cpu->base.ops = &cpu_ops;
     cpu->kernels = levels[chosen].kernels;
     cpu->pool = pool;
-    cpu->memory_cap = desc->memory_cap ? desc->memory_cap : 2ull << 30;
+    cpu->base.memory_cap = desc->memory_cap;
     cpu->base.info = (patina_device_info){ .struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool) };
     snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", levels[chosen].name);
     describe_processor(cpu->base.info.description, sizeof cpu->base.info.description);

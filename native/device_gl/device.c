@@ -159,10 +159,10 @@ static int is_software(const char *renderer)
 // The values that the CPU device uses: float64, cut to float32.
 static void make_srgb_table(struct pt_gl_device *d)
 {
-    float table[256];
+    float table[256][4] = {{0}}; // uniform blocks keep arrays by 16 bytes
     for (int i = 0; i < 256; i++) {
         double c = i / 255.0;
-        table[i] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+        table[i][0] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
     }
     d->gl.GenBuffers(1, &d->srgb);
     d->gl.BindBuffer(GL_UNIFORM_BUFFER, d->srgb);

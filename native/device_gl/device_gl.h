@@ -9,10 +9,10 @@
 #include "glad/gl.h"
 
 enum {
-    PT_GL_VARIANTS = 8,       // programs of one kernel: its passes and special cases
+    PT_GL_VARIANTS = 9,       // programs of one kernel: its passes and special cases
     PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
     PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
-    PT_GL_TEXTURES = 2,       // float4 planes that a kernel reads as textures
+    PT_GL_TEXTURES = 5,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl
 };
 
 // Memory that kernels keep between runs; grows, never shrinks.

@@ -60,28 +60,32 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
     return PATINA_OK;
 }
 
-// float4 planes that shaders read as buffer textures: llvmpipe fetches a texel in the time of one word of a block.
-// Numbers of buffers in kernels.def, from 1; 0: none.
+// Planes that shaders read as buffer textures (lib/planes.glsl): numbers of buffers in kernels.def, from 1; 0: none.
 static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
-    [PT_KERNEL_surface] = {3},   [PT_KERNEL_fill] = {3},      [PT_KERNEL_push] = {5},    [PT_KERNEL_shade] = {3, 7},
-    [PT_KERNEL_smooth] = {4},    [PT_KERNEL_antialias] = {4}, [PT_KERNEL_compose] = {2}, [PT_KERNEL_extract] = {3},
+    // keys, from, deff, float4, float4
+    [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
+    [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3, 7},
+    [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
+    [PT_KERNEL_extract] = {1, 2, 0, 3},
 };
 
 static int bind_textures(struct pt_gl_device *d, enum pt_kernel kernel, struct pt_buffer *const *buffers,
                          uint32_t count)
 {
+    static const GLenum formats[PT_GL_TEXTURES] = {GL_RG32UI, GL_R32UI, GL_R32F, GL_RGBA32F, GL_RGBA32F};
+    static const uint8_t sizes[PT_GL_TEXTURES] = {8, 4, 4, 16, 16};
     for (uint32_t unit = 0; unit < PT_GL_TEXTURES; unit++) {
         uint32_t number = textures[kernel][unit];
         if (!number || number > count || !buffers[number - 1] || !buffers[number - 1]->name)
             continue;
-        size_t texels = buffers[number - 1]->size / 16;
+        size_t texels = buffers[number - 1]->size / sizes[unit];
         if (texels > d->texels)
             return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
                               "%s: a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most",
                               pt_kernel_names[kernel], texels, d->texels);
         d->gl.ActiveTexture(GL_TEXTURE0 + unit);
         d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
-        d->gl.TexBuffer(GL_TEXTURE_BUFFER, GL_RGBA32F, buffers[number - 1]->name);
+        d->gl.TexBuffer(GL_TEXTURE_BUFFER, formats[unit], buffers[number - 1]->name);
     }
     return PATINA_OK;
 }

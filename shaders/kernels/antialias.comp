@@ -10,6 +10,7 @@
 //   STEP 0: find;   STEP 1: mix, an edge an invocation;   STEP 2: apply
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 #if STEP == 0
 #include "lib/tiles.glsl"
 #else
@@ -17,14 +18,11 @@ layout(local_size_x = 64) in;
 #endif
 
 layout(std430, binding = 0) readonly buffer arguments_block { antialias_args args; };
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) buffer from_block { uint from[]; };
-layout(std430, binding = 3) readonly buffer deff_block { float deff[]; };
 layout(std430, binding = 4) writeonly buffer color_block { vec4 color[]; };
 layout(std430, binding = 5) buffer counters_block { uint edge_count; };
 layout(std430, binding = 6) buffer edges_block { uint edges[]; };
 layout(std430, binding = 7) buffer mixed_block { vec4 mixed[]; };
-layout(binding = 0) uniform samplerBuffer old_color; // the colour plane too
 
 const ivec2 cross_offsets[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
 
@@ -39,7 +37,7 @@ uint neighbour(ivec2 size, int x, int y, int i)
 // Beyond this a neighbour is on another layer.
 float step_limit(bool layers, uint at, uint z_bits)
 {
-    precise float limit = pt_float(z_bits) + deff[from[at] & ~PT_FROM_MIXED];
+    precise float limit = pt_float(z_bits) + read_deff(read_from(at));
     return layers ? limit : pt_float(PT_KEY_EMPTY_Z);
 }
 
@@ -49,13 +47,13 @@ bool is_far(float z, float limit) { return z > limit || z == pt_float(PT_KEY_EMP
 
 bool is_edge(ivec2 size, bool layers, int x, int y)
 {
-    uint at = uint(y * size.x + x), z_bits = keys[at].y;
+    uint at = uint(y * size.x + x), z_bits = read_z_bits(at);
     if (z_bits == PT_KEY_EMPTY_Z)
         return false;
     float limit = step_limit(layers, at, z_bits);
     bool edge = false;
     for (int i = 0; i < 4; i++)
-        edge = is_far(pt_float(keys[neighbour(size, x, y, i)].y), limit) || edge;
+        edge = is_far(read_z(neighbour(size, x, y, i)), limit) || edge;
     return edge;
 }
 
@@ -93,22 +91,23 @@ void main()
     uint index = entry_index();
     if (index >= entries)
         return;
-    uint at = edges[index], z_bits = keys[at].y;
+    uint at = edges[index], z_bits = read_z_bits(at);
+    uvec2 pixel = pt_pixel(at, uint(size.x));
     float limit = step_limit(layers, at, z_bits);
     precise vec4 sum = vec4(0.0);
     float count = 0.0;
     for (int i = 0; i < 4; i++) {
-        uint q = neighbour(size, int(at) % size.x, int(at) / size.x, i);
-        float z = pt_float(keys[q].y);
+        uint q = neighbour(size, int(pixel.x), int(pixel.y), i);
+        float z = read_z(q);
         if (!is_far(z, limit))
             continue;
         count += 1.0;
         if (z < pt_float(PT_KEY_EMPTY_Z))
-            sum = sum + texelFetch(old_color, int(q));
+            sum = sum + read_float4(q);
     }
     precise float coverage = pt_max(0.833333313465 - count * 0.333333343267, 0.166666671634); // 5/6, 1/3, 1/6
     precise float share = (1.0 - coverage) * pt_rcp(count);
-    precise vec4 mix_color = texelFetch(old_color, int(at)) * coverage + sum * share;
+    precise vec4 mix_color = read_float4(at) * coverage + sum * share;
     mixed[index] = mix_color;
 }
 

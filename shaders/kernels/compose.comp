@@ -2,13 +2,12 @@
 // compose: colour over the background, into the crop; twin of native/device_cpu/kernels/compose.c
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { compose_args args; };
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 3) writeonly buffer combined_block { vec4 combined[]; };
-layout(binding = 0) uniform samplerBuffer color;
 
 void main()
 {
@@ -19,7 +18,7 @@ void main()
     if (x >= crop_width || y >= crop_height)
         return;
     uint at = (crop_y + y) * width + crop_x + x;
-    vec4 c = texelFetch(color, int(at));
+    vec4 c = read_float4(at);
     precise vec4 over = c + (1.0 - c.w) * background;
-    combined[y * crop_width + x] = keys[at].y == PT_KEY_EMPTY_Z ? background : over;
+    combined[y * crop_width + x] = read_z_bits(at) == PT_KEY_EMPTY_Z ? background : over;
 }

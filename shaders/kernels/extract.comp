@@ -3,21 +3,20 @@
 // is scan and what is invention); twin of native/device_cpu/kernels/extract.c
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { extract_args args; };
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 2) readonly buffer from_block { uint from[]; };
 layout(std430, binding = 4) writeonly buffer depth_block { float depth[]; };
 layout(std430, binding = 5) writeonly buffer normal_block { float normal[]; }; // 3 a pixel
 layout(std430, binding = 6) writeonly buffer source_block { float source[]; };
-layout(binding = 0) uniform samplerBuffer shading;
 
 float source_value(uint width, uint word, uint x, uint y)
 {
     uint origin = word & ~PT_FROM_MIXED;
-    float dx = float(int(origin % width) - int(x)), dy = float(int(origin / width) - int(y));
+    uvec2 from = pt_pixel(origin, width);
+    float dx = float(int(from.x) - int(x)), dy = float(int(from.y) - int(y));
     precise float square = dx * dx + dy * dy;
     precise float distance_to = 1.0 + square * pt_rsqrt(square);
     float value = square > 0.0 ? distance_to : 1.0;
@@ -38,18 +37,18 @@ void main()
     if (x >= crop_width || y >= crop_height)
         return;
     uint at = (crop_y + y) * width + crop_x + x, to = y * crop_width + x;
-    uint z_bits = keys[at].y;
+    uint z_bits = read_z_bits(at);
     bool some = z_bits != PT_KEY_EMPTY_Z;
 #if PLANE == 0
     depth[to] = pt_float(z_bits);
 #elif PLANE == 1
-    vec3 v = texelFetch(shading, int(at)).xyz;
+    vec3 v = read_float4(at).xyz;
     vec3 n = some ? vec3(pt_dot(row_x, v), pt_dot(row_y, v), pt_dot(row_z, v)) : vec3(0.0);
     normal[3u * to] = n.x;
     normal[3u * to + 1u] = n.y;
     normal[3u * to + 2u] = n.z;
 #else
-    uint word = some ? from[at] : at;
+    uint word = texelFetch(from_plane, int(at)).x;
     source[to] = some ? source_value(width, word, crop_x + x, crop_y + y) : 0.0;
 #endif
 }

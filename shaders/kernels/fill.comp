@@ -8,6 +8,7 @@
 //   STEP 0: find the pixels to fill;   STEP 1: what they become;   STEP 2: apply;   STEP 3: mark;   STEP 4: restore
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 #if STEP == 0
 #include "lib/tiles.glsl"
 #else
@@ -26,16 +27,14 @@ struct saved_pixel { // as it was before the phase
 };
 
 layout(std430, binding = 0) readonly buffer arguments_block { fill_args args; };
-layout(std430, binding = 1) buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 2) buffer from_block { uint from[]; };
-layout(std430, binding = 4) readonly buffer deff_block { float deff[]; };
+layout(std430, binding = 1) writeonly buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = 2) writeonly buffer from_block { uint from[]; };
 layout(std430, binding = 5) buffer counters_block { uint changed_count, saved_count, woken_count; };
 layout(std430, binding = 6) buffer changed_block { change changed[]; };
 layout(std430, binding = 7) buffer saved_block { saved_pixel saved[]; };
 layout(std430, binding = 8) buffer filled_block { uint filled[]; }; // a bit a pixel: filled in this phase
 layout(std430, binding = 9) buffer stamps_block { uint stamps[]; }; // a word a tile: the step it was listed for last
 layout(std430, binding = 10) buffer woken_block { uint woken[]; };  // tiles for the next step
-layout(binding = 0) uniform samplerBuffer normals;
 
 layout(location = 0) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
 layout(location = 1) uniform uint stamp;   // of this step
@@ -49,13 +48,13 @@ const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(1, 1), ivec2(0, 1), ivec2(-1, 
 float z_at(ivec2 size, int x, int y)
 {
     bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
-    float z = pt_float(keys[inside ? uint(y * size.x + x) : 0u].y);
+    float z = read_z(inside ? uint(y * size.x + x) : 0u);
     return inside ? z : pt_float(PT_KEY_EMPTY_Z);
 }
 
 float own_distance(view_args view, uint source, float z)
 {
-    return pt_level_distance(view, deff[source], texelFetch(normals, int(source)).w, z);
+    return pt_level_distance(view, read_deff(source), read_float4(source).w, z);
 }
 
 #if STEP == 0
@@ -67,7 +66,7 @@ bool candidate(view_args view, uint pixel, float z, out float threshold)
     threshold = empty;
 #if OCCLUDED
     bool some = z < empty;
-    precise float t = z - own_distance(view, some ? from[pixel] : 0u, z);
+    precise float t = z - own_distance(view, some ? read_from(pixel) : 0u, z);
     threshold = t;
     return some;
 #else
@@ -124,29 +123,28 @@ void main()
     if (index >= entries)
         return;
     uint pixel = changed[index].pixel;
-    int x = int(pixel % view.width), y = int(pixel / view.width);
+    ivec2 place = ivec2(pt_pixel(pixel, view.width));
+    int x = place.x, y = place.y;
     uvec2 key = uvec2(0xFFFFFFFFu);
-    ivec2 best = ivec2(x, y);
+    ivec2 best = place;
     for (int d = 0; d < 8; d++) {
-        ivec2 at = ivec2(x, y) + ring[d];
-        if (at.x < 0 || at.y < 0 || at.x >= size.x || at.y >= size.y)
-            continue;
-        uvec2 other = keys[uint(at.y * size.x + at.x)];
-        if (pt_key_less(other, key)) {
-            key = other;
-            best = at;
-        }
+        ivec2 at = place + ring[d];
+        bool inside = at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
+        uvec2 other = read_key(inside ? uint(at.y * size.x + at.x) : pixel);
+        bool less = inside && pt_key_less(other, key);
+        key = less ? other : key;
+        best = less ? at : best;
     }
-    uint source = from[uint(best.y * size.x + best.x)];
+    uint source = texelFetch(from_plane, best.y * size.x + best.x).x;
     if (refined) {
         float z = pt_float(key.y);
-        z = pt_plane_depth(view, texelFetch(normals, int(source)).xyz, pt_ray(view, best.x, best.y), z,
+        z = pt_plane_depth(view, read_float4(source).xyz, pt_ray(view, best.x, best.y), z,
                            pt_ray(view, x, y), own_distance(view, source, z));
         key.y = pt_bits(z);
     }
-    precise float threshold = pt_float(keys[pixel].y);
+    precise float threshold = read_z(pixel);
     if (occluded)
-        threshold = threshold - own_distance(view, from[pixel], threshold);
+        threshold = threshold - own_distance(view, read_from(pixel), threshold);
     changed[index] = change(pixel, key.x, key.y, source, threshold);
 }
 
@@ -173,11 +171,12 @@ void main()
     if (index >= entries)
         return;
     change c = changed[index];
-    uvec2 old_key = keys[c.pixel];
-    uint old_from = from[c.pixel];
+    uvec2 old_key = read_key(c.pixel);
+    uint old_from = texelFetch(from_plane, int(c.pixel)).x;
     keys[c.pixel] = uvec2(c.id, c.z);
     from[c.pixel] = c.from;
-    wake_tiles(rect, c.pixel % width, c.pixel / width);
+    uvec2 place = pt_pixel(c.pixel, width);
+    wake_tiles(rect, place.x, place.y);
     if (!unfills)
         return;
     uint bit = 1u << (c.pixel & 31u);
@@ -198,11 +197,11 @@ void main()
     uint index = entry_index();
     if (index >= entries || saved[index].pixel == NO_PIXEL)
         return;
-    int pixel = int(saved[index].pixel), x = pixel % size.x, y = pixel / size.x;
+    ivec2 place = ivec2(pt_pixel(saved[index].pixel, uint(size.x)));
     float threshold = saved[index].threshold;
     uint white = 0u;
     for (int d = 0; d < 8; d++)
-        white |= uint(!(z_at(size, x + ring[d].x, y + ring[d].y) < threshold)) << d;
+        white |= uint(!(z_at(size, place.x + ring[d].x, place.y + ring[d].y) < threshold)) << d;
     saved[index].restore = uint(pt_four_white(white));
 }
 

@@ -5,10 +5,10 @@
 // can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
 layout(std430, binding = 0) readonly buffer arguments_block { normals_args args; };
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
 layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
 
@@ -28,7 +28,7 @@ window_sums gather(view_args view, int radius, int x, int y, float z, float w, f
             int qx = x + dx, qy = y + dy;
             if (qx < 0 || qy < 0 || qx >= int(view.width) || qy >= int(view.height))
                 continue;
-            float zq = pt_float(keys[uint(qy) * view.width + uint(qx)].y);
+            float zq = read_z(uint(qy) * view.width + uint(qx));
             precise float apart = zq - z;
             precise float reach = slope * float(max(abs(dx), abs(dy)));
             if (!(pt_abs(apart) <= pt_max(distance_limit, reach)))
@@ -81,7 +81,7 @@ vec3 fit(view_args view, window_sums s, float w, vec2 ray)
 void normal_pixel(view_args view, int radius, uint id_base, uint id_count, float d_min, uint x, uint y)
 {
     uint at = y * view.width + x;
-    uvec2 key = keys[at];
+    uvec2 key = read_key(at);
     uint id = key.x - id_base;
     if (key.y == PT_KEY_EMPTY_Z || id >= id_count)
         return;

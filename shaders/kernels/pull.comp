@@ -3,12 +3,11 @@
 // native/device_cpu/kernels/pull.c
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { pull_args args; };
-layout(std430, binding = 1) readonly buffer fine_keys_block { uvec2 fine_keys[]; };
-layout(std430, binding = 2) readonly buffer fine_from_block { uint fine_from[]; };
 layout(std430, binding = 3) writeonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 4) writeonly buffer from_block { uint from[]; };
 
@@ -20,15 +19,16 @@ void main()
     if (x >= rect.z || y >= rect.w)
         return;
     uint best = 2u * y * fine_width + 2u * x;
-    uvec2 key = fine_keys[best];
+    uvec2 key = read_key(best);
     for (uint child = 1u; child < 4u; child++) {
         uint fx = 2u * x + (child & 1u), fy = 2u * y + (child >> 1);
-        uint at = fy * fine_width + fx;
-        if (fx < fine_width && fy < fine_height && pt_key_less(fine_keys[at], key)) {
-            best = at;
-            key = fine_keys[at];
-        }
+        bool inside = fx < fine_width && fy < fine_height;
+        uint at = inside ? fy * fine_width + fx : best;
+        uvec2 other = read_key(at);
+        bool less = pt_key_less(other, key);
+        best = less ? at : best;
+        key = less ? other : key;
     }
     keys[y * width + x] = key;
-    from[y * width + x] = fine_from[best];
+    from[y * width + x] = texelFetch(from_plane, int(best)).x;
 }

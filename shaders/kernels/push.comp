@@ -3,22 +3,19 @@
 // are covered too (else every edge would grow by a coarse pixel). SPEC 2.2; twin of native/device_cpu/kernels/push.c
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { push_args args; };
-layout(std430, binding = 1) readonly buffer coarse_keys_block { uvec2 coarse_keys[]; };
-layout(std430, binding = 2) readonly buffer coarse_from_block { uint coarse_from[]; };
 layout(std430, binding = 3) buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 4) buffer from_block { uint from[]; };
-layout(std430, binding = 6) readonly buffer deff_block { float deff[]; };
-layout(binding = 0) uniform samplerBuffer normals;
 
 float coarse_z(ivec2 size, int x, int y)
 {
-    if (x < 0 || y < 0 || x >= size.x || y >= size.y)
-        return pt_float(PT_KEY_EMPTY_Z);
-    return pt_float(coarse_keys[y * size.x + x].y);
+    bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
+    float z = read_z(inside ? uint(y * size.x + x) : 0u);
+    return inside ? z : pt_float(PT_KEY_EMPTY_Z);
 }
 
 void main()
@@ -35,7 +32,7 @@ void main()
     precise float t = pt_float(keys[at].y);
     if (t < pt_float(PT_KEY_EMPTY_Z)) {
         uint own = from[at];
-        t = t - pt_level_distance(view, deff[own], texelFetch(normals, int(own)).w, t);
+        t = t - pt_level_distance(view, read_deff(own), read_float4(own).w, t);
     }
     // 2. the parent and the three coarse cells on this pixel's side
     int px = int(x >> 1), py = int(y >> 1), sx = (x & 1u) != 0u ? 1 : -1, sy = (y & 1u) != 0u ? 1 : -1;
@@ -48,15 +45,15 @@ void main()
         return;
     // 3. its key; refined: its surface's tangent plane here
     uint parent = uint(py * coarse_size.x + px);
-    uint source = coarse_from[parent];
+    uint source = texelFetch(from_plane, int(parent)).x;
     if (refined) {
         view_args coarse = view;
         coarse.level++;
         vec2 ray_p = pt_ray(view, int(x), int(y)), ray_q = pt_ray(coarse, px, py);
-        vec4 normal = texelFetch(normals, int(source));
-        float limit = pt_level_distance(coarse, deff[source], normal.w, z);
+        vec4 normal = read_float4(source);
+        float limit = pt_level_distance(coarse, read_deff(source), normal.w, z);
         z = pt_plane_depth(view, normal.xyz, ray_q, z, ray_p, limit);
     }
-    keys[at] = uvec2(coarse_keys[parent].x, pt_bits(z));
+    keys[at] = uvec2(read_key(parent).x, pt_bits(z));
     from[at] = source;
 }

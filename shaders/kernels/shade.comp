@@ -2,10 +2,11 @@
 // shade: id -> colour and normal, Phong. [D 3.1], deferred: only what the picture shows is lit; twin of
 // native/device_cpu/kernels/shade.c
 //
-// STEP 0: normals of pixels as their sources have them; filled ones are listed (refined);
-// STEP 1: the listed ones' normals, blended;   STEP 2: colour, by COLOR_FORMAT and LIT
+// STEP 0: normals; filled pixels take theirs from their neighbours (REFINED), those filled from afar are listed;
+// STEP 1: the listed ones' normals;   STEP 2: colour, by COLOR_FORMAT and LIT
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 #include "lib/srgb.glsl"
 #if STEP == 1
 layout(local_size_x = 64) in;
@@ -14,83 +15,133 @@ layout(local_size_x = 64) in;
 #endif
 
 layout(std430, binding = 0) readonly buffer arguments_block { shade_args args; };
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 2) readonly buffer from_block { uint from[]; };
-layout(std430, binding = 4) readonly buffer deff_block { float deff[]; };
 layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; };
 layout(std430, binding = 7) writeonly buffer shading_block { vec4 shading[]; };
 layout(std430, binding = 8) writeonly buffer color_block { vec4 color[]; };
-layout(std430, binding = 9) buffer counters_block { uint filled_count; };
-layout(std430, binding = 10) buffer filled_block { uint filled_pixels[]; };
-layout(binding = 0) uniform samplerBuffer normals;
-layout(binding = 1) uniform samplerBuffer shading_normals; // the shading plane too
+layout(std430, binding = 9) buffer counters_block { uint far_count; };
+layout(std430, binding = 10) buffer far_block { uint far_pixels[]; };
+
+// The normal of a filled pixel, refined: measured neighbours of the same layer, as far as the pixel it was filled from,
+// weighted by 1 / (1 + distance^2); the source's own normal where there are none.
+vec3 finish_blend(vec3 sum, uint source)
+{
+    float square = pt_dot(sum, sum);
+    precise vec3 unit = sum * pt_rsqrt(square);
+    return 1e-12 < square ? unit : read_float4(source).xyz;
+}
 
 #if STEP == 0
 
-// 1. the point   2. its normal
-void source_normal(view_args view, uint id_base, uint id_count, bool refined, uint x, uint y)
+// What a neighbour gives to a blend: its normal, and its z if it was measured, else +inf.
+vec4 read_tap(ivec2 size, int x, int y)
 {
-    uint at = y * view.width + x;
-    uvec2 key = keys[at];
-    if (key.x - id_base >= id_count || key.y == PT_KEY_EMPTY_Z)
-        return;
-    uint source = from[at] & ~PT_FROM_MIXED;
-    shading[at] = vec4(texelFetch(normals, int(source)).xyz, 0.0);
-    if (refined && source != at)
-        filled_pixels[atomicAdd(filled_count, 1u)] = at;
+    bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
+    uint at = inside ? uint(y * size.x + x) : 0u;
+    vec4 tap = vec4(read_float4(at).xyz, read_z(at));
+    if (!inside || read_from(at) != at)
+        tap.w = pt_float(PT_KEY_EMPTY_Z);
+    return tap;
+}
+
+struct tap_row {
+    vec4 west, middle, east;
+};
+
+tap_row read_row(ivec2 size, int x, int y)
+{
+    return tap_row(read_tap(size, x - 1, y), read_tap(size, x, y), read_tap(size, x + 1, y));
+}
+
+void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum)
+{
+    precise float apart = tap.w - z;
+    precise vec3 more = sum + tap.xyz * weight;
+    sum = pt_abs(apart) <= limit ? more : sum;
+}
+
+void add_row(tap_row row, float z, float limit, float side, float middle, inout vec3 sum)
+{
+    add_tap(row.west, z, limit, side, sum);
+    add_tap(row.middle, z, limit, middle, sum);
+    add_tap(row.east, z, limit, side, sum);
+}
+
+// Whether one of the eight neighbours has this index: it differs by -1, 0 or 1 plus -width, 0 or width.
+bool is_near(uint at, uint source, uint width)
+{
+    return source - at + 1u < 3u || source + width - at + 1u < 3u || source - width - at + 1u < 3u;
 }
 
 void main()
 {
     view_args view = args.view;
     uint id_base = args.instance.id_base, id_count = args.instance.id_count;
-    bool refined = args.refined != 0u;
+    ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
-        source_normal(view, id_base, id_count, refined, column.x, y);
+    uint end = pt_tile_end(view, column), listed = 0u;
+    int x = int(column.x);
+#if REFINED
+    float edge = pt_rcp(2.0), corner = pt_rcp(3.0);
+    tap_row below = read_row(size, x, int(column.y) - 1), row = read_row(size, x, int(column.y));
+#endif
+    for (uint y = column.y; y < end; y++) {
+        uint at = y * view.width + column.x;
+        uvec2 key = read_key(at);
+        uint source = read_from(at);
+        bool ours = key.x - id_base < id_count && key.y != PT_KEY_EMPTY_Z;
+        source = ours ? source : at;
+#if REFINED
+        tap_row above = read_row(size, x, int(y) + 1);
+        float z = pt_float(key.y), limit = read_deff(source);
+        vec3 sum = vec3(0.0);
+        add_row(below, z, limit, corner, edge, sum);
+        add_row(row, z, limit, edge, pt_rcp(1.0), sum);
+        add_row(above, z, limit, corner, edge, sum);
+        vec3 blend = finish_blend(sum, source);
+        vec3 normal = source == at ? row.middle.xyz : blend;
+        listed |= uint(source != at && !is_near(at, source, view.width)) << (y - column.y);
+        below = row;
+        row = above;
+#else
+        vec3 normal = read_float4(source).xyz;
+#endif
+        if (ours)
+            shading[at] = vec4(normal, 0.0);
+    }
+    if (listed == 0u)
+        return;
+    uint to = atomicAdd(far_count, uint(bitCount(listed)));
+    for (; listed != 0u; listed &= listed - 1u, to++)
+        far_pixels[to] = (column.y + uint(findLSB(listed))) * view.width + column.x;
 }
 
 #elif STEP == 1
 
 layout(location = 0) uniform uint entries;
 
-// The normal of a filled pixel, refined: measured neighbours of the same layer, as far as the pixel it was filled from,
-// weighted by 1 / (1 + distance^2); the source's own normal where there are none.
-vec3 blend_normal(view_args view, int x, int y, float z, uint source)
-{
-    int width = int(view.width), height = int(view.height);
-    int sx = abs(int(source % view.width) - x), sy = abs(int(source / view.width) - y);
-    int r = min(max(sx, sy), 8);
-    float limit = deff[source];
-    precise vec3 n = vec3(0.0);
-    for (int dy = -r; dy <= r; dy++)
-        for (int dx = -r; dx <= r; dx++) {
-            int qx = x + dx, qy = y + dy;
-            if (qx < 0 || qy < 0 || qx >= width || qy >= height)
-                continue;
-            uint q = uint(qy) * view.width + uint(qx);
-            precise float apart = pt_float(keys[q].y) - z;
-            if (!(pt_abs(apart) <= limit) || (from[q] & ~PT_FROM_MIXED) != q)
-                continue;
-            n = n + texelFetch(normals, int(q)).xyz * pt_rcp(float(1 + dx * dx + dy * dy));
-        }
-    return n;
-}
-
 void main()
 {
     view_args view = args.view;
+    int width = int(view.width), height = int(view.height);
     uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
                  gl_LocalInvocationID.x;
     if (index >= entries)
         return;
-    uint at = filled_pixels[index];
-    vec3 blend = blend_normal(view, int(at % view.width), int(at / view.width), pt_float(keys[at].y),
-                              from[at] & ~PT_FROM_MIXED);
-    float square = pt_dot(blend, blend);
-    precise vec3 unit = blend * pt_rsqrt(square);
-    if (square > 1e-12)
-        shading[at] = vec4(unit, 0.0);
+    uint at = far_pixels[index], source = read_from(at);
+    ivec2 place = ivec2(pt_pixel(at, view.width)), apart_by = abs(ivec2(pt_pixel(source, view.width)) - place);
+    int r = min(max(apart_by.x, apart_by.y), 8);
+    float z = read_z(at), limit = read_deff(source);
+    precise vec3 sum = vec3(0.0);
+    for (int dy = -r; dy <= r; dy++)
+        for (int dx = -r; dx <= r; dx++) {
+            int qx = place.x + dx, qy = place.y + dy;
+            bool inside = qx >= 0 && qy >= 0 && qx < width && qy < height;
+            uint q = inside ? uint(qy * width + qx) : at;
+            precise float apart = read_z(q) - z;
+            precise vec3 more = sum + read_float4(q).xyz * pt_rcp(float(1 + dx * dx + dy * dy));
+            sum = inside && pt_abs(apart) <= limit && read_from(q) == q ? more : sum;
+        }
+    shading[at] = vec4(finish_blend(sum, source), 0.0);
 }
 
 #else
@@ -186,7 +237,7 @@ void main()
     uvec2 column = pt_tile_column(view);
     for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
         uint at = y * view.width + column.x;
-        uvec2 key = keys[at];
+        uvec2 key = read_key(at);
         uint id = key.x - id_base;
         if (id >= id_count || key.y == PT_KEY_EMPTY_Z)
             continue;
@@ -194,7 +245,7 @@ void main()
         p.z = pt_float(key.y);
         p.ray = pt_ray(view, int(column.x), int(y));
         p.albedo = gather_albedo(style, id);
-        p.n = texelFetch(shading_normals, int(at)).xyz;
+        p.n = texelFetch(other_float4_plane, int(at)).xyz;
         // 3. light
 #if LIT
         vec3 c = phong(view, eye_z, factors, shininess, world, light_count, p);

@@ -2,15 +2,14 @@
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/surface.c
 #version 430 core
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
 layout(std430, binding = 0) readonly buffer arguments_block { surface_args args; };
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
 layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
 layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = 4) writeonly buffer deff_block { float deff[]; };
 layout(std430, binding = 5) writeonly buffer from_block { uint from[]; };
-layout(binding = 0) uniform samplerBuffer estimates; // the normal plane too
 
 struct instance_part {
     uint id_base, id_count;
@@ -23,7 +22,7 @@ void surface_pixel(view_args view, instance_part instance, uint x, uint y)
 {
     uint at = y * view.width + x;
     // 1. the point
-    uvec2 key = keys[at];
+    uvec2 key = read_key(at);
     uint id = key.x - instance.id_base;
     if (id >= instance.id_count || key.y == PT_KEY_EMPTY_Z)
         return;
@@ -36,7 +35,7 @@ void surface_pixel(view_args view, instance_part instance, uint x, uint y)
     vec3 n = vec3(pt_dot(instance.rows[0], object), pt_dot(instance.rows[1], object), pt_dot(instance.rows[2], object));
     bool none = (word & PT_NORMAL_BITS) == PT_NORMAL_NONE;
     if (!instance.has_normals) {
-        n = texelFetch(estimates, int(at)).xyz;
+        n = read_float4(at).xyz;
         none = false;
     }
     float square = pt_dot(n, n);

@@ -141,6 +141,22 @@ float pt_plane_depth(view_args view, vec3 n, vec2 ray_q, float z_q, vec2 ray_p, 
     return pt_min(pt_max(z, z_q), farthest);
 }
 
+// Column and row of a pixel's index in a plane of this width (at most 2^22 rows): integer division costs llvmpipe 20
+// times what this does. The float quotient is off by one at most.
+uvec2 pt_pixel(uint index, uint width)
+{
+    uint row = uint(float(index) / float(width));
+    int column = int(index - row * width);
+    if (column < 0) {
+        row--;
+        column += int(width);
+    } else if (column >= int(width)) {
+        row++;
+        column -= int(width);
+    }
+    return uvec2(uint(column), row);
+}
+
 // Bit i of white: ring neighbour i is white, counted anticlockwise. True when five (four) consecutive ones are.
 bool pt_five_white(uint white)
 {

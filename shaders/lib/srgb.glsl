@@ -3,13 +3,8 @@
 #ifndef PT_SRGB_GLSL
 #define PT_SRGB_GLSL
 
-layout(std140, binding = 0) uniform srgb_block { vec4 srgb_table[64]; };
+layout(std140, binding = 0) uniform srgb_block { vec4 srgb_table[256]; }; // in x
 
-float pt_srgb(uint value)
-{
-    vec4 four = srgb_table[value >> 2];
-    vec2 two = (value & 2u) != 0u ? four.zw : four.xy;
-    return (value & 1u) != 0u ? two.y : two.x;
-}
+float pt_srgb(uint value) { return srgb_table[value].x; }
 
 #endif

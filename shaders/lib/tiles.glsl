@@ -5,7 +5,7 @@
 #ifndef PT_TILES_GLSL
 #define PT_TILES_GLSL
 
-#include "shared/kernel_args.h"
+#include "lib/math.glsl"
 
 #define PT_TILE_X 32u
 #define PT_TILE_Y 8u
@@ -21,7 +21,7 @@ uvec2 pt_tile_column(view_args view)
 {
     uint index = min(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, tile_count - 1u);
     uint tile = tile_list[index];
-    uvec2 corner = uvec2(tile % tile_columns, tile / tile_columns) * uvec2(PT_TILE_X, PT_TILE_Y);
+    uvec2 corner = pt_pixel(tile, tile_columns) * uvec2(PT_TILE_X, PT_TILE_Y);
     return uvec2(view.rect[0], view.rect[1]) + corner + uvec2(gl_LocalInvocationID.x, 0u);
 }
 

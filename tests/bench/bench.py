@@ -59,6 +59,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     os.environ["PATINA_LIBRARY"] = str(options.library)
     result = {
         "date": datetime.date.today().isoformat(), "processor": machine.processor(), "cores": machine.cores(),
+        "load": os.getloadavg()[0],
         "version": one_case.native.library().patina_version().decode(), "frames": options.frames,
         "distance": truth.DISTANCE, "elevation": truth.ELEVATION, "fov": truth.FOV,
         "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1), "rows": [],

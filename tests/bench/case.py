@@ -41,7 +41,8 @@ def scene_of(cloud: native.Cloud, case: dict[str, Any]) -> native.Scene:
 
 
 def frames(frame: native.Frame, scene: native.Scene, count: int) -> tuple[list[float], dict[str, float], dict[str, str]]:
-    """Times of a camera that turns one degree a frame; medians of the passes; reasons of those left out."""
+    """Times of a camera that turns one degree a frame; medians of the passes and of what is in none of them ("rest");
+    reasons of those left out."""
     times, passes, skipped = [], {}, {}
     for i in range(count + WARM_UP):
         scene.set_camera(**truth.view(float(i)).fields())
@@ -52,8 +53,9 @@ def frames(frame: native.Frame, scene: native.Scene, count: int) -> tuple[list[f
             continue
         times.append(elapsed)
         stats = frame.pass_stats()
-        skipped = stats.get("skipped", {})
-        for name, ms in stats.get("passes", {}).items():
+        skipped = stats["skipped"]
+        rest = elapsed - sum(stats["passes"].values())
+        for name, ms in {**stats["passes"], "rest": rest}.items():
             passes.setdefault(name, []).append(ms)
     return times, {name: median(values) for name, values in passes.items()}, skipped
 

@@ -24,6 +24,13 @@ def name_of(row: Row) -> str:
     return f"{row.get('device_name', row['device'])}{threads}"
 
 
+def _pass_names(rows: list[Row]) -> list[str]:
+    """In the order of the frame, what is in no pass last."""
+    names = list(dict.fromkeys(name for row in rows for name in row["passes"] if name != "rest"))
+    order = sorted(names, key=lambda name: max(list(row["passes"]).index(name) for row in rows if name in row["passes"]))
+    return [*order, "rest"]
+
+
 def times_table(rows: list[Row]) -> str:
     head = ["device", "points", "quality", "ms median", "min–max", "floor ms", "× floor", "upload ms", "peak MB",
             "planes MB", "cloud B/pt"]
@@ -50,13 +57,12 @@ def errors_table(rows: list[Row]) -> str:
 
 
 def passes_table(rows: list[Row]) -> str:
-    names = list(dict.fromkeys(name for row in rows for name in row["passes"]))
+    names = _pass_names(rows)
     body = []
     for r in rows:
-        rest = r["ms_median"] - sum(r["passes"].values())
         cells = [f"{r['passes'][name]:.2f}" if name in r["passes"] else "–" for name in names]
-        body.append([name_of(r), _count(r["points"]), r["quality"], *cells, f"{rest:.2f}"])
-    return _table(["device", "points", "quality", *names, "rest"], body)
+        body.append([name_of(r), _count(r["points"]), r["quality"], *cells])
+    return _table(["device", "points", "quality", *names], body)
 
 
 def markdown(result: dict[str, Any]) -> str:
@@ -66,7 +72,8 @@ def markdown(result: dict[str, Any]) -> str:
             f"{result['processor']}, {result['cores']} cores. Patina {result['version']}. Random torus (R 1, r 0.4), "
             f"normals and colours, lit by a sun, culled; camera {result['distance']} away, {result['elevation']}° up, "
             f"field of view {result['fov']}°, 1024×1024; at least {result['frames']} frames, one degree apart, after a "
-            "warm-up. All passes of the surface pipeline.", "",
+            f"warm-up. All passes of the surface pipeline. Load average when it began: {result['load']:.1f} (other programs' "
+            "share of the processor shows in the maxima).", "",
             f"Floor: 12 bytes a point and the bytes of all planes ÷ {result['bandwidth']:.1f} GB/s, what a copy by "
             f"numpy on {result['cores']} threads moves (read + written); a single thread: "
             f"{result['bandwidth_one']:.1f} GB/s.", "",
@@ -104,8 +111,8 @@ def plot(result: dict[str, Any], path: Path) -> None:
     labels = [f"{name_of(r)}\n{_count(r['points'])} {r['quality']}" for r in rows]
     bottom = [0.0] * len(rows)
     right.set_prop_cycle(color=plt.get_cmap("tab20").colors)
-    for name in dict.fromkeys(name for r in rows for name in r["passes"]):
-        share = [100.0 * r["passes"].get(name, 0.0) / r["ms_median"] for r in rows]
+    for name in _pass_names(rows):
+        share = [100.0 * max(r["passes"].get(name, 0.0), 0.0) / r["ms_median"] for r in rows]
         right.bar(labels, share, bottom=bottom, label=name)
         bottom = [b + s for b, s in zip(bottom, share)]
     right.set(ylabel="% of the frame", title="Where the time goes", ylim=(0, 105))

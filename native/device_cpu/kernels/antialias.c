@@ -129,8 +129,8 @@ int PT_KERNEL_ENTRY(antialias)(const struct pt_cpu_call *call)
         return PATINA_OK;
     uint32_t bands = (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS;
     job.band_edges = (size_t)(rect[2] - rect[0]) * BAND_ROWS;
-    job.edges = pt_cpu_scratch(call, 2, bands * job.band_edges * sizeof *job.edges);
-    job.counts = pt_cpu_scratch(call, 1, bands * sizeof *job.counts);
+    job.edges = pt_cpu_scratch(call, 1, bands * job.band_edges * sizeof *job.edges);
+    job.counts = pt_cpu_scratch(call, 0, bands * sizeof *job.counts);
     if (!job.edges || !job.counts)
         return PATINA_ERROR_MEMORY;
     memset(job.counts, 0, bands * sizeof *job.counts);

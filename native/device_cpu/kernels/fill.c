@@ -397,8 +397,8 @@ static int allocate(struct fill *fill)
     fill->row_stride = view->width + 2 * PAD;
     size_t words = fill->words * view->height, room = count * fill->band_entries + PT_LANES;
     size_t rows = threads * 4 * fill->row_stride;
-    uint8_t *lists = pt_cpu_scratch(fill->call, 2, room * 36);
-    uint8_t *memory = pt_cpu_scratch(fill->call, 1, words * 10 + rows * 4 + count * 8);
+    uint8_t *lists = pt_cpu_scratch(fill->call, 1, room * 36);
+    uint8_t *memory = pt_cpu_scratch(fill->call, 0, words * 10 + rows * 4 + count * 8);
     if (!lists || !memory)
         return PATINA_ERROR_MEMORY;
     e->key = (uint64_t *)lists;

