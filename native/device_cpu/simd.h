@@ -458,4 +458,37 @@ static inline vf vf_layer_distance(const struct view_args *view, float d_min, vf
     return d * inverse;
 }
 
+// d_eff at this view's level of pixels whose surface comes from the measured pixels `source`.
+static inline vf vf_level_distance(const struct view_args *view, const float *deff, const float *normals, vi source, vf z,
+                                   vm lanes)
+{
+    vf d = vf_gather(deff, source, lanes);
+    if (view->level) {
+        vf inverse = vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(3)), lanes);
+        d = vf_max(d, vf_footprint(view, z) * inverse);
+    }
+    return d;
+}
+
+static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], const vf ray_q[2], vf z_q, const vf ray_p[2],
+                                vf limit)
+{
+    const vf zero = vf_zero(), one = vf_set(1.0f);
+    vf z = z_q;
+    if (view->perspective) {
+        vf dot_q = (n[0] * ray_q[0] + n[1] * ray_q[1]) - n[2], dot_p = (n[0] * ray_p[0] + n[1] * ray_p[1]) - n[2];
+        vf sign = vf_select(vf_lt(dot_p, zero), vf_set(-1.0f), one), size = vf_abs(dot_p);
+        vm good = vf_lt(vf_set(1e-6f), size);
+        vf r = vf_rcp(vf_select(good, size, one));
+        z = vf_select(good, (z_q * (dot_q * sign)) * r, z);
+    } else {
+        vf sign = vf_select(vf_lt(n[2], zero), vf_set(-1.0f), one), size = vf_abs(n[2]);
+        vm good = vf_lt(vf_set(1e-6f), size);
+        vf r = vf_rcp(vf_select(good, size, one));
+        vf rise = (n[0] * (ray_p[0] - ray_q[0]) + n[1] * (ray_p[1] - ray_q[1])) * sign;
+        z = vf_select(good, z_q + rise * r, z);
+    }
+    return vf_min(vf_max(z, z_q), z_q + limit);
+}
+
 #endif

@@ -105,7 +105,7 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const struct view_args *view);
 void pt_gl_tiles_forget(struct pt_gl_device *d); // keys changed
 int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list);
-// A workgroup for each of `count` tiles of the list bound at PT_GL_BINDING_TILES.
+// Workgroups for `count` tiles of the list bound at PT_GL_BINDING_TILES.
 int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count);
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);

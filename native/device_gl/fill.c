@@ -5,12 +5,12 @@
 
 enum {
     ENTRY_GROUP = 64, // as in fill.comp
-    CHANGE_SIZE = 20, // struct change
+    CHANGE_SIZE = 16, // struct change
     SAVED_SIZE = 24,  // struct saved_pixel
     LEAST_ENTRIES = 1 << 16,
 };
 
-enum program { FIND_EMPTY, FIND_OCCLUDED, DECIDE, APPLY, MARK, RESTORE };
+enum program { FIND_EMPTY, FIND_OCCLUDED, DECIDE, APPLY, WAKE, MARK, RESTORE };
 
 struct counters {
     uint32_t changed, saved, woken;
@@ -40,9 +40,10 @@ static int programs(struct fill *f)
                                               "#define STEP 1\n",
                                               "#define STEP 2\n",
                                               "#define STEP 3\n",
-                                              "#define STEP 4\n"};
+                                              "#define STEP 4\n",
+                                              "#define STEP 5\n"};
     int result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, f->find, definitions[f->find]);
-    for (uint32_t p = DECIDE; p <= (f->args->unfills ? RESTORE : APPLY) && result == PATINA_OK; p++)
+    for (uint32_t p = DECIDE; p <= (f->args->unfills ? RESTORE : WAKE) && result == PATINA_OK; p++)
         result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, p, definitions[p]);
     return result;
 }
@@ -51,6 +52,7 @@ static int prepare(struct fill *f)
 {
     const struct view_args *view = &f->args->view;
     const GladGLContext *gl = &f->d->gl;
+    int refills = f->args->unfills && f->args->occluded; // an empty pixel is filled once
     size_t bits = ((size_t)view->width * view->height + 31) / 32 * 4;
     size_t tiles = (size_t)f->d->tiles.columns * f->d->tiles.rows * 4;
     int result = programs(f);
@@ -61,12 +63,12 @@ static int prepare(struct fill *f)
     if (result == PATINA_OK)
         result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, f->args->unfills ? LEAST_ENTRIES * SAVED_SIZE : 16, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 8, PT_GL_SCRATCH_FILLED, f->args->unfills ? bits : 16, 0);
+        result = bind_scratch(f, 8, PT_GL_SCRATCH_FILLED, refills ? bits : 16, 0);
     if (result == PATINA_OK)
         result = bind_scratch(f, 9, PT_GL_SCRATCH_STAMPS, tiles, 0);
     if (result == PATINA_OK)
         result = bind_scratch(f, 10, PT_GL_SCRATCH_WOKEN, tiles, 0);
-    if (result != PATINA_OK || !f->args->unfills)
+    if (result != PATINA_OK || !refills)
         return result;
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_FILLED].name);
     gl->ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)bits, GL_RED_INTEGER, GL_UNSIGNED_INT, NULL);
@@ -92,10 +94,10 @@ static int dispatch_entries(struct fill *f, enum program p, uint32_t entries)
     uint32_t x, y;
     pt_gl_grid((entries + ENTRY_GROUP - 1) / ENTRY_GROUP, &x, &y);
     f->d->gl.ProgramUniform1ui(program, 0, entries);
-    if (p == APPLY) {
+    if (p == APPLY || p == WAKE)
         f->d->gl.ProgramUniform1ui(program, 1, f->d->stamp);
+    if (p == APPLY)
         f->d->gl.ProgramUniform1ui(program, 2, f->d->tiles.columns);
-    }
     return pt_gl_dispatch(f->d, PT_KERNEL_fill, p, x, y);
 }
 
@@ -130,21 +132,29 @@ static int find(struct fill *f)
 
 static int fill_step(struct fill *f)
 {
-    int result = find(f);
-    uint32_t changed = f->counters.changed;
+    int result = find(f), all_new = f->first || !f->args->occluded;
+    uint32_t changed = f->counters.changed, kept = f->counters.saved, tiles = f->d->tiles.columns * f->d->tiles.rows;
     f->first = 0;
     f->d->stamp++;
     if (result != PATINA_OK || !changed)
         return result;
     pt_gl_tiles_forget(f->d);
     if (f->args->unfills)
-        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, ((size_t)f->counters.saved + changed) * SAVED_SIZE,
-                              (size_t)f->counters.saved * SAVED_SIZE);
+        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, ((size_t)kept + changed) * SAVED_SIZE,
+                              (size_t)kept * SAVED_SIZE);
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][DECIDE], 3, (GLuint)all_new);
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][DECIDE], 4, kept);
     if (result == PATINA_OK)
         result = dispatch_entries(f, DECIDE, changed);
     if (result == PATINA_OK)
         result = dispatch_entries(f, APPLY, changed);
-    return result == PATINA_OK ? read_counters(f) : result;
+    if (result == PATINA_OK)
+        result = dispatch_entries(f, WAKE, tiles);
+    if (result == PATINA_OK)
+        result = read_counters(f);
+    if (all_new && f->args->unfills)
+        f->counters.saved = kept + changed;
+    return result;
 }
 
 static int unfill_step(struct fill *f)

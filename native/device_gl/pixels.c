@@ -3,7 +3,7 @@
 // (llvmpipe runs all lanes of a vector when one of them needs it.)
 #include "device_gl.h"
 
-enum { TILE_PIXELS = 256, GROUP = 64 };
+enum { TILE_PIXELS = 64, GROUP = 64 };
 
 // Room for as many pixels as the tiles hold; counts from nothing. Both bound.
 static int prepare_list(struct pt_gl_device *d, uint32_t counter_binding, uint32_t list_binding)

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-enum { TILE_X = 32, TILE_Y = 8, GROUP = 32, LISTS = 2, GROUPS_IN_ROW = 16384 }; // as in lib/tiles.glsl
+enum { TILE = 8, GROUP = 32, LISTS = 2, GROUPS_IN_ROW = 16384 }; // as in lib/tiles.glsl
 
 void pt_gl_tiles_forget(struct pt_gl_device *d) { d->tiles.valid = 0; }
 
@@ -55,7 +55,7 @@ static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
     if (result != PATINA_OK)
         return result;
     for (int i = 0; i < 2; i++) {
-        GLuint program = d->tile_programs[i], x = t->columns, y = t->rows;
+        GLuint program = d->tile_programs[i], x = (t->columns * TILE + GROUP - 1) / GROUP, y = t->rows;
         gl->ProgramUniform4ui(program, 0, t->rect[0], t->rect[1], t->rect[2], t->rect[3]);
         gl->ProgramUniform1ui(program, 1, t->width);
         gl->ProgramUniform2ui(program, 2, t->columns, t->rows);
@@ -80,8 +80,8 @@ int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const stru
     memcpy(t->rect, view->rect, sizeof t->rect);
     if (t->rect[2] <= t->rect[0] || t->rect[3] <= t->rect[1])
         return PATINA_OK;
-    t->columns = (t->rect[2] - t->rect[0] + TILE_X - 1) / TILE_X;
-    t->rows = (t->rect[3] - t->rect[1] + TILE_Y - 1) / TILE_Y;
+    t->columns = (t->rect[2] - t->rect[0] + TILE - 1) / TILE;
+    t->rows = (t->rect[3] - t->rect[1] + TILE - 1) / TILE;
     int result = programs(d);
     if (result == PATINA_OK)
         result = room(d, t);
@@ -107,7 +107,7 @@ int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t 
 {
     GLuint program = d->programs[kernel][variant];
     uint32_t x, y;
-    pt_gl_grid(count, &x, &y);
+    pt_gl_grid((count + GROUP / TILE - 1) / (GROUP / TILE), &x, &y);
     d->gl.ProgramUniform1ui(program, 14, count);
     d->gl.ProgramUniform1ui(program, 15, d->tiles.columns);
     return pt_gl_dispatch(d, kernel, variant, x, y);

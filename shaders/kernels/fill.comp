@@ -5,7 +5,8 @@
 // and only tiles within reach of a change are looked at again. Entries stay listed with the pixel's state before the
 // phase: un-filling walks that list alone. The order within lists depends on scheduling; a pixel is in a list once, so
 // it never shows.
-//   STEP 0: find the pixels to fill;   STEP 1: what they become;   STEP 2: apply;   STEP 3: mark;   STEP 4: restore
+//   STEP 0: find the pixels to fill;   STEP 1: what they become;   STEP 2: apply;   STEP 3: the tiles for the next step;
+//   STEP 4: mark;   STEP 5: restore
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -17,12 +18,11 @@ layout(local_size_x = 64) in;
 
 struct change {
     uint pixel, id, z, from;
-    float threshold; // before: a neighbour nearer than this is dark
 };
 
 struct saved_pixel { // as it was before the phase
     uint pixel, id, z, from;
-    float threshold;
+    float threshold; // a neighbour nearer than this was dark
     uint restore;
 };
 
@@ -39,6 +39,8 @@ layout(std430, binding = 10) buffer woken_block { uint woken[]; };  // tiles for
 layout(location = 0) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
 layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
+layout(location = 3) uniform uint all_new; // STEP 1: 1: no entry was filled before in this phase
+layout(location = 4) uniform uint kept;    // STEP 1: entries saved before this step
 
 // The ring, anticlockwise from east.
 const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(1, 1), ivec2(0, 1), ivec2(-1, 1), ivec2(-1, 0), ivec2(-1, -1),
@@ -84,7 +86,7 @@ void main()
     // 1. z of three rows, sliding upwards
     vec3 below = vec3(z_at(size, x - 1, y - 1), z_at(size, x, y - 1), z_at(size, x + 1, y - 1));
     vec3 row = vec3(z_at(size, x - 1, y), z_at(size, x, y), z_at(size, x + 1, y));
-    for (uint i = 0u; i < PT_TILE_Y; i++, y++) {
+    for (uint i = 0u; i < PT_TILE; i++, y++) {
         vec3 above = vec3(z_at(size, x - 1, y + 1), z_at(size, x, y + 1), z_at(size, x + 1, y + 1));
         float t;
         bool fill = uint(y) < end && candidate(view, uint(y * size.x + x), row.y, t);
@@ -117,7 +119,7 @@ uint entry_index()
 void main()
 {
     view_args view = args.view;
-    bool refined = args.refined != 0u, occluded = args.occluded != 0u;
+    bool refined = args.refined != 0u, occluded = args.occluded != 0u, unfills = args.unfills != 0u;
     ivec2 size = ivec2(view.width, view.height);
     uint index = entry_index();
     if (index >= entries)
@@ -142,53 +144,65 @@ void main()
                            pt_ray(view, x, y), own_distance(view, source, z));
         key.y = pt_bits(z);
     }
-    precise float threshold = read_z(pixel);
+    changed[index] = change(pixel, key.x, key.y, source);
+    if (!unfills)
+        return;
+    // An entry filled before in this phase is saved already.
+    uint slot = kept + index;
+    if (all_new == 0u) {
+        if ((filled[pixel >> 5] >> (pixel & 31u) & 1u) != 0u)
+            return;
+        slot = atomicAdd(saved_count, 1u);
+    }
+    uvec2 old_key = read_key(pixel);
+    uint old_from = texelFetch(from_plane, int(pixel)).x;
+    precise float threshold = pt_float(old_key.y);
     if (occluded)
-        threshold = threshold - own_distance(view, read_from(pixel), threshold);
-    changed[index] = change(pixel, key.x, key.y, source, threshold);
+        threshold = threshold - own_distance(view, old_from & ~PT_FROM_MIXED, threshold);
+    saved[slot] = saved_pixel(pixel, old_key.x, old_key.y, old_from, threshold, 0u);
 }
 
 #elif STEP == 2
 
-// The tiles that a change at this pixel concerns are listed for the next step, each once.
-void wake_tiles(uvec4 rect, uint x, uint y)
+// The tiles that a change at this pixel concerns.
+void wake_tiles(uvec4 rect, uvec2 place)
 {
-    uvec2 low = uvec2(max(x, rect.x + 1u) - 1u - rect.x, max(y, rect.y + 1u) - 1u - rect.y) / uvec2(32u, 8u);
-    uvec2 high = uvec2(min(x + 1u, rect.z - 1u) - rect.x, min(y + 1u, rect.w - 1u) - rect.y) / uvec2(32u, 8u);
-    for (uint ty = low.y; ty <= high.y; ty++)
-        for (uint tx = low.x; tx <= high.x; tx++) {
-            uint tile = ty * columns + tx;
-            if (stamps[tile] != stamp && atomicExchange(stamps[tile], stamp) != stamp)
-                woken[atomicAdd(woken_count, 1u)] = tile;
-        }
+    uvec2 low = (max(place, rect.xy + 1u) - 1u - rect.xy) / 8u, high = (min(place + 1u, rect.zw - 1u) - rect.xy) / 8u;
+    stamps[low.y * columns + low.x] = stamp;
+    stamps[low.y * columns + high.x] = stamp;
+    stamps[high.y * columns + low.x] = stamp;
+    stamps[high.y * columns + high.x] = stamp;
 }
 
 void main()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, index = entry_index();
-    bool unfills = args.unfills != 0u;
+    bool refills = args.occluded != 0u && args.unfills != 0u; // a pixel can be filled twice in the phase
     if (index >= entries)
         return;
     change c = changed[index];
-    uvec2 old_key = read_key(c.pixel);
-    uint old_from = texelFetch(from_plane, int(c.pixel)).x;
     keys[c.pixel] = uvec2(c.id, c.z);
     from[c.pixel] = c.from;
-    uvec2 place = pt_pixel(c.pixel, width);
-    wake_tiles(rect, place.x, place.y);
-    if (!unfills)
-        return;
-    uint bit = 1u << (c.pixel & 31u);
-    if ((atomicOr(filled[c.pixel >> 5], bit) & bit) == 0u) // else an earlier entry knows the state before the phase
-        saved[atomicAdd(saved_count, 1u)] = saved_pixel(c.pixel, old_key.x, old_key.y, old_from, c.threshold, 0u);
+    wake_tiles(rect, pt_pixel(c.pixel, width));
+    if (refills)
+        atomicOr(filled[c.pixel >> 5], 1u << (c.pixel & 31u));
+}
+
+#elif STEP == 3
+
+void main()
+{
+    uint tile = entry_index();
+    if (tile < entries && stamps[tile] == stamp)
+        woken[atomicAdd(woken_count, 1u)] = tile;
 }
 
 #else
 
 const uint NO_PIXEL = 0xFFFFFFFFu;
 
-#if STEP == 3
+#if STEP == 4
 
 // 5. Un-filling: an entry whose pixel shows four consecutive white cells is marked ...
 void main()

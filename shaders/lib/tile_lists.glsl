@@ -6,7 +6,7 @@
 
 #define HOLDS_POINTS 1u
 #define HOLDS_NOTHING 2u
-#define TILE_Y 8u
+#define TILE 8u
 
 layout(local_size_x = 32) in;
 
@@ -24,11 +24,11 @@ layout(location = 3) uniform uint stride;
 
 void main()
 {
-    uint x = min(rect.x + gl_GlobalInvocationID.x, rect.z - 1u), y = rect.y + gl_WorkGroupID.y * TILE_Y;
-    uint holds = 0u, end = min(y + TILE_Y, rect.w);
+    uint column = min(gl_GlobalInvocationID.x, rect.z - rect.x - 1u), x = rect.x + column, y = rect.y + gl_WorkGroupID.y * TILE;
+    uint holds = 0u, end = min(y + TILE, rect.w);
     for (; y < end; y++)
         holds |= keys[y * width + x].y != PT_KEY_EMPTY_Z ? HOLDS_POINTS : HOLDS_NOTHING;
-    atomicOr(tiles[gl_WorkGroupID.y * size.x + gl_WorkGroupID.x], holds);
+    atomicOr(tiles[gl_WorkGroupID.y * size.x + column / TILE], holds);
 }
 
 #else

@@ -40,24 +40,27 @@ def scene_of(cloud: native.Cloud, case: dict[str, Any]) -> native.Scene:
     return scene
 
 
-def frames(frame: native.Frame, scene: native.Scene, count: int) -> tuple[list[float], dict[str, float], dict[str, str]]:
-    """Times of a camera that turns one degree a frame; medians of the passes and of what is in none of them ("rest");
-    reasons of those left out."""
-    times, passes, skipped = [], {}, {}
+def frames(frame: native.Frame, scene: native.Scene, count: int) -> dict[str, Any]:
+    """A camera that turns one degree a frame: times; medians of the passes and of what is in none of them ("rest"); why
+    other passes are left out. work: processor time, all threads, which other programs hardly disturb."""
+    times, work, passes, skipped = [], [], {}, {}
     for i in range(count + WARM_UP):
         scene.set_camera(**truth.view(float(i)).fields())
-        start = time.perf_counter()
+        start, spent = time.perf_counter(), time.process_time()
         frame.render(scene)
         elapsed = 1e3 * (time.perf_counter() - start)
         if i < WARM_UP:
             continue
         times.append(elapsed)
+        work.append(1e3 * (time.process_time() - spent))
         stats = frame.pass_stats()
         skipped = stats["skipped"]
         rest = elapsed - sum(stats["passes"].values())
         for name, ms in {**stats["passes"], "rest": rest}.items():
             passes.setdefault(name, []).append(ms)
-    return times, {name: median(values) for name, values in passes.items()}, skipped
+    return {"frames": count, "ms_median": median(times), "ms_min": min(times), "ms_max": max(times),
+            "work_ms": median(work), "passes": {name: median(values) for name, values in passes.items()},
+            "skipped": skipped}
 
 
 def run(case: dict[str, Any]) -> dict[str, Any]:
@@ -66,7 +69,7 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     machine.reset_peak()
     scene = scene_of(cloud, case)
     frame = native.Frame(device)
-    times, passes, skipped = frames(frame, scene, case["frames"])
+    timing = frames(frame, scene, case["frames"])
     peak = machine.memory_peak()
     stats = frame.stats()
 
@@ -78,11 +81,10 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     exact = truth.Picture.load(case["truth"])
     return {
         **{name: case[name] for name in ("scene", "mode", "device", "width", "height", "points", "quality", "threads")},
-        "device_name": device.name, "device_description": device.description, "frames": len(times),
-        "ms_median": median(times), "ms_min": min(times), "ms_max": max(times), "read_ms": read_ms,
+        "device_name": device.name, "device_description": device.description, **timing, "read_ms": read_ms,
         "upload_ms": median(upload_ms), "peak_mb": peak, "plane_bytes": stats["plane_bytes"],
         "cloud_bytes": cloud.bytes, "points_scattered": stats["points_scattered"],
-        "passes": passes, "skipped": skipped, "error": truth.errors(exact, depth, normal, rgba, case["points"]),
+        "error": truth.errors(exact, depth, normal, rgba, case["points"]),
     }
 
 

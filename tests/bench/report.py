@@ -32,11 +32,11 @@ def _pass_names(rows: list[Row]) -> list[str]:
 
 
 def times_table(rows: list[Row]) -> str:
-    head = ["device", "points", "quality", "ms median", "min–max", "floor ms", "× floor", "upload ms", "peak MB",
-            "planes MB", "cloud B/pt"]
+    head = ["device", "points", "quality", "ms median", "min–max", "work ms", "floor ms", "× floor", "upload ms",
+            "peak MB", "planes MB", "cloud B/pt"]
     body = [[name_of(r), _count(r["points"]), r["quality"], f"{r['ms_median']:.2f}",
-             f"{r['ms_min']:.2f}–{r['ms_max']:.2f}", f"{r['floor_ms']:.2f}", f"{r['ms_median'] / r['floor_ms']:.1f}",
-             f"{r['upload_ms']:.0f}", f"{r['peak_mb']:.0f}", f"{r['plane_bytes'] / 2**20:.0f}",
+             f"{r['ms_min']:.2f}–{r['ms_max']:.2f}", f"{r['work_ms']:.2f}", f"{r['floor_ms']:.2f}",
+             f"{r['ms_median'] / r['floor_ms']:.1f}", f"{r['upload_ms']:.0f}", f"{r['peak_mb']:.0f}", f"{r['plane_bytes'] / 2**20:.0f}",
              f"{r['cloud_bytes'] / r['points']:.1f}"] for r in rows]
     return _table(head, body)
 
@@ -76,7 +76,7 @@ def markdown(result: dict[str, Any]) -> str:
             "share of the processor shows in the maxima).", "",
             f"Floor: 12 bytes a point and the bytes of all planes ÷ {result['bandwidth']:.1f} GB/s, what a copy by "
             f"numpy on {result['cores']} threads moves (read + written); a single thread: "
-            f"{result['bandwidth_one']:.1f} GB/s.", "",
+            f"{result['bandwidth_one']:.1f} GB/s. Work: processor time of all threads.", "",
             "## Time", "", times_table(rows), "",
             "## Error against the analytic torus, beside the time", "",
             "Truth at pixel centres; spacing = 1/√(points per area); inner, outer: pixels away from the silhouette.", "",
@@ -102,7 +102,7 @@ def plot(result: dict[str, Any], path: Path) -> None:
         high = [r["ms_max"] - r["ms_median"] for r in line]
         left.errorbar([r["points"] for r in line], [r["ms_median"] for r in line], yerr=[low, high], marker="o",
                       capsize=3, label=", ".join(name))
-    floors = sorted({(r["points"], r["floor_ms"]) for r in rows})
+    floors = sorted({r["points"]: r["floor_ms"] for r in rows}.items())
     left.plot(*zip(*floors), "k--", label="floor (memory)")
     left.set(xscale="log", yscale="log", xlabel="points", ylabel="ms a frame, 1024×1024", title="Time against points")
     left.grid(True, which="both", alpha=0.25)
@@ -135,11 +135,12 @@ def compare(new: dict[str, Any], old: dict[str, Any]) -> str:
         error, past = row["error"], other["error"]
         body.append([name_of(row), _count(row["points"]), row["quality"],
                      f"{other['ms_median']:.2f} → {row['ms_median']:.2f}", f"{row['ms_median'] / other['ms_median']:.3f}",
+                     f"{row['work_ms'] / other['work_ms']:.3f}",
                      f"{row['upload_ms'] / other['upload_ms']:.3f}", f"{row['peak_mb'] / other['peak_mb']:.3f}",
                      f"{error['depth_rms_spacings'] / max(past['depth_rms_spacings'], 1e-12):.3f}",
                      f"{error['normal_mean_degrees'] / max(past['normal_mean_degrees'], 1e-12):.3f}",
                      f"{error['coverage_iou'] - past['coverage_iou']:+.5f}"])
-    head = ["device", "points", "quality", "ms", "× time", "× upload", "× peak MB", "× depth error", "× normal error",
+    head = ["device", "points", "quality", "ms", "× time", "× work", "× upload", "× peak MB", "× depth error", "× normal error",
             "IoU change"]
     machine = "" if old.get("processor") == new["processor"] else f" (another machine: {old.get('processor')})"
     return f"## Against {old.get('date', 'an older run')}{machine}\n\n" + _table(head, body) + "\n"

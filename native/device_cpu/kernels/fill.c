@@ -90,12 +90,7 @@ static void load_z(const struct fill *fill, int32_t y, float *row)
 // d_eff at this level of pixels whose surface comes from `source`.
 static vf own_distance(const struct fill *fill, vi source, vf z, vm lanes)
 {
-    vf d = vf_gather(fill->deff, source, lanes);
-    if (fill->view->level) {
-        vf inverse = vf_gather(fill->normals, vi_add(vi_mul(source, vi_set(4)), vi_set(3)), lanes);
-        d = vf_max(d, vf_footprint(fill->view, z) * inverse);
-    }
-    return d;
+    return vf_level_distance(fill->view, fill->deff, fill->normals, source, z, lanes);
 }
 
 // 2. Thresholds of 64 pixels from x on, and which of them are candidates.
@@ -144,27 +139,6 @@ static vi neighbour_of(const struct view_args *view, vi x, vi y, int d, vm lanes
     return vi_add(vi_mul(qy, vi_set(view->width)), qx);
 }
 
-// The plane's depth at ray_p: twin of pt_plane_depth.
-static vf plane_depth(const struct view_args *view, const vf n[3], const vf ray_q[2], vf z_q, const vf ray_p[2], vf limit)
-{
-    const vf zero = vf_zero(), one = vf_set(1.0f);
-    vf z = z_q;
-    if (view->perspective) {
-        vf dot_q = (n[0] * ray_q[0] + n[1] * ray_q[1]) - n[2], dot_p = (n[0] * ray_p[0] + n[1] * ray_p[1]) - n[2];
-        vf sign = vf_select(vf_lt(dot_p, zero), vf_set(-1.0f), one), size = vf_abs(dot_p);
-        vm good = vf_lt(vf_set(1e-6f), size);
-        vf r = vf_rcp(vf_select(good, size, one));
-        z = vf_select(good, (z_q * (dot_q * sign)) * r, z);
-    } else {
-        vf sign = vf_select(vf_lt(n[2], zero), vf_set(-1.0f), one), size = vf_abs(n[2]);
-        vm good = vf_lt(vf_set(1e-6f), size);
-        vf r = vf_rcp(vf_select(good, size, one));
-        vf rise = (n[0] * (ray_p[0] - ray_q[0]) + n[1] * (ray_p[1] - ray_q[1])) * sign;
-        z = vf_select(good, z_q + rise * r, z);
-    }
-    return vf_min(vf_max(z, z_q), z_q + limit);
-}
-
 struct chosen { // pixels to fill, PT_LANES at a time
     uint32_t x[PT_LANES], y[PT_LANES], count;
     float threshold[PT_LANES];
@@ -197,7 +171,7 @@ static void list_chosen(const struct fill *fill, struct chosen *chosen, size_t a
             n[k] = vf_gather(fill->normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes);
         vf_ray_of(view, x, y, ray_p);
         vf_ray_of(view, qx, qy, ray_q);
-        z = plane_depth(view, n, ray_q, z, ray_p, own_distance(fill, source, z, lanes));
+        z = vf_plane_depth(view, n, ray_q, z, ray_p, own_distance(fill, source, z, lanes));
     }
     uint32_t zs[PT_LANES], ids[PT_LANES], sources[PT_LANES];
     vi_store(zs, vf_bits(z), vm_first(PT_LANES));

@@ -26,6 +26,7 @@ struct shade {
     const struct shade_args *args;
     float *rows;   // per thread: RING rows x CHANNELS
     size_t stride; // floats of one channel of a row
+    float weights[2 * BLEND_REACH * BLEND_REACH + 1]; // by squared distance
 };
 
 struct filled { // PT_LANES of them
@@ -118,7 +119,7 @@ static void blend_near(const struct shade *shade, float *const around[RING], uin
             vm take = vm_and(lanes, vf_le(vf_abs(vf_load(tap) - z), limit));
             if (distance > 1)
                 take = vm_and(take, vm_not(vi_lt_unsigned(reach, vi_set(distance))));
-            vf weight = vf_set(pt_rcp((float)(1 + dx * dx + dy * dy)));
+            vf weight = vf_set(shade->weights[dx * dx + dy * dy]);
             for (size_t k = 0; k < 3; k++)
                 n[k] = n[k] + vf_select(take, vf_load(tap + (1 + k) * shade->stride), vf_zero()) * weight;
         }
@@ -162,7 +163,7 @@ static void blend_far(const struct shade *shade, struct filled *filled, uint32_t
             take = vm_and(take, vi_eq(vi_and(vi_gather(from, q, take), vi_set(~PT_FROM_MIXED)), q));
             if (!vm_bits(take))
                 continue;
-            vf weight = vf_set(pt_rcp((float)(1 + dx * dx + dy * dy)));
+            vf weight = vf_set(shade->weights[dx * dx + dy * dy]);
             for (uint32_t k = 0; k < 3; k++)
                 n[k] = n[k] + vf_gather(normals, vi_add(vi_mul(q, vi_set(4)), vi_set(k)), take) * weight;
         }
@@ -408,6 +409,8 @@ int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
     struct shade shade = { .call = call, .args = args };
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
+    for (int i = 0; i <= 2 * BLEND_REACH * BLEND_REACH; i++)
+        shade.weights[i] = pt_rcp((float)(1 + i));
     shade.stride = rect[2] - rect[0] + 4 * PAD;
     shade.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * RING * CHANNELS * shade.stride * sizeof(float));
     if (!shade.rows)
