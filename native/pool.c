@@ -10,11 +10,18 @@
 // work a while (some 30 us) before they sleep. Not where threads outnumber cores.
 enum { MAX_THREADS = 256, SPINS = 2000 };
 
+// Every thread has a range of its own, the same in every step of a frame with as many items: what it wrote it reads again,
+// from its own caches. A thread that is done takes from the others' ranges.
+struct range {
+    _Alignas(64) atomic_uint next;
+    uint32_t end;
+};
+
 struct job {
     pt_work *work;
     void *context;
-    uint32_t items, grain;
-    atomic_uint next;
+    uint32_t grain, ranges;
+    struct range *range;
 };
 
 struct pt_pool {
@@ -22,6 +29,7 @@ struct pt_pool {
     pthread_mutex_t caller; // one pt_parallel at a time
     pthread_cond_t wake, done;
     struct job *job;
+    struct range *ranges; // one a thread
     _Atomic uint64_t generation;
     atomic_uint running; // helpers still in the current job
     uint32_t spins;
@@ -38,12 +46,14 @@ struct helper_start {
 
 static void take_part(struct job *job, uint32_t thread)
 {
-    for (;;) {
-        uint32_t begin = atomic_fetch_add_explicit(&job->next, job->grain, memory_order_relaxed);
-        if (begin >= job->items)
-            return;
-        uint32_t end = job->items - begin < job->grain ? job->items : begin + job->grain;
-        job->work(job->context, begin, end, thread);
+    for (uint32_t k = 0; k < job->ranges; k++) {
+        struct range *range = &job->range[(thread + k) % job->ranges];
+        for (;;) {
+            uint32_t begin = atomic_fetch_add_explicit(&range->next, job->grain, memory_order_relaxed);
+            if (begin >= range->end)
+                break;
+            job->work(job->context, begin, range->end - begin < job->grain ? range->end : begin + job->grain, thread);
+        }
     }
 }
 
@@ -100,6 +110,11 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
     if (pool->threads > MAX_THREADS)
         pool->threads = MAX_THREADS;
     pool->batch = batch;
+    pool->ranges = aligned_alloc(_Alignof(struct range), pool->threads * sizeof *pool->ranges);
+    if (!pool->ranges) {
+        free(pool);
+        return NULL;
+    }
     pool->spins = pool->threads <= core_count() ? SPINS : 0;
     pthread_mutex_init(&pool->lock, NULL);
     pthread_mutex_init(&pool->caller, NULL);
@@ -133,6 +148,7 @@ void pt_pool_destroy(struct pt_pool *pool)
     pthread_cond_destroy(&pool->done);
     pthread_mutex_destroy(&pool->caller);
     pthread_mutex_destroy(&pool->lock);
+    free(pool->ranges);
     free(pool);
 }
 
@@ -150,11 +166,15 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
         grain = pool->batch;
     if (!grain)
         grain = items / (4 * pool->threads);
-    // next runs past items by up to threads * grain; keep that from wrapping
+    // next runs past its end by up to threads * grain; keep that from wrapping
     uint32_t most = UINT32_MAX / (2 * pool->threads);
     grain = grain < 1 ? 1 : grain > most ? most : grain;
-    struct job job = { .work = work, .context = context, .items = items, .grain = grain };
+    struct job job = { work, context, grain, pool->threads, pool->ranges };
     pthread_mutex_lock(&pool->caller);
+    for (uint32_t t = 0; t < pool->threads; t++) {
+        atomic_init(&pool->ranges[t].next, (uint32_t)((uint64_t)items * t / pool->threads));
+        pool->ranges[t].end = (uint32_t)((uint64_t)items * (t + 1) / pool->threads);
+    }
     if (items > grain) {
         pthread_mutex_lock(&pool->lock);
         pool->job = &job;

@@ -6,11 +6,11 @@
 enum {
     ENTRY_GROUP = 64, // as in fill.comp
     CHANGE_SIZE = 16, // struct change
-    SAVED_SIZE = 24,  // struct saved_pixel
+    SAVED_SIZE = 20,  // struct saved_pixel
     LEAST_ENTRIES = 1 << 16,
 };
 
-enum program { FIND_EMPTY, FIND_OCCLUDED, DECIDE, APPLY, WAKE, MARK, RESTORE };
+enum program { FIND_EMPTY, FIND_OCCLUDED, FIND_COARSE, DECIDE, APPLY, WAKE, MARK, RESTORE, SELECT };
 
 struct counters {
     uint32_t changed, saved, woken;
@@ -21,7 +21,7 @@ struct fill {
     const struct fill_args *args;
     const atomic_int *cancel;
     enum program find;
-    int first; // the phase's first step looks at every tile that can hold a pixel to fill
+    int first; // the first of its steps looks everywhere
     struct counters counters;
 };
 
@@ -37,13 +37,15 @@ static int programs(struct fill *f)
 {
     static const char *const definitions[] = {"#define STEP 0\n#define OCCLUDED 0\n",
                                               "#define STEP 0\n#define OCCLUDED 1\n",
+                                              "#define STEP 0\n#define OCCLUDED 2\n",
                                               "#define STEP 1\n",
                                               "#define STEP 2\n",
                                               "#define STEP 3\n",
                                               "#define STEP 4\n",
-                                              "#define STEP 5\n"};
+                                              "#define STEP 5\n",
+                                              "#define STEP 6\n"};
     int result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, f->find, definitions[f->find]);
-    for (uint32_t p = DECIDE; p <= (f->args->unfills ? RESTORE : WAKE) && result == PATINA_OK; p++)
+    for (uint32_t p = DECIDE; p <= (f->args->unfills ? SELECT : WAKE) && result == PATINA_OK; p++)
         result = pt_gl_kernel_program(f->d, PT_KERNEL_fill, p, definitions[p]);
     return result;
 }
@@ -94,9 +96,9 @@ static int dispatch_entries(struct fill *f, enum program p, uint32_t entries)
     uint32_t x, y;
     pt_gl_grid((entries + ENTRY_GROUP - 1) / ENTRY_GROUP, &x, &y);
     f->d->gl.ProgramUniform1ui(program, 0, entries);
-    if (p == APPLY || p == WAKE)
+    if (p == APPLY || p == WAKE || p == RESTORE || p == SELECT)
         f->d->gl.ProgramUniform1ui(program, 1, f->d->stamp);
-    if (p == APPLY)
+    if (p == APPLY || p == RESTORE || p == SELECT)
         f->d->gl.ProgramUniform1ui(program, 2, f->d->tiles.columns);
     return pt_gl_dispatch(f->d, PT_KERNEL_fill, p, x, y);
 }
@@ -159,17 +161,29 @@ static int fill_step(struct fill *f)
 
 static int unfill_step(struct fill *f)
 {
-    f->counters.changed = 0;
+    uint32_t look = f->first ? f->counters.saved : f->counters.woken;
+    int result = bind_scratch(f, 6, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.saved * CHANGE_SIZE, 0);
+    f->counters.changed = f->counters.woken = 0;
     write_counters(f);
-    int result = dispatch_entries(f, MARK, f->counters.saved);
+    f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][MARK], 3, (GLuint)f->first);
+    f->first = 0;
     if (result == PATINA_OK)
-        result = dispatch_entries(f, RESTORE, f->counters.saved);
+        result = dispatch_entries(f, MARK, look);
+    if (result == PATINA_OK)
+        result = read_counters(f);
+    if (result != PATINA_OK || !f->counters.changed)
+        return result;
+    f->d->stamp++;
+    result = dispatch_entries(f, RESTORE, f->counters.changed);
+    if (result == PATINA_OK)
+        result = dispatch_entries(f, SELECT, f->counters.saved);
     return result == PATINA_OK ? read_counters(f) : result;
 }
 
 // Repeats a step until nothing changes, `most` times at the most.
 static int repeat(struct fill *f, int (*step)(struct fill *), uint32_t most)
 {
+    f->first = 1;
     for (uint32_t i = 0; i < most; i++) {
         if (f->cancel && atomic_load(f->cancel))
             return pt_gl_fail(f->d, PATINA_ERROR_CANCELLED, "cancelled");
@@ -182,8 +196,9 @@ static int repeat(struct fill *f, int (*step)(struct fill *), uint32_t most)
 
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel)
 {
-    struct fill f = {
-        .d = d, .args = args, .cancel = cancel, .find = args->occluded ? FIND_OCCLUDED : FIND_EMPTY, .first = 1};
+    struct fill f = {.d = d, .args = args, .cancel = cancel, .find = FIND_EMPTY};
+    if (args->occluded)
+        f.find = args->view.level ? FIND_COARSE : FIND_OCCLUDED;
     if (!d->tiles.count[PT_GL_TILES_POINTS] && !d->tiles.count[PT_GL_TILES_RIM])
         return PATINA_OK;
     int result = prepare(&f);

@@ -69,24 +69,18 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_extract] = {1, 2, 0, 3},
 };
 
-static int bind_textures(struct pt_gl_device *d, enum pt_kernel kernel, struct pt_buffer *const *buffers,
-                         uint32_t count)
+int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
 {
     static const GLenum formats[PT_GL_TEXTURES] = {GL_RG32UI, GL_R32UI, GL_R32F, GL_RGBA32F, GL_RGBA32F};
     static const uint8_t sizes[PT_GL_TEXTURES] = {8, 4, 4, 16, 16};
-    for (uint32_t unit = 0; unit < PT_GL_TEXTURES; unit++) {
-        uint32_t number = textures[kernel][unit];
-        if (!number || number > count || !buffers[number - 1] || !buffers[number - 1]->name)
-            continue;
-        size_t texels = buffers[number - 1]->size / sizes[unit];
-        if (texels > d->texels)
-            return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
-                              "%s: a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most",
-                              pt_kernel_names[kernel], texels, d->texels);
-        d->gl.ActiveTexture(GL_TEXTURE0 + unit);
-        d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
-        d->gl.TexBuffer(GL_TEXTURE_BUFFER, formats[unit], buffers[number - 1]->name);
-    }
+    size_t texels = plane->size / sizes[unit];
+    if (texels > d->texels)
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
+                          "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels,
+                          d->texels);
+    d->gl.ActiveTexture(GL_TEXTURE0 + unit);
+    d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
+    d->gl.TexBuffer(GL_TEXTURE_BUFFER, formats[unit], plane->name);
     return PATINA_OK;
 }
 
@@ -138,7 +132,15 @@ static int bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t ar
         if (result != PATINA_OK)
             return result;
     }
-    return bind_textures(d, kernel, buffers, count);
+    for (uint32_t unit = 0; unit < PT_GL_TEXTURES; unit++) {
+        uint32_t number = textures[kernel][unit];
+        if (!number || number > count || !buffers[number - 1] || !buffers[number - 1]->name)
+            continue;
+        int result = pt_gl_bind_texture(d, unit, buffers[number - 1]);
+        if (result != PATINA_OK)
+            return result;
+    }
+    return PATINA_OK;
 }
 
 static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, const atomic_int *cancel)

@@ -42,16 +42,19 @@ static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 
 // ---- shade -----------------------------------------------------------------------------------------------------
 
-enum { NORMALS = 0, BLEND = 1, COLORS = 2, REFINED_NORMALS = 8 };
+enum { NORMALS = 0, REFINED_NORMALS = 1, BLEND = 2, COLORS = 3 };
 
 static int shade_programs(struct pt_gl_device *d, const struct shade_args *args, uint32_t colors)
 {
     static const char *const definitions[] = {"#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 0\n",
                                               "#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 1\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 2\n",
                                               "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 0\n",
                                               "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 1\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 2\n",
                                               "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 0\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 1\n"};
+                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 1\n",
+                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 2\n"};
     int result = args->refined ? pt_gl_kernel_program(d, PT_KERNEL_shade, REFINED_NORMALS,
                                                       "#define STEP 0\n#define REFINED 1\n")
                                : pt_gl_kernel_program(d, PT_KERNEL_shade, NORMALS, "#define STEP 0\n");
@@ -79,7 +82,8 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
 
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 {
-    uint32_t colors = COLORS + 2 * (args->instance.color_format % 3) + (args->instance.lit != 0);
+    uint32_t lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1;
+    uint32_t colors = COLORS + 3 * (args->instance.color_format % 3) + lit;
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
     int result = shade_programs(d, args, colors);

@@ -86,7 +86,7 @@ int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const stru
     if (result == PATINA_OK)
         result = room(d, t);
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 1, keys->name, 0, keys->size, "tiles");
+        result = pt_gl_bind_texture(d, 0, keys);
     if (result == PATINA_OK)
         result = build(d, t);
     t->valid = result == PATINA_OK;

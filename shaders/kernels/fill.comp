@@ -5,8 +5,9 @@
 // and only tiles within reach of a change are looked at again. Entries stay listed with the pixel's state before the
 // phase: un-filling walks that list alone. The order within lists depends on scheduling; a pixel is in a list once, so
 // it never shows.
-//   STEP 0: find the pixels to fill;   STEP 1: what they become;   STEP 2: apply;   STEP 3: the tiles for the next step;
-//   STEP 4: mark;   STEP 5: restore
+//   STEP 0: find the pixels to fill, empty or OCCLUDED ones (2: above level 0);   STEP 1: what they become;
+//   STEP 2: apply;   STEP 3: the tiles for the next step;
+//   STEP 4: mark;   STEP 5: restore;   STEP 6: the entries for the next step
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -23,7 +24,6 @@ struct change {
 struct saved_pixel { // as it was before the phase
     uint pixel, id, z, from;
     float threshold; // a neighbour nearer than this was dark
-    uint restore;
 };
 
 layout(std430, binding = 0) readonly buffer arguments_block { fill_args args; };
@@ -39,7 +39,7 @@ layout(std430, binding = 10) buffer woken_block { uint woken[]; };  // tiles for
 layout(location = 0) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
 layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
-layout(location = 3) uniform uint all_new; // STEP 1: 1: no entry was filled before in this phase
+layout(location = 3) uniform uint all_new; // STEP 1: no entry was filled before in this phase; STEP 4: look at all entries
 layout(location = 4) uniform uint kept;    // STEP 1: entries saved before this step
 
 // The ring, anticlockwise from east.
@@ -56,7 +56,11 @@ float z_at(ivec2 size, int x, int y)
 
 float own_distance(view_args view, uint source, float z)
 {
+#if STEP == 0 && OCCLUDED == 1
+    return read_deff(source);
+#else
     return pt_level_distance(view, read_deff(source), read_float4(source).w, z);
+#endif
 }
 
 #if STEP == 0
@@ -113,6 +117,20 @@ uint entry_index()
     return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
 }
 
+#if STEP == 2 || STEP == 5
+
+// The tiles that a change at this pixel concerns.
+void wake_tiles(uvec4 rect, uvec2 place)
+{
+    uvec2 low = (max(place, rect.xy + 1u) - 1u - rect.xy) / 8u, high = (min(place + 1u, rect.zw - 1u) - rect.xy) / 8u;
+    stamps[low.y * columns + low.x] = stamp;
+    stamps[low.y * columns + high.x] = stamp;
+    stamps[high.y * columns + low.x] = stamp;
+    stamps[high.y * columns + high.x] = stamp;
+}
+
+#endif
+
 #if STEP == 1
 
 // 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
@@ -159,20 +177,10 @@ void main()
     precise float threshold = pt_float(old_key.y);
     if (occluded)
         threshold = threshold - own_distance(view, old_from & ~PT_FROM_MIXED, threshold);
-    saved[slot] = saved_pixel(pixel, old_key.x, old_key.y, old_from, threshold, 0u);
+    saved[slot] = saved_pixel(pixel, old_key.x, old_key.y, old_from, threshold);
 }
 
 #elif STEP == 2
-
-// The tiles that a change at this pixel concerns.
-void wake_tiles(uvec4 rect, uvec2 place)
-{
-    uvec2 low = (max(place, rect.xy + 1u) - 1u - rect.xy) / 8u, high = (min(place + 1u, rect.zw - 1u) - rect.xy) / 8u;
-    stamps[low.y * columns + low.x] = stamp;
-    stamps[low.y * columns + high.x] = stamp;
-    stamps[high.y * columns + low.x] = stamp;
-    stamps[high.y * columns + high.x] = stamp;
-}
 
 void main()
 {
@@ -202,36 +210,54 @@ void main()
 
 const uint NO_PIXEL = 0xFFFFFFFFu;
 
+// 5. Un-filling. changed[].id lists the entries to look at (all: the phase's first step), changed[].pixel those marked:
+// an entry whose pixel shows four consecutive white cells ...
 #if STEP == 4
 
-// 5. Un-filling: an entry whose pixel shows four consecutive white cells is marked ...
 void main()
 {
     ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
-    if (index >= entries || saved[index].pixel == NO_PIXEL)
+    if (index >= entries)
         return;
-    ivec2 place = ivec2(pt_pixel(saved[index].pixel, uint(size.x)));
-    float threshold = saved[index].threshold;
+    uint entry = all_new != 0u ? index : changed[index].id;
+    ivec2 place = ivec2(pt_pixel(saved[entry].pixel, uint(size.x)));
+    float threshold = saved[entry].threshold;
     uint white = 0u;
     for (int d = 0; d < 8; d++)
         white |= uint(!(z_at(size, place.x + ring[d].x, place.y + ring[d].y) < threshold)) << d;
-    saved[index].restore = uint(pt_four_white(white));
+    if (pt_four_white(white))
+        changed[atomicAdd(changed_count, 1u)].pixel = entry;
+}
+
+// ... gets back what it was before the phase.
+#elif STEP == 5
+
+void main()
+{
+    uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
+    uint width = args.view.width, index = entry_index();
+    if (index >= entries)
+        return;
+    uint entry = changed[index].pixel;
+    saved_pixel s = saved[entry];
+    keys[s.pixel] = uvec2(s.id, s.z);
+    from[s.pixel] = s.from;
+    saved[entry].pixel = NO_PIXEL;
+    wake_tiles(rect, pt_pixel(s.pixel, width));
 }
 
 #else
 
-// ... and gets back what it was before the phase.
 void main()
 {
-    uint index = entry_index();
-    if (index >= entries || saved[index].pixel == NO_PIXEL || saved[index].restore == 0u)
+    uvec2 corner = uvec2(args.view.rect[0], args.view.rect[1]);
+    uint width = args.view.width, index = entry_index();
+    if (index >= entries || saved[index].pixel == NO_PIXEL)
         return;
-    saved_pixel s = saved[index];
-    keys[s.pixel] = uvec2(s.id, s.z);
-    from[s.pixel] = s.from;
-    saved[index].pixel = NO_PIXEL;
-    atomicAdd(changed_count, 1u);
+    uvec2 tile = (pt_pixel(saved[index].pixel, width) - corner) / 8u;
+    if (stamps[tile.y * columns + tile.x] == stamp)
+        changed[atomicAdd(woken_count, 1u)].id = index;
 }
 
 #endif

@@ -3,7 +3,7 @@
 // native/device_cpu/kernels/shade.c
 //
 // STEP 0: normals; filled pixels take theirs from their neighbours (REFINED), those filled from afar are listed;
-// STEP 1: the listed ones' normals;   STEP 2: colour, by COLOR_FORMAT and LIT
+// STEP 1: the listed ones' normals;   STEP 2: colour, by COLOR_FORMAT and LIT (2: with highlights)
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -180,8 +180,8 @@ float power(float x, uint exponent)
     return result;
 }
 
-void add_light(vec4 light, vec3 vector, float specular_factor, uint shininess, vec3 n, vec3 point, vec3 to_eye,
-               inout vec3 diffuse, inout vec3 specular)
+void add_light(vec4 light, vec3 vector, uint shininess, vec3 n, vec3 point, vec3 to_eye, inout vec3 diffuse,
+               inout vec3 specular)
 {
     precise vec3 l = vector;
     vec3 color_of_light = light.xyz;
@@ -196,13 +196,13 @@ void add_light(vec4 light, vec3 vector, float specular_factor, uint shininess, v
     precise float lambert = pt_max(cosine, 0.0) * falloff;
     precise vec3 lit = diffuse + color_of_light * lambert;
     diffuse = lit;
-    if (!(specular_factor > 0.0))
-        return;
+#if LIT == 2
     precise vec3 r = (2.0 * cosine) * n - l;
     precise float shine = power(pt_min(pt_max(pt_dot(r, to_eye), 0.0), 1.0), shininess) * falloff;
     shine = 0.0 < cosine ? shine : 0.0;
     precise vec3 glossy = specular + color_of_light * shine;
     specular = glossy;
+#endif
 }
 
 // c = albedo (k_a world + k_d sum E max(n.l, 0) / pi) + albedo k_s sum E max(r.v, 0)^shininess / pi
@@ -219,7 +219,7 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
     vec3 n = away ? 0.0 - p.n : p.n;
     vec3 diffuse = vec3(0.0), specular = vec3(0.0);
     for (uint i = 0u; i < light_count; i++)
-        add_light(lights[2u * i], lights[2u * i + 1u].xyz, factors.z, shininess, n, point, to_eye, diffuse, specular);
+        add_light(lights[2u * i], lights[2u * i + 1u].xyz, shininess, n, point, to_eye, diffuse, specular);
     precise vec3 light = factors.x * world + factors.y * diffuse;
     precise vec3 sum = p.albedo * (light + factors.z * specular);
     return sum;

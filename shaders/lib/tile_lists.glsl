@@ -10,7 +10,7 @@
 
 layout(local_size_x = 32) in;
 
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; };
+layout(binding = 0) uniform usamplerBuffer key_plane;
 layout(std430, binding = 2) buffer tiles_block { uint tiles[]; };
 layout(std430, binding = 3) buffer lists_block { uint lists[]; };   // two of `stride`
 layout(std430, binding = 4) buffer counts_block { uint counts[]; }; // 0: with points, 1: with a hole's rim
@@ -27,7 +27,7 @@ void main()
     uint column = min(gl_GlobalInvocationID.x, rect.z - rect.x - 1u), x = rect.x + column, y = rect.y + gl_WorkGroupID.y * TILE;
     uint holds = 0u, end = min(y + TILE, rect.w);
     for (; y < end; y++)
-        holds |= keys[y * width + x].y != PT_KEY_EMPTY_Z ? HOLDS_POINTS : HOLDS_NOTHING;
+        holds |= texelFetch(key_plane, int(y * width + x)).y != PT_KEY_EMPTY_Z ? HOLDS_POINTS : HOLDS_NOTHING;
     atomicOr(tiles[gl_WorkGroupID.y * size.x + column / TILE], holds);
 }
 

@@ -26,7 +26,7 @@ def cores() -> int:
 
 
 def copy_bandwidth(threads: int, megabytes: int = 64, runs: int = 15) -> float:
-    """GB/s of a plain copy (numpy.copyto, which releases the GIL), bytes read and bytes written counted; best of runs."""
+    """GB/s of a plain copy (numpy.copyto, which releases the GIL), bytes read and written counted; best of runs."""
     pairs = [(np.zeros(megabytes << 18, np.float32), np.ones(megabytes << 18, np.float32)) for _ in range(threads)]
     best = 0.0
     for _ in range(runs):

@@ -27,7 +27,7 @@ def name_of(row: Row) -> str:
 def _pass_names(rows: list[Row]) -> list[str]:
     """In the order of the frame, what is in no pass last."""
     names = list(dict.fromkeys(name for row in rows for name in row["passes"] if name != "rest"))
-    order = sorted(names, key=lambda name: max(list(row["passes"]).index(name) for row in rows if name in row["passes"]))
+    order = sorted(names, key=lambda name: max(list(r["passes"]).index(name) for r in rows if name in r["passes"]))
     return [*order, "rest"]
 
 
@@ -36,8 +36,8 @@ def times_table(rows: list[Row]) -> str:
             "peak MB", "planes MB", "cloud B/pt"]
     body = [[name_of(r), _count(r["points"]), r["quality"], f"{r['ms_median']:.2f}",
              f"{r['ms_min']:.2f}–{r['ms_max']:.2f}", f"{r['work_ms']:.2f}", f"{r['floor_ms']:.2f}",
-             f"{r['ms_median'] / r['floor_ms']:.1f}", f"{r['upload_ms']:.0f}", f"{r['peak_mb']:.0f}", f"{r['plane_bytes'] / 2**20:.0f}",
-             f"{r['cloud_bytes'] / r['points']:.1f}"] for r in rows]
+             f"{r['ms_median'] / r['floor_ms']:.1f}", f"{r['upload_ms']:.0f}", f"{r['peak_mb']:.0f}",
+             f"{r['plane_bytes'] / 2**20:.0f}", f"{r['cloud_bytes'] / r['points']:.1f}"] for r in rows]
     return _table(head, body)
 
 
@@ -72,8 +72,8 @@ def markdown(result: dict[str, Any]) -> str:
             f"{result['processor']}, {result['cores']} cores. Patina {result['version']}. Random torus (R 1, r 0.4), "
             f"normals and colours, lit by a sun, culled; camera {result['distance']} away, {result['elevation']}° up, "
             f"field of view {result['fov']}°, 1024×1024; at least {result['frames']} frames, one degree apart, after a "
-            f"warm-up. All passes of the surface pipeline. Load average when it began: {result['load']:.1f} (other programs' "
-            "share of the processor shows in the maxima).", "",
+            f"warm-up. All passes of the surface pipeline. Load average when it began: "
+            f"{result['load']:.1f} (other programs' share of the processor shows in the maxima).", "",
             f"Floor: 12 bytes a point and the bytes of all planes ÷ {result['bandwidth']:.1f} GB/s, what a copy by "
             f"numpy on {result['cores']} threads moves (read + written); a single thread: "
             f"{result['bandwidth_one']:.1f} GB/s. Work: processor time of all threads.", "",
@@ -140,7 +140,7 @@ def compare(new: dict[str, Any], old: dict[str, Any]) -> str:
                      f"{error['depth_rms_spacings'] / max(past['depth_rms_spacings'], 1e-12):.3f}",
                      f"{error['normal_mean_degrees'] / max(past['normal_mean_degrees'], 1e-12):.3f}",
                      f"{error['coverage_iou'] - past['coverage_iou']:+.5f}"])
-    head = ["device", "points", "quality", "ms", "× time", "× work", "× upload", "× peak MB", "× depth error", "× normal error",
-            "IoU change"]
+    head = ["device", "points", "quality", "ms", "× time", "× work", "× upload", "× peak MB", "× depth error",
+            "× normal error", "IoU change"]
     machine = "" if old.get("processor") == new["processor"] else f" (another machine: {old.get('processor')})"
     return f"## Against {old.get('date', 'an older run')}{machine}\n\n" + _table(head, body) + "\n"

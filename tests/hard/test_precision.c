@@ -198,8 +198,8 @@ static void test_sixteen_kilometres(void **state)
     patina_device_destroy(device);
 }
 
-// Seven decades of distance in one view. As seven clouds every point is as exact as float32 is; in one cloud a point can
-// only be as exact as 2^-24 of its chunk's extent, which is printed.
+// Seven decades of distance in one view. As a cloud a decade every point is as exact as float32 is; in one cloud a point
+// can only be as exact as 2^-24 of its chunk's extent, which is printed.
 static void test_far_over_near(void **state)
 {
     (void)state;

@@ -75,7 +75,8 @@ struct picture picture_render(patina_device *device, patina_scene *scene, const 
                               const patina_settings *settings);
 void picture_free(struct picture *picture);
 uint64_t picture_count(const struct picture *picture); // pixels that are not empty
-// (keys only where both have them) Whole pictures, or a crop of `whole` at (x, y) against `part`; fail with the first pixel that differs.
+// Whole pictures, or a crop of `whole` at (x, y) against `part`; fails with the first pixel that differs. Keys only where
+// both have them.
 void picture_assert_identical(const struct picture *part, const struct picture *whole, uint32_t x, uint32_t y,
                               const char *what);
 

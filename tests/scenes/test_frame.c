@@ -287,6 +287,43 @@ static void test_cancel_while_running(void **state)
     patina_device_destroy(device);
 }
 
+// A cap on memory refuses what does not fit and says so; what fits is the same picture.
+static void test_memory_cap(void **state)
+{
+    (void)state;
+    struct stage stage = stage_build(staging_named("orthographic, refined"));
+    uint64_t needed = 0;
+    struct picture truth = {0};
+    for (int capped = 0; capped < 3; capped++) {
+        patina_device_desc desc = {.struct_size = sizeof desc, .name = "cpu"};
+        desc.memory_cap = capped == 0 ? 0 : capped == 1 ? needed : needed / 2;
+        patina_device *device = NULL;
+        CHECK(patina_device_create(&desc, &device), NULL);
+        patina_frame *frame = frame_of(device, &stage);
+        int code = patina_frame_render(frame, stage.scene);
+        if (capped == 2) {
+            assert_int_equal(code, PATINA_ERROR_MEMORY);
+            printf("  message: %s\n", support_message(frame));
+        } else {
+            CHECK(code, frame);
+            struct picture picture = picture_read(frame);
+            if (capped) {
+                picture_assert_identical(&picture, &truth, 0, 0, "under a memory cap");
+                picture_free(&picture);
+            } else {
+                truth = picture;
+            }
+            patina_frame_stats stats = {.struct_size = sizeof stats};
+            CHECK(patina_frame_get_stats(frame, &stats), frame);
+            needed = stats.plane_bytes;
+        }
+        patina_frame_destroy(frame);
+        patina_device_destroy(device);
+    }
+    picture_free(&truth);
+    stage_free(&stage);
+}
+
 static void test_refused_arguments(void **state)
 {
     (void)state;
@@ -351,6 +388,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_plan),
         cmocka_unit_test(test_cancel_keeps_the_picture),
         cmocka_unit_test(test_cancel_while_running),
+        cmocka_unit_test(test_memory_cap),
         cmocka_unit_test(test_refused_arguments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 
 enum { SIZE = 384 };
+enum { SPHERE = ANALYTIC_SPHERE, TORUS = ANALYTIC_TORUS, PLANE = ANALYTIC_RECTANGLE };
 
 struct bounds {
     double iou;                       // at least
@@ -33,25 +34,25 @@ struct scenario {
 // surface at the pixel's centre, and a spacing is half a pixel: hence the larger figures in spacings.
 // clang-format off
 static const struct scenario scenarios[] = {
-    //                                                                         IoU   inner outer depth p99.9 normal color
-    {"sphere",                 ANALYTIC_SPHERE,    0.3, 0, POINTS_NORMALS, 0, {0.982, 0.05, 0.30, 0.65, 3.2, 0.42, 0.0110}},
-    {"sphere",                 ANALYTIC_SPHERE,    1.0, 0, POINTS_NORMALS, 0, {0.987, 0.01, 0.02, 0.56, 3.2, 0.31, 0.0037}},
-    {"sphere",                 ANALYTIC_SPHERE,    4.0, 0, POINTS_NORMALS, 0, {0.986, 0.01, 0.02, 1.45, 7.0, 0.38, 0.0060}},
-    {"sphere, paper's depth",  ANALYTIC_SPHERE,    1.0, 0, POINTS_NORMALS, 1, {0.987, 0.01, 0.02, 0.95, 5.3, 0.58, 0.0063}},
-    {"sphere, orthographic",   ANALYTIC_SPHERE,    1.0, 1, POINTS_NORMALS, 0, {0.987, 0.01, 0.02, 0.66, 3.5, 0.34, 0.0042}},
-    {"sphere without normals", ANALYTIC_SPHERE,    1.0, 0, POINTS_PLAIN,   0, {0.987, 0.01, 0.02, 0.56, 3.2, 1.05, 0.0108}},
-    {"torus",                  ANALYTIC_TORUS,     0.3, 0, POINTS_NORMALS, 0, {0.974, 0.05, 0.70, 0.66, 3.9, 0.70, 0.0146}},
-    {"torus",                  ANALYTIC_TORUS,     1.0, 0, POINTS_NORMALS, 0, {0.984, 0.01, 0.05, 0.55, 3.6, 0.52, 0.0052}},
-    {"torus",                  ANALYTIC_TORUS,     4.0, 0, POINTS_NORMALS, 0, {0.984, 0.01, 0.02, 1.40, 8.5, 0.64, 0.0080}},
-    {"torus, paper's depth",   ANALYTIC_TORUS,     1.0, 0, POINTS_NORMALS, 1, {0.984, 0.01, 0.05, 0.98, 5.5, 0.94, 0.0093}},
-    {"torus, orthographic",    ANALYTIC_TORUS,     1.0, 1, POINTS_NORMALS, 0, {0.984, 0.01, 0.05, 0.60, 3.6, 0.56, 0.0060}},
-    {"torus without normals",  ANALYTIC_TORUS,     4.0, 0, POINTS_PLAIN,   0, {0.984, 0.01, 0.02, 1.40, 8.5, 0.90, 0.0117}},
-    {"plane at 60 degrees",    ANALYTIC_RECTANGLE, 0.3, 0, POINTS_NORMALS, 0, {0.975, 0.40, 0.05, 0.65, 2.5, 0.01, 0.0005}},
-    {"plane at 60 degrees",    ANALYTIC_RECTANGLE, 1.0, 0, POINTS_NORMALS, 0, {0.988, 0.01, 0.02, 0.45, 1.0, 0.01, 0.0005}},
-    {"plane at 60 degrees",    ANALYTIC_RECTANGLE, 4.0, 0, POINTS_NORMALS, 0, {0.987, 0.01, 0.02, 1.00, 1.9, 0.01, 0.0005}},
-    {"plane, paper's depth",   ANALYTIC_RECTANGLE, 1.0, 0, POINTS_NORMALS, 1, {0.988, 0.01, 0.02, 1.20, 4.0, 0.01, 0.0005}},
-    {"plane, orthographic",    ANALYTIC_RECTANGLE, 1.0, 1, POINTS_NORMALS, 0, {0.988, 0.01, 0.02, 0.45, 0.8, 0.01, 0.0005}},
-    {"plane without normals",  ANALYTIC_RECTANGLE, 1.0, 0, POINTS_PLAIN,   0, {0.988, 0.01, 0.02, 0.65, 2.2, 1.00, 0.0060}},
+    //                                                               IoU   inner outer depth p99.9 normal color
+    {"sphere",                 SPHERE, 0.3, 0, POINTS_NORMALS, 0, {0.982, 0.05, 0.30, 0.65, 3.2, 0.42, 0.0110}},
+    {"sphere",                 SPHERE, 1.0, 0, POINTS_NORMALS, 0, {0.987, 0.01, 0.02, 0.56, 3.2, 0.31, 0.0037}},
+    {"sphere",                 SPHERE, 4.0, 0, POINTS_NORMALS, 0, {0.986, 0.01, 0.02, 1.45, 7.0, 0.38, 0.0060}},
+    {"sphere, paper's depth",  SPHERE, 1.0, 0, POINTS_NORMALS, 1, {0.987, 0.01, 0.02, 0.95, 5.3, 0.58, 0.0063}},
+    {"sphere, orthographic",   SPHERE, 1.0, 1, POINTS_NORMALS, 0, {0.987, 0.01, 0.02, 0.66, 3.5, 0.34, 0.0042}},
+    {"sphere without normals", SPHERE, 1.0, 0, POINTS_PLAIN,   0, {0.987, 0.01, 0.02, 0.56, 3.2, 1.05, 0.0108}},
+    {"torus",                  TORUS,  0.3, 0, POINTS_NORMALS, 0, {0.974, 0.05, 0.70, 0.66, 3.9, 0.70, 0.0146}},
+    {"torus",                  TORUS,  1.0, 0, POINTS_NORMALS, 0, {0.984, 0.01, 0.05, 0.55, 3.6, 0.52, 0.0052}},
+    {"torus",                  TORUS,  4.0, 0, POINTS_NORMALS, 0, {0.984, 0.01, 0.02, 1.40, 8.5, 0.64, 0.0080}},
+    {"torus, paper's depth",   TORUS,  1.0, 0, POINTS_NORMALS, 1, {0.984, 0.01, 0.05, 0.98, 5.5, 0.94, 0.0093}},
+    {"torus, orthographic",    TORUS,  1.0, 1, POINTS_NORMALS, 0, {0.984, 0.01, 0.05, 0.60, 3.6, 0.56, 0.0060}},
+    {"torus without normals",  TORUS,  4.0, 0, POINTS_PLAIN,   0, {0.984, 0.01, 0.02, 1.40, 8.5, 0.90, 0.0117}},
+    {"plane at 60 degrees",    PLANE,  0.3, 0, POINTS_NORMALS, 0, {0.975, 0.40, 0.05, 0.65, 2.5, 0.01, 0.0005}},
+    {"plane at 60 degrees",    PLANE,  1.0, 0, POINTS_NORMALS, 0, {0.988, 0.01, 0.02, 0.45, 1.0, 0.01, 0.0005}},
+    {"plane at 60 degrees",    PLANE,  4.0, 0, POINTS_NORMALS, 0, {0.987, 0.01, 0.02, 1.00, 1.9, 0.01, 0.0005}},
+    {"plane, paper's depth",   PLANE,  1.0, 0, POINTS_NORMALS, 1, {0.988, 0.01, 0.02, 1.20, 4.0, 0.01, 0.0005}},
+    {"plane, orthographic",    PLANE,  1.0, 1, POINTS_NORMALS, 0, {0.988, 0.01, 0.02, 0.45, 0.8, 0.01, 0.0005}},
+    {"plane without normals",  PLANE,  1.0, 0, POINTS_PLAIN,   0, {0.988, 0.01, 0.02, 0.65, 2.2, 1.00, 0.0060}},
 };
 // clang-format on
 
@@ -70,25 +71,25 @@ static struct setting prepare(const struct scenario *scenario)
     double a = 1.0, b = 0.4, area;
     double pixel = 3.4 / SIZE; // world units at the target
     double distance = 6.0;
-    if (scenario->kind == ANALYTIC_SPHERE) {
+    if (scenario->kind == SPHERE) {
         area = area_sphere(a);
-    } else if (scenario->kind == ANALYTIC_TORUS) {
+    } else if (scenario->kind == TORUS) {
         area = area_torus(a, b);
     } else {
         a = b = 1.8;
         area = a * b;
     }
-    double facing = scenario->kind == ANALYTIC_RECTANGLE ? 0.5 : 1.0; // cosine of the plane's tilt
+    double facing = scenario->kind == PLANE ? 0.5 : 1.0; // cosine of the plane's tilt
     uint64_t count = (uint64_t)(scenario->density * area * facing / (pixel * pixel));
     set.shape = analytic_shape(scenario->kind, a, b);
     set.spacing = sqrt(area / (double)count);
-    if (scenario->kind == ANALYTIC_SPHERE)
+    if (scenario->kind == SPHERE)
         set.points = points_sphere(count, a, scenario->columns, 21);
-    else if (scenario->kind == ANALYTIC_TORUS)
+    else if (scenario->kind == TORUS)
         set.points = points_torus(count, a, b, scenario->columns, 22);
     else
         set.points = points_rectangle(count, a, b, scenario->columns, 23);
-    double elevation = scenario->kind == ANALYTIC_RECTANGLE ? 30.0 : 40.0; // above the horizon
+    double elevation = scenario->kind == PLANE ? 30.0 : 40.0; // above the horizon
     double high = sin(elevation * M_PI / 180.0), across = cos(elevation * M_PI / 180.0);
     const double eye[3] = {0.3 * distance * across, -0.9539392 * distance * across, distance * high};
     const double target[3] = {0.0, 0.0, 0.0};
