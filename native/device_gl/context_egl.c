@@ -205,6 +205,9 @@ fail:
     return NULL;
 }
 
-static pt_gl_function function(void *context, const char *name) { return ((struct egl *)context)->get_proc(name); }
+static pt_gl_function function(void *context, const char *name)
+{
+    return ((struct egl *)context)->get_proc(name);
+}
 
 const struct pt_gl_context_ops pt_gl_context_egl = {"gl-egl", create, destroy, function};

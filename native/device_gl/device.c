@@ -355,7 +355,10 @@ static int op_run(struct patina_device *device, enum pt_kernel kernel, const voi
                                    .cancel = cancel});
 }
 
-static int op_finish(struct patina_device *device) { return call(device, finish_work, NULL); }
+static int op_finish(struct patina_device *device)
+{
+    return call(device, finish_work, NULL);
+}
 
 static void op_destroy(struct patina_device *device)
 {

@@ -23,13 +23,13 @@ struct pt_gl_scratch {
 
 enum pt_gl_scratch_use {
     PT_GL_SCRATCH_COUNTERS,
-    PT_GL_SCRATCH_PIXELS,      // fill: this step's changes; shade: filled pixels; antialias: edges
-    PT_GL_SCRATCH_COLORS,      // antialias: of edges
-    PT_GL_SCRATCH_SAVED,       // fill: pixels as they were before the phase
-    PT_GL_SCRATCH_FILLED,      // fill: a bit for each pixel filled in this phase
-    PT_GL_SCRATCH_STAMPS,      // fill: the step for which a tile was listed last
-    PT_GL_SCRATCH_WOKEN,       // fill: tiles that the next step has to look at
-    PT_GL_SCRATCH_TILES,       // what each tile holds
+    PT_GL_SCRATCH_PIXELS, // fill: this step's changes; shade: filled pixels; antialias: edges
+    PT_GL_SCRATCH_COLORS, // antialias: of edges
+    PT_GL_SCRATCH_SAVED,  // fill: pixels as they were before the phase
+    PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
+    PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
+    PT_GL_SCRATCH_WOKEN,  // fill: tiles that the next step has to look at
+    PT_GL_SCRATCH_TILES,  // what each tile holds
     PT_GL_SCRATCH_TILE_LISTS,
     PT_GL_SCRATCH_TILE_COUNTS,
     PT_GL_SCRATCH_COUNT

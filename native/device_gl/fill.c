@@ -30,7 +30,8 @@ static int bind_scratch(struct fill *f, uint32_t binding, enum pt_gl_scratch_use
     int result = pt_gl_scratch(f->d, use, size, keep);
     const struct pt_gl_scratch *scratch = &f->d->scratch[use];
     size_t bound = scratch->size < f->d->block_size ? scratch->size : f->d->block_size & ~(size_t)15;
-    return result == PATINA_OK ? pt_gl_bind(f->d, binding, scratch->name, 0, size > bound ? size : bound, "fill") : result;
+    return result == PATINA_OK ? pt_gl_bind(f->d, binding, scratch->name, 0, size > bound ? size : bound, "fill")
+                               : result;
 }
 
 static int programs(struct fill *f)
@@ -117,7 +118,8 @@ static int find(struct fill *f)
 {
     uint32_t woken = f->counters.woken;
     for (;;) {
-        uint32_t room = (uint32_t)(f->d->scratch[PT_GL_SCRATCH_PIXELS].size / CHANGE_SIZE);
+        size_t size = f->d->scratch[PT_GL_SCRATCH_PIXELS].size;
+        uint32_t room = (uint32_t)((size < f->d->block_size ? size : f->d->block_size) / CHANGE_SIZE);
         f->counters.changed = f->counters.woken = 0;
         write_counters(f);
         f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][f->find], 0, room);

@@ -32,7 +32,9 @@ int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t varia
         d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
                             GL_TEXTURE_FETCH_BARRIER_BIT);
     }
-    return pt_gl_check(d, pt_kernel_names[kernel]);
+    char doing[64];
+    snprintf(doing, sizeof doing, "running %s", pt_kernel_names[kernel]);
+    return pt_gl_check(d, doing);
 }
 
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep)
@@ -147,17 +149,22 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
 {
     const struct view_args *view = arguments; // every argument struct begins with its view
     switch (kernel) {
-    case PT_KERNEL_fill: return pt_gl_fill(d, arguments, cancel);
-    case PT_KERNEL_shade: return pt_gl_shade(d, arguments);
-    case PT_KERNEL_antialias: return pt_gl_antialias(d);
+    case PT_KERNEL_fill:
+        return pt_gl_fill(d, arguments, cancel);
+    case PT_KERNEL_shade:
+        return pt_gl_shade(d, arguments);
+    case PT_KERNEL_antialias:
+        return pt_gl_antialias(d);
     case PT_KERNEL_normals:
     case PT_KERNEL_surface:
-    case PT_KERNEL_smooth: return run_tiles(d, kernel);
+    case PT_KERNEL_smooth:
+        return run_tiles(d, kernel);
     case PT_KERNEL_compose: {
         const struct compose_args *args = arguments;
         return run_over(d, kernel, 0, "", args->crop_width, args->crop_height);
     }
-    case PT_KERNEL_extract: return run_extract(d, arguments);
+    case PT_KERNEL_extract:
+        return run_extract(d, arguments);
     default:
         pt_gl_tiles_forget(d); // pull and push write keys
         return run_over(d, kernel, 0, "", view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);

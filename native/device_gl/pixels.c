@@ -55,9 +55,9 @@ static int shade_programs(struct pt_gl_device *d, const struct shade_args *args,
                                               "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 0\n",
                                               "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 1\n",
                                               "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 2\n"};
-    int result = args->refined ? pt_gl_kernel_program(d, PT_KERNEL_shade, REFINED_NORMALS,
-                                                      "#define STEP 0\n#define REFINED 1\n")
-                               : pt_gl_kernel_program(d, PT_KERNEL_shade, NORMALS, "#define STEP 0\n");
+    int result = args->refined
+                     ? pt_gl_kernel_program(d, PT_KERNEL_shade, REFINED_NORMALS, "#define STEP 0\n#define REFINED 1\n")
+                     : pt_gl_kernel_program(d, PT_KERNEL_shade, NORMALS, "#define STEP 0\n");
     if (result == PATINA_OK && args->refined)
         result = pt_gl_kernel_program(d, PT_KERNEL_shade, BLEND, "#define STEP 1\n");
     if (result == PATINA_OK)
@@ -90,7 +90,8 @@ int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
     if (result == PATINA_OK)
         result = prepare_list(d, 9, 10);
     if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, args->refined ? REFINED_NORMALS : NORMALS, PT_GL_TILES_POINTS);
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, args->refined ? REFINED_NORMALS : NORMALS,
+                                      PT_GL_TILES_POINTS);
     if (result == PATINA_OK && args->refined)
         result = dispatch_list(d, PT_KERNEL_shade, BLEND, list_length(d));
     if (result == PATINA_OK && args->instance.lit)

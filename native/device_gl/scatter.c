@@ -6,8 +6,8 @@
 #include <stdlib.h>
 
 enum {
-    SLICES = 16,        // workgroups that share a chunk on a GPU: 4096 points are too many for one where cores abound
-    LONG_RUN = 4096,    // chunks between two looks at cancel
+    SLICES = 16,     // workgroups that share a chunk on a GPU: 4096 points are too many for one where cores abound
+    LONG_RUN = 4096, // chunks between two looks at cancel
 };
 
 struct instance_buffers {

@@ -6,7 +6,10 @@
 
 enum { TILE = 8, GROUP = 32, LISTS = 2, GROUPS_IN_ROW = 16384 }; // as in lib/tiles.glsl
 
-void pt_gl_tiles_forget(struct pt_gl_device *d) { d->tiles.valid = 0; }
+void pt_gl_tiles_forget(struct pt_gl_device *d)
+{
+    d->tiles.valid = 0;
+}
 
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y)
 {

@@ -79,7 +79,7 @@ def markdown(result: dict[str, Any]) -> str:
             f"{result['bandwidth_one']:.1f} GB/s. Work: processor time of all threads.", "",
             "## Time", "", times_table(rows), "",
             "## Error against the analytic torus, beside the time", "",
-            "Truth at pixel centres; spacing = 1/√(points per area); inner, outer: pixels away from the silhouette.", "",
+            "Truth at pixel centres; spacing = 1/√(points per area); inner, outer: away from the silhouette.", "",
             errors_table(rows), "", "## Milliseconds by pass", "", passes_table(rows), ""]
     skipped = {name: reason for row in rows for name, reason in row["skipped"].items()}
     if skipped:
@@ -134,7 +134,8 @@ def compare(new: dict[str, Any], old: dict[str, Any]) -> str:
             continue
         error, past = row["error"], other["error"]
         body.append([name_of(row), _count(row["points"]), row["quality"],
-                     f"{other['ms_median']:.2f} → {row['ms_median']:.2f}", f"{row['ms_median'] / other['ms_median']:.3f}",
+                     f"{other['ms_median']:.2f} → {row['ms_median']:.2f}",
+                     f"{row['ms_median'] / other['ms_median']:.3f}",
                      f"{row['work_ms'] / other['work_ms']:.3f}",
                      f"{row['upload_ms'] / other['upload_ms']:.3f}", f"{row['peak_mb'] / other['peak_mb']:.3f}",
                      f"{error['depth_rms_spacings'] / max(past['depth_rms_spacings'], 1e-12):.3f}",

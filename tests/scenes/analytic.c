@@ -47,9 +47,9 @@ static double torus_walk(const struct analytic_shape *shape, const double o[3], 
 
 static double cast_unit(const struct analytic_shape *shape, const double o[3], const double d[3], double normal[3])
 {
-    if (shape->kind == ANALYTIC_TORUS)
+    if (shape->kind == TORUS)
         return torus_walk(shape, o, d, normal);
-    if (shape->kind == ANALYTIC_SPHERE) {
+    if (shape->kind == SPHERE) {
         double along = -dot(o, d), foot[3];
         for (int k = 0; k < 3; k++)
             foot[k] = o[k] + along * d[k];

@@ -5,18 +5,18 @@
 
 #include "support.h"
 
-enum analytic_kind { ANALYTIC_SPHERE, ANALYTIC_TORUS, ANALYTIC_RECTANGLE };
+enum analytic_kind { SPHERE, TORUS, PLANE };
 
 // Placed in the world by world_from_object (row-major 3x4, rotation and move only).
 struct analytic_shape {
     enum analytic_kind kind;
-    double a, b; // sphere: radius; torus around z: ring, tube radius; rectangle z = 0: width, height
+    double a, b; // sphere: radius; torus around z: ring, tube radius; plane z = 0: width, height
     double world_from_object[12];
 };
 
 struct analytic_hit {
     double z;         // pass depth; HUGE_VAL where nothing is
-    double normal[3]; // world, unit, outwards (rectangle: +z of the object)
+    double normal[3]; // world, unit, outwards (plane: +z of the object)
 };
 
 struct analytic_shape analytic_shape(enum analytic_kind kind, double a, double b);

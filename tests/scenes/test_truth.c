@@ -9,7 +9,6 @@
 #include <stdlib.h>
 
 enum { SIZE = 384 };
-enum { SPHERE = ANALYTIC_SPHERE, TORUS = ANALYTIC_TORUS, PLANE = ANALYTIC_RECTANGLE };
 
 struct bounds {
     double iou;                       // at least

@@ -3,27 +3,46 @@
 // is scan and what is invention); twin of shaders/kernels/extract.comp
 #include "device_cpu/rows.h"
 
+// Row and column of pixels of a plane: a float quotient is at most one row off, also where the index has more than 24 bits.
+static void place_of(vi index, uint32_t width, vi *x, vi *y)
+{
+    const vf inverse = vf_set(1.0f / (float)width);
+    vi row = vf_int(vi_convert(index) * inverse), column = vi_sub(index, vi_mul(row, vi_set(width)));
+    vm under = vi_lt_unsigned(vi_set(0x7FFFFFFFu), column); // negative
+    row = vi_select(under, vi_sub(row, vi_set(1)), row);
+    column = vi_select(under, vi_add(column, vi_set(width)), column);
+    vm over = vm_not(vi_lt_unsigned(column, vi_set(width)));
+    *y = vi_select(over, vi_add(row, vi_set(1)), row);
+    *x = vi_select(over, vi_sub(column, vi_set(width)), column);
+}
+
 // 1 measured, 1 + distance filled, negative when anti-aliasing mixed the colour.
 static void extract_source(const struct extract_args *args, const uint64_t *keys, const uint32_t *from, uint32_t y,
                            float *out)
 {
     const struct view_args *view = &args->view;
+    const vf one = vf_set(1.0f);
     uint32_t row = (args->crop_y + y) * view->width + args->crop_x;
     for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
         vm some = vm_and(lanes, vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
-        vi word = vi_load(from + x), source = vi_and(word, vi_set(~PT_FROM_MIXED));
-        vm mixed = vm_not(vi_eq(word, source));
-        vm measured = vi_eq(source, vi_add(vi_set(row + x), vi_lanes()));
-        vf value = vf_select(mixed, vf_set(-1.0f), vf_set(1.0f));
-        vf_store(out + x, vf_select(some, value, vf_zero()), lanes);
-        for (uint32_t bits = vm_bits(vm_and(some, vm_not(measured))); bits; bits &= bits - 1) {
-            uint32_t i = x + (uint32_t)__builtin_ctz(bits), at = from[i] & ~PT_FROM_MIXED;
-            float dx = (float)((int32_t)(at % view->width) - (int32_t)(args->crop_x + i));
-            float dy = (float)((int32_t)(at / view->width) - (int32_t)(args->crop_y + y));
-            float square = dx * dx + dy * dy, distance = 1.0f + square * pt_rsqrt(square);
-            out[i] = from[i] & PT_FROM_MIXED ? -distance : distance;
+        if (!vm_bits(some)) {
+            vf_store(out + x, vf_zero(), lanes);
+            continue;
         }
+        vi word = vi_load(from + x), source = vi_and(word, vi_set(~PT_FROM_MIXED));
+        vm filled = vm_and(some, vm_not(vi_eq(source, vi_add(vi_set(row + x), vi_lanes()))));
+        vf value = one;
+        if (vm_bits(filled)) {
+            vi sx, sy;
+            place_of(source, view->width, &sx, &sy);
+            vf dx = vi_convert(vi_sub(sx, vi_add(vi_set(args->crop_x + x), vi_lanes())));
+            vf dy = vi_convert(vi_sub(sy, vi_set(args->crop_y + y)));
+            vf square = vf_select(filled, dx * dx + dy * dy, one);
+            value = vf_select(filled, one + square * vf_rsqrt(square), one);
+        }
+        value = vf_select(vi_eq(word, source), value, vf_zero() - value);
+        vf_store(out + x, vf_select(some, value, vf_zero()), lanes);
     }
 }
 
