@@ -20,6 +20,14 @@ static inline void pt_progress_set(struct patina_progress *progress, double valu
         atomic_store_explicit(&progress->value, (float)value, memory_order_relaxed);
 }
 
+// From several threads: never goes back.
+static inline void pt_progress_raise(struct patina_progress *progress, double value)
+{
+    float seen = progress ? atomic_load_explicit(&progress->value, memory_order_relaxed) : 1.0f;
+    while (seen < (float)value && !atomic_compare_exchange_weak(&progress->value, &seen, (float)value))
+        ;
+}
+
 static inline int pt_progress_cancelled(const struct patina_progress *progress)
 {
     return progress && atomic_load_explicit(&progress->cancelled, memory_order_relaxed);

@@ -189,14 +189,17 @@ static int open_context(struct pt_gl_device *d, void *unused)
     info->hardware = !is_software(info->description);
 
     GLint64 block = 0;
-    GLint blocks = 0, alignment = 0, texels = 0;
+    GLint blocks = 0, bindings = 0, alignment = 0, texels = 0;
     d->gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &block);
     d->gl.GetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &blocks);
+    d->gl.GetIntegerv(GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS, &bindings);
     d->gl.GetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
     d->gl.GetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
     int result = pt_gl_check(d, "reading the driver's limits");
     if (result != PATINA_OK)
         return result;
+    if (bindings < blocks)
+        blocks = bindings;
     if (blocks < PT_GL_BINDINGS)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "%s offers %d storage blocks to a shader, %d are needed",
                           info->description, blocks, PT_GL_BINDINGS);

@@ -39,6 +39,9 @@ struct build {
     struct patina_progress *progress;
     uint64_t *words, *scratch; // Morton code << 32 | id of the drawn points
     uint32_t drawn;
+    uint32_t cell_bits;        // the grid of cells has 2^cell_bits cells a side
+    uint32_t *cells;           // first word of each cell, and one past the last
+    uint32_t *begins;          // first word of each chunk
     double box_min[3], box_max[3];
     struct block {
         uint32_t drawn, offset;
@@ -160,6 +163,30 @@ static int refine_range(struct build *build, uint32_t begin, uint32_t end, int d
     return PATINA_OK;
 }
 
+// No chunk reaches over a cell: what a chunk's points have in common (float32 offsets, spacing, normals) stays local where
+// a scan is sparse or has strays. 8 x 8 x 8 cells when they hold 256 points each on average, fewer for small clouds.
+static int find_cells(struct build *build)
+{
+    while (build->cell_bits < 3 && build->drawn >> (3 * build->cell_bits + 3) >= 256)
+        build->cell_bits++;
+    uint32_t count = 1u << 3 * build->cell_bits, shift = 62 - 3 * build->cell_bits;
+    build->cells = malloc((count + 1) * sizeof *build->cells);
+    if (!build->cells)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t cell = 0; cell <= count; cell++) {
+        uint32_t low = 0, high = build->drawn;
+        while (low < high) {
+            uint32_t middle = low + (high - low) / 2;
+            if (build->words[middle] >> shift < cell)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        build->cells[cell] = low;
+    }
+    return PATINA_OK;
+}
+
 static int sort_points(struct build *build)
 {
     size_t bytes = (size_t)build->drawn * sizeof *build->words;
@@ -171,6 +198,8 @@ static int sort_points(struct build *build)
     pt_parallel(build->pool, build->block_count, 1, code_blocks, build);
     pt_progress_set(build->progress, 0.2);
     int error = pt_morton_sort(build->pool, build->words, build->scratch, build->drawn);
+    if (!error)
+        error = find_cells(build);
     if (!error)
         error = refine_range(build, 0, build->drawn, 0);
     pt_pages_free(build->scratch, bytes);
@@ -234,9 +263,9 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     struct build *build = context;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++) {
-        fill_chunk(build, &build->cloud->chunks[c], build->words + (size_t)c * PT_CHUNK_POINTS);
+        fill_chunk(build, &build->cloud->chunks[c], build->words + build->begins[c]);
         uint32_t done = atomic_fetch_add_explicit(&build->chunks_done, 1, memory_order_relaxed);
-        pt_progress_set(build->progress, 0.5 + 0.3 * done / build->cloud->chunk_count);
+        pt_progress_raise(build->progress, 0.5 + 0.3 * done / build->cloud->chunk_count);
     }
 }
 
@@ -276,7 +305,7 @@ double pt_spacing_of_class(uint32_t index) { return index ? exp2(((double)index 
 
 static uint32_t class_of_spacing(double spacing, double base) // rounded up: a layer distance may be too wide, not too narrow
 {
-    if (!(spacing > 0.0) || !(base > 0.0))
+    if (!(spacing > 0.0) || !(base > 0.0) || !isfinite(spacing / base))
         return 0;
     double steps = ceil(4.0 * log2(spacing / base) - 1e-6);
     return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
@@ -427,25 +456,40 @@ static size_t color_bytes(const struct patina_cloud *cloud)
     return cloud->info.count * bytes[cloud->color_format] + 4; // kernels read bytes as words
 }
 
-static int allocate(struct patina_cloud *cloud, uint64_t drawn)
+// Cuts the cells into chunks, as even as PT_CHUNK_POINTS allows.
+static int cut_chunks(struct build *build)
 {
-    uint64_t full = drawn / PT_CHUNK_POINTS, rest = drawn % PT_CHUNK_POINTS;
-    cloud->chunk_count = (uint32_t)(full + (rest != 0));
-    cloud->slots = full * PT_CHUNK_POINTS + (rest + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
-    cloud->chunks = calloc(cloud->chunk_count ? cloud->chunk_count : 1, sizeof *cloud->chunks);
+    struct patina_cloud *cloud = build->cloud;
+    uint32_t cells = 1u << 3 * build->cell_bits, most = build->drawn / PT_CHUNK_POINTS + cells, c = 0;
+    cloud->chunks = calloc(most + 1, sizeof *cloud->chunks);
+    build->begins = malloc((most + 1) * sizeof *build->begins);
+    if (!cloud->chunks || !build->begins)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t cell = 0; cell < cells; cell++) {
+        uint32_t begin = build->cells[cell], count = build->cells[cell + 1] - begin;
+        uint32_t parts = (count + PT_CHUNK_POINTS - 1) / PT_CHUNK_POINTS;
+        for (uint32_t part = 0; part < parts; part++) {
+            struct pt_chunk *chunk = &cloud->chunks[c];
+            uint32_t first = (uint32_t)((uint64_t)count * part / parts);
+            chunk->count = (uint32_t)((uint64_t)count * (part + 1) / parts) - first;
+            chunk->padded = (chunk->count + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
+            chunk->first = (uint32_t)cloud->slots;
+            cloud->slots += chunk->padded;
+            build->begins[c++] = begin + first;
+        }
+    }
+    cloud->chunk_count = c;
+    return PATINA_OK;
+}
+
+static int allocate(struct patina_cloud *cloud)
+{
     cloud->positions = pt_pages_alloc(cloud->slots * 12);
     cloud->ids = pt_pages_alloc(cloud->slots * 4);
     cloud->surface = pt_pages_alloc(cloud->info.count * 4);
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
-    if (!cloud->chunks || !cloud->positions || !cloud->ids || !cloud->surface ||
-        (cloud->color_format && !cloud->colors))
+    if (!cloud->positions || !cloud->ids || !cloud->surface || (cloud->color_format && !cloud->colors))
         return PATINA_ERROR_MEMORY;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
-        struct pt_chunk *chunk = &cloud->chunks[c];
-        chunk->first = c * PT_CHUNK_POINTS;
-        chunk->count = c < full ? PT_CHUNK_POINTS : (uint32_t)rest;
-        chunk->padded = c < full ? PT_CHUNK_POINTS : (uint32_t)(cloud->slots - full * PT_CHUNK_POINTS);
-    }
     cloud->info.bytes = cloud->slots * 16 + cloud->info.count * 4 + (cloud->colors ? color_bytes(cloud) : 0) +
                         cloud->chunk_count * sizeof *cloud->chunks;
     return PATINA_OK;
@@ -469,7 +513,7 @@ static int build_cloud(struct build *build)
     if (pt_progress_cancelled(build->progress))
         return PATINA_ERROR_CANCELLED;
     int error = sort_points(build);
-    if (error || (error = allocate(cloud, build->drawn)))
+    if (error || (error = cut_chunks(build)) || (error = allocate(cloud)))
         return error;
     pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
     if ((error = settle_spacing(cloud)))
@@ -572,6 +616,8 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
     pt_pages_free(build.words, (size_t)build.drawn * sizeof *build.words);
     pt_pages_free(build.scratch, (size_t)build.drawn * sizeof *build.scratch);
     free(build.blocks);
+    free(build.cells);
+    free(build.begins);
     pt_pool_destroy(build.pool);
     if (error) {
         if (cloud && cloud->alive) {

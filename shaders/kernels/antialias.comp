@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // antialias: Laplace on depth as steps. [D 3.5]; twin of native/device_cpu/kernels/antialias.c
 //
-// k of the four cross neighbours are farther than d_eff (or empty). A pixel is drawn when a point falls anywhere in it, so
-// an edge pixel's true coverage is below 1: for a straight edge at 0 degrees (k = 1) it is uniform in 0..1, mean 1/2; at
-// 45 degrees the outermost pixels (k = 2) cover t^2/2, mean 1/6. Both are met by coverage = 5/6 - k/3, floored at 1/6 so
-// that lone pixels stay visible.
+// k of the four cross neighbours are farther than d_eff (or empty). A pixel is drawn when a point falls anywhere in it,
+// so an edge pixel's true coverage is below 1: for a straight edge at 0 degrees (k = 1) it is uniform in 0..1, mean
+// 1/2; at 45 degrees the outermost pixels (k = 2) cover t^2/2, mean 1/6. Both are met by coverage = 5/6 - k/3, floored
+// at 1/6 so that lone pixels stay visible.
 //
 // Edges are few: they are listed, their new colours made, and applied when every pixel has been looked at.
 //   STEP 0: find;   STEP 1: mix, an edge an invocation;   STEP 2: apply

@@ -39,7 +39,7 @@ layout(std430, binding = 10) buffer woken_block { uint woken[]; };  // tiles for
 layout(location = 0) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
 layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
-layout(location = 3) uniform uint all_new; // STEP 1: no entry was filled before in this phase; STEP 4: look at all entries
+layout(location = 3) uniform uint all_new; // STEP 1: no entry was filled before in this phase; STEP 4: look at all
 layout(location = 4) uniform uint kept;    // STEP 1: entries saved before this step
 
 // The ring, anticlockwise from east.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // normals: image-space normals of points that have none; twin of native/device_cpu/kernels/normals.c
 //
-// A plane is linear in the picture as 1/z (perspective) or z (orthographic). Least squares over the window's pixels that
-// can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
+// A plane is linear in the picture as 1/z (perspective) or z (orthographic). Least squares over the window's pixels
+// that can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"

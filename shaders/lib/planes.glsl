@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Planes that a kernel reads come as buffer textures, the same units in all kernels (native/device_gl/kernels.c), and are
-// written as storage blocks. llvmpipe fetches a texel, of four floats too, in half the time of one word of a block.
+// Planes that a kernel reads come as buffer textures, the same units in all kernels (native/device_gl/kernels.c), and
+// are written as storage blocks. llvmpipe fetches a texel, of four floats too, in half the time of a block's word.
 #ifndef PT_PLANES_GLSL
 #define PT_PLANES_GLSL
 

@@ -24,7 +24,8 @@ layout(location = 3) uniform uint stride;
 
 void main()
 {
-    uint column = min(gl_GlobalInvocationID.x, rect.z - rect.x - 1u), x = rect.x + column, y = rect.y + gl_WorkGroupID.y * TILE;
+    uint column = min(gl_GlobalInvocationID.x, rect.z - rect.x - 1u);
+    uint x = rect.x + column, y = rect.y + gl_WorkGroupID.y * TILE;
     uint holds = 0u, end = min(y + TILE, rect.w);
     for (; y < end; y++)
         holds |= texelFetch(key_plane, int(y * width + x)).y != PT_KEY_EMPTY_Z ? HOLDS_POINTS : HOLDS_NOTHING;
@@ -35,7 +36,8 @@ void main()
 
 void main()
 {
-    uint tile = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint tile = group * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (tile >= size.x * size.y)
         return;
     int tx = int(tile % size.x), ty = int(tile / size.x);
