@@ -8,7 +8,7 @@
 
 // Radius of the window for image-space normals: two spacings, at least 3 pixels so that a point's place within its pixel
 // averages out, at most 16 (beyond, points are too far apart on screen for a surface to be seen anyway).
-enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16 };
+enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16, BLEND_MOST = 8 };
 
 static const struct {
     uint32_t bytes, levels;
@@ -256,9 +256,11 @@ static void plan_shade(struct builder *builder, uint32_t i)
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     uint32_t margin = (plan->iterations + 2) << plan->levels;
-    struct shade_args args = { .view = view_of(plan, instance, margin),
-                               .instance = instance->args,
-                               .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED };
+    struct shade_args args = { .view = view_of(plan, instance, margin), .instance = instance->args };
+    // filled pixels show their source's surface: half a spacing around, they border on the next source's
+    double blend = floor(0.5 * plan->spacing_px + 0.5);
+    if (builder->scene->settings.quality == PATINA_QUALITY_REFINED)
+        args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     memcpy(args.world, builder->scene->settings.world_color, sizeof args.world);
     args.eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f;
     if (instance->args.lit)
@@ -266,7 +268,8 @@ static void plan_shade(struct builder *builder, uint32_t i)
     REASON(ADD(builder, shade, args,
                { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
                  buffer(PT_SURFACE, i), buffer(PT_COLORS, i), plane(PT_PLANE_SHADING, 0), plane(PT_PLANE_COLOR_A, 0) }),
-           "instance %u, %s, %u lights", i, instance->args.lit ? "lit" : "unlit", args.light_count);
+           "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
+           instance->args.lit ? "lit" : "unlit", args.light_count, args.blend);
 }
 
 // Returns the plane that holds the finished colour.

@@ -118,6 +118,9 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
 int pt_gl_antialias(struct pt_gl_device *d);
+int pt_gl_push(struct pt_gl_device *d);
+// The coarse cells over the rectangle of a push.
+struct view_args pt_gl_coarse_view(const struct push_args *args);
 
 // selftest.c
 // Whether 64-bit atomics of this driver give what the CPU says; 0 too where the driver has none.

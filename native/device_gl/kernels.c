@@ -90,7 +90,8 @@ int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_bu
 static int tiled(enum pt_kernel kernel)
 {
     return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_fill ||
-           kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias;
+           kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
+           kernel == PT_KERNEL_push;
 }
 
 static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
@@ -153,6 +154,8 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
         return pt_gl_fill(d, arguments, cancel);
     case PT_KERNEL_shade:
         return pt_gl_shade(d, arguments);
+    case PT_KERNEL_push:
+        return pt_gl_push(d);
     case PT_KERNEL_antialias:
         return pt_gl_antialias(d);
     case PT_KERNEL_normals:
@@ -166,7 +169,7 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     case PT_KERNEL_extract:
         return run_extract(d, arguments);
     default:
-        pt_gl_tiles_forget(d); // pull and push write keys
+        pt_gl_tiles_forget(d); // pull writes keys
         return run_over(d, kernel, 0, "", view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);
     }
 }
@@ -186,7 +189,8 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
     int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_extract;
     if (!crops && (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1]))
         return PATINA_OK;
-    int result = tiled(kernel) ? pt_gl_tiles(d, buffers[0], view) : PATINA_OK;
+    struct view_args tiles = kernel == PT_KERNEL_push ? pt_gl_coarse_view(arguments) : *view;
+    int result = tiled(kernel) ? pt_gl_tiles(d, buffers[0], &tiles) : PATINA_OK;
     if (result == PATINA_OK)
         result = bind_buffers(d, kernel, argument_size, buffers, count);
     return result == PATINA_OK ? run_filter(d, kernel, arguments, cancel) : result;

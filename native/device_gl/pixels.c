@@ -6,10 +6,10 @@
 enum { TILE_PIXELS = 64, GROUP = 64 };
 
 // Room for as many pixels as the tiles hold; counts from nothing. Both bound.
-static int prepare_list(struct pt_gl_device *d, uint32_t counter_binding, uint32_t list_binding)
+static int prepare_list(struct pt_gl_device *d, uint32_t counter_binding, uint32_t list_binding, uint32_t tile_pixels)
 {
     static const uint32_t none;
-    size_t size = (size_t)d->tiles.count[PT_GL_TILES_POINTS] * TILE_PIXELS * 4;
+    size_t size = (size_t)d->tiles.count[PT_GL_TILES_POINTS] * tile_pixels * 4;
     int result = pt_gl_scratch(d, PT_GL_SCRATCH_COUNTERS, sizeof none, 0);
     if (result == PATINA_OK)
         result = pt_gl_scratch(d, PT_GL_SCRATCH_PIXELS, size, 0);
@@ -42,27 +42,24 @@ static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 
 // ---- shade -----------------------------------------------------------------------------------------------------
 
-enum { NORMALS = 0, REFINED_NORMALS = 1, BLEND = 2, COLORS = 3 };
+enum { NORMALS = 0, BLEND = 1, BLEND_WIDE = 2, COLORS = 3 };
 
-static int shade_programs(struct pt_gl_device *d, const struct shade_args *args, uint32_t colors)
+static int shade_programs(struct pt_gl_device *d, uint32_t normals, uint32_t colors)
 {
-    static const char *const definitions[] = {"#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 0\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 1\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 0\n#define LIT 2\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 0\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 1\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 1\n#define LIT 2\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 0\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 1\n",
-                                              "#define STEP 2\n#define COLOR_FORMAT 2\n#define LIT 2\n"};
-    int result = args->refined
-                     ? pt_gl_kernel_program(d, PT_KERNEL_shade, REFINED_NORMALS, "#define STEP 0\n#define REFINED 1\n")
-                     : pt_gl_kernel_program(d, PT_KERNEL_shade, NORMALS, "#define STEP 0\n");
-    if (result == PATINA_OK && args->refined)
-        result = pt_gl_kernel_program(d, PT_KERNEL_shade, BLEND, "#define STEP 1\n");
-    if (result == PATINA_OK)
-        result = pt_gl_kernel_program(d, PT_KERNEL_shade, colors, definitions[colors - COLORS]);
-    return result;
+    static const char *const definitions[] = {"#define STEP 0\n",
+                                              "#define STEP 0\n#define BLEND 1\n",
+                                              "#define STEP 0\n#define WIDE 1\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 0\n#define LIT 0\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 0\n#define LIT 1\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 0\n#define LIT 2\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 1\n#define LIT 0\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 1\n#define LIT 1\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 1\n#define LIT 2\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 2\n#define LIT 0\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 2\n#define LIT 1\n",
+                                              "#define STEP 1\n#define COLOR_FORMAT 2\n#define LIT 2\n"};
+    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, normals, definitions[normals]);
+    return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors, definitions[colors]) : result;
 }
 
 // In a uniform array: read once for all lanes, where a block would be read once a lane.
@@ -84,16 +81,12 @@ int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 {
     uint32_t lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1;
     uint32_t colors = COLORS + 3 * (args->instance.color_format % 3) + lit;
+    uint32_t normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE;
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
-    int result = shade_programs(d, args, colors);
+    int result = shade_programs(d, normals, colors);
     if (result == PATINA_OK)
-        result = prepare_list(d, 9, 10);
-    if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, args->refined ? REFINED_NORMALS : NORMALS,
-                                      PT_GL_TILES_POINTS);
-    if (result == PATINA_OK && args->refined)
-        result = dispatch_list(d, PT_KERNEL_shade, BLEND, list_length(d));
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, normals, PT_GL_TILES_POINTS);
     if (result == PATINA_OK && args->instance.lit)
         set_lights(d, args, colors);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, colors, PT_GL_TILES_POINTS) : result;
@@ -112,7 +105,7 @@ int pt_gl_antialias(struct pt_gl_device *d)
     for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++)
         result = pt_gl_kernel_program(d, PT_KERNEL_antialias, step, definitions[step]);
     if (result == PATINA_OK)
-        result = prepare_list(d, 5, 6);
+        result = prepare_list(d, 5, 6, TILE_PIXELS);
     if (result == PATINA_OK)
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, FIND, PT_GL_TILES_POINTS);
     if (result != PATINA_OK)
@@ -126,4 +119,34 @@ int pt_gl_antialias(struct pt_gl_device *d)
     if (result == PATINA_OK)
         result = dispatch_list(d, PT_KERNEL_antialias, APPLY, count);
     return result;
+}
+
+// ---- push ------------------------------------------------------------------------------------------------------
+
+enum { COVERED = 0, TAKE = 1 };
+
+struct view_args pt_gl_coarse_view(const struct push_args *args)
+{
+    struct view_args view = args->view;
+    view.width = args->coarse_width;
+    view.height = args->coarse_height;
+    view.rect[0] >>= 1;
+    view.rect[1] >>= 1;
+    view.rect[2] = (view.rect[2] + 1) >> 1;
+    view.rect[3] = (view.rect[3] + 1) >> 1;
+    return view;
+}
+
+int pt_gl_push(struct pt_gl_device *d)
+{
+    int result = pt_gl_kernel_program(d, PT_KERNEL_push, COVERED, "#define STEP 0\n");
+    if (!d->tiles.count[PT_GL_TILES_POINTS])
+        return PATINA_OK;
+    if (result == PATINA_OK)
+        result = pt_gl_kernel_program(d, PT_KERNEL_push, TAKE, "#define STEP 1\n");
+    if (result == PATINA_OK)
+        result = prepare_list(d, 7, 8, 4 * TILE_PIXELS);
+    if (result == PATINA_OK) // a tile has twice the columns of a tile of its own level
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_push, COVERED, PT_GL_TILES_POINTS);
+    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_push, TAKE, list_length(d)) : result;
 }

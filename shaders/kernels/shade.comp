@@ -2,45 +2,37 @@
 // shade: id -> colour and normal, Phong. [D 3.1], deferred: only what the picture shows is lit; twin of
 // native/device_cpu/kernels/shade.c
 //
-// STEP 0: normals; filled pixels take theirs from their neighbours (REFINED), those filled from afar are listed;
-// STEP 1: the listed ones' normals;   STEP 2: colour, by COLOR_FORMAT and LIT (2: with highlights)
+// STEP 0: normals (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any window);
+// STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights)
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/srgb.glsl"
-#if STEP == 1
-layout(local_size_x = 64) in;
-#else
 #include "lib/tiles.glsl"
-#endif
 
 layout(std430, binding = 0) readonly buffer arguments_block { shade_args args; };
 layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; };
 layout(std430, binding = 7) writeonly buffer shading_block { vec4 shading[]; };
 layout(std430, binding = 8) writeonly buffer color_block { vec4 color[]; };
-layout(std430, binding = 9) buffer counters_block { uint far_count; };
-layout(std430, binding = 10) buffer far_block { uint far_pixels[]; };
-
-// The normal of a filled pixel, refined: measured neighbours of the same layer, as far as the pixel it was filled from,
-// weighted by 1 / (1 + distance^2); the source's own normal where there are none.
-vec3 finish_blend(vec3 sum, uint source)
-{
-    float square = pt_dot(sum, sum);
-    precise vec3 unit = sum * pt_rsqrt(square);
-    return 1e-12 < square ? unit : read_float4(source).xyz;
-}
 
 #if STEP == 0
 
-// What a neighbour gives to a blend: its normal, and its z if it was measured, else +inf.
+// The blend, or where it is nothing the source's own normal.
+vec3 finish_blend(vec3 sum, vec3 own)
+{
+    float square = pt_dot(sum, sum);
+    precise vec3 unit = sum * pt_rsqrt(square);
+    return 1e-12 < square ? unit : own;
+}
+
+// What a pixel gives to a blend: the normal of the surface that it shows, and its z; beyond the plane +inf.
 vec4 read_tap(ivec2 size, int x, int y)
 {
     bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
     uint at = inside ? uint(y * size.x + x) : 0u;
-    vec4 tap = vec4(read_float4(at).xyz, read_z(at));
-    if (!inside || read_from(at) != at)
-        tap.w = pt_float(PT_KEY_EMPTY_Z);
-    return tap;
+    float z = inside ? read_z(at) : pt_float(PT_KEY_EMPTY_Z);
+    uint source = z < pt_float(PT_KEY_EMPTY_Z) ? read_from(at) : 0u;
+    return vec4(read_float4(source).xyz, z);
 }
 
 struct tap_row {
@@ -66,11 +58,17 @@ void add_row(tap_row row, float z, float limit, float side, float middle, inout 
     add_tap(row.east, z, limit, side, sum);
 }
 
-// Whether one of the eight neighbours has this index: it differs by -1, 0 or 1 plus -width, 0 or width.
-bool is_near(uint at, uint source, uint width)
+#if WIDE
+vec3 blend_wide(view_args view, ivec2 size, int x, int y, float z, float limit)
 {
-    return source - at + 1u < 3u || source + width - at + 1u < 3u || source - width - at + 1u < 3u;
+    vec3 sum = vec3(0.0);
+    int reach = int(args.blend);
+    for (int dy = -reach; dy <= reach; dy++)
+        for (int dx = -reach; dx <= reach; dx++)
+            add_tap(read_tap(size, x + dx, y + dy), z, limit, pt_rcp(float(1 + dx * dx + dy * dy)), sum);
+    return sum;
 }
+#endif
 
 void main()
 {
@@ -78,9 +76,9 @@ void main()
     uint id_base = args.instance.id_base, id_count = args.instance.id_count;
     ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
-    uint end = pt_tile_end(view, column), listed = 0u;
+    uint end = pt_tile_end(view, column);
     int x = int(column.x);
-#if REFINED
+#if BLEND
     float edge = pt_rcp(2.0), corner = pt_rcp(3.0);
     tap_row below = read_row(size, x, int(column.y) - 1), row = read_row(size, x, int(column.y));
 #endif
@@ -90,58 +88,24 @@ void main()
         uint source = read_from(at);
         bool ours = key.x - id_base < id_count && key.y != PT_KEY_EMPTY_Z;
         source = ours ? source : at;
-#if REFINED
+        vec3 normal = read_float4(source).xyz;
+#if BLEND
         tap_row above = read_row(size, x, int(y) + 1);
         float z = pt_float(key.y), limit = read_deff(source);
         vec3 sum = vec3(0.0);
         add_row(below, z, limit, corner, edge, sum);
         add_row(row, z, limit, edge, pt_rcp(1.0), sum);
         add_row(above, z, limit, corner, edge, sum);
-        vec3 blend = finish_blend(sum, source);
-        vec3 normal = source == at ? row.middle.xyz : blend;
-        listed |= uint(source != at && !is_near(at, source, view.width)) << (y - column.y);
+        normal = source == at ? normal : finish_blend(sum, normal);
         below = row;
         row = above;
-#else
-        vec3 normal = read_float4(source).xyz;
+#elif WIDE
+        if (source != at)
+            normal = finish_blend(blend_wide(view, size, x, int(y), pt_float(key.y), read_deff(source)), normal);
 #endif
         if (ours)
             shading[at] = vec4(normal, 0.0);
     }
-    if (listed == 0u)
-        return;
-    uint to = atomicAdd(far_count, uint(bitCount(listed)));
-    for (; listed != 0u; listed &= listed - 1u, to++)
-        far_pixels[to] = (column.y + uint(findLSB(listed))) * view.width + column.x;
-}
-
-#elif STEP == 1
-
-layout(location = 0) uniform uint entries;
-
-void main()
-{
-    view_args view = args.view;
-    int width = int(view.width), height = int(view.height);
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
-                 gl_LocalInvocationID.x;
-    if (index >= entries)
-        return;
-    uint at = far_pixels[index], source = read_from(at);
-    ivec2 place = ivec2(pt_pixel(at, view.width)), apart_by = abs(ivec2(pt_pixel(source, view.width)) - place);
-    int r = min(max(apart_by.x, apart_by.y), 8);
-    float z = read_z(at), limit = read_deff(source);
-    precise vec3 sum = vec3(0.0);
-    for (int dy = -r; dy <= r; dy++)
-        for (int dx = -r; dx <= r; dx++) {
-            int qx = place.x + dx, qy = place.y + dy;
-            bool inside = qx >= 0 && qy >= 0 && qx < width && qy < height;
-            uint q = inside ? uint(qy * width + qx) : at;
-            precise float apart = read_z(q) - z;
-            precise vec3 more = sum + read_float4(q).xyz * pt_rcp(float(1 + dx * dx + dy * dy));
-            sum = inside && pt_abs(apart) <= limit && read_from(q) == q ? more : sum;
-        }
-    shading[at] = vec4(finish_blend(sum, source), 0.0);
 }
 
 #else

@@ -10,7 +10,11 @@
 #define PT_TILE 8u
 #define PT_TILES_IN_GROUP 4u
 
+#ifdef PT_TILE_COLUMNS // of finer pixels
+layout(local_size_x = 64) in;
+#else
 layout(local_size_x = 32) in; // four tiles' columns
+#endif
 
 layout(std430, binding = 11) readonly buffer tile_list_block { uint tile_list[]; };
 layout(location = 14) uniform uint tile_count;   // in the list

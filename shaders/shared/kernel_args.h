@@ -118,13 +118,15 @@ struct light_args {
     float vector[3];   // sun: unit, towards the light; point: position
 };
 
-// shade: id -> colour, normal (blended over filled pixels when refined), Phong. [D 3.1], deferred
+// shade: id -> colour, normal, Phong. [D 3.1], deferred. A filled pixel's normal (SPEC 2.2, refined) is the blend, over the
+// (2 blend + 1)^2 window, of the surfaces of the same layer that its pixels show: normal[from], |z_q - z| <= deff[from of
+// this pixel], weight 1 / (1 + distance^2); with blend = 0 (paper), and where the blend is nothing, its own source's.
 struct shade_args {
     struct view_args view;
     struct instance_args instance;
     float world[3];     // ambient radiance
     float eye_z;        // orthographic: near, so that view z = -(z + near); perspective: 0
-    uint32_t refined;
+    uint32_t blend;     // radius, 0..8
     uint32_t light_count;
     struct light_args lights[PT_MAX_LIGHTS];
 };

@@ -122,10 +122,10 @@ static void kinds(struct harness *h)
 {
     for (int p = 0; p < 2; p++)
         for (int kind = 0; kind < PICTURE_KINDS; kind++)
-            for (uint32_t refined = 0; refined < 2; refined++) {
+            for (uint32_t blend = 0; blend <= 8; blend = blend < 2 ? blend + 1 : 4 * blend) { // 0, 1, 2, 8
                 struct rng rng = {(uint64_t)kind};
                 struct setup s = make(h, &rng, p, (enum picture_kind)kind, 2);
-                s.args.refined = refined;
+                s.args.blend = blend;
                 check(h, &s, kind == PICTURE_GRAZING || kind == PICTURE_TIGHT ? TOL_UNSURE_HARD : TOL_UNSURE_SHARE);
             }
 }
@@ -136,7 +136,7 @@ static void estimated(struct harness *h)
         struct rng rng = {7};
         struct setup s = make(h, &rng, p, PICTURE_SURFACES, 0);
         s.args.instance.has_normals = 0; // no difference: the normal plane holds the estimates
-        s.args.refined = 1;
+        s.args.blend = 3;
         check(h, &s, TOL_UNSURE_SHARE);
     }
 }

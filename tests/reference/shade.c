@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // [D 3.1], deferred (SPEC 1): colour, normal and Phong light of the points that survived. A filled pixel's normal is its
-// source's (paper) or blended from the measured pixels around it (refined, SPEC 2.2).
+// source's (paper) or blended from the surfaces around it (refined, SPEC 2.2).
 #include "reference.h"
 #include "tolerances.h"
 
@@ -9,11 +9,7 @@
 
 #define PI 3.14159265358979323846
 
-enum {
-    POINT_LIGHT = 2,  // patina_light_type
-    BLEND_BEYOND = 0, // normals are blended as far as the source, and so many pixels more,
-    BLEND_MOST = 8,   // but no farther than this
-};
+enum { POINT_LIGHT = 2 }; // patina_light_type
 
 static void albedo_of(const struct instance_args *instance, const struct ref_planes *planes, uint32_t id,
                       double albedo[3])
@@ -27,14 +23,12 @@ static void albedo_of(const struct instance_args *instance, const struct ref_pla
     }
 }
 
-// Blends the normals of the measured pixels of the same layer around a filled one.
-static void blend(const struct view_args *view, const struct ref_planes *planes, int x, int y, struct ref_shade *out)
+// Blends the normals of the surfaces that the pixels of the same layer around a filled one show.
+static void blend(const struct view_args *view, const struct ref_planes *planes, int radius, int x, int y,
+                  struct ref_shade *out)
 {
     size_t pixel = (size_t)y * view->width + (size_t)x;
     uint32_t from = planes->from[pixel];
-    int fx = (int)(from % view->width), fy = (int)(from / view->width);
-    int distance = abs(fx - x) > abs(fy - y) ? abs(fx - x) : abs(fy - y);
-    int radius = distance + BLEND_BEYOND < BLEND_MOST ? distance + BLEND_BEYOND : BLEND_MOST;
     double z = ref_key_z(planes->keys[pixel]), weights = 0.0;
     struct ref_range d = ref_level_distance(view, planes->normal, planes->deff, from, ref_exactly(z));
     struct ref_vec sum = {0.0, 0.0, 0.0};
@@ -43,7 +37,7 @@ static void blend(const struct view_args *view, const struct ref_planes *planes,
             if (qx < 0 || qy < 0 || qx >= (int)view->width || qy >= (int)view->height)
                 continue;
             size_t q = (size_t)qy * view->width + (size_t)qx;
-            if (planes->keys[q] == REF_EMPTY_KEY || planes->from[q] != q)
+            if (planes->keys[q] == REF_EMPTY_KEY)
                 continue;
             double step = fabs(ref_key_z(planes->keys[q]) - z);
             enum ref_truth same = ref_less_equal(ref_rounded(ref_exactly(step)), d);
@@ -51,7 +45,8 @@ static void blend(const struct view_args *view, const struct ref_planes *planes,
             if (same != REF_YES)
                 continue;
             double weight = 1.0 / (1.0 + (qx - x) * (qx - x) + (qy - y) * (qy - y));
-            sum = ref_add(sum, ref_scale(ref_vec_of(planes->normal + 4 * q), weight));
+            struct ref_vec shown = ref_vec_of(planes->normal + 4 * (size_t)(planes->from[q] & ~PT_FROM_MIXED));
+            sum = ref_add(sum, ref_scale(shown, weight));
             weights += weight;
         }
     }
@@ -70,8 +65,8 @@ static void normal_of(const struct shade_args *args, const struct ref_planes *pl
 {
     size_t pixel = (size_t)y * args->view.width + (size_t)x, from = planes->from[pixel];
     out->n = ref_vec_of(planes->normal + 4 * from);
-    if (args->refined && from != pixel)
-        blend(&args->view, planes, x, y, out);
+    if (args->blend && from != pixel)
+        blend(&args->view, planes, (int)args->blend, x, y, out);
 }
 
 // What a light sends to the pixel, and from where. 0 when the light is too near for float32.

@@ -4,33 +4,26 @@
 #include "device_cpu/rows.h"
 #include "device_cpu/srgb.h"
 
-enum { BLEND_REACH = 8 }; // pixels, of blended normals
-
 struct pixels { // PT_LANES of them
     size_t at;
-    vi id, from;
+    vi id;
     vf z, ray[2], n[4], albedo[3];
     vm ours;
 };
 
 // ---- 1. normals of filled pixels, refined ------------------------------------------------------------------------------
 //
-// Measured neighbours of the same layer, as far as the pixel it was filled from, weighted by 1 / (1 + distance^2); the
-// source's own normal where there are none. Most pixels are filled from near by: those take their taps from a ring of
-// rows with separate vectors, the others gather (three times dearer a tap).
+// A ring of rows holds z and the shown surface's normal as separate vectors, so that every tap is a plain load.
 
-enum { NEAR = 3, RING = 2 * NEAR + 1, BAND_ROWS = 32, PAD = 16, CHANNELS = 4 }; // z of measured pixels (else +inf), normal
+enum { REACH = 8, BAND_ROWS = 32, PAD = 16, CHANNELS = 4 }; // z, normal
 
 struct shade {
     const struct pt_cpu_call *call;
     const struct shade_args *args;
-    float *rows;   // per thread: RING rows x CHANNELS
+    float *rows;   // per thread: `ring` rows x CHANNELS
     size_t stride; // floats of one channel of a row
-    float weights[2 * BLEND_REACH * BLEND_REACH + 1]; // by squared distance
-};
-
-struct filled { // PT_LANES of them
-    uint32_t x[PT_LANES], from[PT_LANES], count;
+    uint32_t ring; // 2 blend + 1
+    float weights[2 * REACH * REACH + 1]; // by squared distance
 };
 
 static float *channel(const struct shade *shade, float *rows, uint32_t row, uint32_t index)
@@ -38,13 +31,33 @@ static float *channel(const struct shade *shade, float *rows, uint32_t row, uint
     return rows + (row * CHANNELS + index) * shade->stride + PAD;
 }
 
-// The rectangle's columns and NEAR more on both sides.
-static void load_row(const struct shade *shade, float *rows, uint32_t slot, int32_t y)
+static vi load_from(const struct shade *shade, size_t at)
+{
+    return vi_and(vi_load((const uint32_t *)pt_cpu_data(shade->call, 1) + at), vi_set(~PT_FROM_MIXED));
+}
+
+// Normals of the surfaces that PT_LANES pixels from `at` on show.
+static void shown_normals(const struct shade *shade, size_t at, vm some, vf n[4])
+{
+    const float *normals = pt_cpu_data(shade->call, 2);
+    vi source = load_from(shade, at);
+    vm filled = vm_and(some, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
+    vf_load4(normals + 4 * at, n);
+    if (!vm_bits(filled))
+        return;
+    vi word = vi_mul(source, vi_set(4));
+    for (uint32_t k = 0; k < 3; k++)
+        n[k] = vf_select(filled, vf_gather(normals, vi_add(word, vi_set(k)), filled), n[k]);
+}
+
+// The rectangle's columns and `blend` more on both sides; what lies beyond the plane is empty.
+static void load_row(const struct shade *shade, float *rows, int32_t y)
 {
     const struct view_args *view = &shade->args->view;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    uint32_t first = view->rect[0] > NEAR ? view->rect[0] - NEAR : 0;
-    uint32_t last = view->rect[2] + NEAR < view->width ? view->rect[2] + NEAR : view->width;
+    uint32_t reach = shade->args->blend, slot = (uint32_t)(y + REACH) % shade->ring;
+    uint32_t first = view->rect[0] > reach ? view->rect[0] - reach : 0;
+    uint32_t last = view->rect[2] + reach < view->width ? view->rect[2] + reach : view->width;
     int32_t shift = (int32_t)view->rect[0];
     float *out[CHANNELS];
     for (uint32_t k = 0; k < CHANNELS; k++)
@@ -53,160 +66,61 @@ static void load_row(const struct shade *shade, float *rows, uint32_t slot, int3
         vf_store(out[0] + x, empty, vm_first(PT_LANES));
     if (y < 0 || y >= (int32_t)view->height)
         return;
-    size_t row = (size_t)y * view->width;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + row;
-    const uint32_t *from = (const uint32_t *)pt_cpu_data(shade->call, 1) + row;
-    const float *normals = (const float *)pt_cpu_data(shade->call, 2) + 4 * row;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * view->width;
     for (uint32_t x = first; x < last; x += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(x, last));
-        vi self = vi_add(vi_set((uint32_t)row + x), vi_lanes());
-        vm measured = vm_and(lanes, vi_eq(vi_and(vi_load(from + x), vi_set(~PT_FROM_MIXED)), self));
-        if (!vm_bits(measured))
+        vf z = vi_float(vi_load_z(keys + x)), n[4];
+        vm some = vm_and(lanes, vf_lt(z, empty));
+        if (!vm_bits(some))
             continue;
-        vf n[4];
-        vf_load4(normals + 4 * (size_t)x, n);
-        vf_store(out[0] + x, vf_select(measured, vi_float(vi_load_z(keys + x)), empty), lanes);
+        shown_normals(shade, (size_t)y * view->width + x, some, n);
+        vf_store(out[0] + x, z, lanes);
         for (uint32_t k = 0; k < 3; k++)
             vf_store(out[1 + k] + x, n[k], lanes);
     }
 }
 
-// The blend, or where it is nothing the source's own; then into the shading plane.
-static void finish_blend(const struct shade *shade, vf n[4], vi source, vm lanes)
-{
-    const float *normals = pt_cpu_data(shade->call, 2);
-    vf square = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
-    vm blended = vf_lt(vf_set(1e-12f), square);
-    vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
-    for (int k = 0; k < 3; k++)
-        n[k] = n[k] * scale;
-    if (vm_bits(vm_and(lanes, vm_not(blended))))
-        for (uint32_t k = 0; k < 3; k++)
-            n[k] = vf_select(blended, n[k], vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes));
-    n[3] = vf_zero();
-}
-
-// How far (Chebyshev) the pixel `source` lies from `self` in a plane of this width; more than NEAR: NEAR + 1.
-static vi near_distance(vi source, vi self, uint32_t width)
-{
-    vi distance = vi_set(NEAR + 1);
-    for (int32_t row = -NEAR; row <= NEAR; row++) {
-        vi column = vi_sub(vi_sub(source, self), vi_set((uint32_t)(row * (int32_t)width)));
-        for (uint32_t d = NEAR; d + 1 > (uint32_t)abs(row); d--) { // the smallest that holds is set last
-            vm within = vi_lt_unsigned(vi_add(column, vi_set(d)), vi_set(2 * d + 1));
-            distance = vi_select(vm_and(within, vi_lt_unsigned(vi_set(d), distance)), vi_set(d), distance);
-        }
-    }
-    return distance;
-}
-
-static void blend_near(const struct shade *shade, float *const around[RING], uint32_t x, uint32_t y, vi source, vi reach,
-                       uint32_t near)
+// Blended normals of those of PT_LANES pixels that `filled` names, into the shading plane.
+static void blend_pixels(const struct shade *shade, float *const *around, uint32_t x, uint32_t y, vm filled)
 {
     const struct view_args *view = &shade->args->view;
+    const int reach = (int)shade->args->blend;
     size_t at = (size_t)y * view->width + x, column = x - view->rect[0];
-    vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(shade->call, 0) + at));
-    vm lanes = vm_of_bits(near);
-    vf limit = vf_gather(pt_cpu_data(shade->call, 3), source, lanes);
+    const float *own = around[reach] + column;
+    vf z = vf_load(own), limit = vf_gather(pt_cpu_data(shade->call, 3), load_from(shade, at), filled);
     vf n[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
-    int most = 1;
-    while (most < NEAR && vm_bits(vm_and(lanes, vi_lt_unsigned(vi_set((uint32_t)most), reach))))
-        most++;
-    for (int dy = -most; dy <= most; dy++)
-        for (int dx = -most; dx <= most; dx++) {
-            uint32_t distance = (uint32_t)(abs(dx) > abs(dy) ? abs(dx) : abs(dy));
-            const float *tap = around[NEAR + dy] + column + dx;
-            vm take = vm_and(lanes, vf_le(vf_abs(vf_load(tap) - z), limit));
-            if (distance > 1)
-                take = vm_and(take, vm_not(vi_lt_unsigned(reach, vi_set(distance))));
+    for (int dy = -reach; dy <= reach; dy++)
+        for (int dx = -reach; dx <= reach; dx++) {
+            const float *tap = around[reach + dy] + column + dx;
+            vm take = vm_and(filled, vf_le(vf_abs(vf_load(tap) - z), limit));
             vf weight = vf_set(shade->weights[dx * dx + dy * dy]);
             for (size_t k = 0; k < 3; k++)
                 n[k] = n[k] + vf_select(take, vf_load(tap + (1 + k) * shade->stride), vf_zero()) * weight;
         }
-    finish_blend(shade, n, source, lanes);
-    vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * at, n, near);
+    vf square = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
+    vm blended = vf_lt(vf_set(1e-12f), square);
+    vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
+    for (size_t k = 0; k < 3; k++)
+        n[k] = vf_select(blended, n[k] * scale, vf_load(own + (1 + k) * shade->stride));
+    vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * at, n, vm_bits(filled));
 }
 
-static void blend_far(const struct shade *shade, struct filled *filled, uint32_t y)
-{
-    const struct view_args *view = &shade->args->view;
-    const uint64_t *keys = pt_cpu_data(shade->call, 0);
-    const uint32_t *from = pt_cpu_data(shade->call, 1);
-    const float *normals = pt_cpu_data(shade->call, 2);
-    uint32_t reach[PT_LANES] = { 0 }, most = 1;
-    vm ours = vm_first(filled->count);
-    for (uint32_t i = 0; i < PT_LANES; i++) {
-        if (i >= filled->count) {
-            filled->x[i] = filled->from[i] = 0;
-            continue;
-        }
-        uint32_t dx = (uint32_t)abs((int32_t)(filled->from[i] % view->width) - (int32_t)filled->x[i]);
-        uint32_t dy = (uint32_t)abs((int32_t)(filled->from[i] / view->width) - (int32_t)y);
-        reach[i] = dx > dy ? dx : dy;
-        reach[i] = reach[i] > BLEND_REACH ? BLEND_REACH : reach[i];
-        most = reach[i] > most ? reach[i] : most;
-    }
-    vi x = vi_load(filled->x), source = vi_load(filled->from), radius = vi_load(reach);
-    vi pixel = vi_add(x, vi_set(y * view->width));
-    vf z = vi_float(vi_gather_z(keys, pixel, ours)), limit = vf_gather(pt_cpu_data(shade->call, 3), source, ours);
-    vf n[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
-    for (int32_t dy = -(int32_t)most; dy <= (int32_t)most; dy++)
-        for (int32_t dx = -(int32_t)most; dx <= (int32_t)most; dx++) {
-            uint32_t distance = (uint32_t)(abs(dx) > abs(dy) ? abs(dx) : abs(dy));
-            vi qx = vi_add(x, vi_set((uint32_t)dx)), q = vi_add(pixel, vi_set((uint32_t)(dy * (int32_t)view->width + dx)));
-            if (y + (uint32_t)dy >= view->height)
-                continue;
-            vm take = vm_and(vm_and(ours, vm_not(vi_lt_unsigned(radius, vi_set(distance)))),
-                             vi_lt_unsigned(qx, vi_set(view->width)));
-            vf zq = vi_float(vi_gather_z(keys, q, take));
-            take = vm_and(take, vf_le(vf_abs(zq - z), limit));
-            take = vm_and(take, vi_eq(vi_and(vi_gather(from, q, take), vi_set(~PT_FROM_MIXED)), q));
-            if (!vm_bits(take))
-                continue;
-            vf weight = vf_set(shade->weights[dx * dx + dy * dy]);
-            for (uint32_t k = 0; k < 3; k++)
-                n[k] = n[k] + vf_gather(normals, vi_add(vi_mul(q, vi_set(4)), vi_set(k)), take) * weight;
-        }
-    finish_blend(shade, n, source, ours);
-    float out[4][PT_LANES], *shading = pt_cpu_data(shade->call, 6);
-    for (int k = 0; k < 4; k++)
-        vf_store(out[k], n[k], vm_first(PT_LANES));
-    for (uint32_t i = 0; i < filled->count; i++)
-        for (int k = 0; k < 4; k++)
-            shading[4 * ((size_t)y * view->width + filled->x[i]) + (size_t)k] = out[k][i];
-    filled->count = 0;
-}
-
-static void blend_row(const struct shade *shade, float *const around[RING], uint32_t y)
+static void blend_row(const struct shade *shade, float *const *around, uint32_t y)
 {
     const struct view_args *view = &shade->args->view;
     const struct instance_args *instance = &shade->args->instance;
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * view->width;
-    const uint32_t *from = (const uint32_t *)pt_cpu_data(shade->call, 1) + (size_t)y * view->width;
-    struct filled filled = { .count = 0 };
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         vi z = vi_load_z(keys + x), id = vi_sub(vi_load_id(keys + x), vi_set(instance->id_base));
-        vi self = vi_add(vi_set(y * view->width + x), vi_lanes()), source = vi_and(vi_load(from + x), vi_set(~PT_FROM_MIXED));
         vm ours = vm_and(vm_and(vm_first(pt_lanes_left(x, view->rect[2])), vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z)))),
                          vi_lt_unsigned(id, vi_set(instance->id_count)));
-        vm other = vm_and(ours, vm_not(vi_eq(source, self)));
-        if (!vm_bits(other))
+        if (!vm_bits(ours))
             continue;
-        vi reach = near_distance(source, self, view->width);
-        vm near = vi_lt_unsigned(reach, vi_set(NEAR + 1));
-        uint32_t bits = vm_bits(vm_and(other, near)), rest = vm_bits(vm_and(other, vm_not(near)));
-        if (bits)
-            blend_near(shade, around, x, y, source, reach, bits);
-        for (; rest; rest &= rest - 1) {
-            uint32_t i = x + (uint32_t)__builtin_ctz(rest);
-            filled.x[filled.count] = i;
-            filled.from[filled.count++] = from[i] & ~PT_FROM_MIXED;
-            if (filled.count == PT_LANES)
-                blend_far(shade, &filled, y);
-        }
+        size_t at = (size_t)y * view->width + x;
+        vm filled = vm_and(ours, vm_not(vi_eq(load_from(shade, at), vi_add(vi_set((uint32_t)at), vi_lanes()))));
+        if (vm_bits(filled))
+            blend_pixels(shade, around, x, y, filled);
     }
-    if (filled.count)
-        blend_far(shade, &filled, y);
 }
 
 // ---- 2. colour and normal ----------------------------------------------------------------------------------------------
@@ -238,23 +152,20 @@ static void gather_albedo(const struct shade_args *args, const void *colors, str
         p->albedo[k] = vf_load(rgb[k]);
 }
 
-static void gather_normals(const struct shade_args *args, const struct pt_cpu_call *call, struct pixels *p)
+static void gather_normals(const struct shade *shade, struct pixels *p)
 {
-    const float *normals = pt_cpu_data(call, 2);
-    vf_load4(normals + 4 * p->at, p->n);
-    vm measured = vi_eq(p->from, vi_add(vi_set((uint32_t)p->at), vi_lanes()));
-    if (!vm_bits(vm_and(p->ours, vm_not(measured))))
+    if (!shade->args->blend) {
+        shown_normals(shade, p->at, p->ours, p->n);
         return;
-    vf other[4];
-    if (args->refined) { // blended before
-        vf_load4((const float *)pt_cpu_data(call, 6) + 4 * p->at, other);
-    } else {
-        vi word = vi_mul(p->from, vi_set(4));
-        for (uint32_t k = 0; k < 3; k++)
-            other[k] = vf_gather(normals, vi_add(word, vi_set(k)), p->ours);
     }
+    vf blended[4];
+    vf_load4((const float *)pt_cpu_data(shade->call, 2) + 4 * p->at, p->n);
+    vm filled = vm_not(vi_eq(load_from(shade, p->at), vi_add(vi_set((uint32_t)p->at), vi_lanes())));
+    if (!vm_bits(vm_and(p->ours, filled)))
+        return;
+    vf_load4((const float *)pt_cpu_data(shade->call, 6) + 4 * p->at, blended);
     for (int k = 0; k < 3; k++)
-        p->n[k] = vf_select(measured, p->n[k], other[k]);
+        p->n[k] = vf_select(filled, blended[k], p->n[k]);
 }
 
 // ---- 3. light ----------------------------------------------------------------------------------------------------------
@@ -347,11 +258,11 @@ static void phong(const struct shade_args *args, const struct pixels *p, vf colo
 
 // ---- the kernel --------------------------------------------------------------------------------------------------------
 
-static void shade_pixels(const struct shade_args *args, const struct pt_cpu_call *call, uint32_t x, uint32_t y,
-                         uint32_t lanes)
+static void shade_pixels(const struct shade *shade, uint32_t x, uint32_t y, uint32_t lanes)
 {
+    const struct shade_args *args = shade->args;
     const struct instance_args *instance = &args->instance;
-    const uint64_t *keys = pt_cpu_data(call, 0);
+    const uint64_t *keys = pt_cpu_data(shade->call, 0);
     struct pixels p = { .at = (size_t)y * args->view.width + x };
     vi z_bits = vi_load_z(keys + p.at);
     p.id = vi_sub(vi_load_id(keys + p.at), vi_set(instance->id_base));
@@ -360,45 +271,49 @@ static void shade_pixels(const struct shade_args *args, const struct pt_cpu_call
     if (!vm_bits(p.ours))
         return;
     p.z = vi_float(z_bits);
-    p.from = vi_and(vi_load((const uint32_t *)pt_cpu_data(call, 1) + p.at), vi_set(~PT_FROM_MIXED));
     vf_ray(&args->view, x, y, p.ray);
-    gather_albedo(args, pt_cpu_data(call, 5), &p);
-    gather_normals(args, call, &p);
+    gather_albedo(args, pt_cpu_data(shade->call, 5), &p);
+    gather_normals(shade, &p);
     p.n[3] = vf_zero();
-    vf_store4((float *)pt_cpu_data(call, 6) + 4 * p.at, p.n, vm_bits(p.ours));
+    vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * p.at, p.n, vm_bits(p.ours));
     vf color[4] = { p.albedo[0], p.albedo[1], p.albedo[2], vf_set(1.0f) };
     if (instance->lit)
         phong(args, &p, color);
-    vf_store4((float *)pt_cpu_data(call, 7) + 4 * p.at, color, vm_bits(p.ours));
+    vf_store4((float *)pt_cpu_data(shade->call, 7) + 4 * p.at, color, vm_bits(p.ours));
+}
+
+static void shade_row(const struct shade *shade, float *rows, uint32_t y)
+{
+    static const uint32_t color_bytes[] = { 0, 3, 12 };
+    const struct shade_args *args = shade->args;
+    const uint32_t *rect = args->view.rect, reach = args->blend;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * args->view.width;
+    if (reach) {
+        float *around[2 * REACH + 1];
+        for (uint32_t k = 0; k < shade->ring; k++)
+            around[k] = channel(shade, rows, (y + k + REACH - reach) % shade->ring, 0);
+        load_row(shade, rows, (int32_t)(y + reach));
+        blend_row(shade, around, y);
+    }
+    for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
+        if (args->instance.color_format)
+            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 5),
+                           color_bytes[args->instance.color_format]);
+        shade_pixels(shade, x, y, pt_lanes_left(x, rect[2]));
+    }
 }
 
 static void shade_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct shade *shade = context;
-    const struct shade_args *args = shade->args;
-    const uint32_t *rect = args->view.rect;
-    static const uint32_t color_bytes[] = { 0, 3, 12 };
-    float *rows = shade->rows + thread * RING * CHANNELS * shade->stride;
+    const uint32_t *rect = shade->args->view.rect;
+    float *rows = shade->rows + thread * shade->ring * CHANNELS * shade->stride;
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(shade->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
-        for (uint32_t k = 0; args->refined && k < RING - 1; k++)
-            load_row(shade, rows, k, (int32_t)(first + k) - NEAR);
-        for (uint32_t y = first; y < last; y++) {
-            const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * args->view.width;
-            float *around[RING];
-            for (uint32_t k = 0; k < RING; k++)
-                around[k] = channel(shade, rows, (y - first + k) % RING, 0);
-            if (args->refined) {
-                load_row(shade, rows, (y - first + RING - 1) % RING, (int32_t)y + NEAR);
-                blend_row(shade, around, y);
-            }
-            for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
-                if (args->instance.color_format)
-                    pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 5),
-                                   color_bytes[args->instance.color_format]);
-                shade_pixels(args, shade->call, x, y, pt_lanes_left(x, rect[2]));
-            }
-        }
+        for (uint32_t k = 0; k + 1 < shade->ring; k++)
+            load_row(shade, rows, (int32_t)(first + k) - (int32_t)shade->args->blend);
+        for (uint32_t y = first; y < last; y++)
+            shade_row(shade, rows, y);
     }
 }
 
@@ -406,13 +321,13 @@ int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
 {
     const struct shade_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct shade shade = { .call = call, .args = args };
+    struct shade shade = { .call = call, .args = args, .ring = 2 * args->blend + 1 };
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
-    for (int i = 0; i <= 2 * BLEND_REACH * BLEND_REACH; i++)
+    for (int i = 0; i <= 2 * REACH * REACH; i++)
         shade.weights[i] = pt_rcp((float)(1 + i));
     shade.stride = rect[2] - rect[0] + 4 * PAD;
-    shade.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * RING * CHANNELS * shade.stride * sizeof(float));
+    shade.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * shade.ring * CHANNELS * shade.stride * sizeof(float));
     if (!shade.rows)
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, shade_bands, &shade);
