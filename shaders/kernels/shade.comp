@@ -32,7 +32,8 @@ vec4 read_tap(ivec2 size, int x, int y)
     uint at = inside ? uint(y * size.x + x) : 0u;
     float z = inside ? read_z(at) : pt_float(PT_KEY_EMPTY_Z);
     uint source = z < pt_float(PT_KEY_EMPTY_Z) ? read_from(at) : 0u;
-    return vec4(read_float4(source).xyz, z);
+    precise vec3 normal = read_float4(source).xyz * (source == at ? 1.0 : PT_BLEND_FILLED);
+    return vec4(normal, z);
 }
 
 struct tap_row {

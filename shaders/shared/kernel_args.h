@@ -22,6 +22,9 @@
 
 #define PT_KEY_EMPTY_Z 0x7F800000u // float bits of +inf
 #define PT_KEY_EMPTY_ID 0xFFFFFFFFu
+// A filled neighbour repeats a surface that was measured elsewhere: 0.33 degrees mean error at weight 1 on a sphere of 1
+// point a pixel, 0.25 at 1/8.
+#define PT_BLEND_FILLED 0.125f
 #define PT_FROM_MIXED 0x80000000u // top bit of the from plane: anti-aliasing mixed this pixel's colour
 
 #define PT_NO_SPACINGS 64
@@ -120,7 +123,7 @@ struct light_args {
 
 // shade: id -> colour, normal, Phong. [D 3.1], deferred. A filled pixel's normal (SPEC 2.2, refined) is the blend, over the
 // (2 blend + 1)^2 window, of the surfaces of the same layer that its pixels show: normal[from], |z_q - z| <= deff[from of
-// this pixel], weight 1 / (1 + distance^2); with blend = 0 (paper), and where the blend is nothing, its own source's.
+// this pixel], weight 1 / (1 + distance^2), an eighth of it where q is filled itself; with blend = 0 (paper), and where the blend is nothing, its own source's.
 struct shade_args {
     struct view_args view;
     struct instance_args instance;

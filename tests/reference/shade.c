@@ -45,6 +45,8 @@ static void blend(const struct view_args *view, const struct ref_planes *planes,
             if (same != REF_YES)
                 continue;
             double weight = 1.0 / (1.0 + (qx - x) * (qx - x) + (qy - y) * (qy - y));
+            if (planes->from[q] != q)
+                weight *= (double)PT_BLEND_FILLED;
             struct ref_vec shown = ref_vec_of(planes->normal + 4 * (size_t)(planes->from[q] & ~PT_FROM_MIXED));
             sum = ref_add(sum, ref_scale(shown, weight));
             weights += weight;

@@ -36,8 +36,8 @@ static vi load_from(const struct shade *shade, size_t at)
     return vi_and(vi_load((const uint32_t *)pt_cpu_data(shade->call, 1) + at), vi_set(~PT_FROM_MIXED));
 }
 
-// Normals of the surfaces that PT_LANES pixels from `at` on show.
-static void shown_normals(const struct shade *shade, size_t at, vm some, vf n[4])
+// Normals of the surfaces that PT_LANES pixels from `at` on show, those of filled pixels times `share`.
+static void shown_normals(const struct shade *shade, size_t at, vm some, float share, vf n[4])
 {
     const float *normals = pt_cpu_data(shade->call, 2);
     vi source = load_from(shade, at);
@@ -47,7 +47,7 @@ static void shown_normals(const struct shade *shade, size_t at, vm some, vf n[4]
         return;
     vi word = vi_mul(source, vi_set(4));
     for (uint32_t k = 0; k < 3; k++)
-        n[k] = vf_select(filled, vf_gather(normals, vi_add(word, vi_set(k)), filled), n[k]);
+        n[k] = vf_select(filled, vf_gather(normals, vi_add(word, vi_set(k)), filled) * vf_set(share), n[k]);
 }
 
 // The rectangle's columns and `blend` more on both sides; what lies beyond the plane is empty.
@@ -73,7 +73,7 @@ static void load_row(const struct shade *shade, float *rows, int32_t y)
         vm some = vm_and(lanes, vf_lt(z, empty));
         if (!vm_bits(some))
             continue;
-        shown_normals(shade, (size_t)y * view->width + x, some, n);
+        shown_normals(shade, (size_t)y * view->width + x, some, PT_BLEND_FILLED, n);
         vf_store(out[0] + x, z, lanes);
         for (uint32_t k = 0; k < 3; k++)
             vf_store(out[1 + k] + x, n[k], lanes);
@@ -101,7 +101,7 @@ static void blend_pixels(const struct shade *shade, float *const *around, uint32
     vm blended = vf_lt(vf_set(1e-12f), square);
     vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
     for (size_t k = 0; k < 3; k++)
-        n[k] = vf_select(blended, n[k] * scale, vf_load(own + (1 + k) * shade->stride));
+        n[k] = vf_select(blended, n[k] * scale, vf_load(own + (1 + k) * shade->stride) * vf_set(1.0f / PT_BLEND_FILLED));
     vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * at, n, vm_bits(filled));
 }
 
@@ -155,7 +155,7 @@ static void gather_albedo(const struct shade_args *args, const void *colors, str
 static void gather_normals(const struct shade *shade, struct pixels *p)
 {
     if (!shade->args->blend) {
-        shown_normals(shade, p->at, p->ours, p->n);
+        shown_normals(shade, p->at, p->ours, 1.0f, p->n);
         return;
     }
     vf blended[4];
