@@ -264,7 +264,8 @@ def test_choices_change_the_picture():
 
 def test_several_files():
     wall("left.ply", lambda x, z: (255, 0, 0))
-    write_ply("right.ply", [(0.5 + x * 0.01, -1, z * 0.01) for x in range(40) for z in range(-20, 20)], [(0, 255, 0)] * 1600)
+    right = [(0.5 + x * 0.01, -1, z * 0.01) for x in range(40) for z in range(-20, 20)]
+    write_ply("right.ply", right, [(0, 255, 0)] * len(right))
     done = run("render", "left.ply", "right.ply", "-o", "both.png", *FRONT)
     assert str(120 * 120 + 1600) in done.stderr
     colors = {pixel for row in read_png("both.png")[3] for pixel in row}
