@@ -60,11 +60,23 @@ static int create_auto(const patina_device_desc *desc, patina_device **out)
     if (pt_device_gl_create(desc, "gl-egl", out) == PATINA_OK) {
         if ((*out)->info.hardware)
             return PATINA_OK;
-        patina_device_destroy(*out);
+        (*out)->ops->destroy(*out);
         *out = NULL;
         pt_log(PT_LOG_INFO, "device auto: OpenGL runs in software here, the CPU device is faster");
     }
     return pt_device_cpu_create(desc, "cpu", out);
+}
+
+static int create_named(const patina_device_desc *desc, const char *name, patina_device **out)
+{
+    if (!strcmp(name, "auto"))
+        return create_auto(desc, out);
+    if (!strncmp(name, "cpu", 3))
+        return pt_device_cpu_create(desc, name, out);
+    if (!strcmp(name, "gl-egl") || !strcmp(name, "gl-osmesa"))
+        return pt_device_gl_create(desc, name, out);
+    return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
+                   "device \"%s\": known are auto, cpu, cpu-scalar, cpu-sse42, cpu-avx2, cpu-avx512, gl-egl, gl-osmesa", name);
 }
 
 int patina_device_create(const patina_device_desc *desc, patina_device **out)
@@ -77,21 +89,18 @@ int patina_device_create(const patina_device_desc *desc, patina_device **out)
         return fail("patina_device_create: desc->struct_size is wrong");
     if (!desc)
         desc = &defaults;
-    const char *name = desc->name ? desc->name : "auto";
-    if (!strcmp(name, "auto"))
-        return create_auto(desc, out);
-    if (!strncmp(name, "cpu", 3))
-        return pt_device_cpu_create(desc, name, out);
-    if (!strcmp(name, "gl-egl") || !strcmp(name, "gl-osmesa"))
-        return pt_device_gl_create(desc, name, out);
-    return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
-                   "device \"%s\": known are auto, cpu, cpu-scalar, cpu-sse42, cpu-avx2, cpu-avx512, gl-egl, gl-osmesa", name);
+    int error = create_named(desc, desc->name ? desc->name : "auto", out);
+    if (!error)
+        pthread_mutex_init(&(*out)->busy, NULL);
+    return error;
 }
 
 void patina_device_destroy(patina_device *device)
 {
-    if (device)
-        device->ops->destroy(device);
+    if (!device)
+        return;
+    pthread_mutex_destroy(&device->busy);
+    device->ops->destroy(device);
 }
 
 int patina_device_get_info(const patina_device *device, patina_device_info *info)
@@ -129,7 +138,10 @@ int patina_frame_render(patina_frame *frame, const patina_scene *scene)
 {
     if (!frame || !scene)
         return fail("patina_frame_render: frame or scene is NULL");
-    return pt_frame_render(frame, scene);
+    pthread_mutex_lock(&frame->device->busy);
+    int error = pt_frame_render(frame, scene);
+    pthread_mutex_unlock(&frame->device->busy);
+    return error;
 }
 
 void patina_frame_cancel(patina_frame *frame)

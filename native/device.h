@@ -53,6 +53,7 @@ struct patina_device {
     const struct pt_device_ops *ops;
     patina_device_info info;
     uint64_t memory_cap; // bytes of planes a frame may hold; 0: no limit
+    pthread_mutex_t busy; // frames of one device take turns: its scratch is one
 };
 
 // Constructors; each returns PATINA_ERROR_UNSUPPORTED with the reason at the thread when it cannot be had.

@@ -147,7 +147,8 @@ typedef struct patina_cloud_desc {
     uint64_t count;
     patina_array position; // 3 x FLOAT32 or FLOAT64, in object units. NaN/Inf rows are left out (and counted)
     patina_array normal;   // 3 x FLOAT32/FLOAT64, any length; zero or NaN = that point has none. Optional
-    patina_array color;    // 3 or 4 x UINT8/UINT16 (sRGB, 0..max) or FLOAT32 (linear). A 4th component is ignored. Optional
+    patina_array color;    // 3 or 4 x UINT8/UINT16 (sRGB, 0..max) or FLOAT32 (linear). A 4th component is ignored. Optional.
+                           // UINT8 stays 3 bytes a point at rest; the others become float32, 12 bytes
     double origin[3];      // added to every position, in float64
     uint32_t threads;      // 0 = one per core
 } patina_cloud_desc;
@@ -224,7 +225,7 @@ typedef struct patina_cloud_style {
     uint32_t lighting;            // patina_lighting
     uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals
     float d_min;                  // the paper's d~, world units: least distance of two layers; 0 = automatic
-    float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8)
+    float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8); for black 1e-20
     float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
     uint32_t shininess;           // Phong exponent; 0 = 32
 } patina_cloud_style;
@@ -307,7 +308,8 @@ typedef struct patina_frame_stats {
     uint64_t plane_bytes;       // planes held by the frame
 } patina_frame_stats;
 
-// A frame keeps its planes from render to render. The device must outlive it.
+// A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
+// several threads; they take turns.
 PATINA_API int patina_frame_create(patina_device *device, patina_frame **out);
 PATINA_API void patina_frame_destroy(patina_frame *frame);
 // Renders; blocks. On any error the last good picture stays readable.
@@ -316,7 +318,8 @@ PATINA_API void patina_frame_cancel(patina_frame *frame); // the running (or els
 PATINA_API float patina_frame_progress(const patina_frame *frame); // 0..1
 // Copies a pass, width * height * channels float32, into the caller's buffer; size in bytes must fit exactly.
 PATINA_API int patina_frame_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size);
-// The visibility keys, width * height uint64: float_bits(z) << 32 | id.
+// The visibility keys, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone after a render
+// that failed or was cancelled (PATINA_ERROR_EMPTY).
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
 PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
 // Milliseconds by pass, and why each other pass was left out, as JSON: {"passes":{..},"skipped":{..}}.

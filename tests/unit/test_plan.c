@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The plan without a device: which passes a scene calls for, why the others are left out, what is culled, and that a
+// region decides as the whole picture does (DESIGN rule 3, SPEC 8).
+#include "plan.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 200, COUNT = SIDE * SIDE };
+
+static float positions[COUNT][3], normals[COUNT][3];
+
+// A square of 2 x 2 in the xy plane, its normals up.
+static patina_cloud *square(int with_normals)
+{
+    for (int i = 0; i < COUNT; i++) {
+        positions[i][0] = (float)(i % SIDE) / (SIDE / 2) - 1.0f;
+        positions[i][1] = (float)(i / SIDE) / (SIDE / 2) - 1.0f;
+        positions[i][2] = 0.0f;
+        normals[i][2] = 1.0f;
+    }
+    patina_cloud_desc desc = { .struct_size = sizeof desc,
+                               .count = COUNT,
+                               .position = { positions, PATINA_FLOAT32, 3, 0 },
+                               .normal = { with_normals ? normals : NULL, PATINA_FLOAT32, 3, 0 } };
+    patina_cloud *cloud = NULL;
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    return cloud;
+}
+
+// An orthographic camera above (or with up = -1 below) the square, `width` units wide.
+static patina_scene *scene_of(const patina_cloud *cloud, double width, double up, int cull_back)
+{
+    patina_scene *scene = NULL;
+    patina_cloud_style style = { .struct_size = sizeof style, .cull_back = (uint32_t)cull_back };
+    patina_camera camera = { .struct_size = sizeof camera,
+                             .orthographic = 1,
+                             .world_from_camera = { up, 0, 0, 0, 0, 1, 0, 0, 0, 0, up, 5 * up, 0, 0, 0, 1 },
+                             .left = -width / 2,
+                             .right = width / 2,
+                             .bottom = -width / 2,
+                             .top = width / 2,
+                             .near_clip = 0.1,
+                             .far_clip = 10 };
+    assert_int_equal(patina_scene_create(&scene), PATINA_OK);
+    if (cloud)
+        assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
+    assert_int_equal(patina_scene_set_camera(scene, &camera), PATINA_OK);
+    return scene;
+}
+
+static struct pt_plan plan_of(const patina_scene *scene)
+{
+    struct pt_plan plan;
+    assert_int_equal(pt_plan_create(scene, &plan), PATINA_OK);
+    return plan;
+}
+
+static uint32_t passes_of(const struct pt_plan *plan, enum pt_kernel kernel)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < plan->pass_count; i++)
+        count += plan->passes[i].kernel == kernel;
+    return count;
+}
+
+static const char *skipped(const struct pt_plan *plan, const char *name)
+{
+    for (uint32_t i = 0; i < plan->skipped_count; i++)
+        if (!strcmp(plan->skipped[i].name, name))
+            return plan->skipped[i].reason;
+    return NULL;
+}
+
+static void test_every_pass_runs_or_has_a_reason(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    struct pt_plan plan = plan_of(scene);
+    for (int k = 0; k < PT_KERNEL_COUNT; k++)
+        assert_true((passes_of(&plan, (enum pt_kernel)k) > 0) != (skipped(&plan, pt_kernel_names[k]) != NULL));
+    for (uint32_t i = 0; i < plan.pass_count; i++)
+        assert_true(plan.passes[i].reason[0]);
+    assert_non_null(skipped(&plan, "normals")); // the cloud has them
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+static void test_missing_normals_are_estimated(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(0);
+    patina_scene *scene = scene_of(cloud, 2.5, 1, 1);
+    struct pt_plan plan = plan_of(scene);
+    assert_int_equal(passes_of(&plan, PT_KERNEL_normals), 1);
+    assert_true(plan.points_scattered == COUNT); // back faces are never culled without normals
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+static void test_settings_leave_passes_out(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_settings settings = { .struct_size = sizeof settings,
+                                 .fill = PATINA_FILL_OFF,
+                                 .smooth = PATINA_SMOOTH_OFF,
+                                 .antialias = PATINA_ANTIALIAS_OFF,
+                                 .passes = 1u << PATINA_PASS_COMBINED };
+    assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+    struct pt_plan plan = plan_of(scene);
+    static const char *const out[] = { "fill", "pull", "push", "smooth", "antialias", "extract" };
+    for (size_t i = 0; i < sizeof out / sizeof *out; i++)
+        assert_non_null(skipped(&plan, out[i]));
+    assert_int_equal(plan.pass_count, 4); // scatter, surface, shade, compose
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+static void test_spacing_chooses_levels(void **state)
+{
+    (void)state;
+    static const struct {
+        double width; // of the window, 1024 pixels: points are 0.01 apart
+        uint32_t least_levels, most_levels;
+    } cases[] = { { 20.0, 0, 0 }, { 10.0, 0, 0 }, { 3.0, 1, 2 }, { 1.0, 3, 4 }, { 0.1, 5, 5 } };
+    patina_cloud *cloud = square(1);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        patina_scene *scene = scene_of(cloud, cases[i].width, 1, 0);
+        struct pt_plan plan = plan_of(scene);
+        double spacing = 0.01 * 1024 / cases[i].width;
+        assert_true(fabs(plan.spacing_px / spacing - 1.0) < 0.1);
+        assert_in_range(plan.levels, cases[i].least_levels, cases[i].most_levels);
+        assert_int_equal(passes_of(&plan, PT_KERNEL_push), plan.levels);
+        assert_int_equal(passes_of(&plan, PT_KERNEL_fill), 2 * (plan.levels + 1));
+        pt_plan_destroy(&plan);
+        patina_scene_destroy(scene);
+    }
+    patina_cloud_destroy(cloud);
+}
+
+static void test_nothing_in_view_is_said(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *behind = scene_of(cloud, 2.5, -1, 1), *empty = scene_of(NULL, 2.5, 1, 0);
+    struct pt_plan plan = plan_of(behind); // from below every chunk faces away
+    assert_string_equal(skipped(&plan, "scatter"), "no cloud is in view");
+    assert_true(plan.chunks_culled == plan.chunks && plan.chunks > 0);
+    assert_int_equal(passes_of(&plan, PT_KERNEL_compose), 1); // the background is a picture too
+    pt_plan_destroy(&plan);
+    plan = plan_of(empty);
+    assert_string_equal(skipped(&plan, "scatter"), "the scene has no cloud");
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(behind);
+    patina_scene_destroy(empty);
+    patina_cloud_destroy(cloud);
+}
+
+static void test_region_decides_as_the_whole(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_of(cloud, 1.5, 1, 0);
+    struct pt_plan whole = plan_of(scene);
+    patina_settings settings = { .struct_size = sizeof settings, .region = { 700, 650, 750, 660 } };
+    assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+    struct pt_plan region = plan_of(scene);
+    assert_int_equal(region.levels, whole.levels);
+    assert_int_equal(region.iterations, whole.iterations);
+    assert_true(region.view.ray_x0 == whole.view.ray_x0 && region.view.ray_ys == whole.view.ray_ys);
+    assert_true(region.view.width < whole.view.width && region.chunks_culled > whole.chunks_culled);
+    assert_int_equal((uint32_t)region.view.origin_x + region.crop[0], (uint32_t)whole.view.origin_x + whole.crop[0] + 700);
+    assert_int_equal((uint32_t)region.view.origin_y + region.crop[1], (uint32_t)whole.view.origin_y + whole.crop[1] + 650);
+    assert_int_equal(region.view.origin_x & ((1 << region.levels) - 1), 0);
+    pt_plan_destroy(&whole);
+    pt_plan_destroy(&region);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+static void test_no_camera_is_an_error(void **state)
+{
+    (void)state;
+    patina_scene *scene = NULL;
+    struct pt_plan plan;
+    char message[256];
+    assert_int_equal(patina_scene_create(&scene), PATINA_OK);
+    assert_int_equal(pt_plan_create(scene, &plan), PATINA_ERROR_ARGUMENT);
+    assert_true(patina_message(scene, message, sizeof message) > 0);
+    assert_non_null(strstr(message, "camera"));
+    patina_scene_destroy(scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_every_pass_runs_or_has_a_reason), cmocka_unit_test(test_missing_normals_are_estimated),
+        cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
+        cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
+        cmocka_unit_test(test_no_camera_is_an_error),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
