@@ -71,21 +71,36 @@ static inline vm vm_or(vm a, vm b) { return a | b; }
 static inline vm vm_not(vm a) { return (vm)~a; }
 static inline void vf_store(float *p, vf a, vm m) { _mm512_mask_storeu_ps(p, m, a); }
 static inline void vi_store(void *p, vi a, vm m) { _mm512_mask_storeu_epi32(p, m, a); }
-static inline vf vf_load_every_fourth(const float *p) // float4 pixels 0, 4, 8, 12
+static inline void vf_swap_quarters(vf r[4]) // quarter j of vector k <-> quarter k of vector j
 {
-    __m512 a = _mm512_insertf32x4(_mm512_castps128_ps512(_mm_loadu_ps(p)), _mm_loadu_ps(p + 16), 1);
-    return _mm512_insertf32x4(_mm512_insertf32x4(a, _mm_loadu_ps(p + 32), 2), _mm_loadu_ps(p + 48), 3);
+    vf a = _mm512_shuffle_f32x4(r[0], r[1], 0x44), b = _mm512_shuffle_f32x4(r[2], r[3], 0x44);
+    vf c = _mm512_shuffle_f32x4(r[0], r[1], 0xEE), d = _mm512_shuffle_f32x4(r[2], r[3], 0xEE);
+    r[0] = _mm512_shuffle_f32x4(a, b, 0x88);
+    r[1] = _mm512_shuffle_f32x4(a, b, 0xDD);
+    r[2] = _mm512_shuffle_f32x4(c, d, 0x88);
+    r[3] = _mm512_shuffle_f32x4(c, d, 0xDD);
 }
-static inline void vf_store_every_fourth(float *p, vf a, uint32_t lanes) // bits 0, 4, 8, 12 of lanes
+static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vector k: pixels k, 4 + k, 8 + k, 12 + k
 {
-    if (lanes & 1u)
-        _mm_storeu_ps(p, _mm512_castps512_ps128(a));
-    if (lanes >> 4 & 1u)
-        _mm_storeu_ps(p + 16, _mm512_extractf32x4_ps(a, 1));
-    if (lanes >> 8 & 1u)
-        _mm_storeu_ps(p + 32, _mm512_extractf32x4_ps(a, 2));
-    if (lanes >> 12 & 1u)
-        _mm_storeu_ps(p + 48, _mm512_extractf32x4_ps(a, 3));
+    for (int j = 0; j < 4; j++)
+        r[j] = _mm512_loadu_ps(p + 16 * j);
+    vf_swap_quarters(r);
+}
+static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
+{
+    vf_swap_quarters(r);
+    for (int j = 0; j < 4; j++)
+        _mm512_mask_storeu_ps(p + 16 * j, (__mmask16)(_pdep_u32(lanes >> 4 * j, 0x1111u) * 15u), r[j]);
+}
+static inline void vf_stream_pixels(float *p, vf r[4]) // p: a multiple of 16 bytes, all lanes
+{
+    vf_swap_quarters(r);
+    for (int j = 0; j < 4; j++)
+        for (int k = 0; k < 4; k++) {
+            float quarters[16];
+            _mm512_storeu_ps(quarters, r[j]);
+            _mm_stream_ps(p + 16 * j + 4 * k, _mm_loadu_ps(quarters + 4 * k));
+        }
 }
 #define PT_VECTOR(name) _mm512_##name
 
@@ -150,13 +165,26 @@ static inline vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
 static inline vm vm_not(vm a) { return _mm256_xor_si256(a, _mm256_set1_epi32(-1)); }
 static inline void vf_store(float *p, vf a, vm m) { _mm256_maskstore_ps(p, m, a); }
 static inline void vi_store(void *p, vi a, vm m) { _mm256_maskstore_epi32(p, m, a); }
-static inline vf vf_load_every_fourth(const float *p) { return _mm256_set_m128(_mm_loadu_ps(p + 16), _mm_loadu_ps(p)); }
-static inline void vf_store_every_fourth(float *p, vf a, uint32_t lanes)
+static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vector k: pixels k, 4 + k
 {
-    if (lanes & 1u)
-        _mm_storeu_ps(p, _mm256_castps256_ps128(a));
-    if (lanes >> 4 & 1u)
-        _mm_storeu_ps(p + 16, _mm256_extractf128_ps(a, 1));
+    for (int k = 0; k < 4; k++)
+        r[k] = _mm256_set_m128(_mm_loadu_ps(p + 16 + 4 * k), _mm_loadu_ps(p + 4 * k));
+}
+static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
+{
+    for (int k = 0; k < 4; k++) {
+        if (lanes >> k & 1u)
+            _mm_storeu_ps(p + 4 * k, _mm256_castps256_ps128(r[k]));
+        if (lanes >> (4 + k) & 1u)
+            _mm_storeu_ps(p + 16 + 4 * k, _mm256_extractf128_ps(r[k], 1));
+    }
+}
+static inline void vf_stream_pixels(float *p, vf r[4])
+{
+    for (int k = 0; k < 4; k++) {
+        _mm_stream_ps(p + 4 * k, _mm256_castps256_ps128(r[k]));
+        _mm_stream_ps(p + 16 + 4 * k, _mm256_extractf128_ps(r[k], 1));
+    }
 }
 #define PT_VECTOR(name) _mm256_##name
 
@@ -237,11 +265,21 @@ static inline void vi_store(void *p, vi a, vm m)
             memcpy((char *)p + 4 * k, &value[k], 4);
 }
 static inline void vf_store(float *p, vf a, vm m) { vi_store(p, vf_bits(a), m); }
-static inline vf vf_load_every_fourth(const float *p) { return _mm_loadu_ps(p); }
-static inline void vf_store_every_fourth(float *p, vf a, uint32_t lanes)
+static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vector k: pixel k
 {
-    if (lanes & 1u)
-        _mm_storeu_ps(p, a);
+    for (int k = 0; k < 4; k++)
+        r[k] = _mm_loadu_ps(p + 4 * k);
+}
+static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
+{
+    for (int k = 0; k < 4; k++)
+        if (lanes >> k & 1u)
+            _mm_storeu_ps(p + 4 * k, r[k]);
+}
+static inline void vf_stream_pixels(float *p, vf r[4])
+{
+    for (int k = 0; k < 4; k++)
+        _mm_stream_ps(p + 4 * k, r[k]);
 }
 #define PT_VECTOR(name) _mm_##name
 
@@ -339,28 +377,21 @@ static inline void vf_transpose(vf r[4]) // 4 x 4 within each quarter
 }
 static inline void vf_load4(const float *pixels, vf out[4])
 {
-    for (int k = 0; k < 4; k++)
-        out[k] = vf_load_every_fourth(pixels + 4 * k);
+    vf_load_pixels(pixels, out);
     vf_transpose(out);
+}
+static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
+{
+    vf r[4] = { in[0], in[1], in[2], in[3] };
+    vf_transpose(r);
+    vf_store_pixels(pixels, r, lanes);
 }
 // All PT_LANES pixels past the caches; pixels must lie on a multiple of 16 bytes.
 static inline void vf_stream4(float *pixels, const vf in[4])
 {
     vf r[4] = { in[0], in[1], in[2], in[3] };
     vf_transpose(r);
-    for (int k = 0; k < 4; k++) {
-        float rows[PT_LANES];
-        memcpy(rows, &r[k], sizeof rows);
-        for (int i = 0; i < PT_LANES; i += 4)
-            _mm_stream_ps(pixels + 4 * (k + i), _mm_loadu_ps(rows + i));
-    }
-}
-static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
-{
-    vf r[4] = { in[0], in[1], in[2], in[3] };
-    vf_transpose(r);
-    for (int k = 0; k < 4; k++)
-        vf_store_every_fourth(pixels + 4 * k, r[k], lanes >> k);
+    vf_stream_pixels(pixels, r);
 }
 #else
 static inline void vf_load4(const float *pixels, vf out[4]) { memcpy(out, pixels, 16); }
