@@ -102,6 +102,14 @@ static inline void vf_stream_pixels(float *p, vf r[4]) // p: a multiple of 16 by
             _mm_stream_ps(p + 16 * j + 4 * k, _mm_loadu_ps(quarters + 4 * k));
         }
 }
+static inline vi vi_pairs(vi a) // each of the first half of the lanes twice
+{
+    return _mm512_permutexvar_epi32(_mm512_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7), a);
+}
+static inline vi vi_sides(vi a) // lane 2k: k, lane 2k + 1: k + 2
+{
+    return _mm512_permutexvar_epi32(_mm512_setr_epi32(0, 2, 1, 3, 2, 4, 3, 5, 4, 6, 5, 7, 6, 8, 7, 9), a);
+}
 #define PT_VECTOR(name) _mm512_##name
 
 #elif defined(PT_ISA_AVX2)
@@ -185,6 +193,14 @@ static inline void vf_stream_pixels(float *p, vf r[4])
         _mm_stream_ps(p + 4 * k, _mm256_castps256_ps128(r[k]));
         _mm_stream_ps(p + 16 + 4 * k, _mm256_extractf128_ps(r[k], 1));
     }
+}
+static inline vi vi_pairs(vi a)
+{
+    return _mm256_permutevar8x32_epi32(a, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3));
+}
+static inline vi vi_sides(vi a)
+{
+    return _mm256_permutevar8x32_epi32(a, _mm256_setr_epi32(0, 2, 1, 3, 2, 4, 3, 5));
 }
 #define PT_VECTOR(name) _mm256_##name
 
@@ -281,6 +297,8 @@ static inline void vf_stream_pixels(float *p, vf r[4])
     for (int k = 0; k < 4; k++)
         _mm_stream_ps(p + 4 * k, r[k]);
 }
+static inline vi vi_pairs(vi a) { return _mm_shuffle_epi32(a, 0x50); }
+static inline vi vi_sides(vi a) { return _mm_shuffle_epi32(a, 0xD8); }
 #define PT_VECTOR(name) _mm_##name
 
 #else // scalar: the same kernels, a lane at a time
@@ -345,6 +363,11 @@ static inline void vi_store(void *p, vi a, vm m)
         memcpy(p, &a, 4);
 }
 
+#endif
+
+#if PT_LANES == 1
+static inline vi vi_pairs(vi a) { return a; }
+static inline vi vi_sides(vi a) { return a; } // of an even pixel
 #endif
 
 // Bytes at base + i: the word that starts there (three bytes beyond the last may be read).

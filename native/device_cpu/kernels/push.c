@@ -21,29 +21,66 @@ static vf coarse_z(const struct push *push, vi x, vi y, vm lanes)
     return vf_select(inside, z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
 }
 
+struct around { // of PT_LANES pixels: z of the parent, and of the three coarse cells on the pixel's side
+    vf parent, beside, above, corner;
+};
+
+// By plain loads: x even, and no cell that is asked for beyond the plane.
+static struct around load_inside(const struct push *push, uint32_t x, uint32_t y)
+{
+    const uint64_t *row = (const uint64_t *)pt_cpu_data(push->call, 0) + (size_t)(y >> 1) * push->args->coarse_width + (x >> 1);
+    const uint64_t *next = y & 1 ? row + push->args->coarse_width : row - push->args->coarse_width;
+    return (struct around){ vi_float(vi_pairs(vi_load_z(row))), vi_float(vi_sides(vi_load_z(row - 1))),
+                            vi_float(vi_pairs(vi_load_z(next))), vi_float(vi_sides(vi_load_z(next - 1))) };
+}
+
+static struct around load_anywhere(const struct push *push, uint32_t x, uint32_t y, vm lanes)
+{
+    vi column = vi_add(vi_set(x), vi_lanes()), px = vi_shr(column, 1), py = vi_set(y >> 1);
+    // towards the pixel's side: -1 for even, 1 for odd
+    vi nx = vi_sub(vi_add(px, vi_mul(vi_and(column, vi_set(1)), vi_set(2))), vi_set(1));
+    vi ny = vi_set((y >> 1) + 2 * (y & 1) - 1);
+    return (struct around){ coarse_z(push, px, py, lanes), coarse_z(push, nx, py, lanes), coarse_z(push, px, ny, lanes),
+                            coarse_z(push, nx, ny, lanes) };
+}
+
+static int is_inside(const struct push *push, uint32_t x, uint32_t y)
+{
+    return PT_LANES > 1 && !(x & 1) && x >= 2 && (x >> 1) + PT_LANES / 2 < push->args->coarse_width && y >= 2 &&
+           (y >> 1) + 1 < push->args->coarse_height;
+}
+
 // 1 in the lanes where z < t.
 static vi nearer(vf z, vf t) { return vi_select(vf_lt(z, t), vi_set(1), vi_set(0)); }
+
+// d_eff of the pixels from `at` on; most of them, and at level 0 all, are measured.
+static vf own_distance(const struct push *push, size_t at, vf z, vm some)
+{
+    const struct view_args *view = &push->args->view;
+    const float *deff = pt_cpu_data(push->call, 5);
+    vi source = vi_load((const uint32_t *)pt_cpu_data(push->call, 3) + at);
+    vm other = vm_and(some, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
+    if (!view->level && !vm_bits(other))
+        return vf_load(deff + at);
+    return vf_level_distance(view, deff, pt_cpu_data(push->call, 4), source, z, some);
+}
 
 // 1. Which of PT_LANES pixels are covered by their parent and by two of the three coarse cells on their side.
 static uint32_t covered(const struct push *push, uint32_t x, uint32_t y, uint32_t lanes)
 {
     size_t at = (size_t)y * push->args->view.width + x;
     vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(push->call, 2) + at));
-    vi column = vi_add(vi_set(x), vi_lanes()), px = vi_shr(column, 1), py = vi_set(y >> 1);
-    vf parent = coarse_z(push, px, py, vm_first(lanes));
-    vm asked = vm_and(vm_first(lanes), vf_lt(parent, z)); // d_eff is never below 0
+    vm asked = vm_first(lanes);
+    struct around around = is_inside(push, x, y) ? load_inside(push, x, y) : load_anywhere(push, x, y, asked);
+    asked = vm_and(asked, vf_lt(around.parent, z)); // d_eff is never below 0
     if (!vm_bits(asked))
         return 0;
     vm some = vm_and(asked, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
-    vi source = vi_load((const uint32_t *)pt_cpu_data(push->call, 3) + at);
-    vf t = vf_select(some, z - vf_level_distance(&push->args->view, pt_cpu_data(push->call, 5), pt_cpu_data(push->call, 4),
-                                                 source, z, some), z);
-    // towards the pixel's side: -1 for even, 1 for odd
-    vi nx = vi_sub(vi_add(px, vi_mul(vi_and(column, vi_set(1)), vi_set(2))), vi_set(1));
-    vi ny = vi_set((y >> 1) + 2 * (y & 1) - 1);
-    vi sides = vi_add(vi_add(nearer(coarse_z(push, nx, py, asked), t), nearer(coarse_z(push, px, ny, asked), t)),
-                      nearer(coarse_z(push, nx, ny, asked), t));
-    return vm_bits(vm_and(vm_and(asked, vf_lt(parent, t)), vi_lt_unsigned(vi_set(1), sides)));
+    vf t = z; // the threshold: what is nearer covers the pixel
+    if (vm_bits(some))
+        t = vf_select(some, z - own_distance(push, at, z, some), z);
+    vi sides = vi_add(vi_add(nearer(around.beside, t), nearer(around.above, t)), nearer(around.corner, t));
+    return vm_bits(vm_and(vm_and(asked, vf_lt(around.parent, t)), vi_lt_unsigned(vi_set(1), sides)));
 }
 
 // 2. The parent's key; refined: its surface's tangent plane here. `x`: the row's pixels that take it.
@@ -84,8 +121,10 @@ static void push_row(void *context, uint32_t y)
     struct push push = { .call = call, .args = args, .coarse = args->view };
     push.coarse.level++;
     uint32_t taken[2 * PT_LANES] = { 0 }, count = 0;
-    for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x += PT_LANES) {
+    for (uint32_t x = args->view.rect[0] & ~1u; x < args->view.rect[2]; x += PT_LANES) {
         uint32_t bits = covered(&push, x, y, pt_lanes_left(x, args->view.rect[2]));
+        if (x < args->view.rect[0])
+            bits &= ~1u; // the pairs begin before the rectangle
         for (; bits; bits &= bits - 1)
             taken[count++] = x + (uint32_t)__builtin_ctz(bits);
         if (count < PT_LANES)
