@@ -50,6 +50,8 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
             self._tell('WARNING', notice)
         self._status("Rendering", BUILDING)
         picture = render.draw(description, {item.plane for item in passes.enabled(layer)}, self._poll_drawing)
+        if picture.notice:
+            self._tell('WARNING', picture.notice)
         passes.write(self, layer, description.camera, picture.planes)
         self._status(f"{picture.stats['points']:,} points, {picture.stats['ms']:.1f} ms, {picture.device}", 1.0)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ class Picture:
     planes: dict[str, np.ndarray]  # (height, width, channels) by plane name, row 0 at the bottom
     stats: dict[str, Any]
     device: str
+    notice: str = ""  # what the artist should know about how it came to be
 
 
 # The device outlives frames: starting threads or a GL context costs more than many a picture.
@@ -42,9 +43,29 @@ def forget_device() -> None:
 
 
 def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool]) -> Picture:
-    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel."""
+    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel.
+    Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
     wanted = list(planes)
-    device = jobs.run(lambda: device_for(description.device), lambda: None, lambda: poll(0.0))
+    device = _open(description.device, poll)
+    try:
+        return _draw_on(device, description, wanted, poll)
+    except native.PatinaCancelled:
+        raise
+    except native.PatinaError as error:
+        if not device.name.startswith("gl"):
+            raise
+        reason = error
+    forget_device()
+    picture = _draw_on(_open(replace(description.device, name="cpu"), poll), description, wanted, poll)
+    return replace(picture, notice=f"{device.name} failed, the CPU drew this picture: {reason}")
+
+
+def _open(choice: DeviceChoice, poll: Callable[[float], bool]) -> native.Device:
+    return jobs.run(lambda: device_for(choice), lambda: None, lambda: poll(0.0))
+
+
+def _draw_on(device: native.Device, description: SceneDescription, wanted: list[str],
+             poll: Callable[[float], bool]) -> Picture:
     # The frame is made and closed on this thread, so that poll never meets a dead handle.
     with native.Scene() as scene, native.Frame(device) as frame:
         _describe(scene, description)

@@ -23,7 +23,7 @@ struct camera {
 // One chunk in view, before it is known which window the planes get.
 struct seen {
     uint32_t chunk;
-    uint32_t cull;
+    uint32_t cull, away; // test each point's normal; every point faces away
     double rect[4];        // bounds on screen, padded picture
     double spacing_px, area_px;
 };
@@ -259,6 +259,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (cull && facing == FACES_AWAY)
             continue;
         seen.cull = cull && facing == FACES_BOTH;
+        seen.away = facing == FACES_AWAY;
         double footprint = fmax(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
         seen.spacing_px = (double)chunk->spacing * object->scale / footprint * sqrt(chunk_cosine(known, angle, spread));
         seen.area_px = chunk->count * seen.spacing_px * seen.spacing_px;
@@ -277,7 +278,24 @@ static int compare_weighted(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// The spacing on screen that 95% of the covered area stays below.
+// The chunks' spacings with the area that they cover; those that face away only when asked for.
+static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *survey, int away, struct weighted *list,
+                             double *area)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        for (uint32_t c = 0; c < survey->seen_count[i]; c++) {
+            const struct seen *seen = &survey->seen[i][c];
+            if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away))
+                continue;
+            list[count++] = (struct weighted){ seen->spacing_px, seen->area_px };
+            *area += seen->area_px;
+        }
+    return count;
+}
+
+// The spacing on screen that 95% of the covered area stays below. What faces away counts only where nothing faces us: the
+// sparse back of a statue is hidden by its front.
 static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
 {
     uint32_t count = 0, total = 0;
@@ -287,14 +305,8 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
     struct weighted *list = malloc((total + 1) * sizeof *list);
     if (!list)
         return PATINA_ERROR_MEMORY;
-    for (uint32_t i = 0; i < plan->instance_count; i++)
-        for (uint32_t c = 0; c < survey->seen_count[i]; c++) {
-            const struct seen *seen = &survey->seen[i][c];
-            if (!(seen->area_px > 0.0) || !isfinite(seen->area_px))
-                continue;
-            list[count++] = (struct weighted){ seen->spacing_px, seen->area_px };
-            area += seen->area_px;
-        }
+    for (int away = 0; away < 2 && !count; away++)
+        count = weigh_chunks(plan, survey, away, list, &area);
     qsort(list, count, sizeof *list, compare_weighted);
     for (uint32_t k = 0; k < count && sum <= 0.95 * area; k++) {
         sum += list[k].weight;

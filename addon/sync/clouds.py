@@ -116,7 +116,7 @@ def collect(depsgraph: bpy.types.Depsgraph, poll: Callable[[str, float], bool],
         notices.append("no visible object has points to draw")
     if faces:
         notices.append(f"{len(faces)} mesh object{'s' * (len(faces) > 1)} with faces not drawn: "
-                       "Patina draws points yet")
+                       "Patina draws only points so far")
     return items
 
 

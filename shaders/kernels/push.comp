@@ -69,7 +69,7 @@ void main()
 
 layout(location = 0) uniform uint entries;
 
-// 3. The parent's key; refined: its surface's tangent plane here.
+// 3. The parent's key, where its surface is not dense at this level; refined: its surface's tangent plane here.
 void main()
 {
     view_args view = args.view;
@@ -83,11 +83,15 @@ void main()
     ivec2 place = ivec2(pt_pixel(at, view.width)), cell = place >> 1;
     uint parent = uint(cell.y) * coarse_width + uint(cell.x), source = texelFetch(from_plane, int(parent)).x;
     uvec2 key = read_key(parent);
+    vec4 normal = read_float4(source);
+    float z = pt_float(key.y);
+    precise float dense = (PT_DENSE * pt_footprint(view, z)) * normal.w;
+    if (read_deff(source) < dense)
+        return;
     if (refined) {
         view_args coarse = view;
         coarse.level++;
-        vec4 normal = read_float4(source);
-        float z = pt_float(key.y), limit = pt_level_distance(coarse, read_deff(source), normal.w, z);
+        float limit = pt_level_distance(coarse, read_deff(source), normal.w, z);
         z = pt_plane_depth(view, normal.xyz, pt_ray(coarse, cell.x, cell.y), z, pt_ray(view, place.x, place.y), limit);
         key.y = pt_bits(z);
     }

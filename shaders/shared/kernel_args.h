@@ -13,6 +13,7 @@
 
 // Effective layer distance (SPEC 1): d_eff = max(d_min, K spacing, footprint, 4 ulp(z)) / max(|n.v|, C).
 #define PT_SPACING_FACTOR 2.0f // K: a hole's rim lies up to two spacings from a neighbour that is on the same layer
+#define PT_DENSE 2.4f // K times 1.2 pixels: see push
 #define PT_COSINE_FLOOR 0.05f  // C: 87 degrees; beyond it a surface is narrower than a pixel's jitter
 
 // The surface word of a point: octahedral normal 2 x 13 bits (at most 0.03 degrees off), spacing class 6 bits.
@@ -96,7 +97,8 @@ struct pull_args {
     uint32_t fine_width, fine_height;
 };
 
-// push: pixels that are empty or occluded take the key of their coarse parent.
+// push: pixels that are empty or occluded take the key of their coarse parent, unless the parent's surface is dense at this
+// level: its spacing is below 1.2 pixels, so that what shows beside it is a groove or an edge and not a hole between points.
 struct push_args {
     struct view_args view; // of the fine level
     uint32_t coarse_width, coarse_height;

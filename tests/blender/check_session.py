@@ -7,7 +7,7 @@ import time
 
 import bpy
 import numpy as np
-from harness import add_points, check, drawn, failing_render, new_scene, patina, render, reports, sphere
+from harness import Skip, add_points, check, drawn, failing_render, new_scene, patina, render, reports, sphere
 
 from patina import engine, jobs, native, passes
 from patina import render as drawing
@@ -167,3 +167,29 @@ def test_registers_twice():
     new_scene()
     add_points([(0, 0, -2)])
     check(drawn(render()), "a render after registering again")
+
+
+def test_cpu_takes_over():
+    """A GL device that fails in the middle of a picture: a warning, and the CPU's picture."""
+    try:
+        native.Device("gl-osmesa").close()
+    except native.PatinaError as error:
+        raise Skip(str(error)) from None
+    new_scene()
+    add_points(*sphere(2000))
+    bpy.context.scene.patina.device = 'GL_SOFTWARE'
+    honest = native.Frame.render
+
+    def failing(self, scene):
+        if self._device.name.startswith("gl"):
+            raise native.PatinaError("the context is lost", -6)
+        honest(self, scene)
+
+    native.Frame.render = failing
+    try:
+        picture = render()
+    finally:
+        native.Frame.render = honest
+        drawing.forget_device()
+    check(drawn(picture), "nothing was drawn")
+    check(any(kind == 'WARNING' and "CPU drew" in text for kind, text in reports), f"reports {reports}")

@@ -5,7 +5,7 @@
     python tests/blender/demo.py FILE.ply OUT.png
 
 PATINA_DEMO_PLY and PATINA_DEMO_PNG stand for missing arguments; PATINA_LIBRARY names the library;
-PATINA_DEMO_LIT=1 lights points that have colours too.
+PATINA_DEMO_LIT=1 lights points that have colours too; PATINA_DEMO_VIEW=32,14 looks from azimuth 32 and 14 degrees up.
 """
 
 import os
@@ -21,7 +21,8 @@ import numpy as np
 from mathutils import Euler
 
 WIDTH, HEIGHT = 1280, 960
-AZIMUTH, ELEVATION = 25.0, 40.0  # degrees around z from -y, and above the horizon
+AZIMUTH, ELEVATION = (float(angle) for angle in os.environ.get("PATINA_DEMO_VIEW", "25,40").split(","))
+# degrees around z from -y, and above the horizon
 MARGIN = 1.05
 
 

@@ -62,6 +62,8 @@ static void pyramid(struct harness *h, uint32_t width, uint32_t height, int pers
 {
     struct rng rng = {width * 1000u + (uint64_t)kind * 10 + refined};
     struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind, density);
+    for (size_t i = 0; i < picture.count; i++) // sparse surfaces, which are pushed, beside dense ones, which are not
+        picture.deff[i] *= i % 3 ? 8.0f : 1.0f;
     struct level levels[4] = {{picture.view, picture.keys, picture.from}};
     for (int l = 1; l < 4; l++) {
         levels[l] = levels[l - 1];
@@ -88,13 +90,14 @@ static void shapes(struct harness *h)
         pyramid(h, sizes[s][0], sizes[s][1], 1, PICTURE_NOISE, 0.5, 1);
 }
 
-// Reference alone: parent and two of three, no less.
+// Reference alone: parent and two of three, no less, and never a dense surface.
 static void sanity(struct harness *h)
 {
     uint32_t from[36] = {0}, coarse_from[9] = {0};
     uint64_t fine[36], coarse[9];
     float normal[4] = {0, 0, 1, 1}, deff[1] = {0.0f};
-    for (int cells = 0; cells < 16; cells++) { // parent, horizontal, vertical, diagonal
+    for (int cells = 0; cells < 32; cells++) { // parent, horizontal, vertical, diagonal; dense
+        deff[0] = cells & 16 ? 0.23f : 0.25f;  // of pixels that are 0.1 wide: K times 1.15 or 1.25 pixels
         for (int i = 0; i < 36; i++)
             fine[i] = REF_EMPTY_KEY;
         for (int i = 0; i < 9; i++)
@@ -103,11 +106,11 @@ static void sanity(struct harness *h)
         for (int i = 0; i < 4; i++)
             if (cells >> i & 1)
                 coarse[at[i]] = ref_key(2.0f, 7);
-        struct push_args args = {.view = {.width = 6, .height = 6}, .coarse_width = 3, .coarse_height = 3};
+        struct push_args args = {.view = {.width = 6, .height = 6, .footprint = 0.1f}, .coarse_width = 3, .coarse_height = 3};
         struct ref_planes planes = {.keys = fine, .from = from, .normal = normal, .deff = deff};
         struct ref_pixel pixel = ref_push(&args, coarse, coarse_from, &planes, 3, 3);
         int sides = (cells >> 1 & 1) + (cells >> 2 & 1) + (cells >> 3 & 1);
-        HARNESS_CHECK(h, (pixel.id == 7) == ((cells & 1) && sides >= 2));
+        HARNESS_CHECK(h, (pixel.id == 7) == ((cells & 1) && sides >= 2 && !(cells & 16)));
     }
 }
 

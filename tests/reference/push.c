@@ -2,6 +2,7 @@
 // SPEC 2.2, pull-push with depth intervals: an empty or occluded pixel takes its coarse parent's surface when the parent
 // and two of the three coarse cells next to the pixel lie before it.
 #include "reference.h"
+#include "tolerances.h"
 
 #include <math.h>
 
@@ -22,6 +23,18 @@ static enum ref_truth two_of(const enum ref_truth truth[3])
         maybe += truth[i] != REF_NO;
     }
     return yes >= 2 ? REF_YES : maybe >= 2 ? REF_UNSURE : REF_NO;
+}
+
+// Whether points of the surface lie closer than 1.2 pixels of this level: d_eff without its cosine is K spacing, or more.
+static enum ref_truth is_dense(const struct view_args *view, const struct ref_planes *planes, struct ref_pixel taken)
+{
+    double width = (double)view->footprint * (double)(1u << view->level);
+    double z = view->perspective ? taken.z.lo : 1.0; // a key's: exact
+    double limit = (double)PT_DENSE * width * z * (double)planes->normal[4 * (size_t)taken.from + 3];
+    double deff = (double)planes->deff[taken.from];
+    if (fabs(deff - limit) <= (TOL_LEVEL + TOL_UNIT) * limit) // one product more than a level distance
+        return REF_UNSURE;
+    return deff < limit ? REF_YES : REF_NO;
 }
 
 struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_keys, const uint32_t *coarse_from,
@@ -54,6 +67,11 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
     }
     size_t coarse = (size_t)py * args->coarse_width + (size_t)px;
     struct ref_pixel taken = ref_pixel(coarse_keys[coarse], coarse_from[coarse]);
+    enum ref_truth dense = is_dense(view, planes, taken);
+    if (dense != REF_NO) {
+        pixel.unsure |= dense == REF_UNSURE;
+        return pixel;
+    }
     if (args->refined) {
         struct view_args above = *view;
         above.level++;

@@ -83,7 +83,8 @@ static uint32_t covered(const struct push *push, uint32_t x, uint32_t y, uint32_
     return vm_bits(vm_and(vm_and(asked, vf_lt(around.parent, t)), vi_lt_unsigned(vi_set(1), sides)));
 }
 
-// 2. The parent's key; refined: its surface's tangent plane here. `x`: the row's pixels that take it.
+// 2. The parent's key, where its surface is not dense at this level; refined: its surface's tangent plane here. `x`: the
+// row's pixels that may take it.
 static void take(const struct push *push, const uint32_t *x, uint32_t y, uint32_t count)
 {
     const struct view_args *view = &push->args->view;
@@ -94,6 +95,12 @@ static void take(const struct push *push, const uint32_t *x, uint32_t y, uint32_
     vi parent = vi_add(vi_mul(py, vi_set(push->args->coarse_width)), px);
     vi source = vi_gather(pt_cpu_data(push->call, 1), parent, lanes), id = vi_gather_id(coarse_keys, parent, lanes);
     vf z = vi_float(vi_gather_z(coarse_keys, parent, lanes));
+    vf inverse = vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(3)), lanes);
+    vm dense = vf_lt(vf_gather(pt_cpu_data(push->call, 5), source, lanes),
+                     (vf_set(PT_DENSE) * vf_footprint(view, z)) * inverse);
+    uint32_t takes = vm_bits(vm_and(lanes, vm_not(dense)));
+    if (!takes)
+        return;
     if (push->args->refined) {
         vf n[3], ray_p[2], ray_q[2];
         for (uint32_t k = 0; k < 3; k++)
@@ -107,7 +114,8 @@ static void take(const struct push *push, const uint32_t *x, uint32_t y, uint32_
     vi_store(zs, vf_bits(z), vm_first(PT_LANES));
     vi_store(ids, id, vm_first(PT_LANES));
     vi_store(sources, source, vm_first(PT_LANES));
-    for (uint32_t i = 0; i < count; i++) {
+    for (; takes; takes &= takes - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(takes);
         size_t at = (size_t)y * view->width + x[i];
         ((uint64_t *)pt_cpu_data(push->call, 2))[at] = (uint64_t)zs[i] << 32 | ids[i];
         ((uint32_t *)pt_cpu_data(push->call, 3))[at] = sources[i];

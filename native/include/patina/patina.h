@@ -4,11 +4,14 @@
 // A program describes a scene (clouds, lights, a camera, settings), renders it into a frame on a
 // device, and reads passes (pictures of one float kind) out of the frame:
 //
-//     patina_device *dev;  patina_device_create(NULL, &dev);
-//     patina_cloud *cloud; patina_cloud_load("statue.ply", NULL, NULL, &cloud);
-//     patina_scene *scene; patina_scene_create(&scene);
+//     patina_device *device; patina_device_create(NULL, &device);
+//     patina_cloud *cloud;   patina_cloud_load("statue.ply", NULL, &cloud);
+//     patina_scene *scene;   patina_scene_create(&scene);
 //     patina_scene_add_cloud(scene, cloud, NULL);
-//     patina_frame *frame; patina_frame_create(dev, &frame);
+//     patina_camera camera = { .struct_size = sizeof camera };
+//     patina_scene_frame_camera(scene, 30, 40, 0, &camera);
+//     patina_scene_set_camera(scene, &camera);
+//     patina_frame *frame;   patina_frame_create(device, &frame);
 //     patina_frame_render(frame, scene);
 //     patina_frame_read(frame, PATINA_PASS_COMBINED, rgba, sizeof rgba);
 //
