@@ -48,5 +48,8 @@ def run(work: Callable[[], T], cancel: Callable[[], None], poll: Callable[[], bo
     finally:
         worker.join()
     if failure:
-        raise failure[0]
+        try:
+            raise failure[0]
+        finally:
+            failure.clear()  # else error, traceback and this list keep each other, and the caller's arrays, alive
     return outcome[0]

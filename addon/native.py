@@ -118,7 +118,7 @@ class _Settings(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
                 ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
                 ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
-                ("background_only_camera", c_uint32)]
+                ("passes", c_uint32)]
 
 
 class _FrameStats(_Descriptor):

@@ -54,7 +54,7 @@ def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[f
     except native.PatinaError as error:
         if not device.name.startswith("gl"):
             raise
-        reason = error
+        reason = str(error)  # the error itself would keep the whole picture alive
     forget_device()
     picture = _draw_on(_open(replace(description.device, name="cpu"), poll), description, wanted, poll)
     return replace(picture, notice=f"{device.name} failed, the CPU drew this picture: {reason}")
@@ -68,7 +68,7 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
              poll: Callable[[float], bool]) -> Picture:
     # The frame is made and closed on this thread, so that poll never meets a dead handle.
     with native.Scene() as scene, native.Frame(device) as frame:
-        _describe(scene, description)
+        _describe(scene, description, wanted)
 
         def work() -> Picture:
             frame.render(scene)
@@ -77,8 +77,9 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
         return jobs.run(work, frame.cancel, lambda: poll(frame.progress()))
 
 
-def _describe(scene: native.Scene, description: SceneDescription) -> None:
-    scene.set_settings(**asdict(description.settings))
+def _describe(scene: native.Scene, description: SceneDescription, wanted: list[str]) -> None:
+    passes = sum(1 << native.PLANES[name][0] for name in {"COMBINED", *wanted})
+    scene.set_settings(**asdict(description.settings), passes=passes)
     scene.set_camera(**asdict(description.camera))
     for light in description.lights:
         scene.add_light(**asdict(light))

@@ -6,6 +6,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 const char *const pt_kernel_names[PT_KERNEL_COUNT] = {
 #define PT_KERNEL(name, kind, buffers) #name,
@@ -138,7 +139,11 @@ int patina_frame_render(patina_frame *frame, const patina_scene *scene)
 {
     if (!frame || !scene)
         return fail("patina_frame_render: frame or scene is NULL");
-    pthread_mutex_lock(&frame->device->busy);
+    while (pthread_mutex_trylock(&frame->device->busy)) { // another frame's turn: a cancel must not wait for it
+        if (atomic_exchange(&frame->cancel, 0))
+            return pt_fail(&frame->handle, PATINA_ERROR_CANCELLED, "rendering was cancelled");
+        nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
+    }
     int error = pt_frame_render(frame, scene);
     pthread_mutex_unlock(&frame->device->busy);
     return error;

@@ -40,6 +40,16 @@ static uint64_t plane_total(const struct patina_frame *frame)
     return total;
 }
 
+static int check_cap(const struct patina_frame *frame, const struct pt_plan *plan, uint64_t total)
+{
+    uint64_t cap = frame->device->memory_cap;
+    if (!cap || total <= cap)
+        return PATINA_OK;
+    return pt_fail(&frame->handle, PATINA_ERROR_MEMORY,
+                   "the planes of a %u x %u picture take more than the %llu MB allowed: render it in regions",
+                   plan->crop[2], plan->crop[3], (unsigned long long)(cap >> 20));
+}
+
 static int ensure_plane(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which, uint32_t level)
 {
     struct pt_buffer *plane = &frame->planes[which][level];
@@ -49,15 +59,40 @@ static int ensure_plane(struct patina_frame *frame, const struct pt_plan *plan, 
     if (plane->size == bytes && (plane->data || plane->name))
         return PATINA_OK;
     frame->device->ops->buffer_destroy(frame->device, plane);
-    uint64_t held = plane_total(frame), cap = frame->device->memory_cap;
-    if (cap && held + bytes > cap)
-        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY,
-                       "the planes of a %u x %u picture take more than the %llu MB allowed: render it in regions",
-                       plan->crop[2], plan->crop[3], (unsigned long long)(cap >> 20));
-    int error = frame->device->ops->buffer_create(frame->device, bytes, NULL, 0, plane);
+    int error = check_cap(frame, plan, plane_total(frame) + bytes);
+    if (!error)
+        error = frame->device->ops->buffer_create(frame->device, bytes, NULL, 0, plane);
     if (error)
         return pt_fail_again(&frame->handle, error);
     return PATINA_OK;
+}
+
+// Makes room for the whole picture before any of it is written: what cannot be had leaves the last picture as it is.
+static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan)
+{
+    const struct pt_device_ops *ops = frame->device->ops;
+    struct pt_buffer made[PT_PLANE_COUNT] = { 0 };
+    uint64_t total = plane_total(frame);
+    int error = PATINA_OK;
+    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_COUNT && !error; p++) {
+        uint32_t size[2];
+        pt_plan_plane_size(plan, (enum pt_plane)p, 0, size);
+        size_t bytes = (size_t)size[0] * size[1] * plane_bytes[p];
+        if (frame->planes[p][0].size == bytes)
+            continue;
+        total += bytes - frame->planes[p][0].size;
+        error = check_cap(frame, plan, total);
+        if (!error)
+            error = ops->buffer_create(frame->device, bytes, NULL, 0, &made[p]);
+    }
+    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_COUNT; p++) {
+        if (!made[p].size)
+            continue;
+        ops->buffer_destroy(frame->device, error ? &made[p] : &frame->planes[p][0]);
+        if (!error)
+            frame->planes[p][0] = made[p];
+    }
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
 static void destroy_planes(struct patina_frame *frame)
@@ -128,10 +163,14 @@ static void note_time(struct patina_frame *frame, const char *name, double ms)
     frame->timings[i].ms += ms;
 }
 
+static int is_output(const struct pt_pass *pass)
+{
+    return pass->kernel == PT_KERNEL_compose || pass->kernel == PT_KERNEL_extract;
+}
+
 static int run_pass(struct render *render, const struct pt_pass *pass)
 {
     struct patina_frame *frame = render->frame;
-    int output = pass->kernel == PT_KERNEL_compose || pass->kernel == PT_KERNEL_extract;
     for (uint32_t i = 0; i < pass->ref_count; i++) {
         const struct pt_ref *ref = &pass->refs[i];
         if (!ref->of_instance) {
@@ -141,9 +180,9 @@ static int run_pass(struct render *render, const struct pt_pass *pass)
         }
         render->bound[i] = buffer_of(render, ref);
     }
-    // the picture is written last and at one go: a cancelled or failed frame leaves the one before it
+    // the picture is written last and at one go: a cancelled frame leaves the one before it
     int error = frame->device->ops->run(frame->device, pass->kernel, pass->arguments, pass->argument_size, render->bound,
-                                        pass->ref_count, output ? NULL : &frame->cancel);
+                                        pass->ref_count, is_output(pass) ? NULL : &frame->cancel);
     if (!error)
         error = frame->device->ops->finish(frame->device);
     return error;
@@ -158,11 +197,19 @@ static int run_plan(struct render *render)
     frame->keys_valid = 0;
     if (error || (error = clear_keys(frame)))
         return error;
+    int writing = 0; // the picture: from then on nothing stops it
     for (uint32_t i = 0; i < plan->pass_count; i++) {
-        if (atomic_load(&frame->cancel))
+        if (!writing && atomic_load(&frame->cancel))
             return PATINA_ERROR_CANCELLED;
-        if ((error = run_pass(render, &plan->passes[i])))
+        if (!writing && is_output(&plan->passes[i])) {
+            if ((error = ensure_picture(frame, plan)))
+                return error;
+            writing = 1;
+        }
+        if ((error = run_pass(render, &plan->passes[i]))) {
+            frame->picture_valid &= !writing; // half a picture is none: the device failed
             return error;
+        }
         double now = milliseconds();
         note_time(frame, plan->passes[i].name, now - before);
         before = now;
@@ -200,8 +247,10 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     atomic_store(&frame->progress, 0.0f);
     frame->timing_count = 0;
     int error = pt_plan_create(scene, &plan);
-    if (error)
+    if (error) {
+        atomic_store(&frame->cancel, 0);
         return pt_fail_again(&frame->handle, error);
+    }
     note_time(frame, "plan", milliseconds() - start);
     error = upload(&render);
     if (!error)
@@ -245,7 +294,8 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
                        pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, expected,
                        size);
-    return frame->device->ops->buffer_read(frame->device, &frame->planes[pass_table[pass].plane][0], 0, pixels, size);
+    int error = frame->device->ops->buffer_read(frame->device, &frame->planes[pass_table[pass].plane][0], 0, pixels, size);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
@@ -273,8 +323,10 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
     length += (size_t)snprintf(buffer && length < size ? buffer + length : NULL, buffer && length < size ? size - length : 0, \
                                __VA_ARGS__)
     PUT("{\"passes\":{");
-    for (uint32_t i = 0; i < frame->timing_count; i++)
-        PUT("%s\"%s\":%.4f", i ? "," : "", frame->timings[i].name, frame->timings[i].ms);
+    for (uint32_t i = 0; i < frame->timing_count; i++) { // whole numbers: a locale may write 0,5 for 0.5
+        unsigned long long parts = (unsigned long long)(frame->timings[i].ms * 1e4 + 0.5);
+        PUT("%s\"%s\":%llu.%04llu", i ? "," : "", frame->timings[i].name, parts / 10000, parts % 10000);
+    }
     PUT("},\"skipped\":{");
     for (uint32_t i = 0; i < frame->skipped_count; i++) // reasons are our own words: no quotes, no backslashes
         PUT("%s\"%s\":\"%s\"", i ? "," : "", frame->skipped[i].name, frame->skipped[i].reason);

@@ -233,7 +233,7 @@ static void set_lights(const struct patina_scene *scene, struct shade_args *args
 {
     double axes[9], position[3];
     pt_camera_axes(&scene->camera, axes, position);
-    for (uint32_t i = 0; i < scene->light_count && i < PT_MAX_LIGHTS; i++) {
+    for (uint32_t i = 0; i < scene->light_count; i++) { // patina_scene_add_light keeps them to PT_MAX_LIGHTS
         const patina_light_desc *light = &scene->lights[i];
         struct light_args *out = &args->lights[args->light_count++];
         double vector[3], view[3], strength = (double)light->power;

@@ -147,10 +147,27 @@ static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chun
             rect[2 + k] = fmax(rect[2 + k], q[k] / w + 1.0);
         }
     }
-    double slop = 1e-5 * (fabs(z_min) + fabs(z_max)); // what float32 may round
+    double error[3], slop; // what float32 may move a point by: where |R p| is large beside the sum, more than a pixel
+    for (int k = 0; k < 3; k++) {
+        error[k] = fabs(translation[k]);
+        for (int c = 0; c < 3; c++)
+            error[k] += fabs(rows[3 * k + c]) * fmax(fabs((double)chunk->box_min[c]), fabs((double)chunk->box_max[c]));
+        error[k] *= 0x1p-21;
+    }
+    slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
     *z_middle = fmax(0.5 * (z_min + z_max), z_near);
     if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
         return 0;
+    double nearest = camera->orthographic ? 1.0 : fmax(z_min, z_near) - error[2];
+    for (int k = 0; k < 2; k++) {
+        double far = fmax(fabs(rect[k]), fabs(rect[2 + k])), wider = INFINITY;
+        if (camera->orthographic)
+            wider = error[k];
+        else if (nearest > 0.0)
+            wider = (error[k] + far * error[2]) / nearest + far * 0x1p-20;
+        rect[k] -= wider;
+        rect[2 + k] += wider;
+    }
     if (!camera->orthographic && z_min < z_near) { // corners behind the camera bound nothing
         rect[0] = rect[1] = 0.0;
         rect[2] = camera->width;
@@ -514,6 +531,9 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     pad_camera(&survey.camera, guard);
     set_view(&survey.camera, &plan->view);
     choose_window(scene, plan, guard);
+    if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
+                       plan->view.width, plan->view.height);
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
     return error;

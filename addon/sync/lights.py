@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 
 SUN, POINT = 1, 2  # patina_light_type
+MOST = 32  # lights of a scene in the library
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,9 @@ def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Light]:
             color=color, power=power,
             position=tuple(matrix.translation),
             direction=tuple(-matrix.col[2].xyz)))
+    if len(lights) > MOST:
+        notices.append(f"only the {MOST} strongest of {len(lights)} lights shine")
+        lights = sorted(lights, key=lambda light: -light.power * max(light.color))[:MOST]
     if left_out:
         names = ", ".join(f"'{name}'" for name in sorted(left_out))
         notices.append(f"only sun and point lights shine yet, not {names}")

@@ -43,6 +43,22 @@ void pt_split_matrix(const double matrix[16], double linear[9], double translati
     }
 }
 
+// Columns of a camera are orthogonal but for rounding; a sheared one (a parent with uneven scale) takes the inverse.
+static int invert_columns(double axes[9])
+{
+    double skew = fabs(pt_dot(axes, axes + 3)) + fabs(pt_dot(axes, axes + 6)) + fabs(pt_dot(axes + 3, axes + 6));
+    double cofactors[9], determinant;
+    if (skew < 1e-5) // float32 matrices: the transposed is as good
+        return PATINA_OK;
+    pt_cofactors(axes, cofactors); // of the transposed: rows of axes are columns of the matrix
+    determinant = pt_dot(axes, cofactors);
+    if (!(fabs(determinant) > 1e-9))
+        return PATINA_ERROR_ARGUMENT;
+    for (int i = 0; i < 9; i++)
+        axes[i] = cofactors[i] / determinant;
+    return PATINA_OK;
+}
+
 int pt_camera_axes(const patina_camera *camera, double axes[9], double position[3])
 {
     double linear[9];
@@ -55,5 +71,5 @@ int pt_camera_axes(const patina_camera *camera, double axes[9], double position[
         for (int i = 0; i < 3; i++)
             axes[3 * axis + i] = column[i] / length;
     }
-    return PATINA_OK;
+    return invert_columns(axes) ? pt_fail(NULL, PATINA_ERROR_ARGUMENT, "camera: world_from_camera is singular") : PATINA_OK;
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "scene.h"
 
+#include "kernel_args.h"
+
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -128,6 +131,9 @@ int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
         checked.color[0] = checked.color[1] = checked.color[2] = 1.0f;
     if (pt_dot(checked.direction, checked.direction) == 0.0)
         checked.direction[2] = -1.0;
+    if (scene->light_count == PT_MAX_LIGHTS)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has %d lights already, the most there can be",
+                       PT_MAX_LIGHTS);
     void *grown = grow(scene->lights, scene->light_count, &scene->light_room, sizeof *scene->lights);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for light %u", scene->light_count);
@@ -150,6 +156,9 @@ int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera)
         return fail(scene, "camera: far_clip must be beyond near_clip");
     if (!camera->orthographic && !(camera->near_clip > 0.0))
         return fail(scene, "camera: near_clip must be above 0 in perspective");
+    if ((!camera->orthographic && (float)camera->near_clip < FLT_MIN) ||
+        !isfinite((float)(camera->far_clip - camera->near_clip)))
+        return fail(scene, "camera: near_clip and far_clip must be within float32");
     scene->camera = *camera;
     scene->has_camera = 1;
     return PATINA_OK;

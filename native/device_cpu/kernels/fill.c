@@ -105,7 +105,7 @@ static uint64_t load_thresholds(const struct fill *fill, uint32_t x, uint32_t y,
         if (!fill->args->occluded)
             asked = vm_not(asked);
         else if (vm_bits(asked))
-            t = t - own_distance(fill, vi_load(from + i), t, asked);
+            t = t - own_distance(fill, vi_and(vi_load(from + i), vi_set(~PT_FROM_MIXED)), t, asked);
         vf_store(thresholds + i, t, vm_first(PT_LANES));
         candidates |= (uint64_t)vm_bits(asked) << i;
     }

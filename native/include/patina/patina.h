@@ -277,6 +277,7 @@ PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds and
 // The cloud must outlive the scene or the next patina_scene_clear. Instances get ids in order of adding: the base
 // of instance i is the sum of the counts before it.
 PATINA_API int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style);
+// At most 32 lights.
 PATINA_API int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light);
 PATINA_API int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera);
 PATINA_API int patina_scene_set_settings(patina_scene *scene, const patina_settings *settings);
