@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is refused, or fails half-way, through the public API: one clear message, and the last good picture stays.
+#include <patina/patina.h>
+
+#include <locale.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { POINTS = 2000, SIDE = 512 };
+
+struct stage {
+    patina_device *device;
+    patina_cloud *cloud;
+    patina_scene *scene;
+    patina_frame *frame;
+};
+
+static void set_size(patina_scene *scene, uint32_t width, uint32_t height)
+{
+    patina_settings settings = { .struct_size = sizeof settings, .width = width, .height = height };
+    assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+}
+
+static struct stage set_stage(uint64_t memory_cap)
+{
+    static float points[POINTS][3];
+    struct stage stage;
+    for (int i = 0; i < POINTS; i++)
+        for (int k = 0; k < 3; k++)
+            points[i][k] = (float)((i * (7 + 6 * k)) % 97) / 97.0f;
+    patina_device_desc device = { .struct_size = sizeof device, .name = "cpu", .memory_cap = memory_cap };
+    patina_cloud_desc cloud = { .struct_size = sizeof cloud,
+                                .count = POINTS,
+                                .position = { points, PATINA_FLOAT32, 3, 0 } };
+    patina_camera camera = { .struct_size = sizeof camera };
+    assert_int_equal(patina_device_create(&device, &stage.device), PATINA_OK);
+    assert_int_equal(patina_cloud_create(&cloud, NULL, &stage.cloud), PATINA_OK);
+    assert_int_equal(patina_scene_create(&stage.scene), PATINA_OK);
+    assert_int_equal(patina_scene_add_cloud(stage.scene, stage.cloud, NULL), PATINA_OK);
+    assert_int_equal(patina_frame_create(stage.device, &stage.frame), PATINA_OK);
+    set_size(stage.scene, SIDE, SIDE);
+    assert_int_equal(patina_scene_frame_camera(stage.scene, 30, 40, 0, &camera), PATINA_OK);
+    assert_int_equal(patina_scene_set_camera(stage.scene, &camera), PATINA_OK);
+    return stage;
+}
+
+static void clear_stage(struct stage *stage)
+{
+    patina_frame_destroy(stage->frame);
+    patina_scene_destroy(stage->scene);
+    patina_cloud_destroy(stage->cloud);
+    patina_device_destroy(stage->device);
+}
+
+static void assert_message(const void *handle, const char *part)
+{
+    char text[512];
+    assert_true(patina_message(handle, text, sizeof text) > 0);
+    assert_non_null(strstr(text, part));
+}
+
+static float *read_picture(const struct stage *stage)
+{
+    size_t size = (size_t)SIDE * SIDE * 4 * sizeof(float);
+    float *pixels = malloc(size);
+    assert_non_null(pixels);
+    assert_int_equal(patina_frame_read(stage->frame, PATINA_PASS_COMBINED, pixels, size), PATINA_OK);
+    return pixels;
+}
+
+static void test_picture_survives_memory_cap(void **state)
+{
+    (void)state;
+    struct stage probe = set_stage(0); // what a picture of this size takes
+    patina_frame_stats stats = { .struct_size = sizeof stats };
+    assert_int_equal(patina_frame_render(probe.frame, probe.scene), PATINA_OK);
+    assert_int_equal(patina_frame_get_stats(probe.frame, &stats), PATINA_OK);
+    clear_stage(&probe);
+    struct stage stage = set_stage(stats.plane_bytes);
+    assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
+    float *before = read_picture(&stage);
+    static const uint32_t sizes[] = { SIDE + 1, SIDE + 60, 700, 2000 };
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        set_size(stage.scene, sizes[i], sizes[i]);
+        assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_MEMORY);
+        assert_message(stage.frame, "MB allowed");
+        float *after = read_picture(&stage);
+        assert_memory_equal(before, after, (size_t)SIDE * SIDE * 16);
+        free(after);
+    }
+    free(before);
+    clear_stage(&stage);
+}
+
+static void test_cancel_ends_with_its_render(void **state)
+{
+    (void)state;
+    struct stage stage = set_stage(0);
+    patina_scene *blind = NULL;
+    assert_int_equal(patina_scene_create(&blind), PATINA_OK);
+    patina_frame_cancel(stage.frame);
+    assert_int_equal(patina_frame_render(stage.frame, blind), PATINA_ERROR_ARGUMENT); // no camera
+    assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
+    patina_scene_destroy(blind);
+    clear_stage(&stage);
+}
+
+static void test_lights_end_at_32(void **state)
+{
+    (void)state;
+    struct stage stage = set_stage(0);
+    patina_light_desc light = { .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 1.0f };
+    for (int i = 0; i < 32; i++)
+        assert_int_equal(patina_scene_add_light(stage.scene, &light), PATINA_OK);
+    assert_int_equal(patina_scene_add_light(stage.scene, &light), PATINA_ERROR_ARGUMENT);
+    assert_message(stage.scene, "32 lights");
+    clear_stage(&stage);
+}
+
+static void test_planes_too_large(void **state)
+{
+    (void)state;
+    struct stage stage = set_stage(0);
+    set_size(stage.scene, 65536, 8300);
+    assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_ARGUMENT);
+    assert_message(stage.frame, "regions");
+    patina_settings part = { .struct_size = sizeof part, .width = 65536, .height = 8300, .region = { 32000, 4000, 32100, 4100 } };
+    assert_int_equal(patina_scene_set_settings(stage.scene, &part), PATINA_OK);
+    assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
+    clear_stage(&stage);
+}
+
+static void test_cameras(void **state)
+{
+    (void)state;
+    struct stage stage = set_stage(0);
+    patina_camera camera = { .struct_size = sizeof camera };
+    assert_int_equal(patina_scene_frame_camera(stage.scene, 30, 40, 0, &camera), PATINA_OK);
+    patina_camera flat = camera, narrow = camera, endless = camera;
+    for (int row = 0; row < 3; row++) // two parallel axes
+        flat.world_from_camera[4 * row] = flat.world_from_camera[4 * row + 1];
+    assert_int_equal(patina_scene_set_camera(stage.scene, &flat), PATINA_ERROR_ARGUMENT);
+    assert_message(stage.scene, "singular");
+    narrow.near_clip = 1e-50;
+    assert_int_equal(patina_scene_set_camera(stage.scene, &narrow), PATINA_ERROR_ARGUMENT);
+    endless.far_clip = 1e300;
+    assert_int_equal(patina_scene_set_camera(stage.scene, &endless), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_scene_set_camera(stage.scene, &camera), PATINA_OK);
+    clear_stage(&stage);
+}
+
+static void test_statistics_in_any_locale(void **state)
+{
+    (void)state;
+    char json[4096];
+    struct stage stage = set_stage(0);
+    const char *comma = setlocale(LC_NUMERIC, "de_DE.UTF-8");
+    assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
+    assert_true(patina_frame_stats_json(stage.frame, json, sizeof json) < sizeof json);
+    setlocale(LC_NUMERIC, "C");
+    if (!comma)
+        print_message("skip comma locale: de_DE.UTF-8 is not installed; the C locale was tried\n");
+    const char *scatter = strstr(json, "\"scatter\":");
+    assert_non_null(scatter);
+    scatter += strlen("\"scatter\":");
+    assert_int_equal(scatter[strspn(scatter, "0123456789")], '.');
+    clear_stage(&stage);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_picture_survives_memory_cap), cmocka_unit_test(test_cancel_ends_with_its_render),
+        cmocka_unit_test(test_lights_end_at_32),            cmocka_unit_test(test_planes_too_large),
+        cmocka_unit_test(test_cameras),                     cmocka_unit_test(test_statistics_in_any_locale),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
