@@ -166,8 +166,7 @@ static void plan_fill_level(struct builder *builder, uint32_t level)
     struct fill_args args = { .view = view_at(plan, level),
                               .iterations = plan->iterations,
                               .unfills = settings->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
-                              .refined = settings->quality == PATINA_QUALITY_REFINED,
-                              .base_width = plan->view.width };
+                              .refined = settings->quality == PATINA_QUALITY_REFINED };
     for (args.occluded = 0; args.occluded < 2; args.occluded++)
         REASON(ADD(builder, fill, args,
                    { plane(PT_PLANE_KEYS, level), plane(PT_PLANE_FROM, level), plane(PT_PLANE_NORMAL, 0),
@@ -197,8 +196,7 @@ static void plan_pyramid(struct builder *builder)
         struct push_args args = { .view = view_at(plan, level - 1),
                                   .coarse_width = coarse.width,
                                   .coarse_height = coarse.height,
-                                  .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED,
-                                  .base_width = plan->view.width };
+                                  .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED };
         REASON(ADD(builder, push, args,
                    { plane(PT_PLANE_KEYS, level), plane(PT_PLANE_FROM, level), plane(PT_PLANE_KEYS, level - 1),
                      plane(PT_PLANE_FROM, level - 1), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),

@@ -443,7 +443,7 @@ static void set_instance(const struct camera *camera, const struct object *objec
     memcpy(args->color, style->color, sizeof args->color);
     args->d_min = style->d_min;
     normal_matrix(camera, object, args->normal_matrix);
-    for (uint32_t k = 0; k < PT_NO_SPACINGS; k++)
+    for (uint32_t k = 0; k < PT_SPACINGS; k++)
         args->spacing[k] = (float)(cloud->spacing_base * pt_spacing_of_class(k) * object->scale);
 }
 

@@ -28,7 +28,7 @@
 #define PT_BLEND_FILLED 0.125f
 #define PT_FROM_MIXED 0x80000000u // top bit of the from plane: anti-aliasing mixed this pixel's colour
 
-#define PT_NO_SPACINGS 64
+#define PT_SPACINGS 64
 #define PT_MAX_LIGHTS 32
 
 // A window of pixels of the full picture, at a level of the pyramid (a pixel of level l is 2^l wide).
@@ -74,7 +74,7 @@ struct instance_args {
     float color[3];
     float normal_matrix[9];     // object normal -> view space, not yet unit
     float d_min;                // world units
-    float spacing[PT_NO_SPACINGS]; // local spacing by class, world units
+    float spacing[PT_SPACINGS]; // local spacing by class, world units
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Taken are pixels with
@@ -103,7 +103,6 @@ struct push_args {
     struct view_args view; // of the fine level
     uint32_t coarse_width, coarse_height;
     uint32_t refined;
-    uint32_t base_width; // width of level 0, for `from`
 };
 
 // fill: one phase of hole filling. [D 3.2, 3.3], SPEC 2.2
@@ -113,7 +112,6 @@ struct fill_args {
     uint32_t iterations; // fills
     uint32_t unfills;    // at most so many un-fills; 0 = as in the paper
     uint32_t refined;    // 1: depth of the source's tangent plane
-    uint32_t base_width;
 };
 
 // Lights in view space.

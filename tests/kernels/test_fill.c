@@ -66,8 +66,7 @@ static void both_phases(struct harness *h, struct picture *picture, uint32_t lev
     struct fill_args args = {.view = picture->view,
                              .iterations = iterations,
                              .unfills = unfills,
-                             .refined = refined,
-                             .base_width = picture->view.width};
+                             .refined = refined};
     uint64_t *keys = picture->keys;
     uint32_t *from = picture->from;
     for (uint32_t l = 0; l < level; l++)
@@ -165,7 +164,7 @@ static void every_ring(struct harness *h)
             if (occluded)
                 picture.keys[centre] = ref_key(9.0f, picture.id_base + (uint32_t)centre);
         }
-        struct fill_args args = {.view = picture.view, .occluded = occluded, .iterations = 1, .base_width = width};
+        struct fill_args args = {.view = picture.view, .occluded = occluded, .iterations = 1};
         struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
         for (int ring = 0; ring < 256; ring++) {
             size_t centre = (size_t)(ring / SIDE * STEP + 2) * width + (size_t)(ring % SIDE * STEP + 2);
@@ -187,7 +186,7 @@ static void disc(struct harness *h)
         if (x * x + y * y > 60 * 60)
             picture.keys[i] = REF_EMPTY_KEY;
     }
-    struct fill_args args = {.view = picture.view, .iterations = 6, .unfills = 6, .base_width = 141};
+    struct fill_args args = {.view = picture.view, .iterations = 6, .unfills = 6};
     struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
     size_t grown = 0;
     for (size_t i = 0; i < picture.count; i++)
@@ -209,7 +208,7 @@ static void sanity(struct harness *h)
     static const int order[8] = {5, 8, 7, 6, 3, 0, 1, 2}; // ring, anticlockwise from the right, in a 3 x 3 plane
     int filled = 0;
     for (int ring = 0; ring < 256; ring++) {
-        struct fill_args args = {.view = {.width = 3, .height = 3}, .iterations = 1, .base_width = 3};
+        struct fill_args args = {.view = {.width = 3, .height = 3}, .iterations = 1};
         struct ref_pixel pixels[9];
         for (int i = 0; i < 9; i++)
             pixels[i] = ref_pixel(REF_EMPTY_KEY, 0);

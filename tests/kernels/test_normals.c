@@ -11,7 +11,7 @@ static struct normals_args arguments(const struct picture *picture, uint32_t rad
     args.instance.id_base = picture->id_base;
     args.instance.id_count = (uint32_t)(picture->count * 3 /
                                         4); // the rest belongs to somebody else, and counts as neighbour
-    for (int i = 0; i < PT_NO_SPACINGS; i++)
+    for (int i = 0; i < PT_SPACINGS; i++)
         args.instance.spacing[i] = (float)(1e-4 * pow(1.2, i));
     return args;
 }
@@ -20,7 +20,7 @@ static uint32_t *words_without(struct harness *h, struct rng *rng, size_t count)
 {
     uint32_t *words = harness_alloc(h, (count ? count : 1) * 4);
     for (size_t i = 0; i < count; i++)
-        words[i] = PT_NORMAL_NONE | rng_below(rng, PT_NO_SPACINGS) << PT_SPACING_SHIFT;
+        words[i] = PT_NORMAL_NONE | rng_below(rng, PT_SPACINGS) << PT_SPACING_SHIFT;
     return words;
 }
 

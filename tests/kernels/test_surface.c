@@ -12,7 +12,7 @@ static struct surface_args arguments(const struct picture *picture, struct rng *
     args.instance.id_base = picture->id_base;
     args.instance.id_count = (uint32_t)(picture->count * 3 / 4);
     args.instance.has_normals = 1;
-    for (int i = 0; i < PT_NO_SPACINGS; i++)
+    for (int i = 0; i < PT_SPACINGS; i++)
         args.instance.spacing[i] = (float)(1e-4 * pow(1.2, i));
     for (int i = 0; i < 9; i++)
         args.instance.normal_matrix[i] = (float)rng_range(rng, -1.0, 1.0);
@@ -142,7 +142,7 @@ static void distances(struct harness *h)
             picture.view.footprint = s == 1 ? 1e-12f : picture.view.footprint; // leaves 4 ulp to decide
             struct surface_args args = arguments(&picture, &rng);
             args.instance.d_min = d_min[s];
-            for (int i = 0; i < PT_NO_SPACINGS; i++)
+            for (int i = 0; i < PT_SPACINGS; i++)
                 args.instance.spacing[i] = s == 1 && i % 2 ? 0.0f : args.instance.spacing[i];
             check(h, &picture, &args, random_words(h, &rng, args.instance.id_count, 0), picture.normal);
         }
