@@ -257,7 +257,8 @@ static void plan_shade(struct builder *builder, uint32_t i)
     struct shade_args args = { .view = view_of(plan, instance, margin), .instance = instance->args };
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
-    if (builder->scene->settings.quality == PATINA_QUALITY_REFINED)
+    uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u);
+    if (builder->scene->settings.quality == PATINA_QUALITY_REFINED && wants_normals)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     memcpy(args.world, builder->scene->settings.world_color, sizeof args.world);
     args.eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f;

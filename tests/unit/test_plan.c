@@ -150,6 +150,35 @@ static void test_spacing_chooses_levels(void **state)
     patina_cloud_destroy(cloud);
 }
 
+static uint32_t blend_of(const patina_scene *scene)
+{
+    struct pt_plan plan = plan_of(scene);
+    uint32_t blend = UINT32_MAX;
+    for (uint32_t i = 0; i < plan.pass_count; i++)
+        if (plan.passes[i].kernel == PT_KERNEL_shade)
+            blend = ((const struct shade_args *)plan.passes[i].arguments)->blend;
+    pt_plan_destroy(&plan);
+    return blend;
+}
+
+static void test_normals_are_blended_where_they_show(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_settings settings = { .struct_size = sizeof settings };
+    patina_cloud_style unlit = { .struct_size = sizeof unlit, .lighting = PATINA_LIGHTING_UNLIT };
+    assert_true(blend_of(scene) > 0); // lit
+    assert_int_equal(patina_scene_clear(scene), PATINA_OK);
+    assert_int_equal(patina_scene_add_cloud(scene, cloud, &unlit), PATINA_OK);
+    assert_true(blend_of(scene) > 0); // the normal pass
+    settings.passes = 1u << PATINA_PASS_COMBINED;
+    assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+    assert_int_equal(blend_of(scene), 0);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 static void test_nothing_in_view_is_said(void **state)
 {
     (void)state;
@@ -209,7 +238,7 @@ int main(void)
         cmocka_unit_test(test_every_pass_runs_or_has_a_reason), cmocka_unit_test(test_missing_normals_are_estimated),
         cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
-        cmocka_unit_test(test_no_camera_is_an_error),
+        cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
