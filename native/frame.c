@@ -40,6 +40,13 @@ static uint64_t plane_total(const struct patina_frame *frame)
     return total;
 }
 
+static size_t size_of(const struct pt_plan *plan, enum pt_plane which, uint32_t level)
+{
+    uint32_t size[2];
+    pt_plan_plane_size(plan, which, level, size);
+    return (size_t)size[0] * size[1] * plane_bytes[which];
+}
+
 static int check_cap(const struct patina_frame *frame, const struct pt_plan *plan, uint64_t total)
 {
     uint64_t cap = frame->device->memory_cap;
@@ -53,9 +60,7 @@ static int check_cap(const struct patina_frame *frame, const struct pt_plan *pla
 static int ensure_plane(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which, uint32_t level)
 {
     struct pt_buffer *plane = &frame->planes[which][level];
-    uint32_t size[2];
-    pt_plan_plane_size(plan, which, level, size);
-    size_t bytes = (size_t)size[0] * size[1] * plane_bytes[which];
+    size_t bytes = size_of(plan, which, level);
     if (plane->size == bytes && (plane->data || plane->name))
         return PATINA_OK;
     frame->device->ops->buffer_destroy(frame->device, plane);
@@ -75,9 +80,7 @@ static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan
     uint64_t total = plane_total(frame);
     int error = PATINA_OK;
     for (int p = PT_PLANE_COMBINED; p < PT_PLANE_COUNT && !error; p++) {
-        uint32_t size[2];
-        pt_plan_plane_size(plan, (enum pt_plane)p, 0, size);
-        size_t bytes = (size_t)size[0] * size[1] * plane_bytes[p];
+        size_t bytes = size_of(plan, (enum pt_plane)p, 0);
         if (frame->planes[p][0].size == bytes)
             continue;
         total += bytes - frame->planes[p][0].size;

@@ -266,7 +266,7 @@ static void plan_shade(struct builder *builder, uint32_t i)
         set_lights(builder->scene, &args);
     REASON(ADD(builder, shade, args,
                { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
-                 buffer(PT_SURFACE, i), buffer(PT_COLORS, i), plane(PT_PLANE_SHADING, 0), plane(PT_PLANE_COLOR_A, 0) }),
+                 buffer(PT_COLORS, i), plane(PT_PLANE_SHADING, 0), plane(PT_PLANE_COLOR_A, 0) }),
            "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
            instance->args.lit ? "lit" : "unlit", args.light_count, args.blend);
 }

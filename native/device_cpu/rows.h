@@ -47,4 +47,24 @@ static inline void pt_fetch_ahead(const uint64_t *row, uint32_t x, uint32_t end,
     }
 }
 
+// Which of the next `lanes` pixels show a point of this instance, and its index in the cloud.
+static inline vm pt_of_instance(const uint64_t *keys, const struct instance_args *instance, uint32_t lanes, vi *id)
+{
+    *id = vi_sub(vi_load_id(keys), vi_set(instance->id_base));
+    return vm_and(vm_first(lanes), vm_and(vi_lt_unsigned(*id, vi_set(instance->id_count)),
+                                          vm_not(vi_eq(vi_load_z(keys), vi_set(PT_KEY_EMPTY_Z)))));
+}
+
+// Rows of float4 pixels kept as separate vectors, for windows whose taps are plain loads. Every channel of a row has
+// room for PT_RING_PAD floats before its first column and at least as many behind its last.
+enum { PT_RING_PAD = 16, PT_RING_CHANNELS = 4 };
+
+static inline size_t pt_ring_stride(const uint32_t rect[4]) { return rect[2] - rect[0] + 4 * PT_RING_PAD; }
+
+// rows: rings of PT_RING_CHANNELS * stride floats a row; the result is indexed from the rectangle's first column.
+static inline float *pt_ring_channel(float *rows, size_t stride, uint32_t row, uint32_t channel)
+{
+    return rows + (row * PT_RING_CHANNELS + channel) * stride + PT_RING_PAD;
+}
+
 #endif

@@ -437,7 +437,10 @@ static inline vf vf_gather(const float *base, vi i, vm m) { return vi_float(vi_g
 static inline vf vf_abs(vf a) { return vi_float(vi_and(vf_bits(a), vi_set(0x7FFFFFFFu))); }
 static inline vf vf_zero(void) { return vf_set(0.0f); }
 
-// Twins of math.h; the order of operations is the same.
+// Functions that decide pixels, twins of shaders/lib/*.glsl: correctly rounded +, -, x only, in one written order, no
+// contraction, so that CPU widths and GL devices agree to the bit (SPEC 1).
+
+// 1 / x for normal x > 0, within 2 ulp: an integer seed (5% off) and three Newton steps.
 static inline vf vf_rcp(vf x)
 {
     const vf two = vf_set(2.0f);
@@ -447,6 +450,7 @@ static inline vf vf_rcp(vf x)
     return r * (two - x * r);
 }
 
+// 1 / sqrt(x) for normal x > 0, within 2 ulp: an integer seed (3.5% off) and three Newton steps.
 static inline vf vf_rsqrt(vf x)
 {
     const vf c = vf_set(1.5f);
@@ -457,8 +461,10 @@ static inline vf vf_rsqrt(vf x)
     return r * (c - (h * r) * r);
 }
 
+// 4 ulp(z) for z >= 0 (0 at 0): the exponent alone, times 2^-21.
 static inline vf vf_ulp4(vf z) { return vi_float(vi_and(vf_bits(z), vi_set(0x7F800000u))) * vf_set(0x1p-21f); }
 
+// The octahedral normals of surface words, not yet unit. Words without one give anything.
 static inline void vf_decode_normal(vi word, vf n[3])
 {
     const vi mask = vi_set(0x1FFFu), middle = vi_set(4095u);
@@ -472,7 +478,7 @@ static inline void vf_decode_normal(vi word, vf n[3])
     n[2] = z;
 }
 
-// Rays of the pixels (x, y).
+// Rays of the pixels (x, y) of this view's level: see struct view_args.
 static inline void vf_ray_of(const struct view_args *view, vi x, vi y, vf ray[2])
 {
     const vf half = vf_set(0.5f), scale = vf_set((float)(1u << view->level));
@@ -488,6 +494,7 @@ static inline void vf_ray(const struct view_args *view, uint32_t x, uint32_t y, 
     vf_ray_of(view, vi_add(vi_set(x), vi_lanes()), vi_set(y), ray);
 }
 
+// |n . v| for unit normals.
 static inline vf vf_cosine(const struct view_args *view, const vf n[3], const vf ray[2])
 {
     if (!view->perspective)
@@ -496,6 +503,7 @@ static inline vf vf_cosine(const struct view_args *view, const vf n[3], const vf
     return vf_abs(dot) * vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f));
 }
 
+// Width of a pixel of this view's level at z.
 static inline vf vf_footprint(const struct view_args *view, vf z)
 {
     vf width = vf_set(view->footprint * (float)(1u << view->level));
@@ -504,6 +512,7 @@ static inline vf vf_footprint(const struct view_args *view, vf z)
     return width;
 }
 
+// SPEC 1, effective layer distance, given 1 / max(|n.v|, C).
 static inline vf vf_layer_distance(const struct view_args *view, float d_min, vf spacing, vf z, vf inverse)
 {
     vf d = vf_max(vf_set(d_min), vf_set(PT_SPACING_FACTOR) * spacing);
@@ -524,6 +533,8 @@ static inline vf vf_level_distance(const struct view_args *view, const float *de
     return d;
 }
 
+// z at ray p of the plane with normal n through the point at (ray q, z_q), not nearer than z_q, not farther than
+// z_q + limit. SPEC 2.2, refined filling.
 static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], const vf ray_q[2], vf z_q, const vf ray_p[2],
                                 vf limit)
 {

@@ -66,7 +66,7 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     // keys, from, deff, float4, float4
     [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
-    [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3, 7},
+    [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3, 6},
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
     [PT_KERNEL_extract] = {1, 2, 0, 3},
 };

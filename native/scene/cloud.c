@@ -30,6 +30,13 @@ static void read_vector(const patina_array *array, uint64_t index, double v[3])
 
 static int finite3(const double v[3]) { return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]); }
 
+// A point's normal; 0 when it has none (zero or not finite).
+static int read_normal(const patina_array *array, uint64_t index, double n[3])
+{
+    read_vector(array, index, n);
+    return finite3(n) && (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0);
+}
+
 // ---- the build -----------------------------------------------------------------------------------------------------
 
 struct build {
@@ -363,8 +370,7 @@ static void surface_chunk(struct build *build, struct pt_chunk *chunk)
     for (uint32_t i = 0; i < chunk->count; i++) {
         uint32_t bits = PT_NORMAL_NONE;
         if (build->desc.normal.data) {
-            read_vector(&build->desc.normal, ids[i], n);
-            if (finite3(n) && (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0)) {
+            if (read_normal(&build->desc.normal, ids[i], n)) {
                 bits = pt_encode_normal(n);
                 decode_normal(bits, n);
                 for (int k = 0; k < 3; k++)
@@ -426,11 +432,8 @@ static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32
         uint64_t last = first + BLOCK_POINTS < build->desc.count ? first + BLOCK_POINTS : build->desc.count;
         for (uint64_t i = first; i < last; i++) {
             double n[3];
-            if (build->desc.normal.data) {
-                read_vector(&build->desc.normal, i, n);
-                if (!finite3(n) || (n[0] == 0.0 && n[1] == 0.0 && n[2] == 0.0))
-                    build->blocks[b].invalid_normals++;
-            }
+            if (build->desc.normal.data)
+                build->blocks[b].invalid_normals += !read_normal(&build->desc.normal, i, n);
             if (cloud->color_format == PT_COLOR_SRGB8) {
                 memcpy((uint8_t *)cloud->colors + 3 * i, element(color, i), 3);
             } else if (cloud->color_format == PT_COLOR_FLOAT) {

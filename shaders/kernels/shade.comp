@@ -11,9 +11,9 @@
 #include "lib/tiles.glsl"
 
 layout(std430, binding = 0) readonly buffer arguments_block { shade_args args; };
-layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; };
-layout(std430, binding = 7) writeonly buffer shading_block { vec4 shading[]; };
-layout(std430, binding = 8) writeonly buffer color_block { vec4 color[]; };
+layout(std430, binding = 5) readonly buffer colors_block { uint point_colors[]; };
+layout(std430, binding = 6) writeonly buffer shading_block { vec4 shading[]; };
+layout(std430, binding = 7) writeonly buffer color_block { vec4 color[]; };
 
 #if STEP == 0
 

@@ -68,16 +68,14 @@ static void check(struct harness *h, const struct setup *s, double most_open)
     float *unset = harness_alloc(h, count * 16);
     for (size_t i = 0; i < count * 4; i++)
         unset[i] = -5.0f;
-    uint32_t *words = harness_alloc(h, (size_t)s->args.instance.id_count * 4);
     struct pt_buffer *keys = harness_buffer(h, picture->keys, count * 8);
     struct pt_buffer *from = harness_buffer(h, picture->from, count * 4);
     struct pt_buffer *normal = harness_buffer(h, picture->normal, count * 16);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, count * 4);
-    struct pt_buffer *surface = harness_buffer(h, words, (size_t)s->args.instance.id_count * 4);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->colors_size);
     struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
     struct pt_buffer *color = harness_buffer(h, unset, count * 16);
-    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, surface, colors, shading, color);
+    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color);
     const float *got = harness_read(h, color), *got_n = harness_read(h, shading);
     struct ref_planes planes = picture_planes(picture);
     planes.colors = s->colors;

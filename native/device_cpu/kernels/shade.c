@@ -15,21 +15,16 @@ struct pixels { // PT_LANES of them
 //
 // A ring of rows holds z and the shown surface's normal as separate vectors, so that every tap is a plain load.
 
-enum { REACH = 8, BAND_ROWS = 32, PAD = 16, CHANNELS = 4 }; // z, normal
+enum { REACH = 8, BAND_ROWS = 32 }; // the ring's channels: z, normal
 
 struct shade {
     const struct pt_cpu_call *call;
     const struct shade_args *args;
-    float *rows;   // per thread: `ring` rows x CHANNELS
+    float *rows;   // per thread: a ring of `ring` rows
     size_t stride; // floats of one channel of a row
     uint32_t ring; // 2 blend + 1
     float weights[2 * REACH * REACH + 1]; // by squared distance
 };
-
-static float *channel(const struct shade *shade, float *rows, uint32_t row, uint32_t index)
-{
-    return rows + (row * CHANNELS + index) * shade->stride + PAD;
-}
 
 static vi load_from(const struct shade *shade, size_t at)
 {
@@ -59,10 +54,10 @@ static void load_row(const struct shade *shade, float *rows, int32_t y)
     uint32_t first = view->rect[0] > reach ? view->rect[0] - reach : 0;
     uint32_t last = view->rect[2] + reach < view->width ? view->rect[2] + reach : view->width;
     int32_t shift = (int32_t)view->rect[0];
-    float *out[CHANNELS];
-    for (uint32_t k = 0; k < CHANNELS; k++)
-        out[k] = channel(shade, rows, slot, k) - shift; // indexed by x
-    for (int32_t x = shift - PAD; x < (int32_t)view->rect[2] + PAD; x += PT_LANES)
+    float *out[PT_RING_CHANNELS];
+    for (uint32_t k = 0; k < PT_RING_CHANNELS; k++)
+        out[k] = pt_ring_channel(rows, shade->stride, slot, k) - shift; // indexed by x
+    for (int32_t x = shift - PT_RING_PAD; x < (int32_t)view->rect[2] + PT_RING_PAD; x += PT_LANES)
         vf_store(out[0] + x, empty, vm_first(PT_LANES));
     if (y < 0 || y >= (int32_t)view->height)
         return;
@@ -102,7 +97,7 @@ static void blend_pixels(const struct shade *shade, float *const *around, uint32
     vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
     for (size_t k = 0; k < 3; k++)
         n[k] = vf_select(blended, n[k] * scale, vf_load(own + (1 + k) * shade->stride) * vf_set(1.0f / PT_BLEND_FILLED));
-    vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * at, n, vm_bits(filled));
+    vf_store4((float *)pt_cpu_data(shade->call, 5) + 4 * at, n, vm_bits(filled));
 }
 
 static void blend_row(const struct shade *shade, float *const *around, uint32_t y)
@@ -111,9 +106,8 @@ static void blend_row(const struct shade *shade, float *const *around, uint32_t 
     const struct instance_args *instance = &shade->args->instance;
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(shade->call, 0) + (size_t)y * view->width;
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
-        vi z = vi_load_z(keys + x), id = vi_sub(vi_load_id(keys + x), vi_set(instance->id_base));
-        vm ours = vm_and(vm_and(vm_first(pt_lanes_left(x, view->rect[2])), vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z)))),
-                         vi_lt_unsigned(id, vi_set(instance->id_count)));
+        vi id;
+        vm ours = pt_of_instance(keys + x, instance, pt_lanes_left(x, view->rect[2]), &id);
         if (!vm_bits(ours))
             continue;
         size_t at = (size_t)y * view->width + x;
@@ -163,7 +157,7 @@ static void gather_normals(const struct shade *shade, struct pixels *p)
     vm filled = vm_not(vi_eq(load_from(shade, p->at), vi_add(vi_set((uint32_t)p->at), vi_lanes())));
     if (!vm_bits(vm_and(p->ours, filled)))
         return;
-    vf_load4((const float *)pt_cpu_data(shade->call, 6) + 4 * p->at, blended);
+    vf_load4((const float *)pt_cpu_data(shade->call, 5) + 4 * p->at, blended);
     for (int k = 0; k < 3; k++)
         p->n[k] = vf_select(filled, blended[k], p->n[k]);
 }
@@ -264,22 +258,19 @@ static void shade_pixels(const struct shade *shade, uint32_t x, uint32_t y, uint
     const struct instance_args *instance = &args->instance;
     const uint64_t *keys = pt_cpu_data(shade->call, 0);
     struct pixels p = { .at = (size_t)y * args->view.width + x };
-    vi z_bits = vi_load_z(keys + p.at);
-    p.id = vi_sub(vi_load_id(keys + p.at), vi_set(instance->id_base));
-    p.ours = vm_and(vm_first(lanes), vm_and(vi_lt_unsigned(p.id, vi_set(instance->id_count)),
-                                            vm_not(vi_eq(z_bits, vi_set(PT_KEY_EMPTY_Z)))));
+    p.ours = pt_of_instance(keys + p.at, instance, lanes, &p.id);
     if (!vm_bits(p.ours))
         return;
-    p.z = vi_float(z_bits);
+    p.z = vi_float(vi_load_z(keys + p.at));
     vf_ray(&args->view, x, y, p.ray);
-    gather_albedo(args, pt_cpu_data(shade->call, 5), &p);
+    gather_albedo(args, pt_cpu_data(shade->call, 4), &p);
     gather_normals(shade, &p);
     p.n[3] = vf_zero();
-    vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * p.at, p.n, vm_bits(p.ours));
+    vf_store4((float *)pt_cpu_data(shade->call, 5) + 4 * p.at, p.n, vm_bits(p.ours));
     vf color[4] = { p.albedo[0], p.albedo[1], p.albedo[2], vf_set(1.0f) };
     if (instance->lit)
         phong(args, &p, color);
-    vf_store4((float *)pt_cpu_data(shade->call, 7) + 4 * p.at, color, vm_bits(p.ours));
+    vf_store4((float *)pt_cpu_data(shade->call, 6) + 4 * p.at, color, vm_bits(p.ours));
 }
 
 static void shade_row(const struct shade *shade, float *rows, uint32_t y)
@@ -291,13 +282,13 @@ static void shade_row(const struct shade *shade, float *rows, uint32_t y)
     if (reach) {
         float *around[2 * REACH + 1];
         for (uint32_t k = 0; k < shade->ring; k++)
-            around[k] = channel(shade, rows, (y + k + REACH - reach) % shade->ring, 0);
+            around[k] = pt_ring_channel(rows, shade->stride, (y + k + REACH - reach) % shade->ring, 0);
         load_row(shade, rows, (int32_t)(y + reach));
         blend_row(shade, around, y);
     }
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         if (args->instance.color_format)
-            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 5),
+            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 4),
                            color_bytes[args->instance.color_format]);
         shade_pixels(shade, x, y, pt_lanes_left(x, rect[2]));
     }
@@ -307,7 +298,7 @@ static void shade_bands(void *context, uint32_t begin, uint32_t end, uint32_t th
 {
     const struct shade *shade = context;
     const uint32_t *rect = shade->args->view.rect;
-    float *rows = shade->rows + thread * shade->ring * CHANNELS * shade->stride;
+    float *rows = shade->rows + thread * shade->ring * PT_RING_CHANNELS * shade->stride;
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(shade->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
         for (uint32_t k = 0; k + 1 < shade->ring; k++)
@@ -321,13 +312,13 @@ int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
 {
     const struct shade_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct shade shade = { .call = call, .args = args, .ring = 2 * args->blend + 1 };
+    struct shade shade = { .call = call, .args = args, .stride = pt_ring_stride(rect), .ring = 2 * args->blend + 1 };
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     for (int i = 0; i <= 2 * REACH * REACH; i++)
         shade.weights[i] = pt_rcp((float)(1 + i));
-    shade.stride = rect[2] - rect[0] + 4 * PAD;
-    shade.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * shade.ring * CHANNELS * shade.stride * sizeof(float));
+    size_t floats = pt_pool_threads(call->pool) * shade.ring * PT_RING_CHANNELS * shade.stride;
+    shade.rows = pt_cpu_scratch(call, 0, floats * sizeof(float));
     if (!shade.rows)
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, shade_bands, &shade);

@@ -5,33 +5,27 @@
 // faster than gathering float4 pixels.
 #include "device_cpu/rows.h"
 
-enum { BAND_ROWS = 32, PAD = 16, CHANNELS = 4 }; // z, r, g, b
+enum { BAND_ROWS = 32 }; // the ring's channels: z, r, g, b
 
 struct smooth {
     const struct pt_cpu_call *call;
     const struct smooth_args *args;
-    float *rows;   // per thread: 3 rows x CHANNELS
+    float *rows;   // per thread: a ring of 3 rows
     size_t stride; // floats of one channel of a row
-    uint32_t x0;   // first column that the rows hold, less PAD
 };
 
-static float *channel(const struct smooth *smooth, float *rows, uint32_t row, uint32_t index)
-{
-    return rows + (row * CHANNELS + index) * smooth->stride + PAD;
-}
-
-// Columns x0 .. rect[2], one more on both sides; beyond the plane z is +inf.
+// The rectangle's columns and one more on both sides; beyond the plane z is +inf.
 static void load_row(const struct smooth *smooth, float *rows, uint32_t slot, int32_t y)
 {
     const struct view_args *view = &smooth->args->view;
     const float empty = pt_float(PT_KEY_EMPTY_Z);
-    float *out[CHANNELS];
-    uint32_t first = smooth->x0, last = view->rect[2];
-    for (uint32_t k = 0; k < CHANNELS; k++)
-        out[k] = channel(smooth, rows, slot, k);
+    float *out[PT_RING_CHANNELS];
+    uint32_t first = view->rect[0], last = view->rect[2];
+    for (uint32_t k = 0; k < PT_RING_CHANNELS; k++)
+        out[k] = pt_ring_channel(rows, smooth->stride, slot, k);
     if (y < (int32_t)view->rect[1] || y >= (int32_t)view->rect[3]) { // nothing outside the rectangle
-        for (uint32_t i = 0; i < last - first + 2 * PAD; i++)
-            out[0][(int32_t)i - PAD] = empty;
+        for (uint32_t i = 0; i < last - first + 2 * PT_RING_PAD; i++)
+            out[0][(int32_t)i - PT_RING_PAD] = empty;
         return;
     }
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(smooth->call, 0) + (size_t)y * view->width;
@@ -45,7 +39,7 @@ static void load_row(const struct smooth *smooth, float *rows, uint32_t slot, in
         for (uint32_t k = 0; k < 3; k++)
             vf_store(out[1 + k] + (x - first), rgb[k], vm_first(PT_LANES));
     }
-    for (uint32_t i = 0; i < PAD; i++)
+    for (uint32_t i = 0; i < PT_RING_PAD; i++)
         out[0][-1 - (int32_t)i] = out[0][last - first + i] = empty;
 }
 
@@ -53,7 +47,7 @@ static void smooth_pixels(const struct smooth *smooth, float *const around[3], u
 {
     const struct smooth_args *args = smooth->args;
     const uint32_t *from = pt_cpu_data(smooth->call, 1);
-    size_t at = (size_t)y * args->view.width + x, column = x - smooth->x0;
+    size_t at = (size_t)y * args->view.width + x, column = x - args->view.rect[0];
     const vf zero = vf_zero(), z = vf_load(around[1] + column);
     vm some = vm_and(vm_first(lanes), vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
     vf sum[4] = { zero, zero, zero, zero }, weights = zero;
@@ -81,7 +75,7 @@ static void smooth_bands(void *context, uint32_t begin, uint32_t end, uint32_t t
 {
     const struct smooth *smooth = context;
     const uint32_t *rect = smooth->args->view.rect;
-    float *rows = smooth->rows + thread * 3 * CHANNELS * smooth->stride;
+    float *rows = smooth->rows + thread * 3 * PT_RING_CHANNELS * smooth->stride;
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(smooth->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
         load_row(smooth, rows, 0, (int32_t)first - 1);
@@ -89,7 +83,7 @@ static void smooth_bands(void *context, uint32_t begin, uint32_t end, uint32_t t
         for (uint32_t y = first; y < last; y++) {
             float *around[3];
             for (uint32_t k = 0; k < 3; k++)
-                around[k] = channel(smooth, rows, (y - first + k) % 3, 0);
+                around[k] = pt_ring_channel(rows, smooth->stride, (y - first + k) % 3, 0);
             load_row(smooth, rows, (y - first + 2) % 3, (int32_t)y + 1);
             for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES)
                 smooth_pixels(smooth, around, x, y, pt_lanes_left(x, rect[2]));
@@ -101,11 +95,10 @@ int PT_KERNEL_ENTRY(smooth)(const struct pt_cpu_call *call)
 {
     const struct smooth_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct smooth smooth = { .call = call, .args = args, .x0 = rect[0] };
+    struct smooth smooth = { .call = call, .args = args, .stride = pt_ring_stride(rect) };
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
-    smooth.stride = rect[2] - rect[0] + 4 * PAD;
-    smooth.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * 3 * CHANNELS * smooth.stride * sizeof(float));
+    smooth.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * 3 * PT_RING_CHANNELS * smooth.stride * sizeof(float));
     if (!smooth.rows)
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, smooth_bands, &smooth);

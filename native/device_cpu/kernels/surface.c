@@ -15,12 +15,11 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     size_t at = (size_t)y * view->width + x;
 
     // 1. the point
-    vi id = vi_sub(vi_load_id(keys + at), vi_set(instance->id_base)), z_bits = vi_load_z(keys + at);
-    vm ours = vm_and(vm_first(lanes), vm_and(vi_lt_unsigned(id, vi_set(instance->id_count)),
-                                             vm_not(vi_eq(z_bits, vi_set(PT_KEY_EMPTY_Z)))));
+    vi id;
+    vm ours = pt_of_instance(keys + at, instance, lanes, &id);
     if (!vm_bits(ours))
         return;
-    vf z = vi_float(z_bits), ray[2], n[4];
+    vf z = vi_float(vi_load_z(keys + at)), ray[2], n[4];
     vf_ray(view, x, y, ray);
     vi word = vi_gather(pt_cpu_data(call, 1), id, ours);
     vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), ours);
