@@ -26,6 +26,14 @@ struct pt_buffer {
     uint32_t wrapped; // CPU device: data belongs to somebody else
 };
 
+// A kernel with what it runs on: see run.
+struct pt_bound_pass {
+    enum pt_kernel kernel;
+    const void *arguments;
+    struct pt_buffer **buffers;
+    uint32_t buffer_count;
+};
+
 struct pt_device_ops {
     void (*destroy)(struct patina_device *device);
     // Uninitialised memory, or a copy of source when not NULL. A CPU device may keep the pointer instead of a copy when
@@ -44,6 +52,9 @@ struct pt_device_ops {
     // PATINA_ERROR_CANCELLED.
     int (*run)(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,
                struct pt_buffer *const *buffers, uint32_t buffer_count, const atomic_int *cancel);
+    // Runs the tail of a plan (plan.h, finish) as one, without the planes between its passes. NULL where a device gains
+    // nothing by it.
+    int (*finish_picture)(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count);
     // Waits for all work (so that a clock means something).
     int (*finish)(struct patina_device *device);
 };

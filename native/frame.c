@@ -191,6 +191,29 @@ static int run_pass(struct render *render, const struct pt_pass *pass)
     return error;
 }
 
+// The plan's tail as one: the planes between its passes are neither made nor written.
+static int run_finish(struct render *render)
+{
+    const struct pt_plan *plan = render->plan;
+    const struct pt_pass *passes = plan->passes + plan->finish;
+    uint32_t count = plan->pass_count - plan->finish, refs = 0;
+    for (uint32_t i = 0; i < count; i++)
+        refs += passes[i].ref_count;
+    struct pt_bound_pass *bound = calloc(count, sizeof *bound);
+    struct pt_buffer **buffers = calloc(refs, sizeof *buffers), **next = buffers;
+    int error = bound && buffers ? PATINA_OK : pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    for (uint32_t i = 0; i < count && !error; i++) {
+        bound[i] = (struct pt_bound_pass){ passes[i].kernel, passes[i].arguments, next, passes[i].ref_count };
+        for (uint32_t k = 0; k < passes[i].ref_count; k++)
+            *next++ = buffer_of(render, &passes[i].refs[k]);
+    }
+    if (!error)
+        error = render->frame->device->ops->finish_picture(render->frame->device, bound, count);
+    free(bound);
+    free(buffers);
+    return error;
+}
+
 static int run_plan(struct render *render)
 {
     struct patina_frame *frame = render->frame;
@@ -204,18 +227,21 @@ static int run_plan(struct render *render)
     for (uint32_t i = 0; i < plan->pass_count; i++) {
         if (!writing && atomic_load(&frame->cancel))
             return PATINA_ERROR_CANCELLED;
-        if (!writing && is_output(&plan->passes[i])) {
+        int together = i == plan->finish && frame->device->ops->finish_picture != NULL;
+        if (!writing && (together || is_output(&plan->passes[i]))) {
             if ((error = ensure_picture(frame, plan)))
                 return error;
             writing = 1;
         }
-        if ((error = run_pass(render, &plan->passes[i]))) {
+        if ((error = together ? run_finish(render) : run_pass(render, &plan->passes[i]))) {
             frame->picture_valid &= !writing; // half a picture is none: the device failed
             return error;
         }
         double now = milliseconds();
-        note_time(frame, plan->passes[i].name, now - before);
+        note_time(frame, together ? "finish" : plan->passes[i].name, now - before);
         before = now;
+        if (together)
+            i = plan->pass_count - 1;
         atomic_store(&frame->progress, (float)(i + 1) / (float)plan->pass_count);
     }
     return PATINA_OK;

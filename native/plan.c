@@ -354,6 +354,7 @@ static void plan_points(struct builder *builder)
     if (!estimate)
         skip(builder, "normals", "every cloud in view has normals");
     plan_filling(builder);
+    plan->finish = plan->pass_count;
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count)
             plan_shade(builder, i);

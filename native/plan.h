@@ -72,6 +72,8 @@ struct pt_plan {
     uint32_t instance_count;
     struct pt_pass *passes;
     uint32_t pass_count;
+    uint32_t finish; // the passes from this one on make the picture: nothing else reads the planes between them, and a device
+                     // may run them as one
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     uint64_t points, points_scattered, chunks, chunks_culled;

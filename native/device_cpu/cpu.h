@@ -39,6 +39,14 @@ static inline void *pt_cpu_data(const struct pt_cpu_call *call, uint32_t n) { re
 // A kernel returns PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
 typedef int pt_cpu_kernel(const struct pt_cpu_call *call);
 
+// Kernels that run as one: see device.h, finish.
+struct pt_cpu_pass {
+    enum pt_kernel kernel;
+    struct pt_cpu_call call;
+};
+typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
+pt_cpu_finish pt_kernel_finish_scalar, pt_kernel_finish_sse42, pt_kernel_finish_avx2, pt_kernel_finish_avx512;
+
 // Every kernel once per level; the levels that a build leaves out are declared and never called.
 #define PT_KERNEL(name, kind, buffers)     \
     pt_cpu_kernel pt_kernel_##name##_scalar; \

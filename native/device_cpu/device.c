@@ -12,6 +12,7 @@
 struct cpu_device {
     struct patina_device base;
     pt_cpu_kernel *const *kernels; // [PT_KERNEL_COUNT]
+    pt_cpu_finish *finish;
     struct pt_pool *pool;
     struct pt_cpu_scratch scratch[PT_CPU_SCRATCHES];
 };
@@ -43,6 +44,7 @@ static pt_cpu_kernel *const kernels_avx512[] = {
 struct level {
     const char *name;
     pt_cpu_kernel *const *kernels;
+    pt_cpu_finish *finish;
 };
 
 // The best level first that this processor has; ends with the scalar one.
@@ -53,13 +55,13 @@ static uint32_t available_levels(struct level levels[4])
     __builtin_cpu_init();
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("bmi2"))
-        levels[count++] = (struct level){ "cpu-avx512", kernels_avx512 };
+        levels[count++] = (struct level){ "cpu-avx512", kernels_avx512, pt_kernel_finish_avx512 };
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2"))
-        levels[count++] = (struct level){ "cpu-avx2", kernels_avx2 };
+        levels[count++] = (struct level){ "cpu-avx2", kernels_avx2, pt_kernel_finish_avx2 };
     if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"))
-        levels[count++] = (struct level){ "cpu-sse42", kernels_sse42 };
+        levels[count++] = (struct level){ "cpu-sse42", kernels_sse42, pt_kernel_finish_sse42 };
 #endif
-    levels[count++] = (struct level){ "cpu-scalar", kernels_scalar };
+    levels[count++] = (struct level){ "cpu-scalar", kernels_scalar, pt_kernel_finish_scalar };
     return count;
 }
 
@@ -180,6 +182,26 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
     return error;
 }
 
+static int cpu_finish_picture(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
+{
+    struct cpu_device *cpu = (struct cpu_device *)device;
+    struct pt_cpu_pass *bound = malloc(count * sizeof *bound);
+    int error = bound ? PATINA_OK : PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < count && bound; i++)
+        bound[i] = (struct pt_cpu_pass){ passes[i].kernel,
+                                         { .arguments = passes[i].arguments,
+                                           .buffers = passes[i].buffers,
+                                           .buffer_count = passes[i].buffer_count,
+                                           .pool = cpu->pool,
+                                           .scratch = cpu->scratch } };
+    if (!error)
+        error = cpu->finish(bound, count);
+    free(bound);
+    if (error)
+        return pt_fail(&device->handle, error, "%s: out of memory for rows of the picture", device->info.name);
+    return PATINA_OK;
+}
+
 static int cpu_finish(struct patina_device *device)
 {
     (void)device;
@@ -204,6 +226,7 @@ static const struct pt_device_ops cpu_ops = {
     .buffer_read = cpu_buffer_read,
     .buffer_fill = cpu_buffer_fill,
     .run = cpu_run,
+    .finish_picture = cpu_finish_picture,
     .finish = cpu_finish,
 };
 
@@ -245,6 +268,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *level, stru
     pt_handle_init(&cpu->base.handle);
     cpu->base.ops = &cpu_ops;
     cpu->kernels = levels[chosen].kernels;
+    cpu->finish = levels[chosen].finish;
     cpu->pool = pool;
     cpu->base.memory_cap = desc->memory_cap;
     cpu->base.info = (patina_device_info){ .struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool) };

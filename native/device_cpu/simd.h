@@ -92,15 +92,25 @@ static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
     for (int j = 0; j < 4; j++)
         _mm512_mask_storeu_ps(p + 16 * j, (__mmask16)(_pdep_u32(lanes >> 4 * j, 0x1111u) * 15u), r[j]);
 }
-static inline void vf_stream_pixels(float *p, vf r[4]) // p: a multiple of 16 bytes, all lanes
+static inline void vf_stream_pixels(float *p, vf r[4]) // p: a multiple of 64 bytes, all lanes
 {
     vf_swap_quarters(r);
     for (int j = 0; j < 4; j++)
-        for (int k = 0; k < 4; k++) {
-            float quarters[16];
-            _mm512_storeu_ps(quarters, r[j]);
-            _mm_stream_ps(p + 16 * j + 4 * k, _mm_loadu_ps(quarters + 4 * k));
-        }
+        _mm512_stream_ps(p + 16 * j, r[j]);
+}
+static inline void vf_stream(float *p, vf a) { _mm512_stream_ps(p, a); }
+static inline vf vf_add_where(vm m, vf a, vf b) { return _mm512_mask_add_ps(a, m, a, b); } // else a; a is never -0
+static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm512_maskz_mul_ps(m, a, b); } // else 0
+static inline void vf_pack3(const vf n[3], vf out[3]) // x, y, z of 16 points -> x y z x y z ...
+{
+    static const int32_t first[3][16] = { { 0, 16, 0, 1, 17, 0, 2, 18, 0, 3, 19, 0, 4, 20, 0, 5 },
+                                          { 21, 0, 6, 22, 0, 7, 23, 0, 8, 24, 0, 9, 25, 0, 10, 26 },
+                                          { 0, 11, 27, 0, 12, 28, 0, 13, 29, 0, 14, 30, 0, 15, 31, 0 } };
+    static const int32_t then[3][16] = { { 0, 1, 16, 3, 4, 17, 6, 7, 18, 9, 10, 19, 12, 13, 20, 15 },
+                                         { 0, 21, 2, 3, 22, 5, 6, 23, 8, 9, 24, 11, 12, 25, 14, 15 },
+                                         { 26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31 } };
+    for (int k = 0; k < 3; k++)
+        out[k] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(n[0], vi_load(first[k]), n[1]), vi_load(then[k]), n[2]);
 }
 static inline vi vi_pairs(vi a) // each of the first half of the lanes twice
 {
@@ -194,6 +204,9 @@ static inline void vf_stream_pixels(float *p, vf r[4])
         _mm_stream_ps(p + 16 + 4 * k, _mm256_extractf128_ps(r[k], 1));
     }
 }
+static inline void vf_stream(float *p, vf a) { _mm256_stream_ps(p, a); }
+static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm256_and_ps(a * b, _mm256_castsi256_ps(m)); }
+static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm256_and_ps(b, _mm256_castsi256_ps(m)); }
 static inline vi vi_pairs(vi a)
 {
     return _mm256_permutevar8x32_epi32(a, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3));
@@ -297,6 +310,9 @@ static inline void vf_stream_pixels(float *p, vf r[4])
     for (int k = 0; k < 4; k++)
         _mm_stream_ps(p + 4 * k, r[k]);
 }
+static inline void vf_stream(float *p, vf a) { _mm_stream_ps(p, a); }
+static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm_and_ps(a * b, _mm_castsi128_ps(m)); }
+static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm_and_ps(b, _mm_castsi128_ps(m)); }
 static inline vi vi_pairs(vi a) { return _mm_shuffle_epi32(a, 0x50); }
 static inline vi vi_sides(vi a) { return _mm_shuffle_epi32(a, 0xD8); }
 #define PT_VECTOR(name) _mm_##name
@@ -368,6 +384,9 @@ static inline void vi_store(void *p, vi a, vm m)
 #if PT_LANES == 1
 static inline vi vi_pairs(vi a) { return a; }
 static inline vi vi_sides(vi a) { return a; } // of an even pixel
+static inline void vf_stream(float *p, vf a) { *p = a; }
+static inline vf vf_mul_where(vm m, vf a, vf b) { return m ? a * b : 0.0f; }
+static inline vf vf_add_where(vm m, vf a, vf b) { return m ? a + b : a; }
 #endif
 
 // Bytes at base + i: the word that starts there (three bytes beyond the last may be read).
@@ -409,8 +428,7 @@ static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
     vf_transpose(r);
     vf_store_pixels(pixels, r, lanes);
 }
-// All PT_LANES pixels past the caches; pixels must lie on a multiple of 16 bytes.
-static inline void vf_stream4(float *pixels, const vf in[4])
+static inline void vf_stream4(float *pixels, const vf in[4]) // a multiple of 64 bytes, all lanes
 {
     vf r[4] = { in[0], in[1], in[2], in[3] };
     vf_transpose(r);
@@ -425,6 +443,45 @@ static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
         memcpy(pixels, in, 16);
 }
 #endif
+
+// Writes to the picture, which is read later and by others: past the caches where whole vectors fit. count <= PT_LANES
+// pixels of one, four or three floats.
+static inline int vf_streams(const float *p, uint32_t count) { return count == PT_LANES && (uintptr_t)p % 64 == 0; }
+
+static inline void vf_put(float *p, vf a, uint32_t count)
+{
+    if (vf_streams(p, count))
+        vf_stream(p, a);
+    else
+        vf_store(p, a, vm_first(count));
+}
+
+static inline void vf_put4(float *p, const vf pixels[4], uint32_t count)
+{
+    if (vf_streams(p, count))
+        vf_stream4(p, pixels);
+    else
+        vf_store4(p, pixels, vm_bits(vm_first(count)));
+}
+
+static inline void vf_put3(float *p, const vf n[3], uint32_t count)
+{
+#if defined(PT_ISA_AVX512)
+    vf packed[3];
+    vf_pack3(n, packed);
+    for (uint32_t k = 0; k < 3; k++) {
+        uint32_t floats = 3 * count <= 16 * k ? 0 : 3 * count - 16 * k;
+        vf_put(p + 16 * k, packed[k], floats < 16 ? floats : 16);
+    }
+#else
+    float pixels[4 * PT_LANES];
+    const vf four[4] = { n[0], n[1], n[2], vf_set(0.0f) };
+    vf_store4(pixels, four, vm_bits(vm_first(PT_LANES)));
+    for (uint32_t i = 0; i + 1 < count; i++) // each store's fourth float is overwritten by the next point's first
+        memcpy(p + 3 * i, pixels + 4 * i, 16);
+    memcpy(p + 3 * (count - 1), pixels + 4 * (count - 1), 12);
+#endif
+}
 
 // ---- the rest is the same for every level ---------------------------------------------------------------------------
 

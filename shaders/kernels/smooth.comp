@@ -27,21 +27,13 @@ tap_row read_row(uvec4 rect, uint width, uint x, uint y)
     return tap_row(read_tap(rect, width, x - 1u, y), read_tap(rect, width, x, y), read_tap(rect, width, x + 1u, y));
 }
 
-void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum, inout float weights)
+// sum.w counts.
+void add_tap(vec4 tap, float z, float limit, inout vec4 sum)
 {
     precise float apart = tap.w - z;
-    precise float more_weights = weights + weight;
-    precise vec3 more = sum + tap.xyz * weight;
+    precise vec4 more = sum + vec4(tap.xyz, 1.0);
     bool same = pt_abs(apart) <= limit; // else another layer, or nothing
-    weights = same ? more_weights : weights;
     sum = same ? more : sum; // what an empty pixel's colour holds is anything, NaN too
-}
-
-void add_row(tap_row row, float z, float limit, float side, float middle, inout vec3 sum, inout float weights)
-{
-    add_tap(row.west, z, limit, side, sum, weights);
-    add_tap(row.middle, z, limit, middle, sum, weights);
-    add_tap(row.east, z, limit, side, sum, weights);
 }
 
 void main()
@@ -55,14 +47,21 @@ void main()
     for (uint y = column.y; y < end; y++) {
         tap_row above = read_row(rect, view.width, x, y + 1u);
         uint at = y * view.width + x;
-        float z = row.middle.w, weights = 0.0;
+        float z = row.middle.w;
         bool some = z < pt_float(PT_KEY_EMPTY_Z);
         float limit = read_deff(some ? read_from(at) : at);
-        vec3 sum = vec3(0.0);
-        add_row(below, z, limit, corner, edge, sum, weights);
-        add_row(row, z, limit, edge, center, sum, weights);
-        add_row(above, z, limit, corner, edge, sum, weights);
-        precise vec3 mean = sum * pt_rcp(weights);
+        vec4 edges = vec4(0.0), corners = vec4(0.0);
+        add_tap(below.west, z, limit, corners);
+        add_tap(below.middle, z, limit, edges);
+        add_tap(below.east, z, limit, corners);
+        add_tap(row.west, z, limit, edges);
+        add_tap(row.east, z, limit, edges);
+        add_tap(above.west, z, limit, corners);
+        add_tap(above.middle, z, limit, edges);
+        add_tap(above.east, z, limit, corners);
+        precise float weights = (center + edges.w * edge) + corners.w * corner;
+        precise vec3 total = (row.middle.xyz * center + edges.xyz * edge) + corners.xyz * corner;
+        precise vec3 mean = total * pt_rcp(weights);
         if (some) // nothing reads the colour of an empty pixel
             result[at] = vec4(mean, 1.0);
         below = row;

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // antialias: Laplace on depth as steps. [D 3.5]; twin of shaders/kernels/antialias.comp
 //
-// k of the four cross neighbours are farther than d_eff (or empty). A pixel is drawn when a point falls anywhere in it, so
-// an edge pixel's true coverage is below 1: for a straight edge at 0 degrees (k = 1) it is uniform in 0..1, mean 1/2; at
-// 45 degrees the outermost pixels (k = 2) cover t^2/2, mean 1/6. Both are met by coverage = 5/6 - k/3, floored at 1/6 so
-// that lone pixels stay visible.
-//
 // Edges are few: their new colours are listed by bands of rows and applied when every pixel has been looked at.
+#include "antialias.h"
 #include "device_cpu/rows.h"
 
 enum { BAND_ROWS = 16 };
@@ -24,8 +20,6 @@ struct antialias {
     size_t band_edges;
 };
 
-static const int8_t cross[4][2] = { { 1, 0 }, { 0, 1 }, { -1, 0 }, { 0, -1 } };
-
 // The new colour of the pixel, or 0 when it is no edge: vectors look past the plane's sides, this does not.
 static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struct edge *edge)
 {
@@ -39,7 +33,7 @@ static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struc
     if (job->args->layers)
         limit = pt_float((uint32_t)(keys[at] >> 32)) + deff[from[at] & ~PT_FROM_MIXED];
     for (int i = 0; i < 4; i++) {
-        uint32_t qx = x + (uint32_t)cross[i][0], qy = y + (uint32_t)cross[i][1];
+        uint32_t qx = x + (uint32_t)pt_cross[i][0], qy = y + (uint32_t)pt_cross[i][1];
         if (qx >= view->width || qy >= view->height)
             continue; // unknown: no edge
         size_t q = (size_t)qy * view->width + qx;
@@ -52,11 +46,9 @@ static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struc
     }
     if (!(count > 0.0f))
         return 0;
-    float coverage = pt_max((float)(5.0 / 6.0) - count * (float)(1.0 / 3.0), (float)(1.0 / 6.0));
-    float share = (1.0f - coverage) * pt_rcp(count);
     edge->pixel = at;
-    for (size_t k = 0; k < 4; k++)
-        edge->color[k] = colors[4 * (size_t)at + k] * coverage + sum[k] * share;
+    memcpy(edge->color, colors + 4 * (size_t)at, sizeof edge->color);
+    pt_mix_edge(edge->color, sum, count);
     return 1;
 }
 
@@ -77,8 +69,8 @@ static uint32_t look(const struct antialias *job, uint32_t x, uint32_t y, uint32
     }
     vf far = z; // the farthest of the four
     for (int i = 0; i < 4; i++) {
-        int64_t offset = cross[i][1] * (int64_t)view->width + cross[i][0];
-        if (y + (uint32_t)cross[i][1] >= view->height)
+        int64_t offset = pt_cross[i][1] * (int64_t)view->width + pt_cross[i][0];
+        if (y + (uint32_t)pt_cross[i][1] >= view->height)
             continue;
         if (!at && offset < 0)
             return vm_bits(some); // nothing may be read before the plane

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // compose: colour over the background, into the crop; twin of shaders/kernels/compose.comp
+#include "compose.h"
 #include "device_cpu/rows.h"
 
 static void compose_row(void *context, uint32_t y)
@@ -14,20 +15,15 @@ static void compose_row(void *context, uint32_t y)
     for (int k = 0; k < 4; k++)
         background[k] = vf_set(args->background[k]);
     for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
-        uint32_t lanes = vm_bits(vm_first(pt_lanes_left(x, args->crop_width)));
-        vm some = vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z)));
-        vf color[4];
-        if (vm_bits(some) & lanes)
+        uint32_t count = pt_lanes_left(x, args->crop_width);
+        vm some = vm_and(vm_first(count), vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
+        vf color[4], over[4];
+        if (vm_bits(some))
             vf_load4(colors + 4 * (size_t)x, color);
         else
             memcpy(color, background, sizeof color);
-        vf through = vf_set(1.0f) - color[3];
-        for (int k = 0; k < 4; k++)
-            color[k] = vf_select(some, color[k] + through * background[k], background[k]);
-        if (args->crop_width - x >= PT_LANES) // the picture is read later, by others
-            vf_stream4(out + 4 * (size_t)x, color);
-        else
-            vf_store4(out + 4 * (size_t)x, color, lanes);
+        pt_compose(color, background, some, over);
+        vf_put4(out + 4 * (size_t)x, over, count);
     }
 }
 

@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// finish: shade, smooth, antialias, compose and extract as one walk over rows. The planes between them stay in rings of
+// rows that the second-level cache holds: nothing but the picture is written. Same functions, same numbers as the kernels.
+#include "device_cpu/kernels/antialias.h"
+#include "device_cpu/kernels/compose.h"
+#include "device_cpu/kernels/extract.h"
+#include "device_cpu/kernels/shade.h"
+#include "device_cpu/kernels/smooth.h"
+
+enum { UNIT = 16, RING = 4, CHANNELS_SEEN = 5, CHANNELS_COLOR = 3 };
+// Row s is shaded when s + reach has been seen, s - 1 is smoothed then, s - 2 finished: anti-aliasing reads s - 3 too.
+enum { SEEN_MOST = 2 * PT_BLEND_MOST + 1 };
+
+struct finish {
+    const struct pt_cpu_pass *shades;
+    uint32_t shade_count;
+    const struct smooth_args *smooth;         // NULL: off
+    const struct antialias_args *antialias;   // NULL: off
+    const struct compose_args *compose;
+    const struct extract_args *extract;       // NULL: nothing beside the colour
+    float *combined, *depth, *normals, *source;
+    struct pt_planes planes;
+    int32_t reach;
+    int with_normals;
+    float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1];
+    float *memory; // per thread
+    size_t stride, thread_floats;
+    uint32_t ring; // of rows seen
+    struct walk *walks; // per thread
+};
+
+// Where a thread is: it goes on where it stopped when its next rows follow.
+struct walk {
+    int32_t first, next;            // row of the picture that it began with; that comes next
+    struct pt_seen_row seen[SEEN_MOST];
+    int any[SEEN_MOST];             // whether the row holds anything
+    struct pt_color_row shaded[RING], smoothed[RING];
+    float *shown[RING][3];          // normals
+};
+
+static struct pt_seen_row *seen_row(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    return &walk->seen[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring];
+}
+
+static int anything(const struct finish *finish, const struct walk *walk, int32_t y)
+{
+    return walk->any[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring];
+}
+
+static uint32_t slot(int32_t y) { return (uint32_t)(y + RING) % RING; }
+
+static void lay_out(const struct finish *finish, uint32_t thread, struct walk *walk)
+{
+    float *at = finish->memory + thread * finish->thread_floats + PT_ROW_PAD;
+    const size_t s = finish->stride;
+    for (uint32_t i = 0; i < finish->ring; i++, at += CHANNELS_SEEN * s)
+        walk->seen[i] = (struct pt_seen_row){ at, at + s, { at + 2 * s, at + 3 * s, at + 4 * s } };
+    for (uint32_t i = 0; i < RING; i++, at += 3 * CHANNELS_COLOR * s) {
+        walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s } };
+        walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 3 * s, at + 4 * s, at + 5 * s } };
+        for (uint32_t k = 0; k < 3; k++)
+            walk->shown[i][k] = at + (6 + k) * s;
+    }
+}
+
+// ---- 1. colours and normals -------------------------------------------------------------------------------------------------
+
+// The colours of points lie in file order, each is a cache miss of its own: ask for those of a row that is shaded later.
+static void ask_for_colors(const struct finish *finish, int32_t y)
+{
+    static const uint32_t color_bytes[] = { 0, 3, 12 };
+    const struct view_args *view = finish->planes.view;
+    for (uint32_t i = 0; i < finish->shade_count; i++) {
+        const struct shade_args *args = finish->shades[i].call.arguments;
+        const char *colors = pt_cpu_data(&finish->shades[i].call, 4);
+        const size_t size = color_bytes[args->instance.color_format];
+        for (uint32_t x = 0; size && x < view->width; x += PT_LANES) {
+            size_t at = (size_t)y * view->width + x;
+            vi id;
+            vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, view->width), &id);
+            uint32_t ids[PT_LANES], bits = vm_bits(ours);
+            if (!bits)
+                continue;
+            vi_store(ids, id, vm_first(PT_LANES));
+            bits &= ~vm_bits(pt_filled(pt_source(&finish->planes, at), at, ours));
+            for (; bits; bits &= bits - 1)
+                __builtin_prefetch(colors + size * ids[__builtin_ctz(bits)]);
+        }
+    }
+}
+
+static void see(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    walk->any[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring] =
+        pt_see_row(&finish->planes, y, finish->reach ? PT_BLEND_FILLED : 1.0f, finish->with_normals,
+                   seen_row(finish, walk, y));
+    if (anything(finish, walk, y))
+        ask_for_colors(finish, y);
+}
+
+static void shade(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const struct view_args *view = finish->planes.view;
+    struct pt_color_row *out = &walk->shaded[slot(y)];
+    out->z = seen_row(finish, walk, y)->z;
+    for (uint32_t i = 0; i < finish->shade_count && anything(finish, walk, y); i++) {
+        const struct shade_args *args = finish->shades[i].call.arguments;
+        const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
+        const int reach = (int)args->blend;
+        for (int32_t k = -reach; k <= reach; k++)
+            around[reach + k] = seen_row(finish, walk, y + k);
+        // a tight loop of its own: colours lie in file order, each is a cache miss, and many are under way at a time
+        for (uint32_t x = 0; x < view->width; x += PT_LANES) {
+            vf albedo[3];
+            vi id;
+            vm ours = pt_of_instance(finish->planes.keys + (size_t)y * view->width + x, &args->instance,
+                                     pt_lanes_left(x, view->width), &id);
+            if (!vm_bits(ours))
+                continue;
+            pt_albedo(&args->instance, pt_cpu_data(&finish->shades[i].call, 4), id, ours, albedo);
+            for (uint32_t k = 0; k < 3; k++)
+                vf_store(out->color[k] + x, albedo[k], ours);
+        }
+        if (!finish->with_normals)
+            continue;
+        for (uint32_t x = 0; x < view->width; x += PT_LANES) {
+            vf color[3] = { vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x) }, normal[3];
+            vi id;
+            vm ours = pt_of_instance(finish->planes.keys + (size_t)y * view->width + x, &args->instance,
+                                     pt_lanes_left(x, view->width), &id);
+            if (!vm_bits(ours))
+                continue;
+            pt_shade_pixels(args, &finish->planes, around, finish->weights, x, (uint32_t)y, ours, color, normal);
+            for (uint32_t k = 0; k < 3; k++) {
+                vf_store(out->color[k] + x, color[k], ours);
+                vf_store(walk->shown[slot(y)][k] + x, normal[k], ours);
+            }
+        }
+    }
+}
+
+// ---- 2. smoothing -------------------------------------------------------------------------------------------------------------
+
+static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const uint32_t width = finish->planes.view->width;
+    const struct pt_color_row *const rows[3] = { &walk->shaded[slot(y - 1)], &walk->shaded[slot(y)],
+                                                 &walk->shaded[slot(y + 1)] };
+    struct pt_color_row *out = &walk->smoothed[slot(y)];
+    const float *limits = seen_row(finish, walk, y)->limit;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    if (!finish->smooth) {
+        *out = *rows[1];
+        return;
+    }
+    out->z = rows[1]->z;
+    if (!anything(finish, walk, y))
+        return;
+    for (uint32_t x = 0; x < width; x += PT_LANES) {
+        vm some = vf_lt(vf_load(out->z + x), empty); // +inf behind the row's end
+        vf color[3];
+        if (!vm_bits(some))
+            continue;
+        pt_smooth_pixels(finish->smooth, rows, x, vf_load(limits + x), some, color);
+        for (uint32_t k = 0; k < 3; k++)
+            vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
+    }
+}
+
+// ---- 3. the picture ----------------------------------------------------------------------------------------------------------
+
+struct around { // rows y - 1, y, y + 1
+    const struct pt_color_row *row[3];
+};
+
+// Mixes the colours of those of PT_LANES pixels that are edges; returns which.
+static vm mix_edges(const struct finish *finish, const struct around *around, const float *limits, uint32_t x, uint32_t y,
+                    vm some, vf color[4])
+{
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), z = vf_load(around->row[1]->z + x);
+    const int layers = (int)finish->antialias->layers;
+    vf limit = empty;
+    if (layers)
+        limit = z + vf_load(limits + x);
+    vf far = vf_max(vf_max(vf_load(around->row[1]->z + x + 1), vf_load(around->row[1]->z + x - 1)),
+                    vf_max(vf_load(around->row[0]->z + x), vf_load(around->row[2]->z + x)));
+    uint32_t candidates = vm_bits(vm_and(some, vm_or(vf_lt(limit, far), vf_le(empty, far)))), edges = 0;
+    if (!candidates)
+        return vm_of_bits(0);
+    float mixed[4][PT_LANES], limit_of[PT_LANES];
+    for (uint32_t k = 0; k < 4; k++)
+        vf_store(mixed[k], color[k], vm_first(PT_LANES));
+    vf_store(limit_of, limit, vm_first(PT_LANES));
+    for (; candidates; candidates &= candidates - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(candidates);
+        float sum[4] = { 0.0f, 0.0f, 0.0f, 0.0f }, own[4], count = 0.0f;
+        for (int d = 0; d < 4; d++) {
+            uint32_t qx = x + i + (uint32_t)pt_cross[d][0], qy = y + (uint32_t)pt_cross[d][1];
+            if (qx >= finish->planes.view->width || qy >= finish->planes.view->height)
+                continue; // unknown: no edge
+            const struct pt_color_row *row = around->row[1 + pt_cross[d][1]];
+            float q = row->z[qx];
+            if (!(q > limit_of[i] || q == pt_float(PT_KEY_EMPTY_Z)))
+                continue;
+            count += 1.0f;
+            for (uint32_t k = 0; k < 4 && q < pt_float(PT_KEY_EMPTY_Z); k++)
+                sum[k] = sum[k] + (k < 3 ? row->color[k][qx] : 1.0f);
+        }
+        if (!(count > 0.0f))
+            continue;
+        for (uint32_t k = 0; k < 4; k++)
+            own[k] = mixed[k][i];
+        pt_mix_edge(own, sum, count);
+        for (uint32_t k = 0; k < 4; k++)
+            mixed[k][i] = own[k];
+        edges |= 1u << i;
+    }
+    for (uint32_t k = 0; k < 4; k++)
+        color[k] = vf_load(mixed[k]);
+    return vm_of_bits(edges);
+}
+
+// The passes beside the colour. (x, y): of the picture.
+static void put_passes(const struct finish *finish, const struct walk *walk, vf z, vm some, vm mixed, uint32_t x, uint32_t y,
+                       uint32_t count)
+{
+    const struct extract_args *args = finish->extract;
+    const uint32_t width = finish->planes.view->width, px = args->crop_x + x, py = args->crop_y + y;
+    size_t out = (size_t)y * args->crop_width + x;
+    if (args->depth)
+        vf_put(finish->depth + out, z, count);
+    if (args->normal) {
+        vf normal[3], world[3] = { vf_zero(), vf_zero(), vf_zero() };
+        if (vm_bits(some)) {
+            for (uint32_t k = 0; k < 3; k++)
+                normal[k] = vf_load(walk->shown[slot((int32_t)py)][k] + px);
+            pt_world_normal(args->world_from_view, normal, some, world);
+        }
+        vf_put3(finish->normals + 3 * out, world, count);
+    }
+    if (args->source) {
+        vf value = vf_zero();
+        if (vm_bits(some))
+            value = pt_source_value(width, pt_source(&finish->planes, (size_t)py * width + px), mixed, some, px, py);
+        vf_put(finish->source + out, value, count);
+    }
+}
+
+static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const struct compose_args *args = finish->compose;
+    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    const struct around around = { { &walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)] } };
+    const uint32_t row = (uint32_t)y - args->crop_y;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    float *combined = finish->combined + 4 * (size_t)row * args->crop_width;
+    vf background[4];
+    for (int k = 0; k < 4; k++)
+        background[k] = vf_set(args->background[k]);
+    for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
+        uint32_t px = args->crop_x + x, count = pt_lanes_left(x, args->crop_width);
+        vf z = vf_load(seen->z + px), color[4] = { background[0], background[1], background[2], background[3] };
+        vm some = vm_and(vm_first(count), vf_lt(z, empty)), mixed = vm_of_bits(0);
+        if (vm_bits(some)) {
+            vf shown[4] = { vf_load(around.row[1]->color[0] + px), vf_load(around.row[1]->color[1] + px),
+                            vf_load(around.row[1]->color[2] + px), vf_set(1.0f) };
+            if (finish->antialias)
+                mixed = mix_edges(finish, &around, seen->limit, px, (uint32_t)y, some, shown);
+            pt_compose(shown, background, some, color);
+        }
+        vf_put4(combined + 4 * (size_t)x, color, count);
+        if (finish->extract)
+            put_passes(finish, walk, z, some, mixed, x, row, count);
+    }
+}
+
+// ---- the walk ----------------------------------------------------------------------------------------------------------------
+
+static void finish_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct finish *finish = context;
+    const struct compose_args *args = finish->compose;
+    struct walk *walk = &finish->walks[thread];
+    const int32_t reach = finish->reach, first = (int32_t)(args->crop_y + begin * UNIT);
+    int32_t last = (int32_t)(args->crop_y + (end * UNIT < args->crop_height ? end * UNIT : args->crop_height));
+    int32_t y = first;
+    if (first != walk->next) { // not where this thread stopped: begin anew
+        walk->first = first;
+        y = first - 4 - 2 * reach;
+    }
+    for (; y < last; y++) { // y is finished when y + 2 + reach has been seen
+        see(finish, walk, y + 2 + reach);
+        if (y + 2 >= walk->first - 2)
+            shade(finish, walk, y + 2);
+        if (y + 1 >= walk->first - 1)
+            smooth(finish, walk, y + 1);
+        if (y >= walk->first)
+            put_row(finish, walk, y);
+    }
+    walk->next = last;
+}
+
+int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
+{
+    struct finish finish = { .shades = passes };
+    const struct pt_cpu_call *shared = &passes[0].call;
+    for (uint32_t i = 0; i < count; i++) {
+        const struct pt_cpu_call *call = &passes[i].call;
+        switch (passes[i].kernel) {
+        case PT_KERNEL_shade:
+            finish.shade_count++;
+            finish.with_normals |= (int)((const struct shade_args *)call->arguments)->instance.lit;
+            if (finish.reach < (int32_t)((const struct shade_args *)call->arguments)->blend)
+                finish.reach = (int32_t)((const struct shade_args *)call->arguments)->blend;
+            finish.planes.normals = pt_cpu_data(call, 2);
+            finish.planes.deff = pt_cpu_data(call, 3);
+            break;
+        case PT_KERNEL_smooth: finish.smooth = call->arguments; break;
+        case PT_KERNEL_antialias: finish.antialias = call->arguments; break;
+        case PT_KERNEL_compose:
+            finish.compose = call->arguments;
+            finish.planes.keys = pt_cpu_data(call, 0);
+            finish.combined = pt_cpu_data(call, 2);
+            break;
+        default: // extract
+            finish.extract = call->arguments;
+            finish.with_normals |= (int)finish.extract->normal;
+            finish.planes.from = pt_cpu_data(call, 1);
+            finish.depth = pt_cpu_data(call, 3);
+            finish.normals = pt_cpu_data(call, 4);
+            finish.source = pt_cpu_data(call, 5);
+        }
+    }
+    if (finish.shade_count)
+        finish.planes.from = pt_cpu_data(shared, 1);
+    finish.planes.view = &finish.compose->view;
+    finish.stride = pt_row_stride(finish.planes.view->width);
+    finish.ring = (uint32_t)(2 * finish.reach > finish.reach + 3 ? 2 * finish.reach : finish.reach + 3) + 1;
+    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * 3 * CHANNELS_COLOR) * finish.stride;
+    pt_blend_weights(finish.weights);
+    uint32_t threads = pt_pool_threads(shared->pool);
+    finish.memory = pt_cpu_scratch(shared, 0, threads * finish.thread_floats * sizeof(float));
+    finish.walks = pt_cpu_scratch(shared, 1, threads * sizeof *finish.walks);
+    if (!finish.memory || !finish.walks)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < threads; i++) {
+        lay_out(&finish, i, &finish.walks[i]);
+        finish.walks[i].next = INT32_MIN;
+    }
+    pt_parallel(shared->pool, (finish.compose->crop_height + UNIT - 1) / UNIT, 1, finish_rows, &finish);
+    return PATINA_OK;
+}

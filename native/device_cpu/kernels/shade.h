@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Shading of PT_LANES pixels: colour, blended normal, Phong. [D 3.1]; twin of shaders/kernels/shade.comp
+#ifndef PT_SHADE_H
+#define PT_SHADE_H
+
+#include "device_cpu/picture_rows.h"
+#include "device_cpu/srgb.h"
+
+enum { PT_BLEND_MOST = 8 };
+
+// Weights of the blend by squared distance.
+static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1])
+{
+    for (int i = 0; i <= 2 * PT_BLEND_MOST * PT_BLEND_MOST; i++)
+        weights[i] = pt_rcp((float)(1 + i));
+}
+
+// Normals of those of PT_LANES pixels from x on that `filled` names, blended over (2 reach + 1)^2 pixels; the others keep n.
+// around[reach]: the pixels' own row.
+static inline void pt_blend_normals(const struct pt_seen_row *const *around, int reach, const float *weights, uint32_t x,
+                                    vm filled, vf n[3])
+{
+    const struct pt_seen_row *own = around[reach];
+    const vf z = vf_load(own->z + x), limit = vf_load(own->limit + x);
+    vf sum[3] = { vf_zero(), vf_zero(), vf_zero() };
+    for (int dy = -reach; dy <= reach; dy++)
+        for (int dx = -reach; dx <= reach; dx++) {
+            const struct pt_seen_row *row = around[reach + dy];
+            vm take = vm_and(filled, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit));
+            vf weight = vf_set(weights[dx * dx + dy * dy]);
+            for (int k = 0; k < 3; k++)
+                sum[k] = sum[k] + vf_mul_where(take, vf_load(row->normal[k] + x + dx), weight);
+        }
+    vf square = (sum[0] * sum[0] + sum[1] * sum[1]) + sum[2] * sum[2];
+    vm blended = vf_lt(vf_set(1e-12f), square);
+    vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
+    for (int k = 0; k < 3; k++) {
+        vf whole = n[k] * vf_set(1.0f / PT_BLEND_FILLED); // where the blend is nothing, the source's own
+        n[k] = vf_select(filled, vf_select(blended, sum[k] * scale, whole), n[k]);
+    }
+}
+
+// The points' own colours, before light.
+static inline void pt_albedo(const struct instance_args *instance, const void *colors, vi id, vm ours, vf albedo[3])
+{
+    for (int k = 0; k < 3; k++)
+        albedo[k] = vf_set(instance->color[k]);
+    if (instance->color_format == 1 && instance->id_count < 1u << 29) { // byte offsets fit a signed index
+        vi rgb = vi_gather_bytes(colors, vi_add(id, vi_add(id, id)), ours);
+        for (int k = 0; k < 3; k++)
+            albedo[k] = vf_gather(pt_srgb_table, vi_and(vi_shr(rgb, 8 * k), vi_set(255)), ours);
+        return;
+    }
+    if (!instance->color_format)
+        return;
+    float rgb[3][PT_LANES];
+    uint32_t ids[PT_LANES], lanes = vm_bits(ours);
+    memset(rgb, 0, sizeof rgb);
+    vi_store(ids, id, vm_first(PT_LANES));
+    for (; lanes; lanes &= lanes - 1)
+        for (int k = 0, i = __builtin_ctz(lanes); k < 3; k++) {
+            size_t at = 3 * (size_t)ids[i] + (size_t)k;
+            rgb[k][i] = instance->color_format == 1 ? pt_srgb_table[((const uint8_t *)colors)[at]]
+                                                    : ((const float *)colors)[at];
+        }
+    for (int k = 0; k < 3; k++)
+        albedo[k] = vf_load(rgb[k]);
+}
+
+// ---- light -------------------------------------------------------------------------------------------------------------
+
+struct pt_surface_point {
+    vf n[3], position[3], to_eye[3];
+};
+
+static inline vf pt_dot3(const vf a[3], const vf b[3]) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
+
+static inline vf pt_power(vf x, uint32_t exponent)
+{
+    vf result = vf_set(1.0f);
+    for (; exponent; exponent >>= 1) {
+        if (exponent & 1u)
+            result = result * x;
+        x = x * x;
+    }
+    return result;
+}
+
+static inline void pt_add_light(const struct instance_args *instance, const struct light_args *light,
+                                const struct pt_surface_point *s, vf diffuse[3], vf specular[3])
+{
+    const vf zero = vf_zero();
+    vf l[3], falloff = vf_set(0.31830988618f); // 1 / pi: radiance of a white Lambert surface under unit irradiance
+    for (int k = 0; k < 3; k++)
+        l[k] = vf_set(light->vector[k]);
+    if (light->type == 2) { // PATINA_LIGHT_POINT
+        for (int k = 0; k < 3; k++)
+            l[k] = l[k] - s->position[k];
+        vf scale = vf_rsqrt(vf_max(pt_dot3(l, l), vf_set(1e-20f)));
+        for (int k = 0; k < 3; k++)
+            l[k] = l[k] * scale;
+        falloff = falloff * (scale * scale);
+    }
+    vf cosine = pt_dot3(s->n, l);
+    vf lambert = vf_max(cosine, zero) * falloff;
+    for (int k = 0; k < 3; k++)
+        diffuse[k] = diffuse[k] + vf_set(light->color[k]) * lambert;
+    if (!(instance->specular > 0.0f))
+        return;
+    vf r[3];
+    for (int k = 0; k < 3; k++)
+        r[k] = (vf_set(2.0f) * cosine) * s->n[k] - l[k];
+    vf shine = pt_power(vf_min(vf_max(pt_dot3(r, s->to_eye), zero), vf_set(1.0f)), instance->shininess) * falloff;
+    shine = vf_select(vf_lt(zero, cosine), shine, zero);
+    for (int k = 0; k < 3; k++)
+        specular[k] = specular[k] + vf_set(light->color[k]) * shine;
+}
+
+static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z, const vf n[3],
+                            struct pt_surface_point *s)
+{
+    const vf zero = vf_zero();
+    s->to_eye[0] = s->to_eye[1] = zero;
+    s->to_eye[2] = vf_set(1.0f);
+    s->position[0] = ray[0];
+    s->position[1] = ray[1];
+    s->position[2] = zero - (z + vf_set(args->eye_z));
+    if (args->view.perspective) {
+        vf r = vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f));
+        s->position[0] = z * ray[0];
+        s->position[1] = z * ray[1];
+        s->position[2] = zero - z;
+        s->to_eye[0] = zero - ray[0] * r;
+        s->to_eye[1] = zero - ray[1] * r;
+        s->to_eye[2] = r;
+    }
+    vm away = vf_lt(pt_dot3(n, s->to_eye), zero); // both sides are lit
+    for (int k = 0; k < 3; k++)
+        s->n[k] = vf_select(away, zero - n[k], n[k]);
+}
+
+// c = albedo (k_a world + k_d sum E max(n.l, 0) / pi) + albedo k_s sum E max(r.v, 0)^shininess / pi. In and out: albedo.
+static inline void pt_phong(const struct shade_args *args, uint32_t x, uint32_t y, vf z, const vf n[3], vf color[3])
+{
+    const struct instance_args *instance = &args->instance;
+    struct pt_surface_point point;
+    vf ray[2], diffuse[3], specular[3];
+    vf_ray(&args->view, x, y, ray);
+    pt_place(args, ray, z, n, &point);
+    for (int k = 0; k < 3; k++)
+        diffuse[k] = specular[k] = vf_zero();
+    for (uint32_t i = 0; i < args->light_count; i++)
+        pt_add_light(instance, &args->lights[i], &point, diffuse, specular);
+    for (int k = 0; k < 3; k++) {
+        vf light = vf_set(instance->ambient * args->world[k]) + vf_set(instance->diffuse) * diffuse[k];
+        color[k] = color[k] * (light + vf_set(instance->specular) * specular[k]);
+    }
+}
+
+// Light on, and shown normals of, PT_LANES pixels of the instance from (x, y) on. color: in albedo. around: rows
+// y - blend ... y + blend.
+static inline void pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes,
+                                   const struct pt_seen_row *const *around, const float *weights, uint32_t x, uint32_t y,
+                                   vm ours, vf color[3], vf normal[3])
+{
+    size_t at = (size_t)y * args->view.width + x;
+    const struct pt_seen_row *own = around[args->blend];
+    for (int k = 0; k < 3; k++)
+        normal[k] = vf_load(own->normal[k] + x);
+    if (args->blend) {
+        vm filled = pt_filled(pt_source(planes, at), at, ours);
+        if (vm_bits(filled))
+            pt_blend_normals(around, (int)args->blend, weights, x, filled, normal);
+    }
+    if (args->instance.lit)
+        pt_phong(args, x, y, vf_load(own->z + x), normal, color);
+}
+
+#endif

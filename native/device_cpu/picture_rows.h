@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rows of the picture as separate vectors, indexed by x, so that every tap of a window is a plain load. What beyond the
+// plane lies is empty. Rings of rows: row y lies in slot y modulo the ring's size.
+#ifndef PT_PICTURE_ROWS_H
+#define PT_PICTURE_ROWS_H
+
+#include "rows.h"
+
+enum { PT_ROW_PAD = 32 }; // floats before a row's first column and at least as many behind its last
+
+static inline size_t pt_row_stride(uint32_t width) { return ((size_t)width + 15) / 16 * 16 + 2 * PT_ROW_PAD; }
+
+// What the keys say of a row. z is +inf where the pixel is empty; the others are undefined there.
+struct pt_seen_row {
+    float *z;
+    float *limit;     // d_eff of the surface shown
+    float *normal[3]; // of the surface shown, those of filled pixels times `share`
+};
+
+// The planes that a row is seen from.
+struct pt_planes {
+    const struct view_args *view;
+    const uint64_t *keys;
+    const uint32_t *from;
+    const float *normals, *deff;
+};
+
+static inline vi pt_source(const struct pt_planes *planes, size_t at)
+{
+    return vi_and(vi_load(planes->from + at), vi_set(~PT_FROM_MIXED));
+}
+
+// Those of `some` that show the surface of another pixel.
+static inline vm pt_filled(vi source, size_t at, vm some)
+{
+    return vm_and(some, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
+}
+
+static inline void pt_empty_row(float *z, uint32_t width)
+{
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    for (size_t x = 0; x < pt_row_stride(width); x += PT_LANES)
+        vf_store(z - PT_ROW_PAD + x, empty, vm_first(PT_LANES));
+}
+
+// PT_LANES pixels of the planes that are about to be read.
+static inline void pt_ask_for(const struct pt_planes *planes, size_t at, int with_normals)
+{
+    __builtin_prefetch(planes->keys + at);
+    __builtin_prefetch(planes->keys + at + 8);
+    __builtin_prefetch(planes->from + at);
+    __builtin_prefetch(planes->deff + at);
+    for (uint32_t i = 0; i < 4 * PT_LANES && with_normals; i += 16)
+        __builtin_prefetch(planes->normals + 4 * at + i);
+}
+
+// Returns whether anything is seen in row y. with_normals = 0: they are not wanted.
+static inline int pt_see_row(const struct pt_planes *planes, int32_t y, float share, int with_normals,
+                             const struct pt_seen_row *row)
+{
+    const uint32_t width = planes->view->width;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    int any = 0;
+    if (y < 0 || y >= (int32_t)planes->view->height) {
+        pt_empty_row(row->z, width);
+        return 0;
+    }
+    for (int32_t i = 0; i < PT_ROW_PAD; i += PT_LANES)
+        vf_store(row->z - PT_ROW_PAD + i, empty, vm_first(PT_LANES));
+    for (uint32_t x = 0; x < width; x += PT_LANES) {
+        size_t at = (size_t)y * width + x;
+        vf z = vi_float(vi_load_z(planes->keys + at));
+        vm some = vm_and(vm_first(pt_lanes_left(x, width)), vf_lt(z, empty));
+        vf_store(row->z + x, z, vm_first(PT_LANES));
+        if (!vm_bits(some))
+            continue;
+        any = 1;
+        pt_ask_for(planes, at + width, with_normals); // the row above: hardware forgets a stream between two rows
+        vi source = pt_source(planes, at);
+        vm filled = pt_filled(source, at, some);
+        vf limit = vf_load(planes->deff + at), n[4];
+        if (with_normals)
+            vf_load4(planes->normals + 4 * at, n);
+        if (vm_bits(filled)) {
+            limit = vf_select(filled, vf_gather(planes->deff, source, filled), limit);
+            vi word = vi_mul(source, vi_set(4));
+            for (uint32_t k = 0; k < 3 && with_normals; k++)
+                n[k] = vf_select(filled, vf_gather(planes->normals + k, word, filled) * vf_set(share), n[k]);
+        }
+        vf_store(row->limit + x, limit, vm_first(PT_LANES));
+        for (uint32_t k = 0; k < 3 && with_normals; k++)
+            vf_store(row->normal[k] + x, n[k], vm_first(PT_LANES));
+    }
+    for (uint32_t i = 0; i < PT_ROW_PAD; i++)
+        row->z[width + i] = pt_float(PT_KEY_EMPTY_Z);
+    return any;
+}
+
+#endif
