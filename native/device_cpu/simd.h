@@ -53,16 +53,6 @@ static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) // upper words of
 {
     return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, (const char *)keys + 4, 8);
 }
-static inline vi vi_load_z(const uint64_t *keys)
-{
-    const vi odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
-    return _mm512_permutex2var_epi32(vi_load(keys), odd, vi_load(keys + 8));
-}
-static inline vi vi_load_id(const uint64_t *keys)
-{
-    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-    return _mm512_permutex2var_epi32(vi_load(keys), even, vi_load(keys + 8));
-}
 static inline uint32_t vm_bits(vm m) { return m; }
 static inline vm vm_first(uint32_t n) { return (vm)((1u << n) - 1u); }
 static inline vm vm_of_bits(uint32_t bits) { return (vm)bits; }
@@ -120,6 +110,23 @@ static inline vi vi_sides(vi a) // lane 2k: k, lane 2k + 1: k + 2
 {
     return _mm512_permutexvar_epi32(_mm512_setr_epi32(0, 2, 1, 3, 2, 4, 3, 5, 4, 6, 5, 7, 6, 8, 7, 9), a);
 }
+static inline vi vi_evens(vi a, vi b) // lanes 0, 2, 4 ... of both
+{
+    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    return _mm512_permutex2var_epi32(a, even, b);
+}
+static inline vi vi_odds(vi a, vi b)
+{
+    const vi odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+    return _mm512_permutex2var_epi32(a, odd, b);
+}
+static inline void vi_store_keys(uint64_t *keys, vi z, vi id) // all lanes
+{
+    const vi low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    const vi high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    _mm512_storeu_si512(keys, _mm512_permutex2var_epi32(id, low, z));
+    _mm512_storeu_si512(keys + 8, _mm512_permutex2var_epi32(id, high, z));
+}
 #define PT_VECTOR(name) _mm512_##name
 
 #elif defined(PT_ISA_AVX2)
@@ -163,14 +170,22 @@ static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m)
 {
     return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), (const int *)keys + 1, i, m, 8);
 }
-static inline vi avx2_words(const uint64_t *keys, int select)
+static inline vi vi_evens(vi a, vi b)
 {
-    __m256 a = _mm256_castsi256_ps(vi_load(keys)), b = _mm256_castsi256_ps(vi_load(keys + 4));
-    __m256 mixed = select ? _mm256_shuffle_ps(a, b, 0xDD) : _mm256_shuffle_ps(a, b, 0x88);
+    __m256 mixed = _mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), 0x88);
     return _mm256_permute4x64_epi64(_mm256_castps_si256(mixed), 0xD8);
 }
-static inline vi vi_load_z(const uint64_t *keys) { return avx2_words(keys, 1); }
-static inline vi vi_load_id(const uint64_t *keys) { return avx2_words(keys, 0); }
+static inline vi vi_odds(vi a, vi b)
+{
+    __m256 mixed = _mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), 0xDD);
+    return _mm256_permute4x64_epi64(_mm256_castps_si256(mixed), 0xD8);
+}
+static inline void vi_store_keys(uint64_t *keys, vi z, vi id)
+{
+    vi low = _mm256_unpacklo_epi32(id, z), high = _mm256_unpackhi_epi32(id, z);
+    _mm256_storeu_si256((__m256i *)keys, _mm256_permute2x128_si256(low, high, 0x20));
+    _mm256_storeu_si256((__m256i *)(keys + 4), _mm256_permute2x128_si256(low, high, 0x31));
+}
 static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
 static inline vm vm_first(uint32_t n) { return _mm256_cmpgt_epi32(_mm256_set1_epi32((int)n), vi_lanes()); }
 static inline vm vm_of_bits(uint32_t bits)
@@ -262,15 +277,18 @@ static inline vi sse_gather(const char *base, vi i, vm m, int scale)
 }
 static inline vi vi_gather(const void *base, vi i, vm m) { return sse_gather(base, i, m, 4); }
 static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return sse_gather((const char *)keys + 4, i, m, 8); }
-static inline vi vi_load_z(const uint64_t *keys)
+static inline vi vi_evens(vi a, vi b)
 {
-    __m128 a = _mm_castsi128_ps(vi_load(keys)), b = _mm_castsi128_ps(vi_load(keys + 2));
-    return _mm_castps_si128(_mm_shuffle_ps(a, b, 0xDD));
+    return _mm_castps_si128(_mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), 0x88));
 }
-static inline vi vi_load_id(const uint64_t *keys)
+static inline vi vi_odds(vi a, vi b)
 {
-    __m128 a = _mm_castsi128_ps(vi_load(keys)), b = _mm_castsi128_ps(vi_load(keys + 2));
-    return _mm_castps_si128(_mm_shuffle_ps(a, b, 0x88));
+    return _mm_castps_si128(_mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), 0xDD));
+}
+static inline void vi_store_keys(uint64_t *keys, vi z, vi id)
+{
+    _mm_storeu_si128((__m128i *)keys, _mm_unpacklo_epi32(id, z));
+    _mm_storeu_si128((__m128i *)(keys + 2), _mm_unpackhi_epi32(id, z));
 }
 static inline vm vm_first(uint32_t n) { return _mm_cmpgt_epi32(_mm_set1_epi32((int)n), vi_lanes()); }
 static inline vm vm_of_bits(uint32_t bits)
@@ -379,6 +397,11 @@ static inline void vi_store(void *p, vi a, vm m)
         memcpy(p, &a, 4);
 }
 
+#endif
+
+#if PT_LANES > 1 // the words of PT_LANES keys
+static inline vi vi_load_z(const uint64_t *keys) { return vi_odds(vi_load(keys), vi_load(keys + PT_LANES / 2)); }
+static inline vi vi_load_id(const uint64_t *keys) { return vi_evens(vi_load(keys), vi_load(keys + PT_LANES / 2)); }
 #endif
 
 #if PT_LANES == 1
