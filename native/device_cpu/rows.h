@@ -55,6 +55,20 @@ static inline vm pt_of_instance(const uint64_t *keys, const struct instance_args
                                           vm_not(vi_eq(vi_load_z(keys), vi_set(PT_KEY_EMPTY_Z)))));
 }
 
+// d_eff at this view's level of those of PT_LANES pixels from `at` on that `lanes` names; at level 0 most are measured.
+static inline vf pt_own_distance(const struct view_args *view, const float *deff, const float *normals, const uint32_t *from,
+                                 size_t at, vf z, vm lanes)
+{
+    vi source = vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED));
+    if (view->level)
+        return vf_level_distance(view, deff, normals, source, z, lanes);
+    vm other = vm_and(lanes, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
+    vf own = vf_load(deff + at);
+    if (!vm_bits(other))
+        return own;
+    return vf_select(other, vf_gather(deff, source, other), own);
+}
+
 // Rows of float4 pixels kept as separate vectors, for windows whose taps are plain loads. Every channel of a row has
 // room for PT_RING_PAD floats before its first column and at least as many behind its last.
 enum { PT_RING_PAD = 16, PT_RING_CHANNELS = 4 };

@@ -178,47 +178,33 @@ struct around { // rows y - 1, y, y + 1
 static vm mix_edges(const struct finish *finish, const struct around *around, const float *limits, uint32_t x, uint32_t y,
                     vm some, vf color[4])
 {
-    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), z = vf_load(around->row[1]->z + x);
-    const int layers = (int)finish->antialias->layers;
-    vf limit = empty;
-    if (layers)
-        limit = z + vf_load(limits + x);
-    vf far = vf_max(vf_max(vf_load(around->row[1]->z + x + 1), vf_load(around->row[1]->z + x - 1)),
-                    vf_max(vf_load(around->row[0]->z + x), vf_load(around->row[2]->z + x)));
-    uint32_t candidates = vm_bits(vm_and(some, vm_or(vf_lt(limit, far), vf_le(empty, far)))), edges = 0;
-    if (!candidates)
-        return vm_of_bits(0);
-    float mixed[4][PT_LANES], limit_of[PT_LANES];
-    for (uint32_t k = 0; k < 4; k++)
-        vf_store(mixed[k], color[k], vm_first(PT_LANES));
-    vf_store(limit_of, limit, vm_first(PT_LANES));
-    for (; candidates; candidates &= candidates - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(candidates);
-        float sum[4] = { 0.0f, 0.0f, 0.0f, 0.0f }, own[4], count = 0.0f;
-        for (int d = 0; d < 4; d++) {
-            uint32_t qx = x + i + (uint32_t)pt_cross[d][0], qy = y + (uint32_t)pt_cross[d][1];
-            if (qx >= finish->planes.view->width || qy >= finish->planes.view->height)
-                continue; // unknown: no edge
-            const struct pt_color_row *row = around->row[1 + pt_cross[d][1]];
-            float q = row->z[qx];
-            if (!(q > limit_of[i] || q == pt_float(PT_KEY_EMPTY_Z)))
-                continue;
-            count += 1.0f;
-            for (uint32_t k = 0; k < 4 && q < pt_float(PT_KEY_EMPTY_Z); k++)
-                sum[k] = sum[k] + (k < 3 ? row->color[k][qx] : 1.0f);
-        }
-        if (!(count > 0.0f))
-            continue;
-        for (uint32_t k = 0; k < 4; k++)
-            own[k] = mixed[k][i];
-        pt_mix_edge(own, sum, count);
-        for (uint32_t k = 0; k < 4; k++)
-            mixed[k][i] = own[k];
-        edges |= 1u << i;
+    const struct view_args *view = finish->planes.view;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
+    vf limit = empty, sum[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() }, count = vf_zero();
+    if (finish->antialias->layers)
+        limit = vf_load(around->row[1]->z + x) + vf_load(limits + x);
+    for (int d = 0; d < 4; d++) {
+        const struct pt_color_row *row = around->row[1 + pt_cross[d][1]];
+        const uint32_t qx = x + (uint32_t)pt_cross[d][0];
+        vf z = vf_load(row->z + (int32_t)qx);
+        vm far = vm_and(some, vm_or(vf_lt(limit, z), vf_le(empty, z)));
+        if (y + (uint32_t)pt_cross[d][1] >= view->height || !vm_bits(far))
+            continue; // beyond the plane all is unknown: no edge
+        far = vm_and(far, vi_lt_unsigned(vi_add(vi_set(qx), vi_lanes()), vi_set(view->width)));
+        count = vf_add_where(far, count, one);
+        far = vm_and(far, vf_lt(z, empty));
+        for (uint32_t k = 0; k < 3; k++)
+            sum[k] = vf_add_where(far, sum[k], vf_load(row->color[k] + (int32_t)qx));
+        sum[3] = vf_add_where(far, sum[3], one);
     }
+    vm edges = vf_lt(vf_zero(), count);
+    if (!vm_bits(edges))
+        return edges;
+    vf mixed[4];
+    pt_mix_edges(color, sum, vf_select(edges, count, one), mixed);
     for (uint32_t k = 0; k < 4; k++)
-        color[k] = vf_load(mixed[k]);
-    return vm_of_bits(edges);
+        color[k] = vf_select(edges, mixed[k], color[k]);
+    return edges;
 }
 
 // The passes beside the colour. (x, y): of the picture.

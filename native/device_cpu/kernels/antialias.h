@@ -8,17 +8,29 @@
 #ifndef PT_ANTIALIAS_H
 #define PT_ANTIALIAS_H
 
-#include "device_cpu/math.h"
+#include "device_cpu/simd.h"
 
 static const int8_t pt_cross[4][2] = { { 1, 0 }, { 0, 1 }, { -1, 0 }, { 0, -1 } };
+
+#define PT_COVERAGE_NONE ((float)(5.0 / 6.0)) // at k = 0
+#define PT_COVERAGE_STEP ((float)(1.0 / 3.0))
+#define PT_COVERAGE_LEAST ((float)(1.0 / 6.0))
 
 // sum: of the colours of the `count` > 0 neighbours that are farther, empty ones counting as nothing.
 static inline void pt_mix_edge(float color[4], const float sum[4], float count)
 {
-    float coverage = pt_max((float)(5.0 / 6.0) - count * (float)(1.0 / 3.0), (float)(1.0 / 6.0));
+    float coverage = pt_max(PT_COVERAGE_NONE - count * PT_COVERAGE_STEP, PT_COVERAGE_LEAST);
     float share = (1.0f - coverage) * pt_rcp(count);
-    for (size_t k = 0; k < 4; k++)
+    for (int k = 0; k < 4; k++)
         color[k] = color[k] * coverage + sum[k] * share;
+}
+
+static inline void pt_mix_edges(const vf color[4], const vf sum[4], vf count, vf mixed[4])
+{
+    vf coverage = vf_max(vf_set(PT_COVERAGE_NONE) - count * vf_set(PT_COVERAGE_STEP), vf_set(PT_COVERAGE_LEAST));
+    vf share = (vf_set(1.0f) - coverage) * vf_rcp(count);
+    for (int k = 0; k < 4; k++)
+        mixed[k] = color[k] * coverage + sum[k] * share;
 }
 
 #endif

@@ -5,8 +5,7 @@
 // never copied. 64 pixels are decided at once: vector compares give eight masks of dark neighbours, four bit operations a
 // mask find the runs. Entries stay listed with the pixel's state before the phase: un-filling walks the lists alone.
 // A step looks only where the one before it changed something.
-#include "device_cpu/cpu.h"
-#include "device_cpu/simd.h"
+#include "device_cpu/rows.h"
 
 enum { BAND_ROWS = 16, RING = 8, PAD = 64 };
 
@@ -87,25 +86,37 @@ static void load_z(const struct fill *fill, int32_t y, float *row)
         row[x] = row[PAD + width + x] = empty;
 }
 
-// d_eff at this level of pixels whose surface comes from `source`.
-static vf own_distance(const struct fill *fill, vi source, vf z, vm lanes)
+// The least z of the 3 x 3 around PT_LANES pixels.
+static vf least_around(const float *const rows[3], uint32_t x)
 {
-    return vf_level_distance(fill->view, fill->deff, fill->normals, source, z, lanes);
+    vf least[3];
+    for (int k = 0; k < 3; k++) {
+        const float *at = rows[k] + PAD + x;
+        least[k] = vf_min(vf_min(vf_load(at - 1), vf_load(at + 1)), vf_load(at));
+    }
+    return vf_min(vf_min(least[0], least[1]), least[2]);
 }
 
-// 2. Thresholds of 64 pixels from x on, and which of them are candidates.
-static uint64_t load_thresholds(const struct fill *fill, uint32_t x, uint32_t y, const float *z_row, float *thresholds)
+// 2. Thresholds of 64 pixels from x on, and which of them are candidates: pixels with a dark neighbour, maybe a few others.
+static uint64_t load_thresholds(const struct fill *fill, uint32_t x, uint32_t y, const float *const rows[3],
+                                float *thresholds)
 {
     uint64_t candidates = 0;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    const uint32_t *from = fill->from + (size_t)y * fill->view->width + x;
+    const size_t at = (size_t)y * fill->view->width + x;
     for (uint32_t i = 0; i < 64; i += PT_LANES) {
-        vf t = vf_load(z_row + PAD + x + i);
-        vm asked = vf_lt(t, empty);
-        if (!fill->args->occluded)
-            asked = vm_not(asked);
-        else if (vm_bits(asked))
-            t = t - own_distance(fill, vi_and(vi_load(from + i), vi_set(~PT_FROM_MIXED)), t, asked);
+        vf t = vf_load(rows[1] + PAD + x + i), nearest = least_around(rows, x + i);
+        vm asked;
+        if (fill->args->occluded) {
+            // no d_eff is below a pixel's footprint: most pixels need not know their own
+            asked = vm_and(vf_lt(t, empty), vf_lt(nearest, t - vf_footprint(fill->view, t)));
+            if (vm_bits(asked)) {
+                t = t - pt_own_distance(fill->view, fill->deff, fill->normals, fill->from, at + i, t, asked);
+                asked = vm_and(asked, vf_lt(nearest, t));
+            }
+        } else {
+            asked = vm_and(vf_le(empty, t), vf_lt(nearest, empty));
+        }
         vf_store(thresholds + i, t, vm_first(PT_LANES));
         candidates |= (uint64_t)vm_bits(asked) << i;
     }
@@ -139,18 +150,13 @@ static vi neighbour_of(const struct view_args *view, vi x, vi y, int d, vm lanes
     return vi_add(vi_mul(qy, vi_set(view->width)), qx);
 }
 
-struct chosen { // pixels to fill, PT_LANES at a time
-    uint32_t x[PT_LANES], y[PT_LANES], count;
-    float threshold[PT_LANES];
-};
-
-// 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel. Appends to the band's list.
-static void list_chosen(const struct fill *fill, struct chosen *chosen, size_t at)
+// 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel. Completes `count` entries.
+static void choose(const struct fill *fill, size_t at, uint32_t count)
 {
     const struct view_args *view = fill->view;
     const struct entries *e = &fill->entries;
-    vm lanes = vm_first(chosen->count);
-    vi x = vi_load(chosen->x), y = vi_load(chosen->y);
+    vm lanes = vm_first(count);
+    vi x = vi_load(e->x + at), y = vi_load(e->y + at);
     vi best_z = vi_set(UINT32_MAX), best_id = vi_set(UINT32_MAX), qx = x, qy = y;
     for (int d = 0; d < RING; d++) {
         vm inside;
@@ -171,29 +177,23 @@ static void list_chosen(const struct fill *fill, struct chosen *chosen, size_t a
             n[k] = vf_gather(fill->normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes);
         vf_ray_of(view, x, y, ray_p);
         vf_ray_of(view, qx, qy, ray_q);
-        z = vf_plane_depth(view, n, ray_q, z, ray_p, own_distance(fill, source, z, lanes));
+        z = vf_plane_depth(view, n, ray_q, z, ray_p, vf_level_distance(view, fill->deff, fill->normals, source, z, lanes));
     }
-    uint32_t zs[PT_LANES], ids[PT_LANES], sources[PT_LANES];
+    uint32_t zs[PT_LANES], ids[PT_LANES];
     vi_store(zs, vf_bits(z), vm_first(PT_LANES));
     vi_store(ids, best_id, vm_first(PT_LANES));
-    vi_store(sources, source, vm_first(PT_LANES));
-    for (uint32_t i = 0; i < chosen->count; i++, at++) {
-        e->key[at] = (uint64_t)zs[i] << 32 | ids[i];
-        e->from[at] = sources[i];
-        e->x[at] = chosen->x[i];
-        e->y[at] = chosen->y[i];
-        e->threshold[at] = chosen->threshold[i];
-    }
-    chosen->count = 0;
+    vi_store(e->from + at, source, lanes);
+    for (uint32_t i = 0; i < count; i++)
+        e->key[at + i] = (uint64_t)zs[i] << 32 | ids[i];
 }
 
 static void decide_band(struct fill *fill, uint32_t band, uint32_t thread)
 {
+    const struct entries *e = &fill->entries;
     float *rows = fill->rows + thread * 4 * fill->row_stride, *thresholds = rows + 3 * fill->row_stride;
     uint32_t first, last, count = fill->kept[band];
     size_t base = band * fill->band_entries;
     int32_t held[3] = { INT32_MIN, INT32_MIN, INT32_MIN }; // which row each slot of the ring holds
-    struct chosen chosen = { .count = 0 };
     band_rows(fill, band, &first, &last);
     memset(fill->touched + first * fill->words, 0, (last - first) * fill->words);
     fill->listed[band] = count;
@@ -213,22 +213,20 @@ static void decide_band(struct fill *fill, uint32_t band, uint32_t thread)
         for (uint32_t x = fill->view->rect[0] & ~63u; x < fill->view->rect[2]; x += 64) {
             if (!fill->first && !word_dirty(fill, x / 64, y))
                 continue;
-            uint64_t fills = load_thresholds(fill, x, y, around[1], thresholds);
+            uint64_t fills = load_thresholds(fill, x, y, around, thresholds);
             if (fills)
                 fills = not_border(around, thresholds, x, fills);
-            for (; fills; fills &= fills - 1) {
+            for (; fills; fills &= fills - 1, count++) {
                 uint32_t i = (uint32_t)__builtin_ctzll(fills);
-                chosen.x[chosen.count] = x + i;
-                chosen.y[chosen.count] = y;
-                chosen.threshold[chosen.count++] = thresholds[i];
-                count++;
-                if (chosen.count == PT_LANES)
-                    list_chosen(fill, &chosen, base + count - PT_LANES);
+                e->x[base + count] = x + i;
+                e->y[base + count] = y;
+                e->threshold[base + count] = thresholds[i];
             }
         }
     }
-    if (chosen.count)
-        list_chosen(fill, &chosen, base + count - chosen.count);
+    // only now: a vector load waits for the scalar stores that it covers
+    for (uint32_t i = fill->kept[band]; i < count; i += PT_LANES)
+        choose(fill, base + i, count - i < PT_LANES ? count - i : PT_LANES);
     fill->listed[band] = count;
 }
 

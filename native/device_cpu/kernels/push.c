@@ -2,7 +2,7 @@
 // push: empty or occluded pixels take the key of their coarse parent, where two of the three coarse cells on their side
 // are covered too (else every edge would grow by a coarse pixel). SPEC 2.2; twin of shaders/kernels/push.comp
 //
-// Vectors look for the pixels whose parent is nearer; those that take its key are gathered into full vectors.
+// Vectors look for a row's pixels whose parent is nearer; those that take its key are listed and taken in full vectors.
 #include "device_cpu/rows.h"
 
 struct push {
@@ -21,17 +21,22 @@ static vf coarse_z(const struct push *push, vi x, vi y, vm lanes)
     return vf_select(inside, z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
 }
 
-struct around { // of PT_LANES pixels: z of the parent, and of the three coarse cells on the pixel's side
-    vf parent, beside, above, corner;
+struct around { // of PT_LANES pixels: z of the three coarse cells on the pixel's side
+    vf beside, above, corner;
 };
 
 // By plain loads: x even, and no cell that is asked for beyond the plane.
+static const uint64_t *coarse_row(const struct push *push, uint32_t x, uint32_t y)
+{
+    return (const uint64_t *)pt_cpu_data(push->call, 0) + (size_t)(y >> 1) * push->args->coarse_width + (x >> 1);
+}
+
 static struct around load_inside(const struct push *push, uint32_t x, uint32_t y)
 {
-    const uint64_t *row = (const uint64_t *)pt_cpu_data(push->call, 0) + (size_t)(y >> 1) * push->args->coarse_width + (x >> 1);
+    const uint64_t *row = coarse_row(push, x, y);
     const uint64_t *next = y & 1 ? row + push->args->coarse_width : row - push->args->coarse_width;
-    return (struct around){ vi_float(vi_pairs(vi_load_z(row))), vi_float(vi_sides(vi_load_z(row - 1))),
-                            vi_float(vi_pairs(vi_load_z(next))), vi_float(vi_sides(vi_load_z(next - 1))) };
+    return (struct around){ vi_float(vi_sides(vi_load_z(row - 1))), vi_float(vi_pairs(vi_load_z(next))),
+                            vi_float(vi_sides(vi_load_z(next - 1))) };
 }
 
 static struct around load_anywhere(const struct push *push, uint32_t x, uint32_t y, vm lanes)
@@ -40,8 +45,14 @@ static struct around load_anywhere(const struct push *push, uint32_t x, uint32_t
     // towards the pixel's side: -1 for even, 1 for odd
     vi nx = vi_sub(vi_add(px, vi_mul(vi_and(column, vi_set(1)), vi_set(2))), vi_set(1));
     vi ny = vi_set((y >> 1) + 2 * (y & 1) - 1);
-    return (struct around){ coarse_z(push, px, py, lanes), coarse_z(push, nx, py, lanes), coarse_z(push, px, ny, lanes),
-                            coarse_z(push, nx, ny, lanes) };
+    return (struct around){ coarse_z(push, nx, py, lanes), coarse_z(push, px, ny, lanes), coarse_z(push, nx, ny, lanes) };
+}
+
+static vf load_parent(const struct push *push, uint32_t x, uint32_t y, int inside, vm lanes)
+{
+    if (inside)
+        return vi_float(vi_pairs(vi_load_z(coarse_row(push, x, y))));
+    return coarse_z(push, vi_shr(vi_add(vi_set(x), vi_lanes()), 1), vi_set(y >> 1), lanes);
 }
 
 static int is_inside(const struct push *push, uint32_t x, uint32_t y)
@@ -53,34 +64,27 @@ static int is_inside(const struct push *push, uint32_t x, uint32_t y)
 // 1 in the lanes where z < t.
 static vi nearer(vf z, vf t) { return vi_select(vf_lt(z, t), vi_set(1), vi_set(0)); }
 
-// d_eff of the pixels from `at` on; most of them, and at level 0 all, are measured.
-static vf own_distance(const struct push *push, size_t at, vf z, vm some)
-{
-    const struct view_args *view = &push->args->view;
-    const float *deff = pt_cpu_data(push->call, 5);
-    vi source = vi_load((const uint32_t *)pt_cpu_data(push->call, 3) + at);
-    vm other = vm_and(some, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
-    if (!view->level && !vm_bits(other))
-        return vf_load(deff + at);
-    return vf_level_distance(view, deff, pt_cpu_data(push->call, 4), source, z, some);
-}
-
 // 1. Which of PT_LANES pixels are covered by their parent and by two of the three coarse cells on their side.
 static uint32_t covered(const struct push *push, uint32_t x, uint32_t y, uint32_t lanes)
 {
     size_t at = (size_t)y * push->args->view.width + x;
     vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(push->call, 2) + at));
-    vm asked = vm_first(lanes);
-    struct around around = is_inside(push, x, y) ? load_inside(push, x, y) : load_anywhere(push, x, y, asked);
-    asked = vm_and(asked, vf_lt(around.parent, z)); // d_eff is never below 0
+    const int inside = is_inside(push, x, y);
+    vf parent = load_parent(push, x, y, inside, vm_first(lanes));
+    vm asked = vm_and(vm_first(lanes), vf_lt(parent, z)); // d_eff is never below 0
     if (!vm_bits(asked))
         return 0;
     vm some = vm_and(asked, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
     vf t = z; // the threshold: what is nearer covers the pixel
     if (vm_bits(some))
-        t = vf_select(some, z - own_distance(push, at, z, some), z);
+        t = vf_select(some, z - pt_own_distance(&push->args->view, pt_cpu_data(push->call, 5), pt_cpu_data(push->call, 4),
+                                            pt_cpu_data(push->call, 3), at, z, some), z);
+    asked = vm_and(asked, vf_lt(parent, t));
+    if (!vm_bits(asked))
+        return 0;
+    struct around around = inside ? load_inside(push, x, y) : load_anywhere(push, x, y, asked);
     vi sides = vi_add(vi_add(nearer(around.beside, t), nearer(around.above, t)), nearer(around.corner, t));
-    return vm_bits(vm_and(vm_and(asked, vf_lt(around.parent, t)), vi_lt_unsigned(vi_set(1), sides)));
+    return vm_bits(vm_and(asked, vi_lt_unsigned(vi_set(1), sides)));
 }
 
 // 2. The parent's key, where its surface is not dense at this level; refined: its surface's tangent plane here. `x`: the
@@ -96,8 +100,8 @@ static void take(const struct push *push, const uint32_t *x, uint32_t y, uint32_
     vi source = vi_gather(pt_cpu_data(push->call, 1), parent, lanes), id = vi_gather_id(coarse_keys, parent, lanes);
     vf z = vi_float(vi_gather_z(coarse_keys, parent, lanes));
     vf inverse = vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(3)), lanes);
-    vm dense = vf_lt(vf_gather(pt_cpu_data(push->call, 5), source, lanes),
-                     (vf_set(PT_DENSE) * vf_footprint(view, z)) * inverse);
+    vf distance = vf_gather(pt_cpu_data(push->call, 5), source, lanes); // at level 0
+    vm dense = vf_lt(distance, (vf_set(PT_DENSE) * vf_footprint(view, z)) * inverse);
     uint32_t takes = vm_bits(vm_and(lanes, vm_not(dense)));
     if (!takes)
         return;
@@ -107,7 +111,7 @@ static void take(const struct push *push, const uint32_t *x, uint32_t y, uint32_
             n[k] = vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes);
         vf_ray_of(view, column, row, ray_p);
         vf_ray_of(&push->coarse, px, py, ray_q);
-        vf limit = vf_level_distance(&push->coarse, pt_cpu_data(push->call, 5), normals, source, z, lanes);
+        vf limit = vf_max(distance, vf_footprint(&push->coarse, z) * inverse);
         z = vf_plane_depth(view, n, ray_q, z, ray_p, limit);
     }
     uint32_t zs[PT_LANES], ids[PT_LANES], sources[PT_LANES];
@@ -122,31 +126,39 @@ static void take(const struct push *push, const uint32_t *x, uint32_t y, uint32_
     }
 }
 
-static void push_row(void *context, uint32_t y)
+static size_t row_room(const uint32_t rect[4]) { return rect[2] - rect[0] + 2 * PT_LANES; }
+
+static void push_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct pt_cpu_call *call = context;
     const struct push_args *args = call->arguments;
+    const uint32_t *rect = args->view.rect;
     struct push push = { .call = call, .args = args, .coarse = args->view };
+    uint32_t *taken = (uint32_t *)pt_cpu_scratch(call, 0, 0) + (size_t)thread * row_room(rect);
     push.coarse.level++;
-    uint32_t taken[2 * PT_LANES] = { 0 }, count = 0;
-    for (uint32_t x = args->view.rect[0] & ~1u; x < args->view.rect[2]; x += PT_LANES) {
-        uint32_t bits = covered(&push, x, y, pt_lanes_left(x, args->view.rect[2]));
-        if (x < args->view.rect[0])
-            bits &= ~1u; // the pairs begin before the rectangle
-        for (; bits; bits &= bits - 1)
-            taken[count++] = x + (uint32_t)__builtin_ctz(bits);
-        if (count < PT_LANES)
-            continue;
-        take(&push, taken, y, PT_LANES);
-        memmove(taken, taken + PT_LANES, sizeof taken / 2);
-        count -= PT_LANES;
+    for (uint32_t y = rect[1] + begin; y < rect[1] + end && !pt_cpu_cancelled(call); y++) {
+        uint32_t count = 0;
+        for (uint32_t x = rect[0] & ~1u; x < rect[2]; x += PT_LANES) {
+            uint32_t bits = covered(&push, x, y, pt_lanes_left(x, rect[2]));
+            if (x < rect[0])
+                bits &= ~1u; // the pairs begin before the rectangle
+            for (; bits; bits &= bits - 1)
+                taken[count++] = x + (uint32_t)__builtin_ctz(bits);
+        }
+        // only now: a vector load waits for the scalar stores that it covers
+        for (uint32_t i = 0; i < count; i += PT_LANES)
+            take(&push, taken + i, y, pt_lanes_left(i, count));
     }
-    if (count)
-        take(&push, taken, y, count);
 }
 
 int PT_KERNEL_ENTRY(push)(const struct pt_cpu_call *call)
 {
     const struct push_args *args = call->arguments;
-    return pt_rows(call, &args->view, push_row);
+    const uint32_t *rect = args->view.rect;
+    if (rect[0] >= rect[2] || rect[1] >= rect[3])
+        return PATINA_OK;
+    if (!pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * row_room(rect) * sizeof(uint32_t)))
+        return PATINA_ERROR_MEMORY;
+    pt_parallel(call->pool, rect[3] - rect[1], 8, push_rows, (void *)call);
+    return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

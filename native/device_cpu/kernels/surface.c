@@ -4,8 +4,9 @@
 #include "device_cpu/rows.h"
 #include "device_cpu/simd.h"
 
-static void surface_pixels(const struct surface_args *args, const struct pt_cpu_call *call, uint32_t x, uint32_t y,
-                           uint32_t lanes)
+// word: the surface words of those of PT_LANES pixels from (x, y) on that are the instance's.
+static void surface_pixels(const struct surface_args *args, const struct pt_cpu_call *call, uint32_t x, uint32_t y, vm ours,
+                           vi word)
 {
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
@@ -15,13 +16,8 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     size_t at = (size_t)y * view->width + x;
 
     // 1. the point
-    vi id;
-    vm ours = pt_of_instance(keys + at, instance, lanes, &id);
-    if (!vm_bits(ours))
-        return;
     vf z = vi_float(vi_load_z(keys + at)), ray[2], n[4];
     vf_ray(view, x, y, ray);
-    vi word = vi_gather(pt_cpu_data(call, 1), id, ours);
     vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), ours);
     // 2. its normal, in view space: the cloud's, or the estimate that the normal plane holds
     vm none = vm_not(ours);
@@ -57,14 +53,29 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     vi_store(from + at, vi_add(vi_set((uint32_t)at), vi_lanes()), ours);
 }
 
+// Words lie in file order, each may be a cache miss: a tight loop gathers those of a block, so that many are under way.
+enum { BLOCK = 16 };
+
 static void surface_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
     const struct surface_args *args = call->arguments;
+    const uint32_t *rect = args->view.rect;
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + (size_t)y * args->view.width;
-    for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x += PT_LANES) {
-        pt_fetch_ahead(keys, x + 4 * PT_LANES, args->view.rect[2], &args->instance, pt_cpu_data(call, 1), 4);
-        surface_pixels(args, call, x, y, pt_lanes_left(x, args->view.rect[2]));
+    vi words[BLOCK];
+    vm ours[BLOCK];
+    for (uint32_t first = rect[0]; first < rect[2]; first += BLOCK * PT_LANES) {
+        uint32_t count = (rect[2] - first + PT_LANES - 1) / PT_LANES;
+        count = count < BLOCK ? count : BLOCK;
+        for (uint32_t i = 0; i < count; i++) {
+            uint32_t x = first + i * PT_LANES;
+            vi id;
+            ours[i] = pt_of_instance(keys + x, &args->instance, pt_lanes_left(x, rect[2]), &id);
+            words[i] = vi_gather(pt_cpu_data(call, 1), id, ours[i]);
+        }
+        for (uint32_t i = 0; i < count; i++)
+            if (vm_bits(ours[i]))
+                surface_pixels(args, call, first + i * PT_LANES, y, ours[i], words[i]);
     }
 }
 
