@@ -120,12 +120,19 @@ static inline vi vi_odds(vi a, vi b)
     const vi odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
     return _mm512_permutex2var_epi32(a, odd, b);
 }
-static inline void vi_store_keys(uint64_t *keys, vi z, vi id) // all lanes
+static inline void vi_zip(vi a, vi b, vi out[2]) // a0 b0 a1 b1 ...
 {
     const vi low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
     const vi high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
-    _mm512_storeu_si512(keys, _mm512_permutex2var_epi32(id, low, z));
-    _mm512_storeu_si512(keys + 8, _mm512_permutex2var_epi32(id, high, z));
+    out[0] = _mm512_permutex2var_epi32(a, low, b);
+    out[1] = _mm512_permutex2var_epi32(a, high, b);
+}
+static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
+{
+    vi words[2];
+    vi_zip(id, z, words);
+    _mm512_mask_storeu_epi64(keys, (__mmask8)lanes, words[0]);
+    _mm512_mask_storeu_epi64(keys + 8, (__mmask8)(lanes >> 8), words[1]);
 }
 #define PT_VECTOR(name) _mm512_##name
 
@@ -180,11 +187,19 @@ static inline vi vi_odds(vi a, vi b)
     __m256 mixed = _mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), 0xDD);
     return _mm256_permute4x64_epi64(_mm256_castps_si256(mixed), 0xD8);
 }
-static inline void vi_store_keys(uint64_t *keys, vi z, vi id)
+static inline void vi_zip(vi a, vi b, vi out[2])
 {
-    vi low = _mm256_unpacklo_epi32(id, z), high = _mm256_unpackhi_epi32(id, z);
-    _mm256_storeu_si256((__m256i *)keys, _mm256_permute2x128_si256(low, high, 0x20));
-    _mm256_storeu_si256((__m256i *)(keys + 4), _mm256_permute2x128_si256(low, high, 0x31));
+    vi low = _mm256_unpacklo_epi32(a, b), high = _mm256_unpackhi_epi32(a, b);
+    out[0] = _mm256_permute2x128_si256(low, high, 0x20);
+    out[1] = _mm256_permute2x128_si256(low, high, 0x31);
+}
+static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
+{
+    const vi each = _mm256_setr_epi64x(1, 2, 4, 8), low = _mm256_set1_epi64x(lanes), high = _mm256_set1_epi64x(lanes >> 4);
+    vi words[2];
+    vi_zip(id, z, words);
+    _mm256_maskstore_epi64((long long *)keys, _mm256_cmpeq_epi64(_mm256_and_si256(low, each), each), words[0]);
+    _mm256_maskstore_epi64((long long *)keys + 4, _mm256_cmpeq_epi64(_mm256_and_si256(high, each), each), words[1]);
 }
 static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
 static inline vm vm_first(uint32_t n) { return _mm256_cmpgt_epi32(_mm256_set1_epi32((int)n), vi_lanes()); }
@@ -285,10 +300,19 @@ static inline vi vi_odds(vi a, vi b)
 {
     return _mm_castps_si128(_mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), 0xDD));
 }
-static inline void vi_store_keys(uint64_t *keys, vi z, vi id)
+static inline void vi_zip(vi a, vi b, vi out[2])
 {
-    _mm_storeu_si128((__m128i *)keys, _mm_unpacklo_epi32(id, z));
-    _mm_storeu_si128((__m128i *)(keys + 2), _mm_unpackhi_epi32(id, z));
+    out[0] = _mm_unpacklo_epi32(a, b);
+    out[1] = _mm_unpackhi_epi32(a, b);
+}
+static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
+{
+    uint64_t words[4];
+    _mm_storeu_si128((__m128i *)words, _mm_unpacklo_epi32(id, z));
+    _mm_storeu_si128((__m128i *)(words + 2), _mm_unpackhi_epi32(id, z));
+    for (int k = 0; k < 4; k++)
+        if (lanes >> k & 1u)
+            keys[k] = words[k];
 }
 static inline vm vm_first(uint32_t n) { return _mm_cmpgt_epi32(_mm_set1_epi32((int)n), vi_lanes()); }
 static inline vm vm_of_bits(uint32_t bits)
@@ -407,6 +431,16 @@ static inline vi vi_load_id(const uint64_t *keys) { return vi_evens(vi_load(keys
 #if PT_LANES == 1
 static inline vi vi_pairs(vi a) { return a; }
 static inline vi vi_sides(vi a) { return a; } // of an even pixel
+static inline void vi_zip(vi a, vi b, vi out[2])
+{
+    out[0] = a;
+    out[1] = b;
+}
+static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
+{
+    if (lanes)
+        *keys = (uint64_t)z << 32 | id;
+}
 static inline void vf_stream(float *p, vf a) { *p = a; }
 static inline vf vf_mul_where(vm m, vf a, vf b) { return m ? a * b : 0.0f; }
 static inline vf vf_add_where(vm m, vf a, vf b) { return m ? a + b : a; }

@@ -2,7 +2,7 @@
 // push: empty or occluded pixels take the key of their coarse parent, where two of the three coarse cells on their side
 // are covered too (else every edge would grow by a coarse pixel). SPEC 2.2; twin of shaders/kernels/push.comp
 //
-// Vectors look for a row's pixels whose parent is nearer; those that take its key are listed and taken in full vectors.
+// Vectors walk along coarse cells: what the cells' surfaces give is fetched once for the four pixels of each.
 #include "device_cpu/rows.h"
 
 struct push {
@@ -87,46 +87,101 @@ static uint32_t covered(const struct push *push, uint32_t x, uint32_t y, uint32_
     return vm_bits(vm_and(asked, vi_lt_unsigned(vi_set(1), sides)));
 }
 
-// 2. The parent's key, where its surface is not dense at this level; refined: its surface's tangent plane here. `x`: the
-// row's pixels that may take it.
-static void take(const struct push *push, const uint32_t *x, uint32_t y, uint32_t count)
+// Bit i becomes bits 2 i and 2 i + 1.
+static uint32_t twice(uint32_t bits)
+{
+    bits = (bits | bits << 8) & 0x00FF00FFu;
+    bits = (bits | bits << 4) & 0x0F0F0F0Fu;
+    bits = (bits | bits << 2) & 0x33333333u;
+    bits = (bits | bits << 1) & 0x55555555u;
+    return bits * 3u;
+}
+
+struct parents { // PT_LANES coarse cells from (x, y) on, and their surfaces
+    uint32_t x, y;
+    vi id, source;
+    vf z, n[3], ray[2], limit;
+    uint32_t give; // cells whose surface is not dense at the fine level
+};
+
+static void load_parents(const struct push *push, uint32_t x, uint32_t y, struct parents *p)
 {
     const struct view_args *view = &push->args->view;
-    const uint64_t *coarse_keys = pt_cpu_data(push->call, 0);
     const float *normals = pt_cpu_data(push->call, 4);
-    vm lanes = vm_first(count);
-    vi column = vi_load(x), row = vi_set(y), px = vi_shr(column, 1), py = vi_set(y >> 1);
-    vi parent = vi_add(vi_mul(py, vi_set(push->args->coarse_width)), px);
-    vi source = vi_gather(pt_cpu_data(push->call, 1), parent, lanes), id = vi_gather_id(coarse_keys, parent, lanes);
-    vf z = vi_float(vi_gather_z(coarse_keys, parent, lanes));
-    vf inverse = vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(3)), lanes);
-    vf distance = vf_gather(pt_cpu_data(push->call, 5), source, lanes); // at level 0
-    vm dense = vf_lt(distance, (vf_set(PT_DENSE) * vf_footprint(view, z)) * inverse);
-    uint32_t takes = vm_bits(vm_and(lanes, vm_not(dense)));
-    if (!takes)
+    const size_t at = (size_t)y * push->args->coarse_width + x;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(push->call, 0) + at;
+    p->x = x;
+    p->y = y;
+    p->z = vi_float(vi_load_z(keys));
+    p->id = vi_load_id(keys);
+    p->source = vi_load((const uint32_t *)pt_cpu_data(push->call, 1) + at);
+    vm some = vm_and(vm_first(pt_lanes_left(x, push->args->coarse_width)), vf_lt(p->z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
+    vi word = vi_mul(p->source, vi_set(4));
+    vf inverse = vf_gather(normals + 3, word, some);
+    vf distance = vf_gather(pt_cpu_data(push->call, 5), p->source, some); // at level 0
+    p->give = vm_bits(vm_and(some, vm_not(vf_lt(distance, (vf_set(PT_DENSE) * vf_footprint(view, p->z)) * inverse))));
+    if (!p->give || !push->args->refined)
         return;
-    if (push->args->refined) {
-        vf n[3], ray_p[2], ray_q[2];
-        for (uint32_t k = 0; k < 3; k++)
-            n[k] = vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes);
-        vf_ray_of(view, column, row, ray_p);
-        vf_ray_of(&push->coarse, px, py, ray_q);
-        vf limit = vf_max(distance, vf_footprint(&push->coarse, z) * inverse);
-        z = vf_plane_depth(view, n, ray_q, z, ray_p, limit);
-    }
-    uint32_t zs[PT_LANES], ids[PT_LANES], sources[PT_LANES];
-    vi_store(zs, vf_bits(z), vm_first(PT_LANES));
-    vi_store(ids, id, vm_first(PT_LANES));
-    vi_store(sources, source, vm_first(PT_LANES));
-    for (; takes; takes &= takes - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(takes);
-        size_t at = (size_t)y * view->width + x[i];
-        ((uint64_t *)pt_cpu_data(push->call, 2))[at] = (uint64_t)zs[i] << 32 | ids[i];
-        ((uint32_t *)pt_cpu_data(push->call, 3))[at] = sources[i];
+    for (uint32_t k = 0; k < 3; k++)
+        p->n[k] = vf_gather(normals + k, word, some);
+    vf_ray(&push->coarse, x, y, p->ray);
+    p->limit = vf_max(distance, vf_footprint(&push->coarse, p->z) * inverse);
+}
+
+// z of the cells' pixels of column 0 or 1, row y: refined, of the surface's tangent plane there.
+static vi pixel_z(const struct push *push, const struct parents *p, uint32_t column, uint32_t y)
+{
+    if (!push->args->refined)
+        return vf_bits(p->z);
+    vi cell = vi_add(vi_set(p->x), vi_lanes());
+    vf ray[2];
+    vf_ray_of(&push->args->view, vi_add(vi_add(cell, cell), vi_set(column)), vi_set(y), ray);
+    return vf_bits(vf_plane_depth(&push->args->view, p->n, p->ray, p->z, ray, p->limit));
+}
+
+// 2. The pixels of row y that `bits` names, PT_LANES in each half, take their parents' keys.
+static void take(const struct push *push, const struct parents *p, uint32_t y, const uint32_t bits[2])
+{
+    vi z[2], id[2], source[2];
+    vi_zip(pixel_z(push, p, 0, y), pixel_z(push, p, 1, y), z);
+    vi_zip(p->id, p->id, id);
+    vi_zip(p->source, p->source, source);
+    for (uint32_t half = 0; half < 2; half++) {
+        if (!bits[half])
+            continue;
+        size_t at = (size_t)y * push->args->view.width + 2 * p->x + half * PT_LANES;
+        vi_store_keys((uint64_t *)pt_cpu_data(push->call, 2) + at, z[half], id[half], bits[half]);
+        vi_store((uint32_t *)pt_cpu_data(push->call, 3) + at, source[half], vm_of_bits(bits[half]));
     }
 }
 
-static size_t row_room(const uint32_t rect[4]) { return rect[2] - rect[0] + 2 * PT_LANES; }
+static uint32_t covered_in_rect(const struct push *push, uint32_t x, uint32_t y)
+{
+    const uint32_t *rect = push->args->view.rect;
+    if (x >= rect[2] || y < rect[1] || y >= rect[3])
+        return 0;
+    uint32_t bits = covered(push, x, y, pt_lanes_left(x, rect[2]));
+    return x < rect[0] ? bits & ~((1u << (rect[0] - x)) - 1u) : bits;
+}
+
+static void push_cells(const struct push *push, uint32_t x, uint32_t y)
+{
+    uint32_t bits[2][2], any = 0;
+    for (uint32_t row = 0; row < 2; row++)
+        for (uint32_t half = 0; half < 2; half++)
+            any |= bits[row][half] = covered_in_rect(push, 2 * x + half * PT_LANES, 2 * y + row);
+    if (!any)
+        return;
+    struct parents parents;
+    load_parents(push, x, y, &parents);
+    uint32_t give = twice(parents.give);
+    for (uint32_t row = 0; row < 2; row++) {
+        for (uint32_t half = 0; half < 2; half++)
+            bits[row][half] &= give >> half * PT_LANES;
+        if (bits[row][0] | bits[row][1])
+            take(push, &parents, 2 * y + row, bits[row]);
+    }
+}
 
 static void push_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
@@ -134,21 +189,11 @@ static void push_rows(void *context, uint32_t begin, uint32_t end, uint32_t thre
     const struct push_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
     struct push push = { .call = call, .args = args, .coarse = args->view };
-    uint32_t *taken = (uint32_t *)pt_cpu_scratch(call, 0, 0) + (size_t)thread * row_room(rect);
+    (void)thread;
     push.coarse.level++;
-    for (uint32_t y = rect[1] + begin; y < rect[1] + end && !pt_cpu_cancelled(call); y++) {
-        uint32_t count = 0;
-        for (uint32_t x = rect[0] & ~1u; x < rect[2]; x += PT_LANES) {
-            uint32_t bits = covered(&push, x, y, pt_lanes_left(x, rect[2]));
-            if (x < rect[0])
-                bits &= ~1u; // the pairs begin before the rectangle
-            for (; bits; bits &= bits - 1)
-                taken[count++] = x + (uint32_t)__builtin_ctz(bits);
-        }
-        // only now: a vector load waits for the scalar stores that it covers
-        for (uint32_t i = 0; i < count; i += PT_LANES)
-            take(&push, taken + i, y, pt_lanes_left(i, count));
-    }
+    for (uint32_t y = begin; y < end && !pt_cpu_cancelled(call); y++)
+        for (uint32_t x = rect[0] / 2; 2 * x < rect[2]; x += PT_LANES)
+            push_cells(&push, x, rect[1] / 2 + y);
 }
 
 int PT_KERNEL_ENTRY(push)(const struct pt_cpu_call *call)
@@ -157,8 +202,6 @@ int PT_KERNEL_ENTRY(push)(const struct pt_cpu_call *call)
     const uint32_t *rect = args->view.rect;
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
-    if (!pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * row_room(rect) * sizeof(uint32_t)))
-        return PATINA_ERROR_MEMORY;
-    pt_parallel(call->pool, rect[3] - rect[1], 8, push_rows, (void *)call);
+    pt_parallel(call->pool, (rect[3] + 1) / 2 - rect[1] / 2, 4, push_rows, (void *)call);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
