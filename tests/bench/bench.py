@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speed against error: a random torus at 1024x1024 on every device, with its exact picture beside every time.
+"""Speed against error: known scenes on every device, the exact picture beside every time, other programs, the paper's table.
 
-    build/bench [--quick] [--compare OLD.json] [--device NAME]... [--points N]... [--out FOLDER]
+    build/bench [--quick | --full] [--compare OLD.json] [--device NAME]... [--only GROUP]... [--out FOLDER] [--readme]
 
-Writes bench.md, bench.json and bench.png. Times are figures, never verdicts: nothing here passes or fails.
+Writes bench.md, bench.json, plots and bench.html, which shows them all, to build/out/bench. Times are figures, never
+verdicts: nothing here passes or fails. bench.json: "rows" hold scene, mode, device, width, height, points, quality, threads,
+ms_median, ms_min, ms_max, peak_mb, passes {name: ms}, error {metric: value}; "details" hold what else is known of them, in
+the same order; "absent" what could not be measured, and why.
+
+    --quick   one size and density of each scene: within two minutes
+    --full    scenes x devices x qualities x sizes x densities, and 10^8 points where memory allows: hours
 """
 
 from __future__ import annotations
@@ -12,102 +18,161 @@ import argparse
 import datetime
 import json
 import os
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
-import case as one_case
+import case as cases
 import machine
+import page
+import papers
+import peers
+import plots
+import readme
 import report
-import truth
+import stage
 
 ROOT = Path(__file__).resolve().parents[2]
-SIZE = 1024
+LARGEST = 20_000_000  # points of a case in the product of scenes and densities
+SURFACES = list(stage.scenes.SURFACES)
+GROUPS = ("headline", "points", "pixels", "threads", "scenes", "patterns", "steady", "papers", "peers")
 
 
-def cases(options: argparse.Namespace) -> list[dict[str, Any]]:
-    """device, points, quality, threads of each row; the GL devices may be software: one size is enough there."""
-    devices = options.device or ["cpu", "gl-egl", "gl-osmesa"]
-    sizes = options.points or ([100_000, 1_000_000] if options.quick else [100_000, 1_000_000, 10_000_000])
-    chosen = []
-    for device in devices:
-        for points in sizes:
-            if device.startswith("gl") and points != 1_000_000 and not options.points:
-                continue
-            chosen.append((device, points, "refined", 0))
-            if points == 1_000_000:
-                chosen.append((device, points, "paper", 0))
-        if device == "cpu" and not options.quick and machine.cores() > 1:
-            chosen.append((device, 1_000_000, "refined", 1))
-    return [{"scene": "torus", "mode": "surface", "device": device, "width": SIZE, "height": SIZE, "points": points,
-             "quality": quality, "threads": threads, "frames": options.frames}
-            for device, points, quality, threads in chosen]
+def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0, density: float = 0,
+            quality: str = "refined", threads: int = 0, frames: int = 24, pattern: str = "random", noise: float = 0.0,
+            **more: Any) -> dict[str, Any]:
+    label = surface + (f" {pattern}" if pattern != "random" else "") + (f" noise {noise:g}" if noise else "")
+    return {"group": group, "scene": label, "surface": surface, "mode": "surface", "device": device, "width": size,
+            "height": size, "points": points or stage.density_count(surface, density, size), "density": density,
+            "quality": quality, "threads": threads, "frames": frames, "pattern": pattern, "noise": noise, **more}
 
 
-def run(case: dict[str, Any]) -> dict[str, Any]:
-    """The row of a case, measured in a fresh process."""
-    done = subprocess.run([sys.executable, str(Path(one_case.__file__))], input=json.dumps(case), text=True,
-                          stdout=subprocess.PIPE, cwd=Path(__file__).parent)
-    if done.returncode:
-        return {**case, "unavailable": f"the case ended with status {done.returncode}"}
-    return json.loads(done.stdout)
+def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
+    """The cases of this run, those that the headline needs first."""
+    quick, full, n = options.quick, options.full, options.frames
+    gl = [name for name in options.device if name.startswith("gl")]
+    found = []
+    for device in options.device:
+        found.append(case_of("headline", device=device, points=1_000_000, frames=n, uploads=1))
+        if not (quick and device in gl):
+            found.append(case_of("headline", device=device, points=1_000_000, quality="paper", frames=n))
+    main = options.device[0]
+    found.append(case_of("headline", device=main, points=1_000_000, quality="unfilled", frames=n))
+    counts = [100_000] if quick else [10_000, 100_000, 10_000_000] + [100_000_000] * full
+    found += [case_of("points", device=main, points=count, frames=n, uploads=1) for count in counts]
+    if not quick:
+        found += [case_of("points", device=name, points=count, frames=7) for name in gl for count in (10_000, 100_000)]
+        found += [case_of("pixels", device=main, size=size, points=1_000_000, frames=n)
+                  for size in [256, 512, 2048] + [4096] * full]
+        found += [case_of("threads", device=main, points=1_000_000, threads=threads, frames=n)
+                  for threads in sorted({1, *(2**k for k in range(1, 8) if 2**k <= machine.cores()), machine.cores()})]
+    frames = 5 if quick else 9
+    sizes = [256, 512, 1024] if full else [256]
+    densities = [1.0] if quick else [0.1, 0.3, 1.0, 3.0, 10.0, 30.0]
+    for surface in SURFACES:
+        for size in sizes:
+            for density in densities:
+                for quality in ["refined"] if quick else ["refined", "paper"]:
+                    found += [case_of("scenes", surface, device, size, density=density, quality=quality, frames=frames)
+                              for device in options.device
+                              if device == main or full or (density == 1.0 and not quick)]
+    if not quick:
+        found += [case_of("patterns", surface, main, 512, density=density, pattern=pattern, noise=noise, frames=frames)
+                  for surface in ("torus", "corner") for density in (0.3, 1.0, 4.0)
+                  for pattern in ("random", "blue", "scan") for noise in (0.0, 0.5, 1.0)]
+        found += [case_of("steady", surface, main, 256, density=density, frames=frames, steady=1)
+                  for surface in ("torus", "corner", "plane75") for density in (0.3, 1.0, 4.0)]
+    else:
+        found.append(case_of("steady", "sphere", main, 256, density=1.0, frames=frames, steady=1))
+    found += papers.cases(main, quick)
+    return [one for one in found if not options.only or one["group"] in options.only]
+
+
+def too_large(case: dict[str, Any]) -> str:
+    """Why a case is left out, or ""."""
+    if case["group"] == "scenes" and case["points"] > LARGEST:
+        return f"{case['points']:,} points, more than the {LARGEST:,} of this table"
+    need = case["points"] * 90 / 2**20  # our cloud while it is built, beside the arrays
+    free = machine.memory_free()
+    return f"needs about {need:.0f} MB, {free:.0f} are free" if need > free else ""
+
+
+def split(result: dict[str, Any], row: dict[str, Any]) -> None:
+    """Puts a measured case where it belongs."""
+    if "unavailable" in row:
+        result["absent"].append({key: row.get(key) for key in ("group", "scene", "mode", "device", "points", "quality",
+                                                               "unavailable")})
+        return
+    result["rows"].append({name: row[name] for name in cases.FIELDS})
+    result["details"].append({key: value for key, value in row.items() if key not in cases.FIELDS})
 
 
 def measure(options: argparse.Namespace) -> dict[str, Any]:
     os.environ["PATINA_LIBRARY"] = str(options.library)
+    stage.tidy()
     result = {
         "date": datetime.date.today().isoformat(), "processor": machine.processor(), "cores": machine.cores(),
-        "load": os.getloadavg()[0],
-        "version": one_case.native.library().patina_version().decode(), "frames": options.frames,
-        "distance": truth.DISTANCE, "elevation": truth.ELEVATION, "fov": truth.FOV,
-        "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1), "rows": [],
+        "load": os.getloadavg()[0], "version": cases.native.library().patina_version().decode(), "frames": options.frames,
+        "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
+        "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
+        "rows": [], "details": [], "absent": [],
     }
-    with tempfile.TemporaryDirectory() as folder:
-        exact = str(Path(folder) / "truth.npz")
-        truth.cast(truth.view(0.0), SIZE).save(exact)
-        for case in cases(options):
-            row = run({**case, "library": str(options.library), "truth": exact})
-            row.pop("library", None)
-            row.pop("truth", None)
-            if "unavailable" in row:
-                print(f"skip {row['device']}: {row['unavailable']}", file=sys.stderr)
-            else:
-                moved = 12 * row["points"] + row["plane_bytes"]
-                row["floor_ms"] = moved / result["bandwidth"] / 1e6
-                print(f"{report.name_of(row)}, {row['points']} points, {row['quality']}: {row['ms_median']:.2f} ms "
-                      f"({row['ms_min']:.2f} to {row['ms_max']:.2f})", file=sys.stderr)
-            result["rows"].append(row)
+    for case in chosen(options):
+        reason = too_large(case)
+        row = {**case, "unavailable": reason} if reason else cases.run(case, str(options.library))
+        if "unavailable" not in row:
+            row["floor_ms"] = (12 * row["points"] + row["plane_bytes"]) / result["bandwidth"] / 1e6
+        say(row)
+        split(result, row)
+    if not options.only or "peers" in options.only:
+        for row in peers.measure(options.quick, options.library):
+            say(row)
+            split(result, row)
     return result
+
+
+def say(row: dict[str, Any]) -> None:
+    name = f"{row['group']}: {row['scene']}, {row['mode']}, {report.name_of(row)}, {row['width']}, " \
+           f"{row['points']:,} points, {row['quality']}"
+    if "unavailable" in row:
+        print(f"skip {name}: {row['unavailable']}", file=sys.stderr)
+    else:
+        print(f"{name}: {row['ms_median']:.2f} ms ({row['ms_min']:.2f} to {row['ms_max']:.2f})", file=sys.stderr)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer sizes: at most two minutes")
+    amount = parser.add_mutually_exclusive_group()
+    amount.add_argument("--quick", action="store_true", help="at most two minutes")
+    amount.add_argument("--full", action="store_true", help="the whole product: hours")
     parser.add_argument("--compare", type=Path, metavar="OLD.json", help="print ratios to an older run")
-    parser.add_argument("--device", action="append", help="default: cpu, gl-egl, gl-osmesa")
-    parser.add_argument("--points", action="append", type=int)
-    parser.add_argument("--frames", type=int, default=24, help="measured frames a case (default 24)")
+    parser.add_argument("--device", action="append", help="default: cpu, gl-egl, gl-osmesa; the first carries most cases")
+    parser.add_argument("--only", action="append", choices=GROUPS, help="these groups of cases")
+    parser.add_argument("--frames", type=int, default=24, help="measured frames a case, at most (default 24)")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/bench")
     parser.add_argument("--library", type=Path, default=ROOT / "build/out/release/libpatina.so")
+    parser.add_argument("--readme", action="store_true", help="write the figures into README.md and .pictures/")
+    parser.add_argument("--from", dest="source", type=Path, metavar="BENCH.json", help="measure nothing: tables of that run")
     options = parser.parse_args()
     options.library = options.library.resolve()
-    if not options.library.is_file():
+    options.device = options.device or ["cpu", "gl-egl"] + ["gl-osmesa"] * (not options.quick)
+    if not options.library.is_file() and not options.source:
         parser.error(f"there is no {options.library}: run build/compile first")
     old = json.loads(options.compare.read_text()) if options.compare else None
 
-    result = measure(options)
+    result = json.loads(options.source.read_text()) if options.source else measure(options)
     text = report.markdown(result)
     if old:
         text += "\n" + report.compare(result, old)
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "bench.md").write_text(text)
     (options.out / "bench.json").write_text(json.dumps(result, indent=1))
-    if any("unavailable" not in row for row in result["rows"]):
-        report.plot(result, options.out / "bench.png")
+    drawn = plots.draw(result, options.out)
+    (options.out / "bench.html").write_text(page.html(text, drawn))
     print(text)
-    print(f"written: {options.out}/bench.md, bench.json, bench.png")
+    print("written to " + str(options.out) + ": " + ", ".join(["bench.md", "bench.json", "bench.html", *drawn]))
+    if options.readme:
+        print(readme.update(result, ROOT))
     return 0
 
 

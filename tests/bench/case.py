@@ -1,55 +1,90 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One case of the bench, in a process of its own so that its peak memory is its own: JSON in, one JSON row out."""
+"""One case of the bench: a scene on a device, timed, and held against the exact picture. Runs in a process of its own, so
+that its peak memory is its own."""
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "addon"))
+import numpy as np
 
-import native  # noqa: E402  the add-on's binding, the only one there is
+sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "addon"), str(Path(__file__).resolve().parent)]
+
 import machine  # noqa: E402
-import truth  # noqa: E402
+import metrics  # noqa: E402
+import native  # noqa: E402  the add-on's binding, the only one there is
+import stage as stages  # noqa: E402
 
 WARM_UP = 4
-QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill": 1}}
+PATIENCE = 6.0  # seconds of frames, after which a slow case stops at five
+QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill": 1, "fill_iterations": 1},
+             "unfilled": {"quality": 1, "fill": 2}}
+STEADY_FRAMES, STEADY_STEP = 8, 0.05  # pictures and degrees between them: a third of a pixel at 1024
+FIELDS = ("scene", "mode", "device", "width", "height", "points", "quality", "threads", "ms_median", "ms_min", "ms_max",
+          "peak_mb", "passes", "error")  # of a row, as the README and other programs know it
 
 
-def uploads(points: int, runs: int) -> tuple[native.Cloud, list[float]]:
-    arrays = truth.torus(points)
-    cloud, times = None, []
-    for _ in range(runs):
-        start = time.perf_counter()
-        cloud = native.Cloud(*arrays)
-        times.append(1e3 * (time.perf_counter() - start))
-    return cloud, times
+@dataclass(frozen=True)
+class Mode:
+    """What a mode asks for beyond lit surfaces: fields of patina_settings, patina_cloud_style and patina_light_desc."""
+
+    settings: dict[str, Any] = field(default_factory=dict)
+    style: dict[str, Any] = field(default_factory=dict)
+    light: dict[str, Any] = field(default_factory=dict)
+
+    def missing(self) -> str:
+        """The first field that the binding does not have yet, or ""."""
+        for wanted, known in ((self.settings, native._Settings), (self.style, native._CloudStyle),
+                              (self.light, native._LightDesc)):
+            names = {name for name, *_ in known._fields_}
+            for name in wanted:
+                if name not in names:
+                    return name
+        return ""
 
 
-def scene_of(cloud: native.Cloud, case: dict[str, Any]) -> native.Scene:
-    scene = native.Scene()
-    scene.add_cloud(cloud, lighting=2, cull_back=1)
-    scene.add_light(type=1, power=truth.SUN_POWER, direction=(-truth.SUN).tolist())
-    scene.set_settings(width=case["width"], height=case["height"], film_transparent=1,
-                       world_color=[truth.WORLD] * 3, **QUALITIES[case["quality"]])
-    return scene
+# The papers' columns. A mode whose fields the library lacks is listed as not built yet.
+MODES = {
+    "surface": Mode(),
+    "3 layers": Mode(settings={"layers": 3}, style={"opacity": 0.5}),
+    "6 layers": Mode(settings={"layers": 6}, style={"opacity": 0.5}),
+    "shadows 1": Mode(settings={"shadow_samples": 1}, light={"shadows": 1}),
+    "shadows 5": Mode(settings={"shadow_samples": 5}, light={"shadows": 1, "angle": 0.1}),
+    "shadows 10": Mode(settings={"shadow_samples": 10}, light={"shadows": 1, "angle": 0.1}),
+}
 
 
-def frames(frame: native.Frame, scene: native.Scene, count: int) -> dict[str, Any]:
+def fill_scene(scene: native.Scene, cloud: native.Cloud, shown: stages.Stage, mode: Mode, turn: float) -> None:
+    """Adds cloud and lights. Where lights cast shadows, they turn too: a kept shadow texture would be no work."""
+    scene.add_cloud(cloud, **{**shown.style, **mode.style})
+    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    for light in shown.lights:
+        light = {**light, **mode.light}
+        if mode.light:
+            x, y, z = light["direction"]
+            light["direction"] = [c * x - s * y, s * x + c * y, z]
+        scene.add_light(**light)
+
+
+def frames(frame: native.Frame, make: Any, count: int) -> dict[str, Any]:
     """A camera that turns one degree a frame: times; medians of the passes and of what is in none of them ("rest"); why
     other passes are left out. work: processor time, all threads, which other programs hardly disturb."""
     times, work, passes, skipped = [], [], {}, {}
+    began = time.perf_counter()
     for i in range(count + WARM_UP):
-        scene.set_camera(**truth.view(float(i)).fields())
+        scene = make(float(i))
         start, spent = time.perf_counter(), time.process_time()
         frame.render(scene)
         elapsed = 1e3 * (time.perf_counter() - start)
-        if i < WARM_UP:
+        if i < WARM_UP and time.perf_counter() - began < 0.5 * PATIENCE:
             continue
         times.append(elapsed)
         work.append(1e3 * (time.process_time() - spent))
@@ -58,46 +93,88 @@ def frames(frame: native.Frame, scene: native.Scene, count: int) -> dict[str, An
         rest = elapsed - sum(stats["passes"].values())
         for name, ms in {**stats["passes"], "rest": rest}.items():
             passes.setdefault(name, []).append(ms)
-    return {"frames": count, "ms_median": median(times), "ms_min": min(times), "ms_max": max(times),
+        if len(times) >= 5 and time.perf_counter() - began > PATIENCE:
+            break
+    return {"frames": len(times), "ms_median": median(times), "ms_min": min(times), "ms_max": max(times),
             "work_ms": median(work), "passes": {name: median(values) for name, values in passes.items()},
             "skipped": skipped}
 
 
-def run(case: dict[str, Any]) -> dict[str, Any]:
+def picture(frame: native.Frame) -> metrics.Shown:
+    return metrics.Shown(frame.read("COMBINED"), frame.read("DEPTH")[..., 0], frame.read("NORMAL"))
+
+
+def steadiness(frame: native.Frame, make: Any, shown: stages.Stage, width: int, height: int) -> dict[str, float]:
+    steady = metrics.Steadiness()
+    for i in range(STEADY_FRAMES):
+        frame.render(make(i * STEADY_STEP))
+        steady.add(shown.exact(i * STEADY_STEP, width, height), picture(frame))
+    return steady.result()
+
+
+def measure(case: dict[str, Any]) -> dict[str, Any]:
+    """The row's fields and more."""
+    base = machine.memory_now()
+    mode = MODES[case["mode"]]
+    if mode.missing():
+        raise native.PatinaError(f"not built yet: the library has no '{mode.missing()}'")
     device = native.Device(case["device"], case["threads"])
-    cloud, upload_ms = uploads(case["points"], 3 if case["points"] <= 1_000_000 else 1)
+    shown = stages.stage_of(case)
+    upload_ms = []
+    for _ in range(3 if case["points"] <= 1_000_000 and case.get("uploads") else 1):
+        start = time.perf_counter()
+        cloud = native.Cloud(shown.position, shown.normal, shown.color)
+        upload_ms.append(1e3 * (time.perf_counter() - start))
+    spacing, count, scene_known = shown.spacing, len(shown.position), shown.scene is not None
+    shown = stages.Stage(**{**vars(shown), "position": None, "normal": None, "color": None})  # the cloud has its own
     machine.reset_peak()
-    scene = scene_of(cloud, case)
+
+    def make(turn: float) -> native.Scene:
+        scene = native.Scene()
+        fill_scene(scene, cloud, shown, mode, turn)
+        scene.set_settings(width=case["width"], height=case["height"], film_transparent=1, world_color=[0.05] * 3,
+                           **{**QUALITIES[case["quality"]], **mode.settings})
+        scene.set_camera(**shown.camera(turn).fields())
+        return scene
+
     frame = native.Frame(device)
-    timing = frames(frame, scene, case["frames"])
-    peak = machine.memory_peak()
+    timing = frames(frame, make, case["frames"])
+    peak = machine.memory_peak() - base
     stats = frame.stats()
-
-    scene.set_camera(**truth.view(0.0).fields())
-    frame.render(scene)
+    frame.render(make(0.0))
     start = time.perf_counter()
-    depth, normal, rgba = frame.read("DEPTH")[..., 0], frame.read("NORMAL"), frame.read("COMBINED")
+    planes = picture(frame)
     read_ms = 1e3 * (time.perf_counter() - start)
-    exact = truth.Picture.load(case["truth"])
-    return {
-        **{name: case[name] for name in ("scene", "mode", "device", "width", "height", "points", "quality", "threads")},
-        "device_name": device.name, "device_description": device.description, **timing, "read_ms": read_ms,
-        "upload_ms": median(upload_ms), "peak_mb": peak, "plane_bytes": stats["plane_bytes"],
-        "cloud_bytes": cloud.bytes, "points_scattered": stats["points_scattered"],
-        "error": truth.errors(exact, depth, normal, rgba, case["points"]),
-    }
+    error = {}
+    if scene_known and mode == MODES["surface"]:
+        error = metrics.errors(shown.exact(0.0, case["width"], case["height"]), planes, spacing)
+        if case.get("steady"):
+            error |= steadiness(frame, make, shown, case["width"], case["height"])
+    return {**case, "points": count, **timing, "peak_mb": peak, "error": error, "device_name": device.name,
+            "device_description": device.description, "read_ms": read_ms, "upload_ms": median(upload_ms),
+            "plane_bytes": stats["plane_bytes"], "cloud_bytes": cloud.bytes,
+            "points_scattered": stats["points_scattered"]}
 
 
-def main() -> int:
-    case = json.load(sys.stdin)
-    os.environ["PATINA_LIBRARY"] = case["library"]
+def _work(case: dict[str, Any], library: str, answer: Connection) -> None:
+    os.environ["PATINA_LIBRARY"] = library
     try:
-        row = run(case)
-    except native.PatinaError as error:
-        row = {**case, "unavailable": str(error)}
-    json.dump(row, sys.stdout)
-    return 0
+        answer.send(measure(case))
+    except (native.PatinaError, RuntimeError, MemoryError) as error:
+        answer.send({**case, "unavailable": str(error) or type(error).__name__})
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def run(case: dict[str, Any], library: str) -> dict[str, Any]:
+    """The case, measured in a fresh process."""
+    context = get_context("forkserver")
+    context.set_forkserver_preload(["case"])
+    answer, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_work, args=(case, library, theirs))
+    process.start()
+    theirs.close()
+    try:
+        result = answer.recv()
+    except EOFError:
+        result = None
+    process.join()
+    return result or {**case, "unavailable": f"the case ended with status {process.exitcode}"}

@@ -75,3 +75,14 @@ def _status(name: str) -> float:
     except OSError:
         pass
     return 0.0
+
+
+def memory_free() -> float:
+    """MB that programs may still take; plenty where the system does not tell."""
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) / 1024.0
+    except OSError:
+        pass
+    return float("inf")

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bench's plots: speed against error, time against points, pixels and threads, time by pass, error against density."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+from report import count, joined, name_of, pass_names  # noqa: E402
+
+Row = dict[str, Any]
+
+
+def front(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Those that no other beats in both, by x."""
+    best, found = float("inf"), []
+    for x, y in sorted(places):
+        if y < best:
+            best = y
+            found.append((x, y))
+    return found
+
+
+def _color(row: Row) -> str:
+    if row["group"] == "peers":
+        return "tab:gray"
+    return "tab:blue" if name_of(row).startswith("cpu") else "tab:orange"
+
+
+def pareto(rows: list[Row], path: Path, title: str) -> bool:
+    """1M random torus points at 1024 x 1024: time against coverage, depth and colour error."""
+    shown = (("1 − IoU of coverage", lambda e: 1.0 - e["coverage_iou"]), ("depth rms, spacings",
+             lambda e: e["depth_rms_spacings"]), ("colour rms, linear", lambda e: e["color_rms"]))
+    if not rows:
+        return False
+    figure, axes = plt.subplots(1, 3, figsize=(15, 5.4))
+    for axis, (label, value) in zip(axes, shown):
+        places, texts = [], []
+        for row in rows:
+            try:
+                y = max(value(row["error"]), 1e-4)
+            except KeyError:
+                continue
+            places.append((row["ms_median"], y))
+            kind = row["device"] if row["group"] == "peers" else f"{name_of(row)} {row['quality']}"
+            axis.plot(row["ms_median"], y, "s" if row["group"] == "peers" else "o", color=_color(row))
+            texts.append((row["ms_median"], y, kind))
+        for k, (x, y, kind) in enumerate(sorted(texts, key=lambda text: text[1])):
+            axis.annotate(kind, (x, y), xytext=(6, -3 + 7 * (k % 2)), textcoords="offset points", fontsize=7)
+        line = front(places)
+        axis.plot(*zip(*line), "-", color="tab:green", linewidth=1, zorder=0, label="Pareto front")
+        axis.set(xscale="log", yscale="log", xlabel="ms a frame", ylabel=label)
+        axis.margins(0.25, 0.12)
+        axis.grid(True, which="both", alpha=0.2)
+        axis.legend(fontsize=8, loc="lower right")
+    figure.suptitle(f"Speed against error, 1,000,000 points, 1024×1024 (lower left is better): {title}", fontsize=10)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return True
+
+
+def _lines(axis: Any, rows: list[Row], key: Any, floor: bool = False) -> None:
+    for name in dict.fromkeys(row["device"] for row in rows):
+        line = sorted((row for row in rows if row["device"] == name), key=key)
+        middle = [row["ms_median"] for row in line]
+        low = [row["ms_median"] - row["ms_min"] for row in line]
+        high = [row["ms_max"] - row["ms_median"] for row in line]
+        axis.errorbar([key(row) for row in line], middle, yerr=[low, high], marker="o", capsize=3, label=name)
+    if floor and rows:
+        axis.plot(*zip(*sorted({key(row): row["floor_ms"] for row in rows}.items())), "k--", label="floor (memory)")
+
+
+def scaling(result: dict[str, Any], path: Path) -> bool:
+    headline = [row for row in joined(result, "headline") if row["quality"] == "refined"]
+    panels = (("points", "points", lambda row: row["points"]),
+              ("pixels", "pixels", lambda row: row["width"] * row["height"]),
+              ("threads", "threads", lambda row: row["threads"]))
+    if not headline:
+        return False
+    figure, axes = plt.subplots(1, 3, figsize=(15, 4.6))
+    for axis, (group, label, key) in zip(axes, panels):
+        rows = joined(result, group)
+        if group != "threads" and rows:
+            rows = rows + [row for row in headline if row["device"] in {one["device"] for one in rows}]
+        _lines(axis, rows, key, floor=group != "threads")
+        if group == "threads" and rows:
+            one = min(rows, key=key)
+            axis.plot([key(row) for row in rows], [one["ms_median"] * key(one) / key(row) for row in rows], "k:",
+                      label="as many times faster")
+        if not rows:
+            axis.text(0.5, 0.5, "not in this run", transform=axis.transAxes, ha="center")
+            continue
+        axis.set(xscale="log", yscale="log", xlabel=label, ylabel="ms a frame", title=f"Time against {label}")
+        axis.grid(True, which="both", alpha=0.25)
+        axis.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return True
+
+
+def passes(rows: list[Row], path: Path) -> bool:
+    if not rows:
+        return False
+    figure, axis = plt.subplots(figsize=(12, 0.5 * len(rows) + 1.8))
+    labels = [f"{name_of(r)}, {count(r['points'])}, {r['width']}², {r['quality']}" for r in rows]
+    left = [0.0] * len(rows)
+    axis.set_prop_cycle(color=plt.get_cmap("tab20").colors)
+    for name in pass_names(rows):
+        share = [100.0 * max(r["passes"].get(name, 0.0), 0.0) / r["ms_median"] for r in rows]
+        axis.barh(range(len(rows)), share, left=left, label=name)
+        left = [a + b for a, b in zip(left, share)]
+    for k, row in enumerate(rows):
+        axis.text(101.0, k, f"{row['ms_median']:.1f} ms", va="center", fontsize=8)
+    axis.set_yticks(range(len(rows)), labels, fontsize=8)
+    axis.invert_yaxis()
+    axis.set(xlabel="% of the frame", title="Time by pass", xlim=(0, 110))
+    axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return True
+
+
+def densities(rows: list[Row], path: Path) -> bool:
+    rows = [row for row in rows if row["device"] == rows[0]["device"] and row["width"] == rows[0]["width"]]
+    if len({row["density"] for row in rows}) < 2:
+        return False
+    shown = (("false_holes", "open, share"), ("false_growth", "grown, share"), ("depth_rms_spacings", "depth rms, spacings"),
+             ("color_psnr", "colour PSNR, dB"))
+    figure, axes = plt.subplots(2, 4, figsize=(17, 8), sharex=True)
+    for line, quality in zip(axes, ("refined", "paper")):
+        for axis, (name, label) in zip(line, shown):
+            for scene in dict.fromkeys(row["scene"] for row in rows):
+                some = sorted((row for row in rows if row["scene"] == scene and row["quality"] == quality
+                               and name in row["error"]), key=lambda row: row["density"])
+                axis.plot([row["density"] for row in some], [row["error"][name] for row in some], marker=".", label=scene)
+            axis.set(xscale="log", xlabel="points a pixel", ylabel=label, title=f"{quality}: {label}")
+            if name != "color_psnr":
+                axis.set_yscale("symlog", linthresh=1e-4 if name.startswith("false") else 0.1)
+            axis.grid(True, which="both", alpha=0.2)
+    axes[0][0].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+    return True
+
+
+def draw(result: dict[str, Any], folder: Path) -> list[str]:
+    """Draws what the run holds; the names of the files."""
+    title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
+    against = [row for row in joined(result, "headline", "peers") if row["points"] == 1_000_000 and row["error"]]
+    scenes = joined(result, "scenes")
+    drawn = []
+    for name, done in (("pareto.png", lambda path: pareto(against, path, title)),
+                       ("scaling.png", lambda path: scaling(result, path)),
+                       ("passes.png", lambda path: passes(joined(result, "headline", "points"), path)),
+                       ("densities.png", lambda path: bool(scenes) and densities(scenes, path))):
+        if done(folder / name):
+            drawn.append(name)
+        else:
+            (folder / name).unlink(missing_ok=True)
+    return drawn
