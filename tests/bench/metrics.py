@@ -106,7 +106,7 @@ def seen(exact: Picture, shown: Shown) -> dict[str, float]:
     square = float(np.mean((ours - theirs)[region] ** 2))
     _, similar = structural_similarity(theirs, ours, data_range=1.0, channel_axis=2, gaussian_weights=True, sigma=1.5,
                                        use_sample_covariance=False, full=True)
-    return {"color_psnr": -10.0 * np.log10(max(square, 1e-12)), "color_ssim": float(similar[region].mean())}
+    return {"color_psnr": float(-10.0 * np.log10(max(square, 1e-12))), "color_ssim": float(similar[region].mean())}
 
 
 def transmittance(exact: Picture, shown: Shown, inner: np.ndarray) -> dict[str, float]:
