@@ -1,0 +1,523 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The hard cases (SPEC 9), each on each device, against float64: what is off, by how much, and whether that is within the limit
+that the case states. What the library cannot do yet is in the table too.
+
+    hard.py [--device NAME]... [--library libpatina.so] [--programs FOLDER]
+
+Ends with "N passed, N failed, N skipped"; the cases that are not built yet are the skipped ones. --programs: where the C tests
+lie that stand for cases which need more than the binding gives (ids, layers to the last bit)."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "tests")]
+
+import native  # noqa: E402
+from truth import Camera, Light, Scene, look, scenes  # noqa: E402
+from truth.surfaces import Rectangle, Sphere  # noqa: E402
+
+EMPTY = 0x7F800000FFFFFFFF
+DEVICES = ("cpu", "cpu-scalar", "cpu-sse42", "cpu-avx2", "cpu-avx512", "gl-egl", "gl-osmesa")
+ULP = 2.0**-24  # unit roundoff of float32
+
+
+@dataclass(frozen=True)
+class Verdict:
+    case: str
+    device: str
+    error: str  # with its unit, and the limit
+    verdict: str  # "holds", "FAILS", "not built yet", or why it could not be tried
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    depth: np.ndarray
+    rgba: np.ndarray
+    source: np.ndarray
+    keys: np.ndarray
+
+
+CASES: list[tuple[str, Callable[[native.Device], tuple[str, bool]]]] = []
+
+# what SPEC 9 names beyond today's library -> what it needs
+NOT_BUILT = {
+    "d = 0 and d = r in the density integral": "soft transparency",
+    "r → 0, r ≫ scene": "soft transparency",
+    "10⁴ soft fragments in one pixel": "soft transparency",
+    "opacity 0 and 1 exactly": "transparency",
+    "light inside the cloud, at a point, behind the plane: its shadows": "shadows",
+    "sun at grazing angle: its shadows": "shadows",
+}
+
+# what C tests hold against the float64 reference, key by key -> program, test
+IN_C = {
+    "two surfaces d_eff ± 8 ulp apart": ("test_layers", "test_two_surfaces"),
+    "ids at 2³² − 2": ("test_ids", "test_last_id"),
+    "4294 instances of a million points": ("test_ids", "test_instances_of_a_million"),
+    "cloud, object or camera at 5·10⁶: bit-equal pictures": ("test_precision", "test_far_from_origin"),
+}
+
+
+def hard(name: str) -> Callable:
+    def add(function: Callable) -> Callable:
+        CASES.append((name, function))
+        return function
+    return add
+
+
+# ---- drawing -------------------------------------------------------------------------------------------------------
+
+
+def draw(device: native.Device, clouds: list[native.Cloud], camera: Camera, width: int, height: int,
+         lights: tuple[Light, ...] = (), style: dict[str, Any] | None = None, **settings: Any) -> Shown:
+    scene = native.Scene()
+    for cloud in clouds:
+        scene.add_cloud(cloud, **(style or {}))
+    for light in lights:
+        scene.add_light(**light.fields())
+    scene.set_camera(**camera.fields())
+    scene.set_settings(width=width, height=height, film_transparent=1, **settings)
+    frame = native.Frame(device)
+    frame.render(scene)
+    keys = np.empty((height, width), np.uint64)
+    call = native.library().patina_frame_read_keys
+    call.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
+    if call(frame._handle, keys.ctypes.data, keys.nbytes):
+        raise native.PatinaError("the keys cannot be read")
+    return Shown(frame.read("DEPTH")[..., 0], frame.read("COMBINED"), frame.read("SOURCE")[..., 0], keys)
+
+
+def cloud_of(position: np.ndarray, normal: np.ndarray | None = None, color: np.ndarray | None = None) -> native.Cloud:
+    return native.Cloud(*(np.ascontiguousarray(one) if one is not None else None for one in (position, normal, color)))
+
+
+OFF = {"fill": 2, "smooth": 3, "antialias": 2}  # measured pixels alone
+
+
+def projected(shown: Shown, camera: Camera, world: np.ndarray, width: int, height: int, margin: float = 1e-3
+              ) -> dict[str, float]:
+    """Measured pixels against float64: worst z error (world units, and as a share of z), how far the true place of a shown
+    point lies outside its pixel, by how much a nearer point was missed, pixels that should show a point and do not, and
+    ids or depths that cannot be."""
+    at = camera.project(world, width, height)
+    first = 0.0 if camera.orthographic else camera.near
+    last = camera.far - camera.near if camera.orthographic else camera.far
+    with np.errstate(invalid="ignore"):
+        cell = np.floor(at[:, :2])
+        sure = ((at[:, :2] - cell > margin) & (cell + 1.0 - at[:, :2] > margin)).all(axis=1)
+        sure &= (cell >= 0).all(axis=1) & (cell[:, 0] < width) & (cell[:, 1] < height)
+        sure &= (at[:, 2] > first * (1.0 + 1e-6)) & (at[:, 2] < last * (1.0 - 1e-6))
+    nearest = np.full((height, width), np.inf)
+    x, y = cell[sure].astype(int).T
+    np.minimum.at(nearest, (y, x), at[sure, 2])
+    full = shown.keys != EMPTY
+    ids = (shown.keys & np.uint64(0xFFFFFFFF)).astype(np.int64)
+    wrong = int((full & (ids >= len(world))).sum() + (full & ~np.isfinite(shown.depth)).sum())
+    rows, columns = np.nonzero(full & (ids < len(world)))
+    true = at[ids[rows, columns]]
+    z = shown.depth[rows, columns].astype(np.float64)
+    outside = np.maximum(np.maximum(np.stack([columns, rows], 1) - true[:, :2], true[:, :2] - np.stack(
+        [columns, rows], 1) - 1.0), 0.0)
+    late = true[:, 2] - nearest[rows, columns]
+    return {"pixels": len(rows), "z": float(np.abs(z - true[:, 2]).max(initial=0.0)),
+            "share": float((np.abs(z - true[:, 2]) / np.maximum(true[:, 2], 1e-300)).max(initial=0.0)),
+            "stray": float(outside.max(initial=0.0)), "late": float(np.where(np.isfinite(late), late, 0.0).max(initial=0.0)),
+            "missed": int((~full & np.isfinite(nearest)).sum()), "wrong": wrong}
+
+
+def sane(shown: Shown) -> str:
+    """What in a picture cannot be, or ""."""
+    full = shown.keys != EMPTY
+    if not np.isfinite(shown.rgba).all() or (shown.rgba < 0.0).any() or (shown.rgba[..., 3] > 1.00001).any():
+        return "colours are not finite, or beyond 0..1 in alpha"
+    if not (np.isfinite(shown.depth) == full).all() or (shown.depth[full] < 0.0).any():
+        return "depth is not finite where something is"
+    return ""
+
+
+def checked(error: dict[str, float], z: float, unit: str = "z", stray: float = 1e-3, late: float | None = None
+            ) -> tuple[str, bool]:
+    """The line and verdict of projected()."""
+    late = 2.0 * z if late is None and unit == "z" else late
+    holds = (error[unit] <= z and error["stray"] <= stray and not error["missed"] and not error["wrong"]
+             and error["pixels"] > 100 and (late is None or error["late"] <= late))
+    what = "depth" if unit == "z" else "depth as a share"
+    return (f"{what} {error[unit]:.1e} (≤ {z:.1e}), stray {error['stray']:.1e} px (≤ {stray:g}), "
+            f"missed {error['missed']} of {error['pixels']}", holds)
+
+
+def same(name: str, value: float, limit: float, shown: Shown | None = None) -> tuple[str, bool]:
+    problem = sane(shown) if shown else ""
+    return f"{name} {value:.3g} (≤ {limit:g})" + (f"; {problem}" if problem else ""), value <= limit and not problem
+
+
+# ---- far, wide, deep -----------------------------------------------------------------------------------------------
+
+
+@hard("origin at 5·10⁶, 1 mm detail")
+def far_origin(device: native.Device) -> tuple[str, bool]:
+    random = np.random.default_rng(1)
+    place = np.array([5e6, 4e6, 300.0])
+    world = place + np.rint(random.uniform(-1.0, 1.0, (20_000, 3)) * 1000.0) / 1000.0
+    camera = look(place + [0.3, -3.0, 2.0], place)
+    shown = draw(device, [cloud_of(world)], camera, 400, 300, **OFF)
+    return checked(projected(shown, camera, world, 400, 300), 1e-6)
+
+
+@hard("16 km extent, 1 mm detail")
+def wide(device: native.Device) -> tuple[str, bool]:
+    random = np.random.default_rng(2)
+    world = random.uniform([-8000, -8000, 0], [8000, 8000, 40], (40_000, 3))
+    world[:20_000] = np.rint(random.uniform([7990, 7990, 0], [7994, 7994, 0.1], (20_000, 3)) * 1000.0) / 1000.0
+    worst: dict[str, float] = {}
+    for eye, target, size in (((7980.0, 7980.0, 9.0), (7992.0, 7992.0, 0.0), 512),
+                              ((10.0, -20.0, 15000.0), (0.0, 0.0, 0.0), 512)):
+        camera = look(np.array(eye), np.array(target), 60.0)
+        camera = Camera(**{**vars(camera), "near": 1.0, "far": 16384.0})
+        one = projected(draw(device, [cloud_of(world)], camera, size, size, **OFF), camera, world, size, size, 0.01)
+        worst = {key: max(value, worst.get(key, 0)) for key, value in one.items()}
+    return checked(worst, 1e-3, stray=0.01)
+
+
+def decades(parts: int) -> np.ndarray:
+    random = np.random.default_rng(3)
+    z = 10.0 ** (-3.0 + 7.0 * (np.arange(28_000) // 4000 + random.random(28_000)) / 7.0)
+    return np.stack([z * random.uniform(-0.45, 0.45, len(z)), z * random.uniform(-0.45, 0.45, len(z)), -z], axis=1)
+
+
+def deep_view(device: native.Device, clouds: int) -> tuple[str, bool]:
+    world = decades(clouds)
+    camera = look(np.zeros(3), np.array([0.0, 0.0, -1.0]), 53.13)
+    camera = Camera(**{**vars(camera), "near": 1e-3, "far": 1e4})
+    shown = draw(device, [cloud_of(part) for part in np.split(world, clouds)], camera, 256, 256, **OFF)
+    return checked(projected(shown, camera, world, 256, 256), 8e-6, "share")
+
+
+@hard("far/near = 10⁷, a cloud a decade")
+def deep(device: native.Device) -> tuple[str, bool]:
+    return deep_view(device, 7)
+
+
+@hard("far/near = 10⁷, one cloud")
+def deep_one(device: native.Device) -> tuple[str, bool]:
+    return deep_view(device, 1)
+
+
+@hard("points on and behind the camera plane")
+def camera_plane(device: native.Device) -> tuple[str, bool]:
+    random = np.random.default_rng(4)
+    world = random.uniform(-1.0, 1.0, (20_000, 3))
+    world[:600, 2] = np.tile([0.0, 1e-30, -1e-30], 200)
+    world[0] = 0.0
+    camera = look(np.zeros(3), np.array([0.0, 0.0, -1.0]), 90.0, 200 / 120)
+    camera = Camera(**{**vars(camera), "near": 0.01, "far": 10.0})
+    return checked(projected(draw(device, [cloud_of(world)], camera, 200, 120, **OFF), camera, world, 200, 120), 8 * ULP)
+
+
+@hard("orthographic scale 10⁻⁶ and 10⁶, near = −far")
+def scales(device: native.Device) -> tuple[str, bool]:
+    worst: dict[str, float] = {}
+    for scale in (1e-6, 1e6):
+        world = np.random.default_rng(5).uniform(-0.55, 0.55, (20_000, 3)) * scale
+        camera = look(np.array([0.1, -0.2, 0.3]) * scale, np.zeros(3))
+        camera = Camera(camera.matrix, -0.5 * scale, 0.5 * scale, -0.5 * scale, 0.5 * scale, -2.0 * scale, 2.0 * scale, True)
+        one = projected(draw(device, [cloud_of(world)], camera, 256, 256, **OFF), camera, world, 256, 256)
+        one["z"] /= scale
+        one["late"] /= scale
+        worst = {key: max(value, worst.get(key, 0)) for key, value in one.items()}
+    return checked(worst, 20 * ULP)
+
+
+# ---- nonsense, and next to nothing ---------------------------------------------------------------------------------
+
+
+def ball(count: int = 6000, seed: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    position, normal = Sphere().sample(count, np.random.default_rng(seed))
+    return position.astype(np.float32), normal.astype(np.float32), np.full((count, 3), 0.5, np.float32)
+
+
+VIEW = look(np.array([0.3, -2.75, 2.25]), np.zeros(3))
+SUN = Light(power=3.0, towards=np.array([0.36, -0.48, 0.8]))
+
+
+@hard("NaN and Inf in positions, normals, colours")
+def not_numbers(device: native.Device) -> tuple[str, bool]:
+    position, normal, color = ball()
+    for k, bad in enumerate((np.nan, np.inf, -np.inf, 1e30, 3e38)):
+        if k < 3:
+            position[k::35, k % 3] = bad
+        normal[k + 5 :: 31, k % 3] = bad
+        color[k + 11 :: 29, k % 3] = bad
+    good = np.isfinite(position).all(axis=1)
+    shown = draw(device, [cloud_of(position, normal, color)], VIEW, 120, 120, (SUN,), {"lighting": 2})
+    measured = draw(device, [cloud_of(position, normal, color)], VIEW, 120, 120, **OFF)
+    error = projected(measured, VIEW, np.where(good[:, None], position.astype(np.float64), 1e300), 120, 120)
+    text, holds = checked(error, 1e-6)
+    problem = sane(shown)
+    return text + (f"; {problem}" if problem else ""), holds and not problem
+
+
+@hard("zero normals")
+def zero_normals(device: native.Device) -> tuple[str, bool]:
+    position, normal, _ = ball(60_000)
+    normal[:] = 0.0
+    shown = draw(device, [cloud_of(position, normal)], VIEW, 200, 200, (SUN,), {"lighting": 2, "cull_back": 1})
+    exact = Scene((Sphere(),)).picture(VIEW, 200, 200, antialias=0)
+    inside = np.isfinite(exact.depth)
+    return same("open pixels", float((inside & ~np.isfinite(shown.depth)).sum()), 0.0, shown)
+
+
+@hard("all points coincident")
+def coincident(device: native.Device) -> tuple[str, bool]:
+    shown = draw(device, [cloud_of(np.tile(np.float32([0.125, 0.0, 0.0]), (5000, 1)))], VIEW, 67, 45)
+    full = shown.keys != EMPTY
+    wrong = abs(int(full.sum()) - 1) + int((shown.keys[full] & np.uint64(0xFFFFFFFF)).sum())
+    return same("pixels but one, ids but 0:", wrong, 0.0, shown)
+
+
+@hard("one point")
+def one_point(device: native.Device) -> tuple[str, bool]:
+    world = np.array([[0.2, 0.1, -0.3]])
+    shown = draw(device, [cloud_of(world)], VIEW, 67, 45)
+    at = VIEW.project(world, 67, 45)[0]
+    full = np.argwhere(shown.keys != EMPTY)
+    wrong = abs(len(full) - 1) or int((full[0] != np.floor(at[1::-1])).any())
+    return same("pixels at a wrong place", wrong, 0.0, shown)
+
+
+@hard("no points")
+def nothing(device: native.Device) -> tuple[str, bool]:
+    shown = draw(device, [cloud_of(np.zeros((0, 3), np.float32)), cloud_of(np.full((3, 3), np.nan, np.float32))], VIEW, 67, 45)
+    return same("pixels", float((shown.keys != EMPTY).sum() + (shown.rgba != 0).sum()), 0.0, shown)
+
+
+@hard("1×1 and 16384×1 images")
+def sizes(device: native.Device) -> tuple[str, bool]:
+    position, _, _ = ball(40_000)
+    world = position.astype(np.float64)
+    missed, off = 0, 0.0
+    for width, height in ((1, 1), (16384, 1), (1, 16384)):
+        camera = Camera(**{**vars(VIEW), "left": -0.2, "right": 0.2, "bottom": -0.2, "top": 0.2})
+        shown = draw(device, [cloud_of(position)], camera, width, height, **OFF)
+        error = projected(shown, camera, world, width, height, 0.02)
+        missed += error["missed"] + error["wrong"]
+        off = max(off, error["z"], 1e-6 if error["stray"] > 0.02 else 0.0)
+    return f"depth {off:.1e} (≤ 1e-06), missed {missed}", off <= 1e-6 and not missed
+
+
+@hard("mirrored and zero-scale object matrices")
+def matrices(device: native.Device) -> tuple[str, bool]:
+    position, normal, _ = ball(20_000)
+    problems, off = [], 0.0
+    for diagonal in ((-1, 1, 1), (-1, -1, -1), (1, 1, 0), (1, 0, 0), (0, 0, 0), (1e-12,) * 3, (1e-30, 1e30, 1)):
+        matrix = np.diag([*map(float, diagonal), 1.0])
+        style = {"world_from_object": matrix.ravel().tolist()}
+        culled = draw(device, [cloud_of(position, normal)], VIEW, 90, 90, (SUN,), {**style, "lighting": 2, "cull_back": 1})
+        problems += [sane(culled)] * bool(sane(culled))
+        shown = draw(device, [cloud_of(position)], VIEW, 90, 90, (), style, **OFF)
+        if max(np.abs(diagonal)) <= 1.0:
+            error = projected(shown, VIEW, position.astype(np.float64) @ matrix[:3, :3], 90, 90)
+            off = max(off, error["z"])
+            problems += ["points missed"] * bool(error["missed"] or error["wrong"])
+    return f"depth {off:.1e} (≤ 1e-06)" + "".join(f"; {one}" for one in problems), off <= 1e-6 and not problems
+
+
+# ---- surfaces ------------------------------------------------------------------------------------------------------
+
+
+def plane_at(device: native.Device, degrees: float, layer: float = 0.0) -> tuple[Shown, Shown, float, float]:
+    """A plane so steep, one unit a pixel: without and with filling, area shown, area of the truth."""
+    size, turn = 128, np.radians(degrees)
+    height = 1.6 * size / max(np.cos(turn), 0.1)
+    position, normal = Rectangle(width=1.6 * size, height=height).sample(60_000, np.random.default_rng(7))
+    c, s = np.cos(turn), np.sin(turn)
+    turned = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    camera = look(np.array([0.0, 0.0, 10.0]), np.zeros(3))
+    half = 0.5 * size
+    camera = Camera(camera.matrix, -half, half, -half, half, -3000.0, 3000.0, True)
+    cloud = [cloud_of(position @ turned.T, normal @ turned.T)]
+    style = {"d_min": layer} if layer else None
+    open_, closed = (draw(device, cloud, camera, size, size, (), style, **{**OFF, "fill": fill}) for fill in (2, 0))
+    return open_, closed, float((closed.keys != EMPTY).sum()), size * min(size, height * c)
+
+
+@hard("a plane edge-on (n·v → 0)")
+def edge_on(device: native.Device) -> tuple[str, bool]:
+    worst, lost = 0.0, 0
+    for degrees in (89.0, 89.9, 90.0):
+        open_, closed, area, _ = plane_at(device, degrees)
+        lost += int(((open_.source == 1.0) & (closed.source != 1.0)).sum())
+        rows = (open_.keys != EMPTY).any(axis=1)  # filling may close these rows, not add more than an eighth of one
+        worst = max(worst, area - 128.0 * rows.sum())
+    return f"measured pixels lost {lost}, grown {max(worst, 0.0):.0f} px (≤ 16)", not lost and worst <= 16
+
+
+@hard("a plane at 45° that steps 1.5 d̃ a pixel")
+def steep_steps(device: native.Device) -> tuple[str, bool]:
+    open_, closed, area, true = plane_at(device, 45.0, 1.0 / 1.5)
+    lost = int(((open_.source == 1.0) & (closed.source != 1.0)).sum())
+    hole = 1.0 - area / true
+    return f"measured pixels lost {lost}, open {100 * hole:.3f} % (≤ 0.1)", not lost and hole <= 1e-3
+
+
+@hard("camera inside a sphere")
+def inside(device: native.Device) -> tuple[str, bool]:
+    position, normal = Sphere().sample(400_000, np.random.default_rng(8))
+    camera = look(np.array([0.2, 0.1, 0.0]), np.array([1.0, 0.5, 0.2]), 70.0)
+    camera = Camera(**{**vars(camera), "near": 0.01, "far": 10.0})
+    shown = draw(device, [cloud_of(position, normal)], camera, 128, 128, (SUN,), {"lighting": 2})
+    exact = Scene((Sphere(),)).picture(camera, 128, 128, antialias=0)
+    off = np.abs(shown.depth - exact.depth)
+    return same("depth", float(off.max()), 0.01, shown)  # half a pixel's slope
+
+
+@hard("density from 30 to 0.1 points a pixel in one cloud")
+def falling(device: native.Device) -> tuple[str, bool]:
+    random = np.random.default_rng(9)
+    long, high, dense, ratio = 640, 160, 30.0, 300.0
+    share = random.random(int(dense * long * high * (1.0 - 1.0 / ratio) / np.log(ratio)))
+    x = -np.log(1.0 - share * (1.0 - 1.0 / ratio)) / np.log(ratio) * long  # density falls by the same factor every pixel
+    world = np.stack([x, random.uniform(0, high, len(x)), np.zeros(len(x))], axis=1)
+    camera = look(np.array([0.0, 0.0, 10.0]), np.zeros(3))
+    camera = Camera(camera.matrix, -10.0, long + 10.0, -10.0, high + 10.0, 0.1, 100.0, True)
+    shown = draw(device, [cloud_of(world, np.tile([0.0, 0.0, 1.0], (len(x), 1)))], camera, long + 20, high + 20)
+    full = shown.keys != EMPTY
+    hole = 1.0 - full[10:-10, 10:-10].mean()
+    grown = (full.sum() - full[10:-10, 10:-10].sum()) / (long * high)
+    text = f"open {100 * hole:.3f} % (≤ 1), grown {100 * grown:.3f} % (≤ 0.1)"
+    return text, hole <= 0.01 and grown <= 1e-3 and not sane(shown)
+
+
+# ---- light ---------------------------------------------------------------------------------------------------------
+
+
+def lit_ball(device: native.Device, light: Light, surface: Any = None, limit: float = 0.01) -> tuple[str, bool]:
+    """Colour against the exact Lambert picture, inner pixels."""
+    surface = surface or Sphere()
+    scene = Scene((surface,), (light,), world=0.05, albedo=lambda owner, point: np.full(point.shape, 0.8))
+    position, normal = surface.sample(400_000, np.random.default_rng(10))
+    camera = scenes_camera()
+    shown = draw(device, [cloud_of(position, normal)], camera, 200, 200, (light,), {"lighting": 2},
+                 world_color=[0.05] * 3)
+    exact = scene.picture(camera, 200, 200, antialias=0)
+    inner = np.isfinite(exact.depth)
+    for _ in range(2):
+        wide_ = np.pad(inner, 1)
+        inner = np.logical_and.reduce([wide_[dy : dy + 200, dx : dx + 200] for dy in range(3) for dx in range(3)])
+    scale = max(float(exact.color[inner].max()), 0.1)
+    off = np.sqrt(np.mean((shown.rgba[inner][:, :3] - exact.color[inner]) ** 2)) / scale
+    return same("colour rms, share of the brightest", float(off), limit, shown)
+
+
+def scenes_camera() -> Camera:
+    from truth import orbit
+    return orbit()
+
+
+@hard("light inside the cloud")
+def light_inside(device: native.Device) -> tuple[str, bool]:
+    return lit_ball(device, Light(power=50.0, position=np.array([0.1, 0.2, 0.3])))
+
+
+@hard("light at a point of the cloud")
+def light_at_point(device: native.Device) -> tuple[str, bool]:
+    position, normal, _ = ball(20_000)
+    facing = int(np.argmax(position @ VIEW.eye.astype(np.float32)))
+    light = Light(power=10.0, position=position[facing].astype(np.float64))
+    shown = draw(device, [cloud_of(position, normal)], VIEW, 120, 120, (light,),
+                 {"lighting": 2, "diffuse": 1.0, "specular": 1.0, "shininess": 1000})
+    problem = sane(shown)
+    return problem or "every pixel finite", not problem
+
+
+@hard("light behind the plane")
+def light_behind(device: native.Device) -> tuple[str, bool]:
+    return lit_ball(device, Light(power=50.0, position=np.array([0.0, 0.0, -1.0])), Rectangle(), 1e-4)
+
+
+@hard("sun at a grazing angle")
+def grazing(device: native.Device) -> tuple[str, bool]:
+    towards = np.array([np.cos(np.radians(1.0)), 0.0, np.sin(np.radians(1.0))])
+    return lit_ball(device, Light(power=3.0, towards=towards), Rectangle(), 1e-3)
+
+
+# ---- the table -----------------------------------------------------------------------------------------------------
+
+
+def in_c(programs: Path, device: str) -> Iterator[Verdict]:
+    """Runs each C program once and reads what it says of its tests."""
+    said: dict[str, str] = {}
+    for case, (program, test) in IN_C.items():
+        path = programs / program
+        if not path.is_file():
+            yield Verdict(case, device, "", f"there is no {path.name}: build/compile release all_tests")
+            continue
+        if program not in said:
+            done = subprocess.run([str(path), "--device", device], capture_output=True, text=True, timeout=600)
+            said[program] = done.stdout + done.stderr
+        holds = f"[       OK ] {test}\n" in said[program]
+        yield Verdict(case, device, f"as the float64 reference has it, {program}", "holds" if holds else "FAILS")
+
+
+def run(devices: list[str], programs: Path | None) -> Iterator[Verdict]:
+    for name in devices:
+        try:
+            device = native.Device(name)
+        except native.PatinaError as error:
+            yield Verdict("all", name, "", f"cannot be had: {error}")
+            continue
+        for case, function in CASES:
+            try:
+                text, holds = function(device)
+                yield Verdict(case, name, text, "holds" if holds else "FAILS")
+            except native.PatinaError as error:
+                yield Verdict(case, name, str(error), "FAILS")
+        if programs:
+            yield from in_c(programs, name)
+    for case, needs in NOT_BUILT.items():
+        yield Verdict(case, "–", f"needs {needs}", "not built yet")
+
+
+def table(verdicts: list[Verdict]) -> str:
+    """Markdown; devices that say the same share a line."""
+    lines: dict[tuple[str, str, str], list[str]] = {}
+    for one in verdicts:
+        lines.setdefault((one.case, one.error, one.verdict), []).append(one.device)
+    order = {case: k for k, case in enumerate(dict.fromkeys(one.case for one in verdicts))}
+    body = [f"| {case} | {', '.join(devices)} | {error} | {verdict} |"
+            for (case, error, verdict), devices in sorted(lines.items(), key=lambda item: order[item[0][0]])]
+    return "\n".join(["| case | device | error against float64 | verdict |", "|---|---|---|---|", *body])
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--device", action="append", help="may be repeated; default: all")
+    parser.add_argument("--library", type=Path, default=ROOT / "build/out/release/libpatina.so")
+    parser.add_argument("--programs", type=Path, default=ROOT / "build/out/release/tests/hard")
+    options = parser.parse_args()
+    os.environ["PATINA_LIBRARY"] = str(options.library.resolve())
+    devices = [name for name in options.device or DEVICES if name != "all"] or list(DEVICES)
+    verdicts = list(run(devices, options.programs))
+    print(table(verdicts))
+    counts = [sum(one.verdict == word for one in verdicts) for word in ("holds", "FAILS")]
+    for one in verdicts:
+        if one.verdict not in ("holds", "FAILS"):
+            print(f"skip {one.case} on {one.device}: {one.verdict}" + f", {one.error}" * bool(one.error))
+    print(f"{counts[0]} passed, {counts[1]} failed, {len(verdicts) - sum(counts)} skipped")
+    return 1 if counts[1] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
