@@ -426,6 +426,8 @@ static void set_chunk(const struct camera *camera, const struct object *object, 
     out->id_base = instance->id_base;
 }
 
+#define LARGEST_LAYER 1e30f
+
 static void set_instance(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
                          struct instance_args *args)
 {
@@ -441,10 +443,11 @@ static void set_instance(const struct camera *camera, const struct object *objec
     args->diffuse = style->diffuse;
     args->specular = style->specular;
     memcpy(args->color, style->color, sizeof args->color);
-    args->d_min = style->d_min;
+    // finite with all that they are multiplied by: within an infinite layer distance empty pixels would be neighbours
+    args->d_min = fminf(style->d_min, LARGEST_LAYER);
     normal_matrix(camera, object, args->normal_matrix);
     for (uint32_t k = 0; k < PT_SPACINGS; k++)
-        args->spacing[k] = (float)(cloud->spacing_base * pt_spacing_of_class(k) * object->scale);
+        args->spacing[k] = (float)fmin(cloud->spacing_base * pt_spacing_of_class(k) * object->scale, LARGEST_LAYER);
 }
 
 static void join_rect(uint32_t rect[4], const uint32_t other[4])

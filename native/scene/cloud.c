@@ -49,6 +49,7 @@ struct build {
     uint32_t cell_bits;        // the grid of cells has 2^cell_bits cells a side
     uint32_t *cells;           // first word of each cell, and one past the last
     uint32_t *begins;          // first word of each chunk
+    uint32_t chunk_room;       // chunks that the arrays have room for
     double box_min[3], box_max[3];
     struct block {
         uint32_t drawn, offset;
@@ -60,7 +61,7 @@ struct build {
     double cell[3], cell_min[3]; // of the Morton grid being coded
 };
 
-enum { BLOCK_POINTS = 1 << 16 };
+enum { BLOCK_POINTS = 1 << 16, LEAST_POINTS = 16 };
 
 static void position(const struct build *build, uint64_t index, double p[3])
 {
@@ -141,13 +142,38 @@ static void code_blocks(void *context, uint32_t begin, uint32_t end, uint32_t th
     }
 }
 
+static double side(const double box_min[3], const double box_max[3])
+{
+    return fmax(box_max[0] - box_min[0], fmax(box_max[1] - box_min[1], box_max[2] - box_min[2]));
+}
+
+// Does an eighth of these Morton-ordered points lie in a box 32 times smaller than that of all? Told by at most 16 of each.
+static int is_uneven(const struct build *build, uint32_t begin, uint32_t count)
+{
+    double box_min[3], box_max[3], least = INFINITY;
+    box_reset(box_min, box_max);
+    for (uint32_t part = 0; part < 8; part++) {
+        uint32_t first = (uint32_t)((uint64_t)count * part / 8), last = (uint32_t)((uint64_t)count * (part + 1) / 8);
+        double low[3], high[3], p[3];
+        box_reset(low, high);
+        for (uint32_t i = first; i < last; i += (last - first + 15) / 16) {
+            position(build, (uint32_t)build->words[begin + i], p);
+            box_add(low, high, p, p);
+        }
+        least = fmin(least, side(low, high));
+        box_add(box_min, box_max, low, high);
+    }
+    return 32.0 * least < side(box_min, box_max);
+}
+
 // Points that share a grid cell (an outlier stretched the box, say) are ordered by a finer grid of their own.
 static int refine_range(struct build *build, uint32_t begin, uint32_t end, int depth)
 {
     for (uint32_t i = begin, run; i < end; i = run) {
         for (run = i + 1; run < end && build->words[run] >> 32 == build->words[i] >> 32; run++)
             ;
-        if (run - i <= PT_CHUNK_POINTS / 4 || depth > 8)
+        int few = run - i <= PT_CHUNK_POINTS / 4;
+        if (depth > 8 || (few && (run - i < 2 * LEAST_POINTS || !is_uneven(build, i, run - i))))
             continue;
         double box_min[3], box_max[3], p[3];
         box_reset(box_min, box_max);
@@ -406,6 +432,8 @@ static void surface_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
 
 // ---- attributes in file order ----------------------------------------------------------------------------------------
 
+#define MOST_COLOR 65504.0f
+
 static void read_color(const patina_array *array, uint64_t index, float rgb[3])
 {
     const uint8_t *at = element(array, index);
@@ -444,6 +472,8 @@ static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32
                     if (!isfinite(rgb[k])) {
                         rgb[k] = 0.0f;
                         valid = 0;
+                    } else { // sums of lit neighbours must stay finite, and Blender's half floats too
+                        rgb[k] = fmaxf(fminf(rgb[k], MOST_COLOR), -MOST_COLOR);
                     }
                 build->blocks[b].invalid_colors += !valid;
             }
@@ -459,29 +489,52 @@ static size_t color_bytes(const struct patina_cloud *cloud)
     return cloud->info.count * bytes[cloud->color_format] + 4; // kernels read bytes as words
 }
 
+static int add_chunk(struct build *build, uint32_t begin, uint32_t count)
+{
+    struct patina_cloud *cloud = build->cloud;
+    if (cloud->chunk_count == build->chunk_room) {
+        uint32_t room = build->chunk_room ? 2 * build->chunk_room : 64;
+        struct pt_chunk *chunks = realloc(cloud->chunks, room * sizeof *chunks);
+        cloud->chunks = chunks ? chunks : cloud->chunks;
+        uint32_t *begins = realloc(build->begins, room * sizeof *begins);
+        build->begins = begins ? begins : build->begins;
+        if (!chunks || !begins)
+            return PATINA_ERROR_MEMORY;
+        build->chunk_room = room;
+    }
+    build->begins[cloud->chunk_count] = begin;
+    struct pt_chunk *chunk = &cloud->chunks[cloud->chunk_count++];
+    *chunk = (struct pt_chunk){ .count = count, .first = (uint32_t)cloud->slots };
+    chunk->padded = (count + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
+    cloud->slots += chunk->padded;
+    return PATINA_OK;
+}
+
+// Offsets are as fine as their chunk is small: an uneven one is cut, and its parts again. Surfaces never are; where distances
+// span decades, the points at the densest place keep their digits.
+static int cut_uneven(struct build *build, uint32_t begin, uint32_t count)
+{
+    uint32_t half = count / 2;
+    if (half < LEAST_POINTS || !is_uneven(build, begin, count))
+        return add_chunk(build, begin, count);
+    int error = cut_uneven(build, begin, half);
+    return error ? error : cut_uneven(build, begin + half, count - half);
+}
+
 // Cuts the cells into chunks, as even as PT_CHUNK_POINTS allows.
 static int cut_chunks(struct build *build)
 {
-    struct patina_cloud *cloud = build->cloud;
-    uint32_t cells = 1u << 3 * build->cell_bits, most = build->drawn / PT_CHUNK_POINTS + cells, c = 0;
-    cloud->chunks = calloc(most + 1, sizeof *cloud->chunks);
-    build->begins = malloc((most + 1) * sizeof *build->begins);
-    if (!cloud->chunks || !build->begins)
-        return PATINA_ERROR_MEMORY;
-    for (uint32_t cell = 0; cell < cells; cell++) {
+    for (uint32_t cell = 0; cell < 1u << 3 * build->cell_bits; cell++) {
         uint32_t begin = build->cells[cell], count = build->cells[cell + 1] - begin;
         uint32_t parts = (count + PT_CHUNK_POINTS - 1) / PT_CHUNK_POINTS;
         for (uint32_t part = 0; part < parts; part++) {
-            struct pt_chunk *chunk = &cloud->chunks[c];
             uint32_t first = (uint32_t)((uint64_t)count * part / parts);
-            chunk->count = (uint32_t)((uint64_t)count * (part + 1) / parts) - first;
-            chunk->padded = (chunk->count + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
-            chunk->first = (uint32_t)cloud->slots;
-            cloud->slots += chunk->padded;
-            build->begins[c++] = begin + first;
+            uint32_t last = (uint32_t)((uint64_t)count * (part + 1) / parts);
+            int error = cut_uneven(build, begin + first, last - first);
+            if (error)
+                return error;
         }
     }
-    cloud->chunk_count = c;
     return PATINA_OK;
 }
 

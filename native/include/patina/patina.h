@@ -151,7 +151,7 @@ typedef struct patina_cloud_desc {
     patina_array position; // 3 x FLOAT32 or FLOAT64, in object units. NaN/Inf rows are left out (and counted)
     patina_array normal;   // 3 x FLOAT32/FLOAT64, any length; zero or NaN = that point has none. Optional
     patina_array color;    // 3 or 4 x UINT8/UINT16 (sRGB, 0..max) or FLOAT32 (linear). A 4th component is ignored. Optional.
-                           // UINT8 stays 3 bytes a point at rest; the others become float32, 12 bytes
+                           // UINT8 stays 3 bytes a point at rest; the others become float32, 12 bytes, within +-65504
     double origin[3];      // added to every position, in float64
     uint32_t threads;      // 0 = one per core
 } patina_cloud_desc;
