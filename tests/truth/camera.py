@@ -43,11 +43,12 @@ class Camera:
         return np.broadcast_to(self.eye, direction.shape), direction
 
     def project(self, point: np.ndarray, width: int, height: int) -> np.ndarray:
-        """World points (n, 3) -> x, y in pixels and pass depth z."""
+        """World points (n, 3) -> x, y in pixels and pass depth z; x, y are not finite on the camera plane."""
         local = (point - self.eye) @ self.matrix[:3, :3]
-        scale = 1.0 if self.orthographic else -1.0 / local[:, 2]
-        x = (local[:, 0] * scale - self.left) / (self.right - self.left) * width
-        y = (local[:, 1] * scale - self.bottom) / (self.top - self.bottom) * height
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = 1.0 if self.orthographic else -1.0 / local[:, 2]
+            x = (local[:, 0] * scale - self.left) / (self.right - self.left) * width
+            y = (local[:, 1] * scale - self.bottom) / (self.top - self.bottom) * height
         return np.stack([x, y, -local[:, 2] - (self.near if self.orthographic else 0.0)], axis=1)
 
     def pixel(self, height: int, distance: float) -> float:
