@@ -18,6 +18,7 @@ import argparse
 import datetime
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,7 @@ import stage
 ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
-GROUPS = ("headline", "points", "pixels", "threads", "scenes", "patterns", "steady", "papers", "peers")
+GROUPS = ("headline", "points", "pixels", "threads", "scenes", "patterns", "steady", "papers", "peers", "hard")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0, density: float = 0,
@@ -115,7 +116,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "load": os.getloadavg()[0], "version": cases.native.library().patina_version().decode(), "frames": options.frames,
         "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
         "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
-        "rows": [], "details": [], "absent": [],
+        "rows": [], "details": [], "absent": [], "hard": "",
     }
     for case in chosen(options):
         reason = too_large(case)
@@ -128,7 +129,19 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         for row in peers.measure(options.quick, options.library):
             say(row)
             split(result, row)
+    if not options.only or "hard" in options.only:
+        result["hard"] = hard_cases(options)
     return result
+
+
+def hard_cases(options: argparse.Namespace) -> str:
+    """The table of tests/hard/hard.py."""
+    devices = options.device[:1] if options.quick else options.device
+    done = subprocess.run([sys.executable, str(ROOT / "tests/hard/hard.py"), "--library", str(options.library),
+                           *(word for name in devices for word in ("--device", name))], capture_output=True, text=True)
+    lines = done.stdout.splitlines()
+    print(f"hard: {lines[-1] if lines else done.stderr}", file=sys.stderr)
+    return "\n".join(line for line in lines if line.startswith("|"))
 
 
 def say(row: dict[str, Any]) -> None:

@@ -113,7 +113,7 @@ def steadiness(frame: native.Frame, make: Any, shown: stages.Stage, width: int, 
 
 
 def measure(case: dict[str, Any]) -> dict[str, Any]:
-    """The row's fields and more."""
+    """The row's fields and more. All passes are asked for where there is a truth to hold them against, else colour alone."""
     base = machine.memory_now()
     mode = MODES[case["mode"]]
     if mode.missing():
@@ -133,7 +133,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
         scene = native.Scene()
         fill_scene(scene, cloud, shown, mode, turn)
         scene.set_settings(width=case["width"], height=case["height"], film_transparent=1, world_color=[0.05] * 3,
-                           **{**QUALITIES[case["quality"]], **mode.settings})
+                           passes=int(not scene_known), **{**QUALITIES[case["quality"]], **mode.settings})
         scene.set_camera(**shown.camera(turn).fields())
         return scene
 
@@ -142,10 +142,11 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
     peak = machine.memory_peak() - base
     stats = frame.stats()
     frame.render(make(0.0))
-    start = time.perf_counter()
-    planes = picture(frame)
-    read_ms = 1e3 * (time.perf_counter() - start)
-    error = {}
+    error, read_ms = {}, 0.0
+    if scene_known:
+        start = time.perf_counter()
+        planes = picture(frame)
+        read_ms = 1e3 * (time.perf_counter() - start)
     if scene_known and mode == MODES["surface"]:
         error = metrics.errors(shown.exact(0.0, case["width"], case["height"]), planes, spacing)
         if case.get("steady"):

@@ -103,6 +103,8 @@ def markdown(result: dict[str, Any]) -> str:
             text += [f"## {title}", "", errors_table(rows), ""]
     if joined(result, "papers"):
         text += [papers.markdown(result), ""]
+    if result.get("hard"):
+        text += ["## Hard cases", "", result["hard"], ""]
     skipped = {name: reason for row in joined(result) for name, reason in (row.get("skipped") or {}).items()}
     if skipped:
         text += ["Left out: " + "; ".join(f"*{name}*: {reason}" for name, reason in sorted(skipped.items())) + ".", ""]

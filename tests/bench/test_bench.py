@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bench from end to end on one small case: rows as promised, comparison, page, README marks."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import plots  # noqa: E402
+import readme  # noqa: E402
+
+FIELDS = ["scene", "mode", "device", "width", "height", "points", "quality", "threads", "ms_median", "ms_min", "ms_max",
+          "peak_mb", "passes", "error"]
+
+
+class Bench(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.out = Path(cls.folder.name)
+        cls.text = cls.bench("--quick", "--only", "steady")
+        cls.result = json.loads((cls.out / "bench.json").read_text())
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.folder.cleanup()
+
+    @classmethod
+    def bench(cls, *options: str) -> str:
+        done = subprocess.run([sys.executable, str(HERE / "bench.py"), "--device", "cpu", "--out", str(cls.out), *options],
+                              capture_output=True, text=True, timeout=300)
+        if done.returncode:
+            raise AssertionError(done.stderr)
+        return done.stdout
+
+    def test_rows(self) -> None:
+        self.assertEqual(self.result["absent"], [])
+        self.assertEqual(len(self.result["rows"]), len(self.result["details"]))
+        row = self.result["rows"][0]
+        self.assertEqual(list(row), FIELDS)
+        self.assertLessEqual(row["ms_min"], row["ms_median"])
+        self.assertLessEqual(row["ms_median"], row["ms_max"])
+        self.assertGreater(row["passes"]["scatter"], 0.0)
+        self.assertGreater(row["error"]["coverage_iou"], 0.97)
+        self.assertGreater(row["error"]["temporal_variance"], 0.0)
+
+    def test_an_unknown_device_is_a_line(self) -> None:
+        text = self.bench("--quick", "--only", "headline", "--device", "no-such-device", "--out", str(self.out / "absent"))
+        self.assertIn("no-such-device", text)
+        result = json.loads((self.out / "absent/bench.json").read_text())
+        self.assertTrue(all(row["device"] == "cpu" for row in result["rows"]))
+        self.assertTrue(any(row["device"] == "no-such-device" for row in result["absent"]))
+
+    def test_comparison_with_itself(self) -> None:
+        text = self.bench("--from", str(self.out / "bench.json"), "--compare", str(self.out / "bench.json"))
+        line = next(line for line in text.split("## Against")[1].splitlines() if line.startswith("| sphere"))
+        self.assertIn("| 1.000 |", line)
+        self.assertIn("+0.00000", line)
+
+    def test_page(self) -> None:
+        page = (self.out / "bench.html").read_text()
+        self.assertIn("<table>", page)
+        self.assertIn("sphere", page)
+
+    def test_front(self) -> None:
+        self.assertEqual(plots.front([(1, 5), (2, 3), (3, 4), (4, 1), (0.5, 9)]), [(0.5, 9), (1, 5), (2, 3), (4, 1)])
+
+    def test_readme_marks(self) -> None:
+        (self.out / ".pictures").mkdir(exist_ok=True)
+        path = self.out / "README.md"
+        path.write_text("before\n<!-- bench speed -->\nold\n<!-- end -->\nafter\n")
+        self.assertIn("speed", readme.update(self.result, self.out))
+        text = path.read_text()
+        self.assertTrue(text.startswith("before\n<!-- bench speed -->\n") and text.endswith("\n<!-- end -->\nafter\n"))
+        self.assertIn("drawn by", text)
+        self.assertNotIn("old", text)
+
+
+if __name__ == "__main__":
+    result = unittest.main(exit=False, verbosity=0).result
+    failed, skipped = len(result.failures) + len(result.errors), len(result.skipped)
+    print(f"{result.testsRun - failed - skipped} passed, {failed} failed, {skipped} skipped")
+    sys.exit(1 if failed else 0)
