@@ -171,6 +171,13 @@ int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t siz
     return pt_frame_read_keys(frame, keys, size);
 }
 
+int patina_frame_read_layer(const patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size)
+{
+    if (!frame || !pixels)
+        return fail("patina_frame_read_layer: frame or pixels is NULL");
+    return pt_frame_read_layer(frame, layer, pass, pixels, size);
+}
+
 int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats)
 {
     if (!frame || !stats || stats->struct_size != sizeof *stats)

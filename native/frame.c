@@ -2,6 +2,7 @@
 // A frame walks its plan: planes and buffers are bound, kernels run, the picture is kept for reading.
 #include "frame.h"
 
+#include "layers.h"
 #include "residency.h"
 
 #include <math.h>
@@ -35,7 +36,7 @@ static uint64_t plane_total(const struct patina_frame *frame)
 {
     uint64_t total = 0;
     for (int p = 0; p < PT_PLANE_COUNT; p++)
-        for (int level = 0; level < PT_LEVELS; level++)
+        for (int level = 0; level < PT_SLOTS; level++)
             total += frame->planes[p][level].size;
     return total;
 }
@@ -79,7 +80,7 @@ static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan
     struct pt_buffer made[PT_PLANE_COUNT] = { 0 };
     uint64_t total = plane_total(frame);
     int error = PATINA_OK;
-    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_COUNT && !error; p++) {
+    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED && !error; p++) {
         size_t bytes = size_of(plan, (enum pt_plane)p, 0);
         if (frame->planes[p][0].size == bytes)
             continue;
@@ -88,7 +89,7 @@ static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan
         if (!error)
             error = ops->buffer_create(frame->device, bytes, NULL, 0, &made[p]);
     }
-    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_COUNT; p++) {
+    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED; p++) {
         if (!made[p].size)
             continue;
         ops->buffer_destroy(frame->device, error ? &made[p] : &frame->planes[p][0]);
@@ -101,7 +102,7 @@ static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan
 static void destroy_planes(struct patina_frame *frame)
 {
     for (int p = 0; p < PT_PLANE_COUNT; p++)
-        for (int level = 0; level < PT_LEVELS; level++)
+        for (int level = 0; level < PT_SLOTS; level++)
             frame->device->ops->buffer_destroy(frame->device, &frame->planes[p][level]);
 }
 
@@ -111,8 +112,11 @@ struct render {
     struct patina_frame *frame;
     const struct pt_plan *plan;
     struct pt_resident **clouds; // per instance
-    struct pt_buffer *chunks;    // per instance, of this render
+    struct pt_buffer *chunks;    // per instance, of the layer at hand
     struct pt_buffer **bound;    // scratch for one pass
+    struct chunk_view **behind;  // per instance: those of the layer at hand, behind the first
+    struct pt_tile *tiles;       // what the last layer left
+    uint32_t layer;              // at hand
 };
 
 static int upload(struct render *render)
@@ -125,7 +129,8 @@ static int upload(struct render *render)
     render->clouds = calloc(plan->instance_count + 1, sizeof *render->clouds);
     render->chunks = calloc(plan->instance_count + 1, sizeof *render->chunks);
     render->bound = calloc(most, sizeof *render->bound);
-    if (!render->clouds || !render->chunks || !render->bound)
+    render->behind = calloc(plan->instance_count + 1, sizeof *render->behind);
+    if (!render->clouds || !render->chunks || !render->bound || !render->behind)
         return pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
@@ -148,11 +153,82 @@ static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *r
     return ref->which == PT_CHUNKS ? &render->chunks[ref->index] : &render->clouds[ref->index]->buffers[ref->which];
 }
 
-static int clear_keys(struct patina_frame *frame)
+static int clear_keys(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which)
 {
-    return frame->device->ops->buffer_fill(frame->device, &frame->planes[PT_PLANE_KEYS][0],
-                                           (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+    int error = ensure_plane(frame, plan, which, 0);
+    return error ? error
+                 : frame->device->ops->buffer_fill(frame->device, &frame->planes[which][0],
+                                                   (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
 }
+
+// ---- layers --------------------------------------------------------------------------------------------------------------
+
+// Before the first layer: all light comes through, outside the points' rectangle too.
+static int begin_peeling(struct render *render)
+{
+    struct patina_frame *frame = render->frame;
+    const size_t tiles = size_of(render->plan, PT_PLANE_TILES, PT_TILE_LEVEL);
+    int error = ensure_plane(frame, render->plan, PT_PLANE_THROUGH, 0);
+    render->tiles = malloc(tiles);
+    if (!error && !render->tiles)
+        error = pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    return error ? error : frame->device->ops->buffer_fill(frame->device, &frame->planes[PT_PLANE_THROUGH][0], 0x3F800000u, 4);
+}
+
+// Reads what a peeled layer left.
+static int end_layer(struct render *render)
+{
+    struct patina_frame *frame = render->frame;
+    const struct pt_buffer *tiles = &frame->planes[PT_PLANE_TILES][PT_TILE_LEVEL];
+    int error = frame->device->ops->buffer_read(frame->device, tiles, 0, render->tiles, tiles->size);
+    if (!error)
+        frame->layers[render->layer - 1].pixels = pt_layer_pixels(render->plan, render->tiles);
+    return error;
+}
+
+// Chooses the chunks of the next layer. *some: 0 when there is nothing behind.
+static int begin_layer(struct render *render, uint32_t layer, int *some)
+{
+    const struct pt_plan *plan = render->plan;
+    struct patina_device *device = render->frame->device;
+    struct pt_layer *out = &render->frame->layers[layer - 1];
+    int error = PATINA_OK;
+    *out = (struct pt_layer){ 0 };
+    *some = 0;
+    if (!render->frame->layers[layer - 2].pixels)
+        return PATINA_OK;
+    for (uint32_t i = 0; i < plan->instance_count && !error; i++) {
+        uint32_t count, most = plan->instances[i].chunk_count;
+        if (!most)
+            continue;
+        if (!render->behind[i] && !(render->behind[i] = malloc(most * sizeof **render->behind)))
+            return pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+        count = pt_layer_chunks(plan, i, render->tiles, render->behind[i], &out->points);
+        device->ops->buffer_destroy(device, &render->chunks[i]);
+        error = device->ops->buffer_create(device, count * sizeof **render->behind, render->behind[i], 1, &render->chunks[i]);
+    }
+    *some = out->points > 0;
+    return error || !*some ? error : clear_keys(render->frame, plan, PT_PLANE_KEYS_BEHIND);
+}
+
+// Turns to the pass's layer. *run: 0 when that layer does not exist.
+static int turn_to_layer(struct render *render, const struct pt_pass *pass, uint32_t *ended, int *run)
+{
+    *run = !*ended || pass->layer < *ended;
+    if (!*run || pass->layer <= render->layer)
+        return PATINA_OK;
+    int error = PATINA_OK;
+    if (pass->layer > 1)
+        error = begin_layer(render, pass->layer, run);
+    if (!error && !*run) {
+        *ended = pass->layer;
+        return PATINA_OK;
+    }
+    render->layer = render->frame->layer_count = pass->layer;
+    return error;
+}
+
+// ---- passes --------------------------------------------------------------------------------------------------------------
 
 static void note_time(struct patina_frame *frame, const char *name, double ms)
 {
@@ -166,10 +242,7 @@ static void note_time(struct patina_frame *frame, const char *name, double ms)
     frame->timings[i].ms += ms;
 }
 
-static int is_output(const struct pt_pass *pass)
-{
-    return pass->kernel == PT_KERNEL_compose || pass->kernel == PT_KERNEL_extract;
-}
+static int is_output(const struct pt_pass *pass) { return !pass->layer; }
 
 static int run_pass(struct render *render, const struct pt_pass *pass)
 {
@@ -219,12 +292,20 @@ static int run_plan(struct render *render)
     struct patina_frame *frame = render->frame;
     const struct pt_plan *plan = render->plan;
     double before = milliseconds();
-    int error = ensure_plane(frame, plan, PT_PLANE_KEYS, 0);
     frame->keys_valid = 0;
-    if (error || (error = clear_keys(frame)))
-        return error;
-    int writing = 0; // the picture: from then on nothing stops it
-    for (uint32_t i = 0; i < plan->pass_count; i++) {
+    frame->layer_count = 0;
+    frame->layers[0] = (struct pt_layer){ .points = plan->points_scattered };
+    int error = clear_keys(frame, plan, PT_PLANE_KEYS);
+    if (!error && plan->layers > 1)
+        error = begin_peeling(render);
+    uint32_t ended = 0; // from this layer on there are none
+    int writing = 0;    // the picture: from then on nothing stops it
+    for (uint32_t i = 0; i < plan->pass_count && !error; i++) {
+        int run;
+        if ((error = turn_to_layer(render, &plan->passes[i], &ended, &run)))
+            return error;
+        if (!run)
+            continue;
         if (!writing && atomic_load(&frame->cancel))
             return PATINA_ERROR_CANCELLED;
         int together = i == plan->finish && frame->device->ops->finish_picture != NULL;
@@ -237,6 +318,8 @@ static int run_plan(struct render *render)
             frame->picture_valid &= !writing; // half a picture is none: the device failed
             return error;
         }
+        if (plan->passes[i].kernel == PT_KERNEL_peel)
+            error = end_layer(render);
         double now = milliseconds();
         note_time(frame, together ? "finish" : plan->passes[i].name, now - before);
         before = now;
@@ -244,7 +327,7 @@ static int run_plan(struct render *render)
             i = plan->pass_count - 1;
         atomic_store(&frame->progress, (float)(i + 1) / (float)plan->pass_count);
     }
-    return PATINA_OK;
+    return error;
 }
 
 static void keep_statistics(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan,
@@ -259,6 +342,11 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .chunks_culled = plan->chunks_culled,
                                          .ms = ms };
     frame->stats.plane_bytes = plane_total(frame);
+    frame->stats.layers = frame->layer_count && plan->layers == 1;
+    for (uint32_t i = 0; i < frame->layer_count; i++)
+        frame->stats.layers += frame->layers[i].pixels > 0;
+    frame->layer_most = plan->layers;
+    frame->layer_passes = scene->settings.layer_passes;
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
     frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
@@ -291,6 +379,10 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     free(render.clouds);
     free(render.chunks);
     free(render.bound);
+    for (uint32_t i = 0; i < plan.instance_count && render.behind; i++)
+        free(render.behind[i]);
+    free(render.behind);
+    free(render.tiles);
     pt_plan_destroy(&plan);
     atomic_store(&frame->cancel, 0);
     if (error == PATINA_ERROR_CANCELLED)
@@ -327,6 +419,29 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
+int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size)
+{
+    static const enum pt_plane planes[] = { [PATINA_PASS_COMBINED] = PT_PLANE_LAYER_COMBINED,
+                                            [PATINA_PASS_DEPTH] = PT_PLANE_LAYER_DEPTH,
+                                            [PATINA_PASS_NORMAL] = PT_PLANE_LAYER_NORMALS };
+    if (pass > PATINA_PASS_NORMAL || !layer || layer > PATINA_MAX_LAYERS)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: no pass %u of a layer %u", pass, layer);
+    if (!frame->keys_valid || !(frame->layer_passes >> pass & 1u) || layer > frame->layer_most)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_layer: no %s pass of layer %u was asked for",
+                       pass_table[pass].name, layer);
+    size_t count = (size_t)frame->stats.width * frame->stats.height * pass_table[pass].channels;
+    if (size != count * sizeof *pixels)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: %s is %u x %u x %u floats; got %zu bytes",
+                       pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, size);
+    if (layer > frame->layer_count) { // peeling ended before
+        for (size_t i = 0; i < count; i++)
+            pixels[i] = pass == PATINA_PASS_DEPTH ? INFINITY : 0.0f;
+        return PATINA_OK;
+    }
+    int error = frame->device->ops->buffer_read(frame->device, &frame->planes[planes[pass]][layer - 1], 0, pixels, size);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
 {
     if (!frame->keys_valid)
@@ -359,7 +474,11 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
     PUT("},\"skipped\":{");
     for (uint32_t i = 0; i < frame->skipped_count; i++) // reasons are our own words: no quotes, no backslashes
         PUT("%s\"%s\":\"%s\"", i ? "," : "", frame->skipped[i].name, frame->skipped[i].reason);
-    PUT("}}");
+    PUT("},\"layers\":[");
+    for (uint32_t i = 0; i < frame->layer_count; i++)
+        PUT("%s{\"points\":%llu,\"pixels\":%llu}", i ? "," : "", (unsigned long long)frame->layers[i].points,
+            (unsigned long long)frame->layers[i].pixels);
+    PUT("]}");
 #undef PUT
     return length;
 }
@@ -367,7 +486,7 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
 int pt_frame_dump(const struct patina_frame *frame, const char *folder)
 {
     for (int p = 0; p < PT_PLANE_COUNT; p++)
-        for (int level = 0; level < PT_LEVELS; level++) {
+        for (int level = 0; level < PT_SLOTS; level++) {
             const struct pt_buffer *plane = &frame->planes[p][level];
             char path[4096];
             if (!plane->size)

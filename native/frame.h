@@ -11,6 +11,11 @@ struct pt_timing {
     double ms;
 };
 
+struct pt_layer {
+    uint64_t points; // in chunks that were scattered
+    uint64_t pixels; // that it covers; 0 where one layer was not peeled
+};
+
 struct pt_resident;
 
 // The clouds whose buffers a device holds for a frame.
@@ -22,7 +27,7 @@ struct patina_frame {
     struct pt_handle handle;
     struct patina_device *device;
     struct pt_residency residency;
-    struct pt_buffer planes[PT_PLANE_COUNT][PT_LEVELS];
+    struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS];
     atomic_int cancel;
     _Atomic float progress;
     patina_frame_stats stats; // of the last finished render
@@ -31,12 +36,17 @@ struct patina_frame {
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     uint32_t passes;          // bits of what was rendered
+    struct pt_layer layers[PATINA_MAX_LAYERS];
+    uint32_t layer_count;     // scattered
+    uint32_t layer_most;      // that the settings allowed
+    uint32_t layer_passes;    // bits of what was kept of each
     uint32_t crop[4], plane_width;
     int keys_valid, picture_valid;
 };
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene);
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
+int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size);
 int pt_frame_dump(const struct patina_frame *frame, const char *folder);

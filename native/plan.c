@@ -22,12 +22,26 @@ struct builder {
     const struct patina_scene *scene;
     struct pt_plan *plan;
     uint32_t room;
+    uint32_t layer; // that passes are added for; 0: the whole picture
     int failed;
 };
 
 // ---- adding passes -------------------------------------------------------------------------------------------------
 
 static struct pt_ref plane(enum pt_plane which, uint32_t level) { return (struct pt_ref){ 0, which, level }; }
+// Of the layer at hand: the first has its own.
+static struct pt_ref keys_of(const struct builder *builder, uint32_t level)
+{
+    return plane(builder->layer > 1 && !level ? PT_PLANE_KEYS_BEHIND : PT_PLANE_KEYS, level);
+}
+static struct pt_ref from_of(const struct builder *builder, uint32_t level)
+{
+    return plane(builder->layer > 1 && !level ? PT_PLANE_FROM_BEHIND : PT_PLANE_FROM, level);
+}
+static struct pt_ref shading_of(const struct builder *builder)
+{
+    return plane(builder->layer > 1 ? PT_PLANE_SHADING_BEHIND : PT_PLANE_SHADING, 0);
+}
 static struct pt_ref buffer(enum pt_instance_buffer which, uint32_t instance)
 {
     return (struct pt_ref){ 1, which, instance };
@@ -62,6 +76,7 @@ static struct pt_pass *add(struct builder *builder, enum pt_kernel kernel, const
     }
     struct pt_pass *pass = &plan->passes[plan->pass_count++];
     *pass = (struct pt_pass){ .kernel = kernel,
+                              .layer = builder->layer,
                               .name = name,
                               .arguments = copy(builder, arguments, argument_size),
                               .argument_size = argument_size,
@@ -75,8 +90,11 @@ static struct pt_pass *add(struct builder *builder, enum pt_kernel kernel, const
         sizeof((struct pt_ref[])__VA_ARGS__) / sizeof(struct pt_ref))
 #define REASON(pass, ...) snprintf((pass)->reason, sizeof(pass)->reason, __VA_ARGS__)
 
+// Says so once, with the first layer.
 static void skip(struct builder *builder, const char *name, const char *reason)
 {
+    if (builder->layer > 1)
+        return;
     struct pt_skipped *skipped = &builder->plan->skipped[builder->plan->skipped_count++];
     skipped->name = name;
     snprintf(skipped->reason, sizeof skipped->reason, "%s", reason);
@@ -117,14 +135,14 @@ static struct view_args view_of(const struct pt_plan *plan, const struct pt_plan
 static void plan_scatter(struct builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    struct scatter_args args = { .view = plan->view };
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (1 + 4 * (size_t)plan->instance_count) * sizeof *refs);
+    struct scatter_args args = { .view = plan->view, .behind = builder->layer > 1 };
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (2 + 4 * (size_t)plan->instance_count) * sizeof *refs);
     uint32_t count = 0;
     if (!refs) {
         builder->failed = 1;
         return;
     }
-    refs[count++] = plane(PT_PLANE_KEYS, 0);
+    refs[count++] = keys_of(builder, 0);
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         if (!plan->instances[i].chunk_count)
             continue;
@@ -134,8 +152,13 @@ static void plan_scatter(struct builder *builder)
         refs[count++] = buffer(PT_SURFACE, i);
         args.instances++;
     }
+    if (args.behind)
+        refs[count++] = plane(PT_PLANE_LIMIT, 0);
     struct pt_pass *pass = add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
-    REASON(pass, "%llu points in %llu chunks of %u instances are in view", (unsigned long long)plan->points_scattered,
+    if (args.behind)
+        REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
+    else
+        REASON(pass, "%llu points in %llu chunks of %u instances are in view", (unsigned long long)plan->points_scattered,
            (unsigned long long)(plan->chunks - plan->chunks_culled), args.instances);
 }
 
@@ -148,14 +171,14 @@ static void plan_surface(struct builder *builder, uint32_t i)
         struct normals_args args = { .view = view_of(plan, instance, 0), .instance = instance->args };
         args.radius = wanted < ESTIMATE_LEAST ? ESTIMATE_LEAST : wanted > ESTIMATE_MOST ? ESTIMATE_MOST : (uint32_t)wanted;
         REASON(ADD(builder, normals, args,
-                   { plane(PT_PLANE_KEYS, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0) }),
+                   { keys_of(builder, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0) }),
                "instance %u has no normals: estimated from the depth of %u x %u pixels", i, 2 * args.radius + 1,
                2 * args.radius + 1);
     }
     struct surface_args args = { .view = view_of(plan, instance, 0), .instance = instance->args };
     REASON(ADD(builder, surface, args,
-               { plane(PT_PLANE_KEYS, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
-                 plane(PT_PLANE_FROM, 0) }),
+               { keys_of(builder, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
+                 from_of(builder, 0) }),
            "layer distance and normal of instance %u's pixels", i);
 }
 
@@ -169,8 +192,7 @@ static void plan_fill_level(struct builder *builder, uint32_t level)
                               .refined = settings->quality == PATINA_QUALITY_REFINED };
     for (args.occluded = 0; args.occluded < 2; args.occluded++)
         REASON(ADD(builder, fill, args,
-                   { plane(PT_PLANE_KEYS, level), plane(PT_PLANE_FROM, level), plane(PT_PLANE_NORMAL, 0),
-                     plane(PT_PLANE_DEFF, 0) }),
+                   { keys_of(builder, level), from_of(builder, level), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
                "%s pixels at level %u, %u fills, at most %u un-fills (spacing %.2f pixels)",
                args.occluded ? "occluded" : "background", level, args.iterations, args.unfills, plan->spacing_px);
 }
@@ -186,8 +208,8 @@ static void plan_pyramid(struct builder *builder)
         args.view.rect[2] = args.view.width;
         args.view.rect[3] = args.view.height;
         REASON(ADD(builder, pull, args,
-                   { plane(PT_PLANE_KEYS, level - 1), plane(PT_PLANE_FROM, level - 1), plane(PT_PLANE_KEYS, level),
-                     plane(PT_PLANE_FROM, level) }),
+                   { keys_of(builder, level - 1), from_of(builder, level - 1), keys_of(builder, level),
+                     from_of(builder, level) }),
                "spacing %.2f pixels: holes are closed at coarser levels first", plan->spacing_px);
     }
     for (uint32_t level = plan->levels; level > 0; level--) {
@@ -198,8 +220,8 @@ static void plan_pyramid(struct builder *builder)
                                   .coarse_height = coarse.height,
                                   .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED };
         REASON(ADD(builder, push, args,
-                   { plane(PT_PLANE_KEYS, level), plane(PT_PLANE_FROM, level), plane(PT_PLANE_KEYS, level - 1),
-                     plane(PT_PLANE_FROM, level - 1), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
+                   { keys_of(builder, level), from_of(builder, level), keys_of(builder, level - 1),
+                     from_of(builder, level - 1), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
                "level %u to level %u", level, level - 1);
     }
 }
@@ -265,8 +287,8 @@ static void plan_shade(struct builder *builder, uint32_t i)
     if (instance->args.lit)
         set_lights(builder->scene, &args);
     REASON(ADD(builder, shade, args,
-               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
-                 buffer(PT_COLORS, i), plane(PT_PLANE_SHADING, 0), plane(PT_PLANE_COLOR_A, 0) }),
+               { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
+                 buffer(PT_COLORS, i), shading_of(builder), plane(PT_PLANE_COLOR_A, 0), buffer(PT_OPACITIES, i) }),
            "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
            instance->args.lit ? "lit" : "unlit", args.light_count, args.blend);
 }
@@ -281,9 +303,10 @@ static enum pt_plane plan_image_filters(struct builder *builder)
     enum pt_plane color = PT_PLANE_COLOR_A;
     if (settings->smooth != PATINA_SMOOTH_OFF) {
         const float *w = weights[settings->smooth];
-        struct smooth_args args = { .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2] };
+        struct smooth_args args = { .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2],
+                                    .translucent = plan->transparent != 0 };
         REASON(ADD(builder, smooth, args,
-                   { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
+                   { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
                      plane(PT_PLANE_COLOR_B, 0) }),
                "%s, 3 x 3", names[settings->smooth]);
         color = PT_PLANE_COLOR_B;
@@ -294,22 +317,83 @@ static enum pt_plane plan_image_filters(struct builder *builder)
         skip(builder, "antialias", "switched off in the settings");
         return color;
     }
-    struct antialias_args args = { .view = plan->view, .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS };
-    REASON(ADD(builder, antialias, args,
-               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0) }),
+    struct antialias_args args = { .view = plan->view,
+                                   .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS,
+                                   .behind = builder->layer > 1 };
+    const struct pt_ref refs[] = { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
+                                   plane(PT_PLANE_THROUGH, 0) };
+    REASON(add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.behind ? 5 : 4),
            args.layers ? "edges of background and layers" : "edges of background");
     return color;
 }
 
-static void plan_output(struct builder *builder, enum pt_plane color)
+// ---- layers ------------------------------------------------------------------------------------------------------------
+
+static void plan_peel(struct builder *builder, enum pt_plane color)
 {
     const struct pt_plan *plan = builder->plan;
+    struct peel_args args = { .view = plan->view,
+                              .first = builder->layer == 1,
+                              .stop = !builder->scene->settings.layer_passes };
+    REASON(ADD(builder, peel, args,
+               { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_DEFF, 0), shading_of(builder), plane(color, 0),
+                 plane(PT_PLANE_LIMIT, 0), plane(PT_PLANE_THROUGH, 0), plane(PT_PLANE_OVER, 0),
+                 plane(PT_PLANE_TILES, PT_TILE_LEVEL) }),
+           "layer %u of at most %u is blended, what may lie behind it is marked", builder->layer, plan->layers);
+}
+
+static struct compose_args compose_args(const struct pt_plan *plan)
+{
+    return (struct compose_args){ .view = plan->view,
+                                  .crop_x = plan->crop[0],
+                                  .crop_y = plan->crop[1],
+                                  .crop_width = plan->crop[2],
+                                  .crop_height = plan->crop[3] };
+}
+
+static struct extract_args extract_args(const struct builder *builder, uint32_t passes)
+{
+    const struct pt_plan *plan = builder->plan;
+    struct extract_args args = { .view = plan->view,
+                                 .crop_x = plan->crop[0],
+                                 .crop_y = plan->crop[1],
+                                 .crop_width = plan->crop[2],
+                                 .crop_height = plan->crop[3],
+                                 .depth = passes >> PATINA_PASS_DEPTH & 1u,
+                                 .normal = passes >> PATINA_PASS_NORMAL & 1u,
+                                 .source = passes >> PATINA_PASS_SOURCE & 1u };
+    double axes[9], position[3];
+    pt_camera_axes(&builder->scene->camera, axes, position);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            args.world_from_view[3 * r + c] = (float)axes[3 * c + r];
+    return args;
+}
+
+static void plan_layer_passes(struct builder *builder, enum pt_plane color)
+{
+    const uint32_t passes = builder->scene->settings.layer_passes, layer = builder->layer, slot = layer - 1;
+    struct compose_args compose = compose_args(builder->plan);
+    struct extract_args extract = extract_args(builder, passes);
+    // where one is not asked for, the other stands in and is not touched
+    enum pt_plane depth = extract.depth ? PT_PLANE_LAYER_DEPTH : PT_PLANE_LAYER_NORMALS;
+    enum pt_plane normal = extract.normal ? PT_PLANE_LAYER_NORMALS : PT_PLANE_LAYER_DEPTH;
+    if (passes >> PATINA_PASS_COMBINED & 1u)
+        REASON(ADD(builder, compose, compose, { keys_of(builder, 0), plane(color, 0), plane(PT_PLANE_LAYER_COMBINED, slot) }),
+               "colour of layer %u is asked for", layer);
+    if (extract.depth || extract.normal)
+        REASON(ADD(builder, extract, extract,
+                   { keys_of(builder, 0), from_of(builder, 0), shading_of(builder), plane(depth, slot), plane(normal, slot),
+                     plane(depth, slot) }),
+               "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "", extract.normal ? " normal" : "");
+}
+
+// ---- the picture -------------------------------------------------------------------------------------------------------
+
+static void plan_output(struct builder *builder, enum pt_plane color)
+{
     const patina_settings *settings = &builder->scene->settings;
-    struct compose_args compose = { .view = plan->view,
-                                    .crop_x = plan->crop[0],
-                                    .crop_y = plan->crop[1],
-                                    .crop_width = plan->crop[2],
-                                    .crop_height = plan->crop[3] };
+    struct compose_args compose = compose_args(builder->plan);
     for (int k = 0; k < 3 && !settings->film_transparent; k++)
         compose.background[k] = settings->world_color[k];
     compose.background[3] = settings->film_transparent ? 0.0f : 1.0f;
@@ -317,19 +401,7 @@ static void plan_output(struct builder *builder, enum pt_plane color)
                { plane(PT_PLANE_KEYS, 0), plane(color, 0), plane(PT_PLANE_COMBINED, 0) }),
            settings->film_transparent ? "transparent film" : "over the world colour");
 
-    struct extract_args extract = { .view = plan->view,
-                                    .crop_x = plan->crop[0],
-                                    .crop_y = plan->crop[1],
-                                    .crop_width = plan->crop[2],
-                                    .crop_height = plan->crop[3],
-                                    .depth = settings->passes >> PATINA_PASS_DEPTH & 1u,
-                                    .normal = settings->passes >> PATINA_PASS_NORMAL & 1u,
-                                    .source = settings->passes >> PATINA_PASS_SOURCE & 1u };
-    double axes[9], position[3];
-    pt_camera_axes(&builder->scene->camera, axes, position);
-    for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++)
-            extract.world_from_view[3 * r + c] = (float)axes[3 * c + r];
+    struct extract_args extract = extract_args(builder, settings->passes);
     if (!extract.depth && !extract.normal && !extract.source) {
         skip(builder, "extract", "no pass beside the combined one is asked for");
         return;
@@ -341,7 +413,8 @@ static void plan_output(struct builder *builder, enum pt_plane color)
            extract.source ? " source" : "");
 }
 
-static void plan_points(struct builder *builder)
+// Returns the plane that holds the layer's colour.
+static enum pt_plane plan_layer(struct builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     int estimate = 0;
@@ -354,17 +427,35 @@ static void plan_points(struct builder *builder)
     if (!estimate)
         skip(builder, "normals", "every cloud in view has normals");
     plan_filling(builder);
-    plan->finish = plan->pass_count;
+    if (plan->layers == 1 && !plan->transparent && !builder->scene->settings.layer_passes)
+        plan->finish = plan->pass_count;
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count)
             plan_shade(builder, i);
-    plan_output(builder, plan_image_filters(builder));
+    return plan_image_filters(builder);
+}
+
+static void plan_points(struct builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    enum pt_plane color = PT_PLANE_COLOR_A;
+    plan->finish = UINT32_MAX;
+    for (builder->layer = 1; builder->layer <= plan->layers; builder->layer++) {
+        color = plan_layer(builder);
+        if (plan->layers > 1)
+            plan_peel(builder, color);
+        plan_layer_passes(builder, color);
+    }
+    builder->layer = 0;
+    if (plan->layers == 1)
+        skip(builder, "peel", plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");
+    plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
 }
 
 static void plan_nothing(struct builder *builder, const char *reason)
 {
     static const char *const names[] = { "scatter", "normals", "surface", "pull", "fill", "push", "shade", "smooth",
-                                         "antialias" };
+                                         "antialias", "peel" };
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         skip(builder, names[i], reason);
     plan_output(builder, PT_PLANE_COLOR_A);

@@ -9,19 +9,31 @@
 
 enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 
+// Layers behind the first have keys, from and shading of their own: the passes of the picture show the first. Coarser levels
+// serve one layer after another.
 // X(name, bytes a pixel, has coarse levels)
-#define PT_PLANES(X)   \
-    X(KEYS, 8, 1)      \
-    X(FROM, 4, 1)      \
-    X(NORMAL, 16, 0)   \
-    X(DEFF, 4, 0)      \
-    X(SHADING, 16, 0)  \
-    X(COLOR_A, 16, 0)  \
-    X(COLOR_B, 16, 0)  \
-    X(COMBINED, 16, 0) \
-    X(DEPTH, 4, 0)     \
-    X(NORMALS, 12, 0)  \
-    X(SOURCE, 4, 0)
+#define PT_PLANES(X)        \
+    X(KEYS, 8, 1)           \
+    X(FROM, 4, 1)           \
+    X(NORMAL, 16, 0)        \
+    X(DEFF, 4, 0)           \
+    X(SHADING, 16, 0)       \
+    X(COLOR_A, 16, 0)       \
+    X(COLOR_B, 16, 0)       \
+    X(KEYS_BEHIND, 8, 0)    \
+    X(FROM_BEHIND, 4, 0)    \
+    X(SHADING_BEHIND, 16, 0) \
+    X(LIMIT, 4, 0)          \
+    X(THROUGH, 4, 0)        \
+    X(OVER, 16, 0)          \
+    X(TILES, 8, 1)          \
+    X(COMBINED, 16, 0)      \
+    X(DEPTH, 4, 0)          \
+    X(NORMALS, 12, 0)       \
+    X(SOURCE, 4, 0)         \
+    X(LAYER_COMBINED, 16, 0) \
+    X(LAYER_DEPTH, 4, 0)    \
+    X(LAYER_NORMALS, 12, 0)
 
 enum pt_plane {
 #define PT_X(name, bytes, levels) PT_PLANE_##name,
@@ -29,19 +41,24 @@ enum pt_plane {
 #undef PT_X
         PT_PLANE_COUNT
 };
-// From COMBINED on, planes have the size of the crop; they are the picture that callers read.
+// From COMBINED on, planes have the size of the crop; they are the picture that callers read. From LAYER_COMBINED on there is
+// one for each layer. TILES exist at level PT_TILE_LEVEL.
 
-enum pt_instance_buffer { PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS };
+enum { PT_SLOTS = 16 }; // levels or layers that a plane may have
+_Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_SLOTS, "planes have too few slots");
+
+enum pt_instance_buffer { PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_INSTANCE_BUFFERS };
 
 // What a pass binds: a plane at a level, or a buffer of an instance.
 struct pt_ref {
     uint32_t of_instance;
     uint32_t which; // pt_plane or pt_instance_buffer
-    uint32_t index; // level or instance
+    uint32_t index; // level, layer from 0 on, or instance
 };
 
 struct pt_pass {
     enum pt_kernel kernel;
+    uint32_t layer;        // from 1 on; 0: of the whole picture
     const char *name;      // what statistics add it to
     char reason[96];
     const void *arguments; // owned by the plan
@@ -55,10 +72,17 @@ struct pt_skipped {
     char reason[128];
 };
 
+// Where a chunk's points may be seen, nothing left out.
+struct pt_bounds {
+    uint32_t rect[4]; // in the planes
+    float z_far;
+};
+
 struct pt_plan_instance {
     const struct pt_instance *instance;
     struct instance_args args;
     struct chunk_view *chunks; // those in view
+    struct pt_bounds *bounds;  // of each of them
     uint32_t chunk_count;
     uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
 };
@@ -73,12 +97,14 @@ struct pt_plan {
     struct pt_pass *passes;
     uint32_t pass_count;
     uint32_t finish; // the passes from this one on make the picture: nothing else reads the planes between them, and a device
-                     // may run them as one
+                     // may run them as one. Opaque scenes only: else UINT32_MAX
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     uint64_t points, points_scattered, chunks, chunks_culled;
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
     uint32_t iterations;    // of each filling filter
+    uint32_t layers;        // at most so many are peeled; 1: no peeling
+    int transparent;        // something in view lets light through
     struct pt_arena *arena;
 };
 
@@ -86,7 +112,7 @@ struct pt_plan {
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan);
 void pt_plan_destroy(struct pt_plan *plan);
 
-// Width and height of a level's planes; index > 0 only for planes with levels.
+// Width and height of a plane at a level (of planes with levels) or of a layer.
 void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_t level, uint32_t size[2]);
 
 // A line a pass, and one for each that is left out. Returns the full length.

@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { DEFAULT_LAYERS = 8 };
+
 struct camera {
     double axes[9], position[3];
     double xs, ys;         // window units a pixel
@@ -124,9 +126,10 @@ static void chunk_product(const struct camera *camera, const struct object *obje
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
 
-// Bounds on screen of the chunk's box, a pixel wider than exact; 0 when it is outside the view.
+// Bounds on screen of the chunk's box, a pixel wider than exact, its middle depth and one that no point lies beyond; 0 when it
+// is outside the view.
 static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chunk, const double rows[9],
-                        const double translation[3], double rect[4], double *z_middle)
+                        const double translation[3], double rect[4], double *z_middle, double *z_beyond)
 {
     const double z_far = camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip;
     const double z_near = camera->orthographic ? 0.0 : camera->near_clip;
@@ -156,6 +159,7 @@ static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chun
     }
     slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
     *z_middle = fmax(0.5 * (z_min + z_max), z_near);
+    *z_beyond = z_max + slop;
     if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
         return 0;
     double nearest = camera->orthographic ? 1.0 : fmax(z_min, z_near) - error[2];
@@ -251,24 +255,30 @@ struct survey {
     uint32_t *seen_count;
 };
 
+static int is_transparent(const struct pt_instance *instance)
+{
+    return instance->style.transparency > 0.0f || instance->cloud->info.has_opacities;
+}
+
 static int look_at_instance(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey, uint32_t i)
 {
     const struct pt_instance *instance = &scene->instances[i];
     const struct patina_cloud *cloud = instance->cloud;
     const struct camera *camera = &survey->camera;
     struct object *object = &survey->objects[i];
+    int transparent = is_transparent(instance), layered = transparent || scene->settings.layer_passes;
     set_object(camera, instance, object);
-    int cull = instance->style.cull_back && cloud->info.has_normals && !object->singular;
+    int cull = instance->style.cull_back && cloud->info.has_normals && !object->singular && !transparent;
     struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
     if (!list)
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+    for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         struct seen seen = { .chunk = c };
-        double rows[9], translation[3], eye[4], z, angle = 0.0, spread = 0.0;
+        double rows[9], translation[3], eye[4], z, beyond, angle = 0.0, spread = 0.0;
         chunk_product(camera, object, chunk, rows, translation);
-        if (!chunk_bounds(camera, chunk, rows, translation, seen.rect, &z))
+        if (!chunk_bounds(camera, chunk, rows, translation, seen.rect, &z, &beyond))
             continue;
         chunk_eye(camera, object, chunk, eye);
         int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
@@ -276,12 +286,13 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (cull && facing == FACES_AWAY)
             continue;
         seen.cull = cull && facing == FACES_BOTH;
-        seen.away = facing == FACES_AWAY;
+        seen.away = facing == FACES_AWAY && !layered;
         double footprint = fmax(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
         seen.spacing_px = (double)chunk->spacing * object->scale / footprint * sqrt(chunk_cosine(known, angle, spread));
         seen.area_px = chunk->count * seen.spacing_px * seen.spacing_px;
         list[survey->seen_count[i]++] = seen;
     }
+    plan->transparent |= transparent && survey->seen_count[i] > 0;
     return PATINA_OK;
 }
 
@@ -357,16 +368,24 @@ static void choose_filling(const patina_settings *settings, struct pt_plan *plan
     plan->iterations = settings->fill_iterations ? settings->fill_iterations : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : 4;
 }
 
+// An opaque scene has one layer, unless all are asked for as passes.
+static void choose_layers(const patina_settings *settings, struct pt_plan *plan)
+{
+    uint32_t wanted = settings->layers ? settings->layers : DEFAULT_LAYERS;
+    plan->layers = plan->transparent || settings->layer_passes ? wanted : 1;
+}
+
 static uint32_t round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
 
 // How far, in pixels, anything can carry influence: fills and un-fills of both phases and the push at every level, the
-// window of estimated normals (16), the blend of normals (9), smoothing and anti-aliasing.
+// window of estimated normals (16), the blend of normals (9), smoothing and anti-aliasing. Every layer starts from the filled
+// depth of the one before.
 static uint32_t reach_of(const struct pt_plan *plan)
 {
-    uint32_t reach = 16 + 9 + 1 + 1;
+    uint32_t layer = 16;
     for (uint32_t level = 0; level <= plan->levels; level++)
-        reach += (4 * plan->iterations + 3) << level;
-    return reach;
+        layer += (4 * plan->iterations + 3) << level;
+    return plan->layers * layer + 9 + 1 + 1;
 }
 
 static void choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard)
@@ -439,6 +458,8 @@ static void set_instance(const struct camera *camera, const struct object *objec
     args->color_format = cloud->color_format;
     args->lit = style->lighting == PATINA_LIGHTING_LIT;
     args->shininess = style->shininess;
+    args->opacity = 1.0f - style->transparency;
+    args->has_opacities = cloud->info.has_opacities;
     args->ambient = style->ambient;
     args->diffuse = style->diffuse;
     args->specular = style->specular;
@@ -484,17 +505,19 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     out->instance = instance;
     set_instance(&survey->camera, &survey->objects[i], instance, &out->args);
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
-    if (!out->chunks)
+    out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
+    if (!out->chunks || !out->bounds)
         return PATINA_ERROR_MEMORY;
     for (uint32_t k = 0; k < survey->seen_count[i]; k++) {
         const struct seen *seen = &survey->seen[i][k];
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
-        double rows[9], translation[3], bounds[4], z;
-        uint32_t rect[4];
+        double rows[9], translation[3], bounds[4], z, beyond;
+        uint32_t *rect = out->bounds[out->chunk_count].rect;
         chunk_product(&survey->camera, &survey->objects[i], chunk, rows, translation);
-        if (!chunk_bounds(&survey->camera, chunk, rows, translation, bounds, &z) ||
+        if (!chunk_bounds(&survey->camera, chunk, rows, translation, bounds, &z, &beyond) ||
             !rect_in_window(&plan->view, bounds, rect))
             continue;
+        out->bounds[out->chunk_count].z_far = nextafterf((float)beyond, INFINITY);
         set_chunk(&survey->camera, &survey->objects[i], instance, chunk, seen->cull, &out->chunks[out->chunk_count++]);
         join_rect(out->rect, rect);
         plan->points_scattered += chunk->count;
@@ -527,6 +550,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     if (error || (error = spacing_on_screen(plan, &survey)))
         return error;
     choose_filling(&scene->settings, plan);
+    choose_layers(&scene->settings, plan);
     uint32_t cell = 1u << plan->levels;
     uint32_t guard = round_up(8 + 4 * cell, cell > 16 ? cell : 16);
     // 2. The window, and what of the scene falls into it.

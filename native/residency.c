@@ -5,7 +5,7 @@
 
 static void destroy(struct pt_resident *resident, struct patina_device *device)
 {
-    for (int i = 0; i <= PT_COLORS; i++)
+    for (int i = 0; i < PT_INSTANCE_BUFFERS; i++)
         device->ops->buffer_destroy(device, &resident->buffers[i]);
     pt_alive_release(resident->alive);
     free(resident);
@@ -36,6 +36,7 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         { PT_IDS, cloud->ids, cloud->slots * 4 },
         { PT_SURFACE, cloud->surface, cloud->info.count * 4 },
         { PT_COLORS, cloud->colors, cloud->info.count * color_bytes[cloud->color_format] },
+        { PT_OPACITIES, cloud->opacities, cloud->info.count },
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         if (!parts[i].data)

@@ -8,7 +8,7 @@
 struct pt_resident {
     struct pt_resident *next;
     struct pt_alive *alive;
-    struct pt_buffer buffers[PT_COLORS + 1]; // by pt_instance_buffer; PT_CHUNKS is unused
+    struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer; PT_CHUNKS is unused
 };
 
 // The cloud's buffers on the device, uploaded at the first call; forgets dead clouds on the way.

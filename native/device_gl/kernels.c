@@ -68,7 +68,7 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
     [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3, 6},
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
-    [PT_KERNEL_extract] = {1, 2, 0, 3},
+    [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},
 };
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
@@ -168,6 +168,10 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     }
     case PT_KERNEL_extract:
         return run_extract(d, arguments);
+    case PT_KERNEL_peel: // whole tiles, counted from the plane's corner
+        pt_gl_tiles_forget(d);
+        return run_over(d, kernel, 0, "", view->rect[2] - (view->rect[0] >> PT_TILE_LEVEL << PT_TILE_LEVEL),
+                        view->rect[3] - (view->rect[1] >> PT_TILE_LEVEL << PT_TILE_LEVEL));
     default:
         pt_gl_tiles_forget(d); // pull writes keys
         return run_over(d, kernel, 0, "", view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);

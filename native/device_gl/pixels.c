@@ -105,7 +105,7 @@ int pt_gl_antialias(struct pt_gl_device *d)
     for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++)
         result = pt_gl_kernel_program(d, PT_KERNEL_antialias, step, definitions[step]);
     if (result == PATINA_OK)
-        result = prepare_list(d, 5, 6, TILE_PIXELS);
+        result = prepare_list(d, 6, 7, TILE_PIXELS);
     if (result == PATINA_OK)
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, FIND, PT_GL_TILES_POINTS);
     if (result != PATINA_OK)
@@ -113,7 +113,7 @@ int pt_gl_antialias(struct pt_gl_device *d)
     uint32_t count = list_length(d);
     result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, (size_t)count * 16, 0);
     if (result == PATINA_OK && count)
-        result = pt_gl_bind(d, 7, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
+        result = pt_gl_bind(d, 8, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
     if (result == PATINA_OK)
         result = dispatch_list(d, PT_KERNEL_antialias, MIX, count);
     if (result == PATINA_OK)

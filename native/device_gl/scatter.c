@@ -101,7 +101,10 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
 {
     static const char *const definitions[] = {"#define PASS 0\n", "#define PASS 1\n", "#define PASS 2\n"};
     uint32_t first = d->base.info.key64 ? 2 : 0, last = d->base.info.key64 ? 2 : 1;
+    const struct pt_buffer *limit = args->behind ? buffers[1 + 4 * args->instances] : buffers[0]; // any stands in
     int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "scatter");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 6, limit->name, 0, limit->size, "scatter");
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_scatter, pass, definitions[pass]);
         for (uint32_t i = 0; i < args->instances && 4 * i + 4 < count && result == PATINA_OK; i++) {

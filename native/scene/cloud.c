@@ -52,7 +52,7 @@ struct build {
     uint32_t chunk_room;       // chunks that the arrays have room for
     double box_min[3], box_max[3];
     struct block {
-        uint32_t drawn, offset;
+        uint32_t drawn, offset, translucent;
         uint64_t invalid_normals, invalid_colors;
         double box_min[3], box_max[3];
     } *blocks;
@@ -322,6 +322,7 @@ static int settle_spacing(struct patina_cloud *cloud)
     cloud->info.spacing = count ? known[count / 2] : 0.0;
     cloud->info.spacing_min = count ? known[0] : 0.0;
     cloud->info.spacing_max = count ? known[count - 1] : 0.0;
+    cloud->info.layer_distance = (double)PT_SPACING_FACTOR * cloud->info.spacing;
     for (uint32_t i = 0; i < count && !(cloud->spacing_base > 0.0); i++)
         cloud->spacing_base = known[i];
     // sixteen octaves of classes: where density varies more than that, the finest spacings are rounded up
@@ -449,6 +450,30 @@ static void read_color(const patina_array *array, uint64_t index, float rgb[3])
     }
 }
 
+// In 1/255, rounded; what is not a number is opaque.
+static uint8_t read_opacity(const patina_array *array, uint64_t index)
+{
+    const uint8_t *at = element(array, index);
+    double value = 1.0;
+    float f;
+    uint16_t v;
+    switch (array->type) {
+    case PATINA_UINT8:
+        return *at;
+    case PATINA_UINT16:
+        memcpy(&v, at, sizeof v);
+        value = v / 65535.0;
+        break;
+    case PATINA_FLOAT32:
+        memcpy(&f, at, sizeof f);
+        value = (double)f;
+        break;
+    default:
+        memcpy(&value, at, sizeof value);
+    }
+    return isnan(value) ? 255 : (uint8_t)(255.0 * fmin(fmax(value, 0.0), 1.0) + 0.5);
+}
+
 static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct build *build = context;
@@ -460,6 +485,10 @@ static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32
         uint64_t last = first + BLOCK_POINTS < build->desc.count ? first + BLOCK_POINTS : build->desc.count;
         for (uint64_t i = first; i < last; i++) {
             double n[3];
+            if (cloud->opacities) {
+                cloud->opacities[i] = read_opacity(&build->desc.opacity, i);
+                build->blocks[b].translucent |= cloud->opacities[i] < 255;
+            }
             if (build->desc.normal.data)
                 build->blocks[b].invalid_normals += !read_normal(&build->desc.normal, i, n);
             if (cloud->color_format == PT_COLOR_SRGB8) {
@@ -521,6 +550,21 @@ static int cut_uneven(struct build *build, uint32_t begin, uint32_t count)
     return error ? error : cut_uneven(build, begin + half, count - half);
 }
 
+static size_t opacity_bytes(const struct patina_cloud *cloud) { return cloud->info.count + 4; } // kernels read words
+
+// An array of ones says nothing.
+static void drop_opaque(struct patina_cloud *cloud, const struct build *build)
+{
+    for (uint32_t b = 0; b < build->block_count; b++)
+        if (build->blocks[b].translucent)
+            return;
+    if (cloud->opacities)
+        cloud->info.bytes -= opacity_bytes(cloud);
+    pt_pages_free(cloud->opacities, opacity_bytes(cloud));
+    cloud->opacities = NULL;
+    cloud->info.has_opacities = 0;
+}
+
 // Cuts the cells into chunks, as even as PT_CHUNK_POINTS allows.
 static int cut_chunks(struct build *build)
 {
@@ -544,10 +588,12 @@ static int allocate(struct patina_cloud *cloud)
     cloud->ids = pt_pages_alloc(cloud->slots * 4);
     cloud->surface = pt_pages_alloc(cloud->info.count * 4);
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
-    if (!cloud->positions || !cloud->ids || !cloud->surface || (cloud->color_format && !cloud->colors))
+    cloud->opacities = cloud->info.has_opacities ? pt_pages_alloc(opacity_bytes(cloud)) : NULL;
+    if (!cloud->positions || !cloud->ids || !cloud->surface || (cloud->color_format && !cloud->colors) ||
+        (cloud->info.has_opacities && !cloud->opacities))
         return PATINA_ERROR_MEMORY;
     cloud->info.bytes = cloud->slots * 16 + cloud->info.count * 4 + (cloud->colors ? color_bytes(cloud) : 0) +
-                        cloud->chunk_count * sizeof *cloud->chunks;
+                        (cloud->opacities ? opacity_bytes(cloud) : 0) + cloud->chunk_count * sizeof *cloud->chunks;
     return PATINA_OK;
 }
 
@@ -581,6 +627,7 @@ static int build_cloud(struct build *build)
     pt_parallel(build->pool, build->block_count, 1, attribute_blocks, build);
     if (pt_progress_cancelled(build->progress))
         return PATINA_ERROR_CANCELLED;
+    drop_opaque(cloud, build);
     for (uint32_t b = 0; b < build->block_count; b++) {
         cloud->info.invalid_normals += build->blocks[b].invalid_normals;
         cloud->info.invalid_colors += build->blocks[b].invalid_colors;
@@ -605,15 +652,16 @@ static size_t type_bytes(uint32_t type)
     return 0;
 }
 
-static int check_array(patina_array *array, const char *what, uint32_t types, uint32_t most_components)
+static int check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components,
+                       uint32_t most_components)
 {
     if (!array->data)
         return PATINA_OK;
     if (array->type > PATINA_INT32 || !(types >> array->type & 1u))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: element type %u is not supported", what, array->type);
-    if (array->components < 3 || array->components > most_components)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: %u components; 3%s are needed", what, array->components,
-                       most_components > 3 ? " or 4" : "");
+    if (array->components < least_components || array->components > most_components)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: %u components; %u%s needed", what, array->components,
+                       least_components, most_components > 3 ? " or 4 are" : most_components > 1 ? " are" : " is");
     if (!array->stride)
         array->stride = array->components * type_bytes(array->type);
     return PATINA_OK;
@@ -630,10 +678,11 @@ static int check_desc(patina_cloud_desc *desc)
                        (unsigned long long)desc->count);
     if (!finite3(desc->origin))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "origin: not finite");
-    if ((error = check_array(&desc->position, "position", floats, 3)) ||
-        (error = check_array(&desc->normal, "normal", floats, 3)))
+    if ((error = check_array(&desc->position, "position", floats, 3, 3)) ||
+        (error = check_array(&desc->normal, "normal", floats, 3, 3)) ||
+        (error = check_array(&desc->opacity, "opacity", floats | 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1)))
         return error;
-    return check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 4);
+    return check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 3, 4);
 }
 
 int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out)
@@ -661,7 +710,8 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
         cloud->info = (patina_cloud_info){ .struct_size = sizeof cloud->info,
                                            .count = desc->count,
                                            .has_normals = desc->normal.data != NULL,
-                                           .has_colors = desc->color.data != NULL };
+                                           .has_colors = desc->color.data != NULL,
+                                           .has_opacities = desc->opacity.data != NULL };
         memcpy(cloud->info.origin, desc->origin, sizeof desc->origin);
         cloud->color_format = !desc->color.data                    ? PT_COLOR_NONE
                               : desc->color.type == PATINA_UINT8 ? PT_COLOR_SRGB8
@@ -705,6 +755,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_pages_free(cloud->ids, cloud->slots * 4);
     pt_pages_free(cloud->surface, cloud->info.count * 4);
     pt_pages_free(cloud->colors, color_bytes(cloud));
+    pt_pages_free(cloud->opacities, opacity_bytes(cloud));
     free(cloud->chunks);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);

@@ -39,6 +39,7 @@ struct patina_cloud {
     uint32_t *ids;     // slots: index in file order
     uint32_t *surface; // count: octahedral normal and spacing class (kernel_args.h)
     void *colors;      // count x 3 uint8 (sRGB) or float (linear), or NULL
+    uint8_t *opacities; // count, or NULL where every point is opaque
     enum pt_color_format color_format;
     double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };

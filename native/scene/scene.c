@@ -76,6 +76,8 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: world_from_object is not finite");
     if (!(style->d_min >= 0.0f) || !isfinite(style->d_min))
         return fail(scene, "cloud style: d_min must be 0 or more");
+    if (!(style->transparency >= 0.0f) || !(style->transparency <= 1.0f))
+        return fail(scene, "cloud style: transparency must be within 0 and 1");
     if (style->lighting > PATINA_LIGHTING_LIT)
         return fail(scene, "cloud style: no such lighting");
     if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) ||
@@ -186,6 +188,11 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
     if (!isfinite(s.world_color[0] + s.world_color[1] + s.world_color[2]))
         return fail(scene, "settings: world_color is not finite");
+    if (s.layers > PATINA_MAX_LAYERS)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u layers; the most is %d", s.layers,
+                       PATINA_MAX_LAYERS);
+    if (s.layer_passes & ~(1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_NORMAL))
+        return fail(scene, "settings: layer_passes can be COMBINED, DEPTH and NORMAL only");
     if (!s.passes)
         s.passes = (1u << PATINA_PASS_COUNT) - 1;
     scene->settings = s;

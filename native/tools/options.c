@@ -124,6 +124,15 @@ static int parse_color(const char *text, float color[3])
     return 0;
 }
 
+static int parse_opacity(const char *text, struct tool_options *options)
+{
+    options->opacity_count = parse_numbers(text, options->opacity, 1, TOOL_OPACITIES);
+    for (int i = 0; i < options->opacity_count; i++)
+        if (options->opacity[i] < 0 || options->opacity[i] > 1)
+            return -1;
+    return options->opacity_count < 0 ? -1 : 0;
+}
+
 static int parse_width(const char *text, double *width)
 {
     return parse_numbers(text, width, 1, 1) < 0 || *width <= 0 ? -1 : 0;
@@ -186,6 +195,10 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_word(value, "alleviated|gaussian|box|off", &s->smooth);
     else if (!strcmp(name, "--antialias"))
         bad = parse_word(value, "layers|background|off", &s->antialias);
+    else if (!strcmp(name, "--opacity"))
+        bad = parse_opacity(value, o);
+    else if (!strcmp(name, "--layers"))
+        bad = parse_count(value, 0, PATINA_MAX_LAYERS, &s->layers);
     else if (!strcmp(name, "--background"))
         bad = parse_color(value, s->world_color);
     else if (!strcmp(name, "--repeat")) {

@@ -87,6 +87,8 @@ static int load_clouds(struct job *job)
         if (code)
             return tool_failed(options->files[i], NULL, code);
         grow_box(&job->box, &info);
+        if (options->opacity_count)
+            style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);
         code = patina_scene_add_cloud(job->scene, job->clouds[i], &style);
         if (code)
             return tool_failed(options->files[i], job->scene, code);

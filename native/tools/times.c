@@ -193,5 +193,6 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
         print_string(times->pass_names[i]);
         printf(": %.4f", median(times->pass_ms[i], times->frames));
     }
-    printf("}, \"skipped\": %s, \"peak_mb\": %.1f}\n", times->skipped ? times->skipped : "{}", peak_megabytes());
+    printf("}, \"layers\": %u, \"skipped\": %s, \"peak_mb\": %.1f}\n", stats->layers,
+           times->skipped ? times->skipped : "{}", peak_megabytes());
 }

@@ -34,6 +34,8 @@ int tool_cancelled(void);
 
 enum tool_view { VIEW_ANGLES, VIEW_LOOK };
 
+enum { TOOL_OPACITIES = 64 };
+
 struct tool_options {
     char **files; // into the argument vector
     int file_count;
@@ -45,6 +47,8 @@ struct tool_options {
     double eye[3], target[3];       // VIEW_LOOK
     double ortho_width;             // world units; 0 = perspective
     uint32_t lighting;              // patina_lighting
+    double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
+    int opacity_count;              // 0: all opaque
     int cull, transparent, json, dump_plan, verbose;
     int repeat; // measured frames; 0 = just the picture
     patina_settings settings;

@@ -20,9 +20,10 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer arguments_block { antialias_args args; };
 layout(std430, binding = 2) buffer from_block { uint from[]; };
 layout(std430, binding = 4) writeonly buffer color_block { vec4 color[]; };
-layout(std430, binding = 5) buffer counters_block { uint edge_count; };
-layout(std430, binding = 6) buffer edges_block { uint edges[]; };
-layout(std430, binding = 7) buffer mixed_block { vec4 mixed[]; };
+layout(std430, binding = 5) readonly buffer through_block { float through[]; };
+layout(std430, binding = 6) buffer counters_block { uint edge_count; };
+layout(std430, binding = 7) buffer edges_block { uint edges[]; };
+layout(std430, binding = 8) buffer mixed_block { vec4 mixed[]; };
 
 const ivec2 cross_offsets[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
 
@@ -41,31 +42,38 @@ float step_limit(bool layers, uint at, uint z_bits)
     return layers ? limit : pt_float(PT_KEY_EMPTY_Z);
 }
 
-bool is_far(float z, float limit) { return z > limit || z == pt_float(PT_KEY_EMPTY_Z); }
+bool is_far(bool behind, uint q, float z, float limit)
+{
+    if (z == pt_float(PT_KEY_EMPTY_Z))
+        return !(behind && through[q] < PT_SPENT);
+    return z > limit;
+}
 
 #if STEP == 0
 
-bool is_edge(ivec2 size, bool layers, int x, int y)
+bool is_edge(ivec2 size, bool layers, bool behind, int x, int y)
 {
     uint at = uint(y * size.x + x), z_bits = read_z_bits(at);
     if (z_bits == PT_KEY_EMPTY_Z)
         return false;
     float limit = step_limit(layers, at, z_bits);
     bool edge = false;
-    for (int i = 0; i < 4; i++)
-        edge = is_far(read_z(neighbour(size, x, y, i)), limit) || edge;
+    for (int i = 0; i < 4; i++) {
+        uint q = neighbour(size, x, y, i);
+        edge = is_far(behind, q, read_z(q), limit) || edge;
+    }
     return edge;
 }
 
 void main()
 {
     view_args view = args.view;
-    bool layers = args.layers != 0u;
+    bool layers = args.layers != 0u, behind = args.behind != 0u;
     ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
     uint found = 0u, y = column.y, end = pt_tile_end(view, column);
     for (uint i = 0u; y + i < end; i++)
-        found |= uint(is_edge(size, layers, int(column.x), int(y + i))) << i;
+        found |= uint(is_edge(size, layers, behind, int(column.x), int(y + i))) << i;
     if (found == 0u)
         return;
     uint at = atomicAdd(edge_count, uint(bitCount(found)));
@@ -86,7 +94,7 @@ uint entry_index()
 
 void main()
 {
-    bool layers = args.layers != 0u;
+    bool layers = args.layers != 0u, behind = args.behind != 0u;
     ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
     if (index >= entries)
@@ -99,7 +107,7 @@ void main()
     for (int i = 0; i < 4; i++) {
         uint q = neighbour(size, int(pixel.x), int(pixel.y), i);
         float z = read_z(q);
-        if (!is_far(z, limit))
+        if (!is_far(behind, q, z, limit))
             continue;
         count += 1.0;
         if (z < pt_float(PT_KEY_EMPTY_Z))

@@ -23,6 +23,7 @@ layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; 
 layout(std430, binding = 3) readonly buffer positions_block { float positions[]; };
 layout(std430, binding = 4) readonly buffer ids_block { uint ids[]; };
 layout(std430, binding = 5) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = 6) readonly buffer limit_block { float limit[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
@@ -45,7 +46,7 @@ void main()
     vec4 eye = vec4(chunk.eye[0], chunk.eye[1], chunk.eye[2], chunk.eye[3]);
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
-    bool cull = chunk.cull != 0u;
+    bool cull = chunk.cull != 0u, behind = args.behind != 0u;
     uint base = chunk.first - first_slot;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
 
@@ -64,9 +65,11 @@ void main()
         // 2. clip: NaN fails every comparison
         if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
             continue;
-        // 3. early depth test; the sign bit of -0 is dropped
+        // 3. limit and early depth test; the sign bit of -0 is dropped
         uint pixel = uint(int(floor(y)) - view.origin_y) * view.width + uint(int(floor(x)) - view.origin_x);
         uint z_bits = pt_bits(z) & 0x7FFFFFFFu;
+        if (behind && !(limit[pixel] < z))
+            continue;
 #if PASS == 0
         if (keys[2u * pixel + 1u] <= z_bits)
             continue;

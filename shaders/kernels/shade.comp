@@ -2,7 +2,7 @@
 // shade: id -> colour and normal, Phong. [D 3.1], deferred: only what the picture shows is lit; twin of
 // native/device_cpu/kernels/shade.c
 //
-// STEP 0: normals (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any window);
+// STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any window);
 // STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights)
 #version 430 core
 #include "lib/math.glsl"
@@ -14,8 +14,18 @@ layout(std430, binding = 0) readonly buffer arguments_block { shade_args args; }
 layout(std430, binding = 5) readonly buffer colors_block { uint point_colors[]; };
 layout(std430, binding = 6) writeonly buffer shading_block { vec4 shading[]; };
 layout(std430, binding = 7) writeonly buffer color_block { vec4 color[]; };
+layout(std430, binding = 8) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
 
 #if STEP == 0
+
+float opacity_of(float instance_opacity, bool own, uint id)
+{
+    if (!own)
+        return instance_opacity;
+    uint byte_value = (opacities[id >> 2] >> (8u * (id & 3u))) & 255u;
+    precise float opacity = instance_opacity * (float(byte_value) * 0.00392156885936856); // 1 / 255
+    return opacity;
+}
 
 // The blend, or where it is nothing the source's own normal.
 vec3 finish_blend(vec3 sum, vec3 own)
@@ -75,6 +85,8 @@ void main()
 {
     view_args view = args.view;
     uint id_base = args.instance.id_base, id_count = args.instance.id_count;
+    float instance_opacity = args.instance.opacity;
+    bool own_opacity = args.instance.has_opacities != 0u;
     ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
     uint end = pt_tile_end(view, column);
@@ -105,7 +117,7 @@ void main()
             normal = finish_blend(blend_wide(view, size, x, int(y), pt_float(key.y), read_deff(source)), normal);
 #endif
         if (ours)
-            shading[at] = vec4(normal, 0.0);
+            shading[at] = vec4(normal, opacity_of(instance_opacity, own_opacity, key.x - id_base));
     }
 }
 
@@ -210,14 +222,16 @@ void main()
         p.z = pt_float(key.y);
         p.ray = pt_ray(view, int(column.x), int(y));
         p.albedo = gather_albedo(style, id);
-        p.n = texelFetch(other_float4_plane, int(at)).xyz;
+        vec4 shaded = texelFetch(other_float4_plane, int(at));
+        p.n = shaded.xyz;
         // 3. light
 #if LIT
         vec3 c = phong(view, eye_z, factors, shininess, world, light_count, p);
 #else
         vec3 c = p.albedo;
 #endif
-        color[at] = vec4(c, 1.0);
+        precise vec3 premultiplied = c * shaded.w;
+        color[at] = vec4(premultiplied, shaded.w);
     }
 }
 

@@ -28,6 +28,12 @@
 #define PT_BLEND_FILLED 0.125f
 #define PT_FROM_MIXED 0x80000000u // top bit of the from plane: anti-aliasing mixed this pixel's colour
 
+// Peeling: a pixel is finished when less light than this comes through it (half a step of 8 bits).
+#define PT_SPENT 0.001953125f // 1 / 512
+// The limit plane's least values are kept for tiles of 2^PT_TILE_LEVEL pixels: a chunk that lies before them is not scattered
+// again. Chunks of 4096 points are 30 to 70 pixels wide at a point a pixel.
+#define PT_TILE_LEVEL 4
+
 #define PT_SPACINGS 64
 #define PT_MAX_LIGHTS 32
 
@@ -57,10 +63,11 @@ struct chunk_view {
     uint32_t id_base;
 };
 
-// scatter: points -> least key a pixel. [D 3.1]
+// scatter: points -> least key a pixel. [D 3.1]; behind a layer only points with z > limit at their pixel count. [D 5]
 struct scatter_args {
     struct view_args view;
     uint32_t instances;
+    uint32_t behind; // 1: the limit plane holds
 };
 
 // What the per-instance kernels (normals, surface, shade) know of an instance of a cloud.
@@ -72,6 +79,8 @@ struct instance_args {
     uint32_t shininess;
     float ambient, diffuse, specular;
     float color[3];
+    float opacity;              // of the instance; times that of the point
+    uint32_t has_opacities;     // 1: points have their own, a byte each
     float normal_matrix[9];     // object normal -> view space, not yet unit
     float d_min;                // world units
     float spacing[PT_SPACINGS]; // local spacing by class, world units
@@ -138,12 +147,28 @@ struct shade_args {
 struct smooth_args {
     struct view_args view;
     float center, edge, corner; // weights, renormalised over the neighbours taken
+    uint32_t translucent;       // 0: alpha is 1 wherever there is something
 };
 
-// antialias: Laplace on depth as steps. [D 3.5]
+// antialias: Laplace on depth as steps. [D 3.5]. Behind a layer, a neighbour through which no light comes any more is no edge:
+// what this surface borders on there lies before it, and took its share of the pixel already.
 struct antialias_args {
     struct view_args view;
     uint32_t layers; // 1: edges between layers too, 0: background edges only
+    uint32_t behind; // 1: the through plane holds
+};
+
+// peel: a finished layer is blended behind those before it, and says what may show behind it. [D 4, 5], SPEC 3
+//   1. A pixel whose depth is not beyond its limit was filled across a layer already taken: it is emptied, its limit stays.
+//   2. color behind what was blended before: over + (1 - over.a) color.
+//   3. through = through (1 - opacity) of the pixel's own point, limit = z + deff[from]; +inf (finished) where the layer is
+//      empty or, with `stop`, through < PT_SPENT.
+//   4. tiles: the least limit of each 2^PT_TILE_LEVEL x 2^PT_TILE_LEVEL pixels (within the rectangle; +inf: all finished) and how
+//      many of them the layer covers.
+struct peel_args {
+    struct view_args view;
+    uint32_t first; // 1: the first layer: through is 1, nothing is limited, nothing was blended
+    uint32_t stop;  // 0: what lies behind an opaque pixel is wanted too (passes of the layers)
 };
 
 // compose: over the background, into the crop.

@@ -25,6 +25,8 @@ struct ref_color ref_antialias(const struct antialias_args *args, const struct r
             continue; // unknown: taken for the same surface
         size_t neighbour = (size_t)qy * view->width + (size_t)qx;
         int empty = planes->keys[neighbour] == REF_EMPTY_KEY;
+        if (empty && args->behind && planes->through[neighbour] < 1.0 / 512.0)
+            continue; // hidden: what this surface borders on there lies before it
         enum ref_truth is_far = empty ? REF_YES : REF_NO;
         if (!empty && args->layers)
             is_far = ref_less(limit, ref_exactly(ref_key_z(planes->keys[neighbour])));

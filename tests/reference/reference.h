@@ -90,6 +90,8 @@ struct ref_planes {
     const float *normal, *deff, *color, *shading;
     const uint32_t *surface; // by id - id_base
     const void *colors;      // by id - id_base
+    const uint8_t *opacities; // by id - id_base
+    const float *through;    // light that earlier layers let through
 };
 
 // Does the key belong to the instance?
@@ -132,7 +134,8 @@ int ref_fill(const struct fill_args *args, const float *normal, const float *def
 struct ref_shade {
     struct ref_vec n; // the normal that lights the pixel
     double normal_error;
-    double color[4], color_error[4];
+    double color[4], color_error[4]; // premultiplied
+    double opacity;
     int written;  // the pixel belongs to the instance
     int unsure;   // float32 may decide otherwise
     int singular; // a light within rounding of the surface: only finite colours are asked for
@@ -146,6 +149,15 @@ struct ref_color {
 };
 struct ref_color ref_smooth(const struct smooth_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_color ref_antialias(const struct antialias_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_peel {
+    uint64_t key;         // empty: was none, or was filled across a layer taken before
+    float limit, through; // exact
+    double over[4], error[4];
+    int covered; // the layer shows something here
+};
+// limit, through, over: before; not read for the first layer.
+struct ref_peel ref_peel(const struct peel_args *args, const struct ref_planes *planes, const float *limit,
+                         const float *through, const float *over, int x, int y);
 // x, y: in the crop.
 struct ref_color ref_compose(const struct compose_args *args, const struct ref_planes *planes, int x, int y);
 

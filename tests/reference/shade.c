@@ -107,10 +107,14 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     double albedo[3], z = ref_key_z(key);
     albedo_of(instance, planes, ref_key_id(key) - instance->id_base, albedo);
     normal_of(args, planes, x, y, &out);
-    out.color[3] = 1.0;
+    out.opacity = instance->opacity;
+    if (instance->has_opacities)
+        out.opacity *= planes->opacities[ref_key_id(key) - instance->id_base] / 255.0;
+    out.color[3] = out.opacity;
+    out.color_error[3] = TOL_OPACITY * out.opacity;
     for (int c = 0; c < 3; c++) {
-        out.color[c] = albedo[c];
-        out.color_error[c] = TOL_COLOR * fabs(albedo[c]);
+        out.color[c] = out.opacity * albedo[c];
+        out.color_error[c] = TOL_COLOR * fabs(out.color[c]);
     }
     if (!instance->lit)
         return out;
@@ -156,8 +160,8 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
         }
     }
     for (int c = 0; c < 3; c++) {
-        out.color[c] = albedo[c] * light[c];
-        out.color_error[c] = fabs(albedo[c]) * loose[c] + TOL_COLOR * fabs(out.color[c]);
+        out.color[c] = out.opacity * albedo[c] * light[c];
+        out.color_error[c] = out.opacity * fabs(albedo[c]) * loose[c] + TOL_COLOR * fabs(out.color[c]);
     }
     return out;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // finish: shade, smooth, antialias, compose and extract as one walk over rows. The planes between them stay in rings of
 // rows that the second-level cache holds: nothing but the picture is written. Same functions, same numbers as the kernels.
+// Of opaque scenes only: alpha is 1 but for edges.
 #include "device_cpu/kernels/antialias.h"
 #include "device_cpu/kernels/compose.h"
 #include "device_cpu/kernels/extract.h"
@@ -57,8 +58,8 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
     for (uint32_t i = 0; i < finish->ring; i++, at += CHANNELS_SEEN * s)
         walk->seen[i] = (struct pt_seen_row){ at, at + s, { at + 2 * s, at + 3 * s, at + 4 * s } };
     for (uint32_t i = 0; i < RING; i++, at += 3 * CHANNELS_COLOR * s) {
-        walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s } };
-        walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 3 * s, at + 4 * s, at + 5 * s } };
+        walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s, NULL } };
+        walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 3 * s, at + 4 * s, at + 5 * s, NULL } };
         for (uint32_t k = 0; k < 3; k++)
             walk->shown[i][k] = at + (6 + k) * s;
     }
@@ -159,10 +160,10 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         return;
     for (uint32_t x = 0; x < width; x += PT_LANES) {
         vm some = vf_lt(vf_load(out->z + x), empty); // +inf behind the row's end
-        vf color[3];
+        vf color[4];
         if (!vm_bits(some))
             continue;
-        pt_smooth_pixels(finish->smooth, rows, x, vf_load(limits + x), some, color);
+        pt_smooth_pixels(finish->smooth, rows, 3, x, vf_load(limits + x), some, color);
         for (uint32_t k = 0; k < 3; k++)
             vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
     }

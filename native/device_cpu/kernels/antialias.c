@@ -27,6 +27,7 @@ static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struc
     const uint64_t *keys = pt_cpu_data(job->call, 0);
     const uint32_t *from = pt_cpu_data(job->call, 1);
     const float *deff = pt_cpu_data(job->call, 2), *colors = pt_cpu_data(job->call, 3);
+    const float *through = job->args->behind ? pt_cpu_data(job->call, 4) : NULL;
     const float empty = pt_float(PT_KEY_EMPTY_Z);
     uint32_t at = y * view->width + x;
     float sum[4] = { 0.0f, 0.0f, 0.0f, 0.0f }, count = 0.0f, limit = empty;
@@ -38,7 +39,7 @@ static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struc
             continue; // unknown: no edge
         size_t q = (size_t)qy * view->width + qx;
         float z = pt_float((uint32_t)(keys[q] >> 32));
-        if (!(z > limit || z == empty))
+        if (!(z > limit || z == empty) || (through && z == empty && through[q] < PT_SPENT))
             continue;
         count += 1.0f;
         for (size_t k = 0; k < 4 && z < empty; k++)

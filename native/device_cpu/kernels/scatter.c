@@ -15,7 +15,8 @@ struct scatter {
 
 struct target {
     uint64_t *keys;
-    int shared; // by several threads
+    const float *limit; // only what lies beyond counts; NULL: everything
+    int shared;         // by several threads
 };
 
 static inline void store_least(struct target target, uint32_t pixel, uint64_t key)
@@ -102,10 +103,15 @@ static void scatter_chunk(const struct view_args *view, const struct chunk_view 
                            vm_and(vm_and(vf_le(left, x), vf_lt(x, right)), vm_and(vf_le(bottom, y), vf_lt(y, top))));
         if (!vm_bits(inside))
             continue;
-        // 3. early depth test; the sign bit of -0 is dropped
+        // 3. limit and early depth test; the sign bit of -0 is dropped
         vi column = vi_sub(vf_int(vf_floor(x)), origin_x), row = vi_sub(vf_int(vf_floor(y)), origin_y);
         vi pixel = vi_add(vi_mul(row, width), column);
         vi z_bits = vi_and(vf_bits(z), vi_set(0x7FFFFFFFu));
+        if (target.limit) {
+            inside = vm_and(inside, vf_lt(vf_gather(target.limit, pixel, inside), z));
+            if (!vm_bits(inside))
+                continue;
+        }
         vi stored = vi_gather_z(target.keys, pixel, inside);
         uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z_bits))));
         if (!nearer)
@@ -139,7 +145,10 @@ static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
 {
     const struct scatter *scatter = context;
     const struct pt_cpu_call *call = scatter->call;
-    const struct target target = { pt_cpu_data(call, 0), pt_pool_threads(call->pool) > 1 };
+    const struct scatter_args *args = call->arguments;
+    const struct target target = { .keys = pt_cpu_data(call, 0),
+                                   .limit = args->behind ? pt_cpu_data(call, 1 + 4 * args->instances) : NULL,
+                                   .shared = pt_pool_threads(call->pool) > 1 };
     uint32_t instance = 0;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(call); c++) {

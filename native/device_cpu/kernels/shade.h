@@ -67,6 +67,16 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
         albedo[k] = vf_load(rgb[k]);
 }
 
+// The points' opacity, times the instance's.
+static inline vf pt_opacity(const struct instance_args *instance, const uint8_t *opacities, vi id, vm ours)
+{
+    vf opacity = vf_set(instance->opacity);
+    if (!instance->has_opacities)
+        return opacity;
+    vi byte = vi_and(vi_gather_bytes(opacities, id, ours), vi_set(255));
+    return opacity * (vi_convert(byte) * vf_set(1.0f / 255.0f));
+}
+
 // ---- light -------------------------------------------------------------------------------------------------------------
 
 struct pt_surface_point {

@@ -2,7 +2,7 @@
 // smooth: 3 x 3 low-pass over the neighbours of the same layer. [D 3.4, Table 1]; twin of shaders/kernels/smooth.comp
 #include "smooth.h"
 
-enum { BAND_ROWS = 32, CHANNELS = 4 };
+enum { BAND_ROWS = 32, CHANNELS = 5 };
 
 struct smooth {
     const struct pt_cpu_call *call;
@@ -26,7 +26,7 @@ static void load_row(const struct smooth *smooth, int32_t y, const struct pt_col
         if (!vm_bits(vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))))))
             continue;
         vf_load4(colors + 4 * (size_t)x, color);
-        for (uint32_t k = 0; k < 3; k++)
+        for (uint32_t k = 0; k < 3 + smooth->args->translucent; k++)
             vf_store(row->color[k] + x, color[k], vm_first(PT_LANES));
     }
 }
@@ -41,8 +41,7 @@ static void smooth_row(const struct smooth *smooth, const struct pt_color_row *c
         if (!vm_bits(some))
             continue; // nothing reads the colour of an empty pixel
         vf color[4], limit = vf_gather(smooth->planes.deff, pt_source(&smooth->planes, at), some);
-        pt_smooth_pixels(smooth->args, rows, x, limit, some, color);
-        color[3] = vf_set(1.0f);
+        pt_smooth_pixels(smooth->args, rows, smooth->args->translucent ? 4 : 3, x, limit, some, color);
         vf_store4(out + 4 * at, color, vm_bits(some));
     }
 }
@@ -54,7 +53,8 @@ static void smooth_bands(void *context, uint32_t begin, uint32_t end, uint32_t t
     struct pt_color_row ring[3];
     for (uint32_t k = 0; k < 3; k++) {
         float *row = smooth->rows + ((size_t)thread * 3 + k) * CHANNELS * smooth->stride + PT_ROW_PAD;
-        ring[k] = (struct pt_color_row){ row, { row + smooth->stride, row + 2 * smooth->stride, row + 3 * smooth->stride } };
+        const size_t s = smooth->stride;
+        ring[k] = (struct pt_color_row){ row, { row + s, row + 2 * s, row + 3 * s, row + 4 * s } };
     }
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(smooth->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];

@@ -152,6 +152,8 @@ typedef struct patina_cloud_desc {
     patina_array normal;   // 3 x FLOAT32/FLOAT64, any length; zero or NaN = that point has none. Optional
     patina_array color;    // 3 or 4 x UINT8/UINT16 (sRGB, 0..max) or FLOAT32 (linear). A 4th component is ignored. Optional.
                            // UINT8 stays 3 bytes a point at rest; the others become float32, 12 bytes, within +-65504
+    patina_array opacity;  // 1 x UINT8/UINT16 (0..max) or FLOAT32/FLOAT64 (0..1, clamped; NaN = 1), times the instance's.
+                           // Optional; kept in steps of 1/255, a byte a point
     double origin[3];      // added to every position, in float64
     uint32_t threads;      // 0 = one per core
 } patina_cloud_desc;
@@ -166,12 +168,14 @@ typedef struct patina_cloud_info {
     double spacing;          // median over chunks of the local spacing (about 1/sqrt(points per area)), object units
     double spacing_min, spacing_max;
     uint64_t invalid_positions, invalid_normals, invalid_colors; // NaN/Inf (normals: or zero)
-    uint32_t has_normals, has_colors;
+    uint32_t has_normals, has_colors, has_opacities;
     double origin[3];
+    double layer_distance;   // automatic d~: what d_min = 0 stands for at the median spacing, object units. Each chunk
+                             // takes its own spacing's
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
-// at rest (position 12, id 4, colour 3, normal and spacing 4), at most 16 more while building.
+// at rest (position 12, id 4, colour 3, normal and spacing 4, opacity 1), at most 16 more while building.
 PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
 PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
@@ -226,11 +230,13 @@ typedef struct patina_cloud_style {
     size_t struct_size;
     double world_from_object[16]; // all zero = identity. Mirrored, non-uniform, singular: all allowed
     uint32_t lighting;            // patina_lighting
-    uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals
+    uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals and for transparent clouds
     float d_min;                  // the paper's d~, world units: least distance of two layers; 0 = automatic
     float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8); for black 1e-20
     float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
     uint32_t shininess;           // Phong exponent; 0 = 32
+    float transparency;           // share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn at all.
+                                  // Opacity is 1 - transparency, times the point's own. Paper [D 5]
 } patina_cloud_style;
 
 enum patina_light_type { PATINA_LIGHT_SUN = 1, PATINA_LIGHT_POINT = 2 };
@@ -269,7 +275,14 @@ typedef struct patina_settings {
     uint32_t film_transparent; // 1 = background has alpha 0
     float world_color[3];      // linear; background and ambient light
     uint32_t passes;           // bits 1 << PATINA_PASS_*: passes to make beside the combined one; 0 = all
+    uint32_t layers;           // at most so many layers of surface are peeled and blended, up to PATINA_MAX_LAYERS; 0 = 1 where
+                               // everything in view is opaque, else 8. Peeling ends by itself when a layer is empty or less
+                               // than 1/512 of the light comes through. Paper [D 4, 5]
+    uint32_t layer_passes;     // bits 1 << PATINA_PASS_COMBINED, _DEPTH, _NORMAL: kept of every layer for patina_frame_read_layer;
+                               // all layers are then peeled, behind opaque surfaces too, and 0 layers means 8. 0 = none
 } patina_settings;
+
+#define PATINA_MAX_LAYERS 16
 
 PATINA_API int patina_scene_create(patina_scene **out);
 PATINA_API void patina_scene_destroy(patina_scene *scene); // clouds stay
@@ -310,6 +323,7 @@ typedef struct patina_frame_stats {
     uint64_t chunks, chunks_culled;
     double ms;                  // whole render call
     uint64_t plane_bytes;       // planes held by the frame
+    uint32_t layers;            // of surface that show something; 1 without peeling, 0 where nothing is in view
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
@@ -322,11 +336,17 @@ PATINA_API void patina_frame_cancel(patina_frame *frame); // the running (or els
 PATINA_API float patina_frame_progress(const patina_frame *frame); // 0..1
 // Copies a pass, width * height * channels float32, into the caller's buffer; size in bytes must fit exactly.
 PATINA_API int patina_frame_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size);
-// The visibility keys, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone after a render
-// that failed or was cancelled (PATINA_ERROR_EMPTY).
+// Copies a pass of one layer, as patina_frame_read does: COMBINED (what the layer alone shows, before no background), DEPTH or
+// NORMAL, asked for in settings.layer_passes. layer: 1 (nearest) to settings.layers; layers that do not exist read as
+// nothing (0, depth +inf). Like keys they are gone after a render that failed or was cancelled (PATINA_ERROR_EMPTY).
+PATINA_API int patina_frame_read_layer(const patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
+// The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone
+// after a render that failed or was cancelled (PATINA_ERROR_EMPTY).
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
 PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
-// Milliseconds by pass, and why each other pass was left out, as JSON: {"passes":{..},"skipped":{..}}.
+// Milliseconds by pass, why each other pass was left out, and of each layer the points in chunks that were scattered and
+// the pixels that it covers, as JSON: {"passes":{..},"skipped":{..},"layers":[{"points":..,"pixels":..},..]}; one layer
+// that was not peeled has no pixel count.
 // Returns the full length; truncates to size.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
 // The plan as text, a line a pass, without rendering. Returns the full length.
