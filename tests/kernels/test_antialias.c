@@ -5,9 +5,10 @@
 #include <math.h>
 #include <string.h>
 
-static void check(struct harness *h, const struct picture *picture, uint32_t layers)
+// through: NULL for the first layer
+static void check(struct harness *h, const struct picture *picture, uint32_t layers, const float *through)
 {
-    struct antialias_args args = {.view = picture->view, .layers = layers};
+    struct antialias_args args = {.view = picture->view, .layers = layers, .behind = through != NULL};
     size_t count = picture->count, open = 0, mixed = 0;
     float *colors = harness_alloc(h, count * 16); // what empty pixels hold must not matter
     memcpy(colors, picture->color, count * 16);
@@ -18,10 +19,11 @@ static void check(struct harness *h, const struct picture *picture, uint32_t lay
     struct pt_buffer *from = harness_buffer(h, picture->from, count * 4);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, count * 4);
     struct pt_buffer *color = harness_buffer(h, colors, count * 16);
-    HARNESS_RUN(h, antialias, &args, keys, from, deff, color);
+    HARNESS_RUN(h, antialias, &args, keys, from, deff, color, harness_buffer(h, through, through ? count * 4 : 0));
     const float *got = harness_read(h, color);
     uint32_t *got_from = harness_read(h, from);
     struct ref_planes planes = picture_planes(picture);
+    planes.through = through;
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % picture->view.width), y = (int)(i / picture->view.width);
         if (picture->keys[i] == REF_EMPTY_KEY) {
@@ -54,8 +56,13 @@ static void kinds(struct harness *h)
             struct picture picture = picture_random(h, &rng, picture_view(67, 45, p), (enum picture_kind)kind,
                                                     kind % 2 ? 0.9 : 0.5);
             picture_invent(&picture, &rng, 0.5, 4);
-            check(h, &picture, 0);
-            check(h, &picture, 1);
+            check(h, &picture, 0, NULL);
+            check(h, &picture, 1, NULL);
+            float *through = harness_alloc(h, picture.count * 4); // light, no light, and about as little as counts for none
+            for (size_t i = 0; i < picture.count; i++)
+                through[i] = rng_below(&rng, 2) ? PT_SPENT : rng_below(&rng, 2) ? 0.0f : float_step(PT_SPENT, -1);
+            check(h, &picture, 0, through);
+            check(h, &picture, 1, through);
         }
 }
 
@@ -66,7 +73,7 @@ static void shapes(struct harness *h)
         struct rng rng = {s};
         struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES,
                                                 0.9);
-        check(h, &picture, 1);
+        check(h, &picture, 1, NULL);
     }
 }
 

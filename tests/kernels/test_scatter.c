@@ -19,6 +19,7 @@ struct scene {
     struct view_args view;
     struct cloud clouds[MOST_INSTANCES];
     uint32_t count;
+    const float *limit; // by pixel: only points beyond it count; NULL: all
 };
 
 // A camera: view = rotation * object + shift, screen in pixels.
@@ -127,7 +128,7 @@ static void pad(struct cloud *cloud)
 
 static uint64_t *run_scatter(struct harness *h, struct scene *scene)
 {
-    struct pt_buffer *buffers[1 + 4 * MOST_INSTANCES];
+    struct pt_buffer *buffers[2 + 4 * MOST_INSTANCES];
     size_t pixels = (size_t)scene->view.width * scene->view.height;
     uint64_t *empty = harness_alloc(h, pixels * 8);
     for (size_t i = 0; i < pixels; i++)
@@ -142,7 +143,9 @@ static uint64_t *run_scatter(struct harness *h, struct scene *scene)
         buffers[n++] = harness_buffer(h, cloud->ids, 4 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->points);
     }
-    struct scatter_args args = {.view = scene->view, .instances = scene->count};
+    struct scatter_args args = {.view = scene->view, .instances = scene->count, .behind = scene->limit != NULL};
+    if (scene->limit)
+        buffers[n++] = harness_buffer(h, scene->limit, pixels * 4);
     harness_run(h, PT_KERNEL_scatter, &args, sizeof args, buffers, n);
     uint64_t *keys = harness_read(h, buffers[0]);
     harness_same(h, "keys", keys, pixels, 8, 1, scene->view.width);
@@ -177,7 +180,10 @@ static uint64_t *check_scene(struct harness *h, struct scene *scene)
     for (uint32_t i = 0; i < n; i++) {
         open += splats[i].possible && !splats[i].definite;
         if (splats[i].possible && splats[i].definite) {
-            double *at = &farthest[(size_t)splats[i].y0 * width + (size_t)splats[i].x0];
+            size_t pixel = (size_t)splats[i].y0 * width + (size_t)splats[i].x0;
+            double *at = &farthest[pixel];
+            if (scene->limit && !(splats[i].z.lo > scene->limit[pixel])) // may be refused
+                continue;
             *at = fmin(*at, splats[i].z.hi);
         }
     }
@@ -191,6 +197,8 @@ static uint64_t *check_scene(struct harness *h, struct scene *scene)
                          farthest[i]);
         if (keys[i] == REF_EMPTY_KEY)
             continue;
+        if (scene->limit && !(z > scene->limit[i]))
+            harness_fail(h, "keys", x, y, "got z %.9g, which is not beyond the limit %.9g", z, scene->limit[i]);
         struct ref_splat wanted = {.id = ref_key_id(keys[i])};
         const struct ref_splat *splat = bsearch(&wanted, splats, n, sizeof *splats, by_id);
         if (!splat)
@@ -475,6 +483,40 @@ static void culling(struct harness *h)
     }
 }
 
+// Behind a layer: limits in disorder, at the first layer's own depths to the ulp, and none left.
+static void limits(struct harness *h)
+{
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {13};
+        struct scene scene = {.view = window(67, 45, p, p ? 60.0 : 20.0)};
+        for (uint32_t i = 0; i < 3; i++) {
+            struct camera camera = look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+            scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i == 1, i * 5000), 2.0);
+        }
+        size_t pixels = (size_t)67 * 45, emptied = 0;
+        const uint64_t *front = check_scene(h, &scene);
+        float *limit = harness_alloc(h, pixels * 4);
+        scene.limit = limit;
+        for (int way = 0; way < 4; way++) {
+            for (size_t i = 0; i < pixels; i++) {
+                float z = front[i] == REF_EMPTY_KEY ? 4.0f : (float)ref_key_z(front[i]);
+                limit[i] = way == 0 ? (float)rng_range(&rng, 0.0, 6.0) : way == 1 ? z : way == 2 ? float_step(z, -1) : INFINITY;
+            }
+            const uint64_t *keys = check_scene(h, &scene);
+            for (size_t i = 0; i < pixels; i++) {
+                emptied += way == 1 && keys[i] == REF_EMPTY_KEY && front[i] != REF_EMPTY_KEY;
+                if (way == 1 && keys[i] <= front[i] && keys[i] != REF_EMPTY_KEY)
+                    harness_fail(h, "behind", (int)(i % 67), (int)(i / 67), "shows what lies at its limit");
+                if (way == 2 && keys[i] != front[i] && front[i] != REF_EMPTY_KEY)
+                    harness_fail(h, "an ulp before", (int)(i % 67), (int)(i / 67), "shows another point");
+                if (way == 3 && keys[i] != REF_EMPTY_KEY)
+                    harness_fail(h, "finished", (int)(i % 67), (int)(i / 67), "shows a point");
+            }
+        }
+        HARNESS_CHECK(h, emptied > 0);
+    }
+}
+
 // No instance at all, and a plane that already holds something nearer.
 static void nothing(struct harness *h)
 {
@@ -515,6 +557,7 @@ int main(int argc, char **argv)
         {"orthographic scales 1e-6 and 1e6, near = -far", orthographic_scales, 0},
         {"camera 5 10^6 away, singular matrices", far_and_flat, 0},
         {"back faces", culling, 0},
+        {"behind a layer", limits, 0},
         {"nothing to draw", nothing, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

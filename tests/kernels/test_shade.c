@@ -10,6 +10,7 @@ struct setup {
     struct shade_args args;
     void *colors;
     size_t colors_size;
+    uint8_t *opacities;
     float *shading; // before
 };
 
@@ -24,6 +25,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     instance->id_count = (uint32_t)(s.picture.count * 3 / 4);
     instance->has_normals = 1;
     instance->color_format = format;
+    instance->opacity = 1.0f;
     instance->lit = 1;
     instance->shininess = 32;
     instance->ambient = 0.7f;
@@ -75,10 +77,13 @@ static void check(struct harness *h, const struct setup *s, double most_open)
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->colors_size);
     struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
     struct pt_buffer *color = harness_buffer(h, unset, count * 16);
-    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color);
+    struct pt_buffer *opacities = harness_buffer(h, s->opacities, s->opacities ? s->args.instance.id_count : 0);
+    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color, opacities);
     const float *got = harness_read(h, color), *got_n = harness_read(h, shading);
     struct ref_planes planes = picture_planes(picture);
     planes.colors = s->colors;
+    planes.opacities = s->opacities;
+    float *transparent = harness_alloc(h, count * 4);
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % picture->view.width), y = (int)(i / picture->view.width);
         struct ref_shade expected = ref_shade(&s->args, &planes, x, y);
@@ -89,6 +94,9 @@ static void check(struct harness *h, const struct setup *s, double most_open)
             continue;
         }
         open += (size_t)expected.unsure;
+        transparent[i] = n[3];
+        if (!harness_near(n[3], expected.opacity, TOL_OPACITY * expected.opacity))
+            harness_fail(h, "opacity", x, y, "got %.9g, expected %.9g", n[3], expected.opacity);
         if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]))
             harness_fail(h, "color", x, y, "got (%g %g %g)", c[0], c[1], c[2]);
         if (expected.unsure || expected.singular)
@@ -102,7 +110,27 @@ static void check(struct harness *h, const struct setup *s, double most_open)
             harness_fail(h, "normal", x, y, "got (%.7f %.7f %.7f), expected (%.7f %.7f %.7f) +- %.2g", n[0], n[1], n[2],
                          expected.n.x, expected.n.y, expected.n.z, 2.0 * expected.normal_error);
     }
+    harness_same(h, "opacity", transparent, count, 4, 1, picture->view.width);
     harness_unsure(h, open, count, most_open);
+}
+
+// Of the instance and of points, 0 and 1 exactly among them.
+static void opacities(struct harness *h)
+{
+    static const float values[] = {0.0f, 1.0f, 0.3f, 1e-6f};
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++)
+        for (int own = 0; own < 2; own++) {
+            struct rng rng = {11};
+            struct setup s = make(h, &rng, 1, PICTURE_SURFACES, 1);
+            s.args.instance.opacity = values[i];
+            s.args.instance.has_opacities = own != 0;
+            s.opacities = own ? harness_alloc(h, s.args.instance.id_count) : NULL;
+            for (uint32_t k = 0; k < s.args.instance.id_count && own; k++)
+                s.opacities[k] = rng_below(&rng, 3) ? (uint8_t)rng_next(&rng) : rng_below(&rng, 2) ? 255 : 0;
+            s.args.blend = i % 2;
+            s.args.instance.lit = i < 2;
+            check(h, &s, TOL_UNSURE_SHARE);
+        }
 }
 
 static void formats(struct harness *h)
@@ -196,7 +224,7 @@ static void sanity(struct harness *h)
     float normal[4] = {0, 0, -1, 1}, deff = 0.1f; // turned away: lit all the same
     struct shade_args args = {.view = {.width = 1, .height = 1}, .light_count = 1};
     args.instance = (struct instance_args){
-        .id_count = 1, .has_normals = 1, .lit = 1, .shininess = 8, .diffuse = 1.0f, .color = {1, 0.5f, 0}};
+        .id_count = 1, .has_normals = 1, .opacity = 1.0f, .lit = 1, .shininess = 8, .diffuse = 1.0f, .color = {1, 0.5f, 0}};
     args.lights[0] = (struct light_args){1, {(float)3.14159265358979, 0.0f, 0.0f}, {0, 0, 1}};
     struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff};
     struct ref_shade out = ref_shade(&args, &planes, 0, 0);
@@ -216,6 +244,7 @@ int main(int argc, char **argv)
         {"colour formats, lit and unlit", formats, 0},
         {"pictures of all kinds, paper and refined", kinds, 0},
         {"estimated normals", estimated, 0},
+        {"opacities", opacities, 0},
         {"materials", materials, 0},
         {"lights", lights, 0},
     };

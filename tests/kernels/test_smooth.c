@@ -5,9 +5,18 @@
 #include <math.h>
 #include <string.h>
 
+static int translucent(const struct picture *picture)
+{
+    for (size_t i = 0; i < picture->count; i++)
+        if (picture->keys[i] != REF_EMPTY_KEY && picture->color[4 * i + 3] != 1.0f)
+            return 1;
+    return 0;
+}
+
 static void check(struct harness *h, const struct picture *picture, float center, float edge, float corner)
 {
     struct smooth_args args = {.view = picture->view, .center = center, .edge = edge, .corner = corner};
+    args.translucent = translucent(picture) != 0;
     size_t count = picture->count, open = 0;
     struct pt_buffer *keys = harness_buffer(h, picture->keys, count * 8);
     struct pt_buffer *from = harness_buffer(h, picture->from, count * 4);
@@ -54,6 +63,12 @@ static void kinds(struct harness *h)
             struct picture picture = picture_random(h, &rng, picture_view(67, 45, p), (enum picture_kind)kind,
                                                     kind % 2 ? 0.9 : 0.5);
             picture_invent(&picture, &rng, 0.5, 4);
+            all_filters(h, &picture);
+            for (size_t i = 0; i < picture.count; i++) {
+                float opacity = rng_below(&rng, 2) ? 0.3f : (float)rng_below(&rng, 2);
+                for (size_t c = 0; c < 4; c++)
+                    picture.color[4 * i + c] *= opacity;
+            }
             all_filters(h, &picture);
         }
 }
