@@ -2,37 +2,60 @@
 #include "staging.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 enum { REFINED = PATINA_QUALITY_REFINED, PAPERLY = PATINA_QUALITY_PAPER };
 enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF };
+enum { LAYER_PASSES = 1 << PATINA_PASS_COMBINED | 1 << PATINA_PASS_DEPTH | 1 << PATINA_PASS_NORMAL };
 enum { LIT = PATINA_LIGHTING_LIT, UNLIT = PATINA_LIGHTING_UNLIT, AUTO = PATINA_LIGHTING_AUTO };
 
+// glass: transparency, points' own opacity, layers, their passes.
 // The torus covers about a third of a picture: points / (0.6 width height) is its density a pixel, both sides counted.
+#define OPAQUE {0.0f, 0, 0, 0}
 const struct staging stagings[] = {
-    {"one pixel", 1, 1, 5000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0},
-    {"small, 0.1 points a pixel", 67, 45, 180, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 1, 0},
-    {"small, 1 point a pixel", 67, 45, 1800, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0},
-    {"small, 30 points a pixel", 67, 45, 54000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, PAPERLY, CLOSED, 0, 0, 0, 0},
-    {"orthographic, paper's filters", 203, 151, 30000, POINTS_ALL, STAGE_ONE, 1, 0, LIT, PAPERLY, PAPER, 1, 1, 0, 0},
-    {"orthographic, refined", 203, 151, 6000, POINTS_NORMALS, STAGE_ONE, 1, 1, LIT, REFINED, CLOSED, 2, 0, 1, 0},
-    {"paper's filling, refined depth", 203, 151, 30000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, PAPER, 0, 0, 0, 0},
-    {"no filling, no filters", 203, 151, 20000, POINTS_ALL, STAGE_ONE, 0, 1, UNLIT, PAPERLY, OPEN, 3, 2, 0, 0},
-    {"unlit colours", 203, 151, 9000, POINTS_COLORS, STAGE_ONE, 0, 0, AUTO, REFINED, CLOSED, 0, 0, 0, 0},
-    {"normals estimated", 203, 151, 20000, POINTS_PLAIN, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0},
-    {"normals estimated, sparse, orthographic", 203, 151, 2500, POINTS_COLORS, STAGE_ONE, 1, 0, LIT, REFINED, CLOSED, 0,
-     0, 0, 0},
-    {"many instances", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0},
-    {"many instances, culled, orthographic", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 1, 1, LIT, REFINED, CLOSED, 0, 0,
-     1, 0},
-    {"many instances without normals", 203, 151, 15000, POINTS_COLORS, STAGE_MANY, 0, 1, LIT, PAPERLY, CLOSED, 0, 1, 0,
-     0},
-    {"density 0.1 to 30 in one cloud", 203, 151, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 1},
-    {"large", 1024, 768, 400000, POINTS_ALL, STAGE_MANY, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0},
-    {"large, sparse", 1024, 768, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 1, 0},
+    {"one pixel", 1, 1, 5000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"small, 0.1 points a pixel", 67, 45, 180, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 1, 0, OPAQUE},
+    {"small, 1 point a pixel", 67, 45, 1800, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"small, 30 points a pixel", 67, 45, 54000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, PAPERLY, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"orthographic, paper's filters", 203, 151, 30000, POINTS_ALL, STAGE_ONE, 1, 0, LIT, PAPERLY, PAPER, 1, 1, 0, 0,
+     OPAQUE},
+    {"orthographic, refined", 203, 151, 6000, POINTS_NORMALS, STAGE_ONE, 1, 1, LIT, REFINED, CLOSED, 2, 0, 1, 0,
+     OPAQUE},
+    {"paper's filling, refined depth", 203, 151, 30000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, PAPER, 0, 0, 0, 0,
+     OPAQUE},
+    {"no filling, no filters", 203, 151, 20000, POINTS_ALL, STAGE_ONE, 0, 1, UNLIT, PAPERLY, OPEN, 3, 2, 0, 0, OPAQUE},
+    {"unlit colours", 203, 151, 9000, POINTS_COLORS, STAGE_ONE, 0, 0, AUTO, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"normals estimated", 203, 151, 20000, POINTS_PLAIN, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"normals estimated, sparse, orthographic", 203, 151, 2500, POINTS_COLORS, STAGE_ONE, 1, 0, LIT, REFINED, CLOSED,
+     0, 0, 0, 0, OPAQUE},
+    {"many instances", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"many instances, culled, orthographic", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 1, 1, LIT, REFINED, CLOSED, 0,
+     0, 1, 0, OPAQUE},
+    {"many instances without normals", 203, 151, 15000, POINTS_COLORS, STAGE_MANY, 0, 1, LIT, PAPERLY, CLOSED, 0, 1,
+     0, 0, OPAQUE},
+    {"density 0.1 to 30 in one cloud", 203, 151, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 1,
+     OPAQUE},
+    {"large", 1024, 768, 400000, POINTS_ALL, STAGE_MANY, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"large, sparse", 1024, 768, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 1, 0, OPAQUE},
+    {"transparent", 203, 151, 30000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0, {0.6f, 0, 0, 0}},
+    {"transparent, as in the paper, orthographic", 203, 151, 60000, POINTS_ALL, STAGE_ONE, 1, 0, LIT, PAPERLY, PAPER,
+     1, 1, 1, 0, {0.3f, 0, 3, 0}},
+    {"transparent, sparse, normals estimated", 203, 151, 4000, POINTS_COLORS, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED,
+     0, 0, 1, 0, {0.8f, 0, 0, LAYER_PASSES}},
+    {"transparent and opaque instances", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0,
+     {0.7f, 0, 16, 0}},
+    {"points with opacities", 203, 151, 20000, POINTS_ALL, STAGE_MANY, 0, 0, UNLIT, PAPERLY, CLOSED, 0, 0, 1, 0,
+     {0.0f, 1, 5, LAYER_PASSES}},
+    {"layers of what is opaque, one asked for", 67, 45, 3000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 0, 0,
+     0, 0, {0.0f, 0, 1, LAYER_PASSES}},
+    {"layers of what is opaque", 203, 151, 20000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, CLOSED, 3, 2, 0, 0,
+     {0.0f, 0, 4, LAYER_PASSES}},
+    {"large, transparent", 1024, 768, 400000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0,
+     {0.5f, 0, 6, 0}},
 };
 const uint32_t staging_count = sizeof stagings / sizeof stagings[0];
 
-static void add(struct stage *stage, const struct staging *staging, const double matrix[16])
+static void add(struct stage *stage, const struct staging *staging, const double matrix[16], float transparency)
 {
     patina_cloud_style style = {.struct_size = sizeof style, .lighting = staging->lighting};
     style.cull_back = staging->cull_back;
@@ -40,6 +63,7 @@ static void add(struct stage *stage, const struct staging *staging, const double
     style.diffuse = 0.9f;
     style.specular = 0.4f;
     style.shininess = 20;
+    style.transparency = staging->glass.transparency > 0.0f ? transparency : 0.0f;
     for (int k = 0; k < 16; k++)
         style.world_from_object[k] = matrix[k];
     CHECK(patina_scene_add_cloud(stage->scene, stage->cloud, &style), stage->scene);
@@ -83,6 +107,25 @@ static void thin_out(struct points *points)
     points->count = kept;
 }
 
+// Patches of the surface are opaque, clear, or anything between.
+static patina_cloud *upload_with_opacities(const struct points *points)
+{
+    struct pcg random = pcg_seed(5);
+    float *opacity = malloc((points->count + 1) * sizeof *opacity);
+    assert_non_null(opacity);
+    for (uint64_t i = 0; i < points->count; i++) {
+        const float *p = points->position + 3 * i;
+        double patch = sin(5.0 * (double)p[0]) * sin(5.0 * (double)p[1]);
+        opacity[i] = patch > 0.6 ? 1.0f : patch < -0.6 ? 0.0f : (float)pcg_unit(&random);
+    }
+    patina_cloud_desc desc = points_desc(points);
+    desc.opacity = (patina_array){.data = opacity, .type = PATINA_FLOAT32, .components = 1};
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+    free(opacity);
+    return cloud;
+}
+
 struct stage stage_build(const struct staging *staging)
 {
     struct stage stage = {0};
@@ -90,23 +133,23 @@ struct stage stage_build(const struct staging *staging)
     struct points points = points_torus(count, 1.0, 0.4, staging->columns, 7);
     if (staging->stretched)
         thin_out(&points);
-    stage.cloud = points_upload(&points);
+    stage.cloud = staging->glass.own_opacity ? upload_with_opacities(&points) : points_upload(&points);
     points_free(&points);
 
     CHECK(patina_scene_create(&stage.scene), NULL);
     const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    add(&stage, staging, identity);
+    add(&stage, staging, identity, staging->glass.transparency);
     if (staging->objects == STAGE_MANY) {
         const double mirrored[16] = {-0.6, 0, 0, 0.9, 0, 0.6, 0, 0.8, 0, 0, 0.6, 0.5, 0, 0, 0, 1};
         const double uneven[16] = {0.3, -0.4, 0.1, -0.8, 0.2, 0.7, 0.0, -0.7, -0.3, 0.1, 1.1, 0.3, 0, 0, 0, 1};
         const double flat[16] = {0.5, 0, 0, 0.9, 0, 0.5, 0, -0.9, 0, 0, 0, -0.4, 0, 0, 0, 1};
         const double point[16] = {0, 0, 0, 0.0, 0, 0, 0, -1.2, 0, 0, 0, 0.6, 0, 0, 0, 1};
         const double far_off[16] = {1, 0, 0, 500, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-        add(&stage, staging, mirrored);
-        add(&stage, staging, uneven);
-        add(&stage, staging, flat);
-        add(&stage, staging, point);
-        add(&stage, staging, far_off);
+        add(&stage, staging, mirrored, 0.0f);
+        add(&stage, staging, uneven, 0.5f * staging->glass.transparency);
+        add(&stage, staging, flat, 1.0f);
+        add(&stage, staging, point, 0.9f);
+        add(&stage, staging, far_off, 0.5f);
     }
     add_lights(stage.scene);
 
@@ -120,6 +163,8 @@ struct stage stage_build(const struct staging *staging)
     stage.settings.smooth = staging->smooth;
     stage.settings.antialias = staging->antialias;
     stage.settings.film_transparent = staging->film_transparent;
+    stage.settings.layers = staging->glass.layers;
+    stage.settings.layer_passes = staging->glass.layer_passes;
     stage.settings.world_color[0] = 0.05f;
     stage.settings.world_color[1] = 0.06f;
     stage.settings.world_color[2] = 0.08f;

@@ -17,6 +17,11 @@ struct staging {
     uint32_t orthographic, cull_back, lighting;
     uint32_t quality, fill, smooth, antialias, film_transparent;
     uint32_t stretched; // density falls by 1/300 along x: coarse levels and dense ones in one picture
+    struct {
+        float transparency;   // of the first object, the third half of it, the second opaque, the fourth not drawn
+        uint32_t own_opacity; // of points
+        uint32_t layers, layer_passes;
+    } glass;
 };
 
 extern const struct staging stagings[];

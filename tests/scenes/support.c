@@ -238,6 +238,26 @@ struct picture picture_read(const patina_frame *frame)
     return picture;
 }
 
+void picture_read_layers(struct picture *picture, const patina_frame *frame, const patina_settings *settings)
+{
+    if (!settings->layer_passes)
+        return;
+    size_t pixels = (size_t)picture->width * picture->height;
+    picture->layers = settings->layers ? settings->layers : 8;
+    picture->layer_combined = malloc(picture->layers * pixels * 16);
+    picture->layer_depth = malloc(picture->layers * pixels * 4);
+    picture->layer_normal = malloc(picture->layers * pixels * 12);
+    if (!picture->layer_combined || !picture->layer_depth || !picture->layer_normal)
+        support_die("out of memory");
+    for (uint32_t k = 0; k < picture->layers; k++) {
+        CHECK(patina_frame_read_layer(frame, k + 1, PATINA_PASS_COMBINED, picture->layer_combined + 4 * k * pixels,
+                                      pixels * 16), frame);
+        CHECK(patina_frame_read_layer(frame, k + 1, PATINA_PASS_DEPTH, picture->layer_depth + k * pixels, pixels * 4), frame);
+        CHECK(patina_frame_read_layer(frame, k + 1, PATINA_PASS_NORMAL, picture->layer_normal + 3 * k * pixels,
+                                      pixels * 12), frame);
+    }
+}
+
 struct picture picture_render(patina_device *device, patina_scene *scene, const patina_camera *camera,
                               const patina_settings *settings)
 {
@@ -247,6 +267,7 @@ struct picture picture_render(patina_device *device, patina_scene *scene, const 
     CHECK(patina_frame_create(device, &frame), device);
     CHECK(patina_frame_render(frame, scene), frame);
     struct picture picture = picture_read(frame);
+    picture_read_layers(&picture, frame, settings);
     patina_frame_destroy(frame);
     return picture;
 }
@@ -258,6 +279,9 @@ void picture_free(struct picture *picture)
     free(picture->depth);
     free(picture->normal);
     free(picture->source);
+    free(picture->layer_combined);
+    free(picture->layer_depth);
+    free(picture->layer_normal);
     *picture = (struct picture){0};
 }
 
@@ -298,6 +322,15 @@ void picture_assert_identical(const struct picture *part, const struct picture *
     assert_same_bytes(part->source, whole->source, 4, part, whole, x, y, "source", what);
     assert_same_bytes(part->normal, whole->normal, 12, part, whole, x, y, "normal", what);
     assert_same_bytes(part->combined, whole->combined, 16, part, whole, x, y, "combined", what);
+    assert_int_equal(part->layers, whole->layers);
+    for (uint32_t k = 0; k < part->layers; k++) {
+        size_t p = (size_t)k * part->width * part->height, w = (size_t)k * whole->width * whole->height;
+        assert_same_bytes(part->layer_depth + p, whole->layer_depth + w, 4, part, whole, x, y, "a layer's depth", what);
+        assert_same_bytes(part->layer_normal + 3 * p, whole->layer_normal + 3 * w, 12, part, whole, x, y, "a layer's normal",
+                          what);
+        assert_same_bytes(part->layer_combined + 4 * p, whole->layer_combined + 4 * w, 16, part, whole, x, y,
+                          "a layer's colour", what);
+    }
 }
 
 patina_scene *scene_of(const patina_cloud *cloud, const patina_cloud_style *style)

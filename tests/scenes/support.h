@@ -60,6 +60,8 @@ struct picture {
     uint32_t width, height;
     uint64_t *keys;
     float *combined, *depth, *normal, *source; // 4, 1, 3, 1 channels
+    uint32_t layers;                           // kept as passes; whole pictures one after another:
+    float *layer_combined, *layer_depth, *layer_normal;
 };
 
 #define KEY_EMPTY 0x7F800000FFFFFFFFu
@@ -73,6 +75,8 @@ struct picture picture_read_passes(const patina_frame *frame); // keys stay NULL
 // Sets camera and settings, renders in a fresh frame and reads everything.
 struct picture picture_render(patina_device *device, patina_scene *scene, const patina_camera *camera,
                               const patina_settings *settings);
+// Where the settings asked for COMBINED, DEPTH and NORMAL of layers.
+void picture_read_layers(struct picture *picture, const patina_frame *frame, const patina_settings *settings);
 void picture_free(struct picture *picture);
 uint64_t picture_count(const struct picture *picture); // pixels that are not empty
 // Whole pictures, or a crop of `whole` at (x, y) against `part`; fails with the first pixel that differs. Keys only where

@@ -6,6 +6,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#define LAYER_DIFFERS "%s, %s: %s of layer %u at pixel %llu is %.9g, the first device has %.9g"
+
 // Colours: TOL_COLOR is a share of the terms' absolute sum. The scenes' brightest term is a point light near the
 // surface, a few units; premultiplied alpha is 1 at most.
 static double color_scale(const struct picture *picture)
@@ -53,6 +55,19 @@ static void compare(const struct picture *picture, const struct picture *truth, 
         if (fabs((double)picture->source[i] - (double)truth->source[i]) > TOL_DISTANCE * fabs((double)truth->source[i]))
             support_die("%s, %s: source at pixel %llu is %.9g, the first device has %.9g", name, scene,
                         (unsigned long long)i, (double)picture->source[i], (double)truth->source[i]);
+    for (uint32_t k = 0; k < truth->layers; k++) {
+        const float *a = picture->layer_depth + k * pixels, *b = truth->layer_depth + k * pixels;
+        if (farthest(a, b, pixels, &where) > 0.0)
+            support_die(LAYER_DIFFERS, name, scene, "depth", k + 1, (unsigned long long)where, (double)a[where], (double)b[where]);
+        a = picture->layer_normal + 3 * k * pixels;
+        b = truth->layer_normal + 3 * k * pixels;
+        if (farthest(a, b, 3 * pixels, &where) > 0.0)
+            support_die(LAYER_DIFFERS, name, scene, "normal", k + 1, (unsigned long long)where, (double)a[where], (double)b[where]);
+        a = picture->layer_combined + 4 * k * pixels;
+        b = truth->layer_combined + 4 * k * pixels;
+        if (farthest(a, b, 4 * pixels, &where) > TOL_COLOR * color_scale(truth))
+            support_die(LAYER_DIFFERS, name, scene, "colour", k + 1, (unsigned long long)where, (double)a[where], (double)b[where]);
+    }
     double colors = farthest(picture->combined, truth->combined, 4 * pixels, &where), scale = color_scale(truth);
     if (colors > TOL_COLOR * scale)
         support_die("%s, %s: colour at pixel %llu is off by %g (allowed %g)", name, scene,
@@ -108,12 +123,13 @@ static void test_reused_frames(void **state)
             continue;
         patina_frame *frame = NULL;
         CHECK(patina_frame_create(device, &frame), device);
-        const uint32_t order[] = {11, 1, 7, 4, 9, 1, 7, 12, 0, 11};
+        const uint32_t order[] = {11, 1, 7, 20, 4, 21, 9, 1, 22, 7, 17, 12, 0, 11, 19};
         for (uint32_t k = 0; k < sizeof order / sizeof order[0]; k++) {
             struct stage stage = stage_build(&stagings[order[k]]);
             struct picture fresh = picture_render(device, stage.scene, &stage.camera, &stage.settings);
             CHECK(patina_frame_render(frame, stage.scene), frame);
             struct picture again = picture_read(frame);
+            picture_read_layers(&again, frame, &stage.settings);
             picture_assert_identical(&again, &fresh, 0, 0, stagings[order[k]].name);
             picture_free(&again);
             picture_free(&fresh);

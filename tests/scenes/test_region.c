@@ -78,7 +78,7 @@ static void test_tiles(void **state)
 {
     (void)state;
     patina_device *device = support_device_first();
-    const uint32_t chosen[] = {1, 5, 9, 13, 14};
+    const uint32_t chosen[] = {1, 5, 9, 13, 14, 19};
     for (uint32_t i = 0; i < sizeof chosen / sizeof chosen[0]; i++) {
         struct stage stage = stage_build(&stagings[chosen[i]]);
         struct picture whole = picture_render(device, stage.scene, &stage.camera, &stage.settings);
