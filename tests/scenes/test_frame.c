@@ -2,6 +2,7 @@
 // A frame's life: statistics and plan as data, cancel, the last good picture, arguments that are refused (DESIGN 3, 7).
 #include "staging.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -69,8 +70,23 @@ static const char *json_object(const char *at)
     return at + 1;
 }
 
+static const char *json_array(const char *at)
+{
+    at = json_space(at + 1);
+    while (*at != ']') {
+        at = json_space(json_value(at));
+        if (*at == ',')
+            at = json_space(at + 1);
+        else if (*at != ']')
+            support_die("JSON: no comma at '%.20s'", at);
+    }
+    return at + 1;
+}
+
 static const char *json_value(const char *at)
 {
+    if (*at == '[')
+        return json_array(at);
     if (*at == '{')
         return json_object(at);
     if (*at == '"')
@@ -141,6 +157,8 @@ static void test_statistics(void **state)
         }
         assert_true(sum <= stats.ms * 1.01 + 0.1);
         assert_true(json_member(full, "skipped", "normals") != NULL); // the cloud has normals
+        assert_true(json_member(full, "skipped", "peel") != NULL); // everything is opaque
+        assert_true(strstr(full, "\"layers\":[{\"points\":1800,\"pixels\":0}]") != NULL && stats.layers == 1);
         free(full);
 
         stage.settings.fill = PATINA_FILL_OFF;
@@ -337,8 +355,8 @@ static void test_refused_arguments(void **state)
     assert_int_equal(patina_frame_read(frame, PATINA_PASS_COUNT, pixels, sizeof pixels), PATINA_ERROR_ARGUMENT);
 
     // Whatever is refused leaves the scene as it was, at setting or at rendering.
-    patina_settings wrong[6];
-    for (int i = 0; i < 6; i++)
+    patina_settings wrong[8];
+    for (int i = 0; i < 8; i++)
         wrong[i] = stage.settings;
     wrong[0].region[2] = 68; // beyond the picture
     wrong[0].region[3] = 45;
@@ -348,7 +366,9 @@ static void test_refused_arguments(void **state)
     wrong[3].quality = 77;
     wrong[4].smooth = 77;
     wrong[5].antialias = 77;
-    for (int i = 0; i < 6; i++) {
+    wrong[6].layers = PATINA_MAX_LAYERS + 1;
+    wrong[7].layer_passes = 1u << PATINA_PASS_SOURCE;
+    for (int i = 0; i < 8; i++) {
         int code = patina_scene_set_settings(stage.scene, &wrong[i]);
         if (code == PATINA_OK)
             code = patina_frame_render(frame, stage.scene);
@@ -380,6 +400,42 @@ static void test_refused_arguments(void **state)
     patina_device_destroy(device);
 }
 
+// Layers can be read that were asked for; those that do not exist are empty.
+static void test_reading_layers(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    struct stage stage = stage_build(staging_named("small, 1 point a pixel"));
+    enum { PIXELS = 67 * 45 };
+    static float depth[PIXELS], color[4 * PIXELS];
+    patina_frame *frame = frame_of(device, &stage);
+    assert_int_equal(patina_frame_read_layer(frame, 1, PATINA_PASS_DEPTH, depth, sizeof depth), PATINA_ERROR_EMPTY);
+    CHECK(patina_frame_render(frame, stage.scene), frame);
+    assert_int_equal(patina_frame_read_layer(frame, 1, PATINA_PASS_DEPTH, depth, sizeof depth), PATINA_ERROR_EMPTY);
+    stage.settings.layer_passes = 1u << PATINA_PASS_DEPTH;
+    CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+    CHECK(patina_frame_render(frame, stage.scene), frame);
+    patina_frame_stats stats = {.struct_size = sizeof stats};
+    CHECK(patina_frame_get_stats(frame, &stats), frame);
+    assert_in_range(stats.layers, 1, 4); // culled: the tube's near halves
+    uint32_t covered[9] = {0};
+    for (uint32_t layer = 1; layer <= 8; layer++) {
+        CHECK(patina_frame_read_layer(frame, layer, PATINA_PASS_DEPTH, depth, sizeof depth), frame);
+        for (int i = 0; i < PIXELS; i++)
+            covered[layer] += isfinite(depth[i]);
+        assert_true((covered[layer] > 0) == (layer <= stats.layers));
+    }
+    assert_int_equal(patina_frame_read_layer(frame, 1, PATINA_PASS_COMBINED, color, sizeof color), PATINA_ERROR_EMPTY);
+    assert_int_equal(patina_frame_read_layer(frame, 9, PATINA_PASS_DEPTH, depth, sizeof depth), PATINA_ERROR_EMPTY);
+    assert_int_equal(patina_frame_read_layer(frame, 0, PATINA_PASS_DEPTH, depth, sizeof depth), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_frame_read_layer(frame, 17, PATINA_PASS_DEPTH, depth, sizeof depth), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_frame_read_layer(frame, 1, PATINA_PASS_SOURCE, depth, sizeof depth), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_frame_read_layer(frame, 1, PATINA_PASS_DEPTH, depth, sizeof depth - 4), PATINA_ERROR_ARGUMENT);
+    patina_frame_destroy(frame);
+    stage_free(&stage);
+    patina_device_destroy(device);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
@@ -390,6 +446,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_cancel_while_running),
         cmocka_unit_test(test_memory_cap),
         cmocka_unit_test(test_refused_arguments),
+        cmocka_unit_test(test_reading_layers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

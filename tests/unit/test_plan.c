@@ -219,6 +219,57 @@ static void test_region_decides_as_the_whole(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// As many passes as layers, none where everything is opaque, back faces kept.
+static void test_layers(void **state)
+{
+    (void)state;
+    static const struct {
+        float transparency;
+        uint32_t asked, passes, layers;
+    } cases[] = { { 0.0f, 0, 0, 1 }, { 0.0f, 5, 0, 1 }, { 0.5f, 0, 0, 8 }, { 0.5f, 1, 0, 1 }, { 0.5f, 3, 0, 3 },
+                  { 0.0f, 0, 1u << PATINA_PASS_DEPTH, 8 }, { 0.0f, 2, 1u << PATINA_PASS_COMBINED, 2 } };
+    patina_cloud *cloud = square(1);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+        patina_cloud_style style = { .struct_size = sizeof style, .transparency = cases[i].transparency };
+        patina_settings settings = { .struct_size = sizeof settings,
+                                     .layers = cases[i].asked,
+                                     .layer_passes = cases[i].passes };
+        assert_int_equal(patina_scene_clear(scene), PATINA_OK);
+        assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
+        assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+        struct pt_plan plan = plan_of(scene);
+        assert_int_equal(plan.layers, cases[i].layers);
+        assert_int_equal(passes_of(&plan, PT_KERNEL_scatter), cases[i].layers);
+        assert_int_equal(passes_of(&plan, PT_KERNEL_peel), cases[i].layers > 1 ? cases[i].layers : 0);
+        assert_true((skipped(&plan, "peel") != NULL) == (cases[i].layers == 1));
+        if (cases[i].layers == 1)
+            assert_non_null(strstr(skipped(&plan, "peel"), cases[i].transparency > 0.0f ? "settings" : "opaque"));
+        for (uint32_t k = 0; k < plan.pass_count; k++)
+            assert_true(plan.passes[k].layer <= plan.layers && (!k || plan.passes[k].layer >= plan.passes[k - 1].layer ||
+                                                                plan.passes[k].layer == 0));
+        pt_plan_destroy(&plan);
+        patina_scene_destroy(scene);
+    }
+    patina_scene *behind = scene_of(cloud, 2.5, -1, 1);
+    patina_cloud_style glass = { .struct_size = sizeof glass, .cull_back = 1, .transparency = 0.5f };
+    assert_int_equal(patina_scene_clear(behind), PATINA_OK);
+    assert_int_equal(patina_scene_add_cloud(behind, cloud, &glass), PATINA_OK);
+    struct pt_plan plan = plan_of(behind);
+    assert_true(plan.points_scattered == COUNT);
+    for (uint32_t c = 0; c < plan.instances[0].chunk_count; c++)
+        assert_false(plan.instances[0].chunks[c].cull);
+    pt_plan_destroy(&plan);
+    glass.transparency = 1.0f;
+    assert_int_equal(patina_scene_clear(behind), PATINA_OK);
+    assert_int_equal(patina_scene_add_cloud(behind, cloud, &glass), PATINA_OK);
+    plan = plan_of(behind);
+    assert_non_null(skipped(&plan, "scatter"));
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(behind);
+    patina_cloud_destroy(cloud);
+}
+
 static void test_no_camera_is_an_error(void **state)
 {
     (void)state;
@@ -239,6 +290,7 @@ int main(void)
         cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
         cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),
+        cmocka_unit_test(test_layers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

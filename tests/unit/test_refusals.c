@@ -3,6 +3,7 @@
 #include <patina/patina.h>
 
 #include <locale.h>
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -172,11 +173,43 @@ static void test_statistics_in_any_locale(void **state)
     clear_stage(&stage);
 }
 
+static void test_opacities(void **state)
+{
+    (void)state;
+    static const float wrong[] = { -0.1f, 1.5f, NAN, INFINITY };
+    static float points[4][3] = { { 0 }, { 1 }, { 0, 1 }, { 1, 1 } };
+    static const float opacities[4] = { 0.5f, 1.0f, -2.0f, NAN };
+    struct stage stage = set_stage(0);
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        patina_cloud_style style = { .struct_size = sizeof style, .transparency = wrong[i] };
+        assert_int_equal(patina_scene_add_cloud(stage.scene, stage.cloud, &style), PATINA_ERROR_ARGUMENT);
+        assert_message(stage.scene, "transparency");
+    }
+    patina_cloud_desc desc = { .struct_size = sizeof desc,
+                               .count = 4,
+                               .position = { points, PATINA_FLOAT32, 3, 0 },
+                               .opacity = { opacities, PATINA_FLOAT32, 3, 0 } };
+    patina_cloud *cloud = NULL;
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
+    assert_message(NULL, "opacity: 3 components; 1 is needed");
+    desc.opacity = (patina_array){ opacities, PATINA_INT32, 1, 0 };
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
+    assert_message(NULL, "opacity: element type 8");
+    desc.opacity.type = PATINA_FLOAT32;
+    patina_cloud_info info = { .struct_size = sizeof info };
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    assert_int_equal(patina_cloud_get_info(cloud, &info), PATINA_OK);
+    assert_true(info.has_opacities && info.layer_distance >= 2.0 * info.spacing && info.spacing > 0.0);
+    patina_cloud_destroy(cloud);
+    clear_stage(&stage);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_picture_survives_memory_cap), cmocka_unit_test(test_cancel_ends_with_its_render),
         cmocka_unit_test(test_lights_end_at_32),            cmocka_unit_test(test_planes_too_large),
+        cmocka_unit_test(test_opacities),
         cmocka_unit_test(test_cameras),                     cmocka_unit_test(test_statistics_in_any_locale),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

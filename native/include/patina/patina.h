@@ -105,7 +105,7 @@ typedef struct patina_device_desc {
                       // by name too: "cpu-sse42", "cpu-avx2", "cpu-avx512"
     uint32_t threads; // CPU worker threads; 0 = one per core available to the process
     uint32_t batch;   // scheduling batch (items a worker takes at once); 0 = automatic. Never changes a picture.
-    uint64_t memory_cap; // bytes of planes that a frame may hold (about 100 a pixel); 0 = no limit
+    uint64_t memory_cap; // bytes of planes that a frame may hold (about 100 a pixel, 150 in transparent scenes); 0 = no limit
 } patina_device_desc;
 
 typedef struct patina_device_info {
