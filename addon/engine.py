@@ -53,7 +53,9 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         if picture.notice:
             self._tell('WARNING', picture.notice)
         passes.write(self, layer, description.camera, picture.planes)
-        self._status(f"{picture.stats['points']:,} points, {picture.stats['ms']:.1f} ms, {picture.device}", 1.0)
+        layers = picture.stats["layers"]
+        self._status(f"{picture.stats['points']:,} points, {picture.stats['ms']:.1f} ms, {picture.device}" +
+                     (f", {layers} layers" if layers > 1 else ""), 1.0)
 
     def _poll_reading(self, what: str, progress: float) -> bool:
         self._status(what, BUILDING * progress)

@@ -29,6 +29,15 @@ INTERNAL = -10  # PATINA_ERROR_INTERNAL
 # patina_pass: plane name → (number, channels)
 PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1)}
 
+MOST_LAYERS = 16  # PATINA_MAX_LAYERS
+
+
+def split_plane(plane: str) -> tuple[str, int]:
+    """"DEPTH 3" is the depth of layer 3; "DEPTH" that of the picture, layer 0."""
+    name, _, layer = plane.partition(" ")
+    return name, int(layer or 0)
+
+
 # patina_type by numpy type
 _TYPES = {"float32": 1, "float64": 2, "uint8": 3, "uint16": 4, "uint32": 5, "int8": 6, "int16": 7, "int32": 8}
 
@@ -75,7 +84,7 @@ class _DeviceInfo(_Descriptor):
 
 class _CloudDesc(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", _Array), ("normal", _Array),
-                ("color", _Array), ("origin", c_double * 3), ("threads", c_uint32)]
+                ("color", _Array), ("opacity", _Array), ("origin", c_double * 3), ("threads", c_uint32)]
 
 
 class _CloudInfo(_Descriptor):
@@ -83,7 +92,8 @@ class _CloudInfo(_Descriptor):
                 ("bytes", c_uint64), ("box_min", c_double * 3), ("box_max", c_double * 3), ("spacing", c_double),
                 ("spacing_min", c_double), ("spacing_max", c_double), ("invalid_positions", c_uint64),
                 ("invalid_normals", c_uint64), ("invalid_colors", c_uint64), ("has_normals", c_uint32),
-                ("has_colors", c_uint32), ("origin", c_double * 3)]
+                ("has_colors", c_uint32), ("has_opacities", c_uint32), ("origin", c_double * 3),
+                ("layer_distance", c_double)]
 
 
 class _FileInfo(_Descriptor):
@@ -100,7 +110,7 @@ class _FileAttribute(_Descriptor):
 class _CloudStyle(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
-                ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32)]
+                ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float)]
 
 
 class _LightDesc(_Descriptor):
@@ -118,13 +128,13 @@ class _Settings(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
                 ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
                 ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
-                ("passes", c_uint32)]
+                ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32)]
 
 
 class _FrameStats(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("points", c_uint64),
                 ("points_scattered", c_uint64), ("chunks", c_uint64), ("chunks_culled", c_uint64),
-                ("ms", c_double), ("plane_bytes", c_uint64)]
+                ("ms", c_double), ("plane_bytes", c_uint64), ("layers", c_uint32)]
 
 
 # ---- the library ---------------------------------------------------------------------------------------------
@@ -167,6 +177,7 @@ _CALLS = {
     "patina_frame_cancel": (c_void_p,),
     "patina_frame_progress": (c_void_p,),
     "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
+    "patina_frame_read_layer": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
 }
@@ -317,21 +328,23 @@ def _view(array: np.ndarray | None, count: int) -> _Array:
 
 
 class Cloud(_Handle):
-    """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None."""
+    """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None;
+    opacities (n, 1), floats 0 to 1, or None."""
 
     _kind = "cloud"
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
-                 progress: Progress | None = None, threads: int = 0) -> None:
+                 progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None) -> None:
         count = len(positions)
         desc = _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
-                          color=_view(colors, count), threads=threads)
+                          color=_view(colors, count), opacity=_view(opacities, count), threads=threads)
         super().__init__(byref(desc), _handle_of(progress))
         info = _CloudInfo()
         self._call("get_info", byref(info))
         self.count, self.drawn, self.bytes = info.count, info.drawn, info.bytes
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
+        self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
 
 
 class File(_Handle):
@@ -422,11 +435,16 @@ class Frame(_Handle):
         return library().patina_frame_progress(self._handle)
 
     def read(self, plane: str) -> np.ndarray:
-        """A plane of the last picture, (height, width, channels) float32, row 0 at the bottom."""
-        number, channels = PLANES[plane]
+        """A plane of the last picture or of one of its layers, (height, width, channels) float32, row 0 at the
+        bottom."""
+        name, layer = split_plane(plane)
+        number, channels = PLANES[name]
         stats = self.stats()
         pixels = np.empty((stats["height"], stats["width"], channels), np.float32)
-        self._call("read", number, pixels.ctypes.data, pixels.nbytes)
+        if layer:
+            self._call("read_layer", layer, number, pixels.ctypes.data, pixels.nbytes)
+        else:
+            self._call("read", number, pixels.ctypes.data, pixels.nbytes)
         return pixels
 
     def stats(self) -> dict[str, Any]:

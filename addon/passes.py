@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from .native import MOST_LAYERS
 from .sync import Camera
 
 # What Blender's engines write where nothing is: infinity would make NaN in the compositor's arithmetic.
@@ -32,11 +33,22 @@ def _depth(plane: np.ndarray, camera: Camera) -> np.ndarray:
     return np.where(np.isfinite(plane), plane + start, DEPTH_OF_NOTHING)
 
 
+def _of_layer(number: int) -> tuple[RenderPass, ...]:
+    """What one layer of surface shows by itself; 1 is the nearest."""
+    def wanted(layer: bpy.types.ViewLayer) -> bool:
+        return layer.patina.pass_layers >= number
+
+    return (RenderPass(f"Layer {number}", 4, "RGBA", 'COLOR', f"COMBINED {number}", wanted),
+            RenderPass(f"Layer {number} Depth", 1, "Z", 'VALUE', f"DEPTH {number}", wanted, _depth),
+            RenderPass(f"Layer {number} Normal", 3, "XYZ", 'VECTOR', f"NORMAL {number}", wanted))
+
+
 PASSES = (
     RenderPass("Combined", 4, "RGBA", 'COLOR', "COMBINED", lambda layer: True),
     RenderPass("Depth", 1, "Z", 'VALUE', "DEPTH", lambda layer: layer.use_pass_z, _depth),
     RenderPass("Normal", 3, "XYZ", 'VECTOR', "NORMAL", lambda layer: layer.use_pass_normal),
     RenderPass("Source", 1, "X", 'VALUE', "SOURCE", lambda layer: layer.patina.use_pass_source),
+    *(item for number in range(1, MOST_LAYERS + 1) for item in _of_layer(number)),
 )
 
 

@@ -77,9 +77,17 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
         return jobs.run(work, frame.cancel, lambda: poll(frame.progress()))
 
 
+def _bits(planes: Iterable[str]) -> int:
+    return sum(1 << native.PLANES[name][0] for name in set(planes))
+
+
 def _describe(scene: native.Scene, description: SceneDescription, wanted: list[str]) -> None:
-    passes = sum(1 << native.PLANES[name][0] for name in {"COMBINED", *wanted})
-    scene.set_settings(**asdict(description.settings), passes=passes)
+    planes = {native.split_plane(plane) for plane in ["COMBINED", *wanted]}
+    settings = asdict(description.settings)
+    settings["passes"] = _bits(name for name, layer in planes if not layer)
+    settings["layer_passes"] = _bits(name for name, layer in planes if layer)
+    settings["layers"] = max(settings["layers"], *(layer for _, layer in planes))  # a pass wants its layer peeled
+    scene.set_settings(**settings)
     scene.set_camera(**asdict(description.camera))
     for light in description.lights:
         scene.add_light(**asdict(light))

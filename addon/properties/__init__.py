@@ -11,6 +11,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy.props import PointerProperty, StringProperty
 from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
 
+from ..native import MOST_LAYERS
+
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 
 
@@ -51,6 +53,10 @@ class PatinaSceneProperties(PropertyGroup):
             ('LAYERS', "All Edges", "Edges before the background and between layers", 0),
             ('BACKGROUND', "Background Edges", "Edges before the background only", 1),
             ('OFF', "Off", "Hard edges", 2)))
+    layers: IntProperty(
+        name="Layers", override=_OVERRIDE, default=8, min=1, max=MOST_LAYERS,
+        description="At most so many layers of surface are drawn behind one another where something is transparent. "
+                    "Fewer when nothing is left to show: opaque scenes have one")
     device: EnumProperty(
         name="Device", override=_OVERRIDE, default='AUTO',
         description="What computes the picture",
@@ -81,6 +87,13 @@ class PatinaObjectProperties(PropertyGroup):
         name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
         unit='LENGTH', precision=4,
         description="Least distance between two surfaces that are told apart; 0 follows the spacing of the points")
+    opacity: FloatProperty(
+        name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
+        description="How much the surface hides of what lies behind it")
+    opacity_attribute: StringProperty(
+        name="Opacities", override=_OVERRIDE,
+        description="Point attribute that opacity is multiplied by: numbers from 0 to 1, yes or no, or the alpha of a "
+                    "colour attribute; empty: none")
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
         description="Colour of points that have none")
@@ -113,6 +126,10 @@ class PatinaViewLayerProperties(PropertyGroup):
         name="Source", default=False, update=_update_passes, override=_OVERRIDE,
         description="What is scan and what is invention: 0 nothing, 1 measured, 1 + distance filled from a "
                     "neighbour that many pixels away, negative where anti-aliasing mixed")
+    pass_layers: IntProperty(
+        name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
+        description="Colour, depth and normal of so many layers of surface, the nearest first, as passes of their own; "
+                    "layers behind opaque surfaces too")
 
 
 _CLASSES = (PatinaSceneProperties, PatinaObjectProperties, PatinaViewLayerProperties)

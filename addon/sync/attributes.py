@@ -13,7 +13,8 @@ NORMAL_NAMES = ("normal", "Normal", "normals", "Normals", "nor", "N")
 COLOR_NAMES = ("Col", "Color", "color", "Cd", "rgb", "RGB")
 
 # data_type → property of an element, components
-_LAYOUTS = {'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4), 'BYTE_COLOR': ("color_srgb", 4)}
+_LAYOUTS = {'FLOAT': ("value", 1), 'BOOLEAN': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4),
+            'BYTE_COLOR': ("color_srgb", 4)}
 
 
 def positions(data: bpy.types.ID, count: int) -> np.ndarray | None:
@@ -43,7 +44,7 @@ def colors(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     Byte colours stay 8-bit sRGB (uint8); float colours are linear. A plain vector counts only when named.
     """
     if name:
-        attribute = _find(data, name, set(_LAYOUTS))
+        attribute = _find(data, name, {'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'})
     else:
         attribute = next(_color_candidates(data), None)
     if attribute is None:
@@ -52,6 +53,13 @@ def colors(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     if values is not None and attribute.data_type == 'BYTE_COLOR':
         return np.rint(values * np.float32(255)).astype(np.uint8)  # exact: Blender hands out byte / 255
     return values
+
+
+def opacities(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
+    """(count, 1) float32 of the named attribute; the alpha of a colour attribute."""
+    attribute = _find(data, name, {'FLOAT', 'BOOLEAN', 'FLOAT_COLOR', 'BYTE_COLOR'}) if name else None
+    values = _values(attribute, count) if attribute else None
+    return None if values is None else np.ascontiguousarray(values[:, -1:])
 
 
 def _color_candidates(data: bpy.types.ID) -> Iterator[bpy.types.Attribute]:

@@ -13,7 +13,7 @@ from mathutils import Matrix
 
 from .. import jobs, native
 from ..properties import enum_number
-from . import attributes
+from . import attributes, estimates
 from .camera import row_major
 
 # Clouds that the last picture did not use may stay up to this many bytes (24 a point): enough for the other view
@@ -28,11 +28,12 @@ class PointArrays:
     positions: np.ndarray  # (n, 3) float32
     normals: np.ndarray | None  # (n, 3) float32
     colors: np.ndarray | None  # (n, 4) uint8 sRGB, or (n, 3|4) float32 linear
+    opacities: np.ndarray | None  # (n, 1) float32
 
     def fingerprint(self) -> bytes:
         """Of the content: what Blender's update tags miss (undo, geometry nodes, scripts) still shows. 1 GB/s."""
         digest = hashlib.blake2b(digest_size=16)
-        for array in (self.positions, self.normals, self.colors):
+        for array in (self.positions, self.normals, self.colors, self.opacities):
             digest.update(b"-" if array is None else f"{array.dtype}{array.shape}".encode())
             if array is not None:
                 digest.update(array)
@@ -52,6 +53,7 @@ class CloudStyle:
     diffuse: float
     specular: float
     shininess: int
+    transparency: float
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ def collect(depsgraph: bpy.types.Depsgraph, poll: Callable[[str, float], bool],
     built: dict[tuple, native.Cloud | None] = {}  # by place in memory, which holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
+    distances: dict[str, float] = {}
     for instance in depsgraph.object_instances:
         obj = instance.object
         if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera:
@@ -106,12 +109,15 @@ def collect(depsgraph: bpy.types.Depsgraph, poll: Callable[[str, float], bool],
         if obj.type == 'MESH' and len(obj.data.polygons):
             faces.add(obj.name)
             continue
-        place = (obj.data.as_pointer(), obj.patina.color_attribute, obj.patina.normal_attribute)
+        place = (obj.data.as_pointer(), *_attribute_names(obj))
         if place not in built:
             built[place] = _cloud(obj, used, poll, notices)
         if built[place]:
             items.append(CloudItem(built[place], _style(obj, instance.matrix_world)))
+            scale = max(map(abs, instance.matrix_world.to_scale()))
+            distances[obj.original.name_full] = built[place].layer_distance * scale
     CACHE.trim(used)
+    estimates.keep(distances)
     if not items:
         notices.append("no visible object has points to draw")
     if faces:
@@ -132,7 +138,8 @@ def _cloud(obj: bpy.types.Object, used: set[tuple], poll: Callable[[str, float],
     def build() -> native.Cloud:
         with native.Progress() as progress:
             return jobs.run(
-                lambda: native.Cloud(arrays.positions, arrays.normals, arrays.colors, progress),
+                lambda: native.Cloud(arrays.positions, arrays.normals, arrays.colors, progress,
+                                     opacities=arrays.opacities),
                 progress.cancel, lambda: poll(f"Reading points of '{name}'", progress.value()))
 
     cloud = CACHE.obtain(identity, arrays, build)
@@ -148,11 +155,15 @@ def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:
     owner = obj.original if original == obj.data else original
     # session_uid came with Blender 4.1
     base = (type(owner).__name__, getattr(owner, "session_uid", None) or owner.name_full, obj.type,
-            obj.patina.color_attribute, obj.patina.normal_attribute)
+            *_attribute_names(obj))
     number = 0
     while (*base, number) in used:
         number += 1
     return (*base, number)
+
+
+def _attribute_names(obj: bpy.types.Object) -> tuple[str, ...]:
+    return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute)
 
 
 def _read(obj: bpy.types.Object, notices: list[str]) -> PointArrays | None:
@@ -165,11 +176,13 @@ def _read(obj: bpy.types.Object, notices: list[str]) -> PointArrays | None:
         return None
     normals = attributes.normals(data, count, obj.patina.normal_attribute)
     colors = attributes.colors(data, count, obj.patina.color_attribute)
+    opacities = attributes.opacities(data, count, obj.patina.opacity_attribute)
     for kind, name, found in (("colour", obj.patina.color_attribute, colors),
-                              ("normal", obj.patina.normal_attribute, normals)):
+                              ("normal", obj.patina.normal_attribute, normals),
+                              ("opacity", obj.patina.opacity_attribute, opacities)):
         if name and found is None:
             notices.append(f"'{obj.name}' has no point attribute '{name}' to take as {kind}")
-    return PointArrays(positions, normals, colors)
+    return PointArrays(positions, normals, colors, opacities)
 
 
 def _style(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
@@ -184,4 +197,5 @@ def _style(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         ambient=NOTHING if dark else patina.ambient,
         diffuse=patina.diffuse,
         specular=patina.specular,
-        shininess=patina.shininess)
+        shininess=patina.shininess,
+        transparency=1.0 - patina.opacity)

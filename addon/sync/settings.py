@@ -34,6 +34,7 @@ class Settings:
     antialias: int
     film_transparent: int
     world_color: tuple[float, float, float]
+    layers: int
 
 
 def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:
@@ -46,7 +47,8 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         smooth=enum_number(patina, "smooth"),
         antialias=enum_number(patina, "antialias"),
         film_transparent=int(scene.render.film_transparent),
-        world_color=world_color)
+        world_color=world_color,
+        layers=patina.layers)
 
 
 def device(scene: bpy.types.Scene) -> DeviceChoice:

@@ -4,9 +4,18 @@
 from __future__ import annotations
 
 import bpy
-from bpy.types import Context, Panel
+from bpy.types import Context, Panel, Scene
 
 from ..engine import PatinaRenderEngine
+from ..sync import estimates
+
+
+def _length(scene: Scene, meters: float) -> str:
+    """A length in the scene's units."""
+    units = scene.unit_settings
+    if units.system == 'NONE':
+        return f"{meters:.4g}"
+    return bpy.utils.units.to_string(units.system, 'LENGTH', meters * units.scale_length, precision=4)
 
 
 class _PatinaPanel:
@@ -46,6 +55,17 @@ class PATINA_PT_surface(_PatinaPanel, Panel):
         layout.prop(patina, "antialias")
 
 
+class PATINA_PT_transparency(_PatinaPanel, Panel):
+    bl_label = "Transparency"
+    bl_context = "render"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.layout.prop(context.scene.patina, "layers")
+
+
 class PATINA_PT_film(_PatinaPanel, Panel):
     bl_label = "Film"
     bl_context = "render"
@@ -82,6 +102,7 @@ class PATINA_PT_passes(_PatinaPanel, Panel):
         column.prop(layer, "use_pass_z", text="Depth")
         column.prop(layer, "use_pass_normal")
         column.prop(layer.patina, "use_pass_source")
+        layout.prop(layer.patina, "pass_layers")
 
 
 class PATINA_PT_points(_PatinaObjectPanel, Panel):
@@ -93,10 +114,18 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         patina, data = context.object.patina, context.object.data
         layout.prop(patina, "lighting")
         layout.prop(patina, "cull_back")
-        layout.prop(patina, "d_min")
+        column = layout.column(align=True)
+        column.prop(patina, "d_min")
+        estimate = estimates.layer_distance(context.object.name_full)
+        if estimate is not None and not patina.d_min:
+            row = column.row()
+            row.alignment = 'RIGHT'
+            row.label(text=f"automatic: {_length(context.scene, estimate)}")
+        layout.prop(patina, "opacity")
         column = layout.column()
         column.prop_search(patina, "color_attribute", data, "attributes")
         column.prop_search(patina, "normal_attribute", data, "attributes")
+        column.prop_search(patina, "opacity_attribute", data, "attributes")
         column.prop(patina, "color")
 
 
@@ -138,8 +167,8 @@ class PATINA_PT_light(_PatinaPanel, Panel):
         layout.prop(light, "energy", text="Strength" if light.type == 'SUN' else "Power")
 
 
-_CLASSES = (PATINA_PT_surface, PATINA_PT_film, PATINA_PT_performance, PATINA_PT_passes, PATINA_PT_points,
-            PATINA_PT_shading, PATINA_PT_light)
+_CLASSES = (PATINA_PT_surface, PATINA_PT_transparency, PATINA_PT_film, PATINA_PT_performance, PATINA_PT_passes,
+            PATINA_PT_points, PATINA_PT_shading, PATINA_PT_light)
 
 
 def register() -> None:
