@@ -128,13 +128,18 @@ class _Settings(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
                 ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
                 ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
-                ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32)]
+                ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float)]
+
+
+class _ExpectedError(Structure):
+    _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float)]
 
 
 class _FrameStats(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("points", c_uint64),
                 ("points_scattered", c_uint64), ("chunks", c_uint64), ("chunks_culled", c_uint64),
-                ("ms", c_double), ("plane_bytes", c_uint64), ("layers", c_uint32)]
+                ("ms", c_double), ("plane_bytes", c_uint64), ("layers", c_uint32), ("spacing_px", c_float),
+                ("expected", _ExpectedError)]
 
 
 # ---- the library ---------------------------------------------------------------------------------------------
@@ -450,7 +455,9 @@ class Frame(_Handle):
     def stats(self) -> dict[str, Any]:
         stats = _FrameStats()
         self._call("get_stats", byref(stats))
-        return {name: getattr(stats, name) for name, _ in _FrameStats._fields_[1:]}
+        values = {name: getattr(stats, name) for name, _ in _FrameStats._fields_[1:]}
+        values["expected"] = {name: getattr(stats.expected, name) for name, _ in _ExpectedError._fields_}
+        return values
 
     def pass_stats(self) -> dict[str, Any]:
         """Milliseconds by pass, and why each other pass was left out."""

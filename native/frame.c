@@ -342,6 +342,8 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .chunks_culled = plan->chunks_culled,
                                          .ms = ms };
     frame->stats.plane_bytes = plane_total(frame);
+    frame->stats.spacing_px = (float)plan->spacing_px;
+    frame->stats.expected = plan->expected;
     frame->stats.layers = frame->layer_count && plan->layers == 1;
     for (uint32_t i = 0; i < frame->layer_count; i++)
         frame->stats.layers += frame->layers[i].pixels > 0;

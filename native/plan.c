@@ -2,6 +2,8 @@
 // THE file: scene + settings -> passes, each with its reason, and why each other pass is left out.
 #include "plan.h"
 
+#include "expected.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -185,11 +187,10 @@ static void plan_surface(struct builder *builder, uint32_t i)
 static void plan_fill_level(struct builder *builder, uint32_t level)
 {
     struct pt_plan *plan = builder->plan;
-    const patina_settings *settings = &builder->scene->settings;
     struct fill_args args = { .view = view_at(plan, level),
                               .iterations = plan->iterations,
-                              .unfills = settings->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
-                              .refined = settings->quality == PATINA_QUALITY_REFINED };
+                              .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
+                              .refined = plan->quality == PATINA_QUALITY_REFINED };
     for (args.occluded = 0; args.occluded < 2; args.occluded++)
         REASON(ADD(builder, fill, args,
                    { keys_of(builder, level), from_of(builder, level), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
@@ -218,7 +219,7 @@ static void plan_pyramid(struct builder *builder)
         struct push_args args = { .view = view_at(plan, level - 1),
                                   .coarse_width = coarse.width,
                                   .coarse_height = coarse.height,
-                                  .refined = builder->scene->settings.quality == PATINA_QUALITY_REFINED };
+                                  .refined = plan->quality == PATINA_QUALITY_REFINED };
         REASON(ADD(builder, push, args,
                    { keys_of(builder, level), from_of(builder, level), keys_of(builder, level - 1),
                      from_of(builder, level - 1), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
@@ -230,7 +231,8 @@ static void plan_filling(struct builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     if (!plan->iterations) {
-        skip(builder, "fill", "switched off in the settings");
+        skip(builder, "fill", builder->scene->settings.error_target > 0.0f ? "the error target is met without"
+                                                                           : "switched off in the settings");
         skip(builder, "pull", "no filling");
         skip(builder, "push", "no filling");
         return;
@@ -240,7 +242,7 @@ static void plan_filling(struct builder *builder)
     } else {
         char reason[96];
         snprintf(reason, sizeof reason,
-                 builder->scene->settings.fill == PATINA_FILL_PAPER ? "filling as in the paper has one level"
+                 plan->fill == PATINA_FILL_PAPER ? "filling as in the paper has one level"
                                                                     : "spacing %.2f pixels needs no coarser level",
                  plan->spacing_px);
         skip(builder, "pull", reason);
@@ -280,7 +282,7 @@ static void plan_shade(struct builder *builder, uint32_t i)
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
     uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u);
-    if (builder->scene->settings.quality == PATINA_QUALITY_REFINED && wants_normals)
+    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     memcpy(args.world, builder->scene->settings.world_color, sizeof args.world);
     args.eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f;
@@ -510,6 +512,9 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
                                buffer_out && length < size ? size - length : 0, __VA_ARGS__)
     LINE("planes %u x %u, crop %u x %u at %u, %u, %u coarse levels\n", plan->view.width, plan->view.height, plan->crop[2],
          plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
+    LINE("expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)\n",
+         (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
+         (double)plan->expected.normal, pt_means_name(pt_means_of(plan->quality, plan->fill)));
     LINE("points %llu, scattered %llu, chunks %llu, culled %llu\n", (unsigned long long)plan->points,
          (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
          (unsigned long long)plan->chunks_culled);

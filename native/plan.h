@@ -103,6 +103,8 @@ struct pt_plan {
     uint64_t points, points_scattered, chunks, chunks_culled;
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
     uint32_t iterations;    // of each filling filter
+    uint32_t quality, fill; // as set, or as the error target chose them
+    patina_expected_error expected;
     uint32_t layers;        // at most so many are peeled; 1: no peeling
     int transparent;        // something in view lets light through
     struct pt_arena *arena;

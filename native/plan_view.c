@@ -7,6 +7,8 @@
 // picture's edge: a region is a crop of the whole, to the bit (SPEC 2.5).
 #include "plan.h"
 
+#include "expected.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -352,20 +354,23 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
 // at 1.35, closes 0.5 points a pixel better (0.04% for 0.32%) but lets steep planes grow by up to 0.5% at 1 point a pixel.
 static void choose_filling(const patina_settings *settings, struct pt_plan *plan)
 {
+    uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
+    plan->quality = settings->quality;
+    plan->fill = settings->fill;
+    if (settings->error_target > 0.0f)
+        pt_means_settings(pt_means_for((double)settings->error_target, s), &plan->quality, &plan->fill);
+    plan->expected = pt_expected_error(pt_means_of(plan->quality, plan->fill), s);
     plan->levels = 0;
-    if (settings->fill == PATINA_FILL_PAPER) {
-        plan->iterations = settings->fill_iterations ? settings->fill_iterations : 1;
+    plan->iterations = 0;
+    if (plan->fill == PATINA_FILL_PAPER)
+        plan->iterations = asked ? asked : 1;
+    if (plan->fill != PATINA_FILL_CLOSED)
         return;
-    }
-    if (settings->fill == PATINA_FILL_OFF) {
-        plan->iterations = 0;
-        return;
-    }
     for (; s > 1.65 || (plan->levels && s > 1.0); s *= 0.5)
         if (plan->levels++ == PT_LEVELS - 2)
             break;
-    plan->iterations = settings->fill_iterations ? settings->fill_iterations : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : 4;
+    plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : 4;
 }
 
 // An opaque scene has one layer, unless all are asked for as passes.

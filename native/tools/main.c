@@ -25,6 +25,7 @@ static const char usage[] =
     "  --antialias layers|background|off\n"
     "  --lit, --unlit                     default: clouds with colours are shown unlit\n"
     "  --cull                             leave out points that face away\n"
+    "  --error E                          picks quality and fill: colour error at most E of white, if it can be had\n"
     "  --opacity X[,X...]                 0 to 1, of each FILE; the last counts for those behind it\n"
     "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
     "  --background R,G,B                 linear; also the ambient light\n"

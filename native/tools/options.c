@@ -111,6 +111,15 @@ static int parse_region(const char *text, uint32_t region[4])
     return region[0] < region[2] && region[1] < region[3] ? 0 : -1;
 }
 
+static int parse_error(const char *text, float *target)
+{
+    double n;
+    if (parse_numbers(text, &n, 1, 1) < 0 || !(n > 0 && n <= 1))
+        return -1;
+    *target = (float)n;
+    return 0;
+}
+
 static int parse_color(const char *text, float color[3])
 {
     double n[3];
@@ -195,6 +204,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_word(value, "alleviated|gaussian|box|off", &s->smooth);
     else if (!strcmp(name, "--antialias"))
         bad = parse_word(value, "layers|background|off", &s->antialias);
+    else if (!strcmp(name, "--error"))
+        bad = parse_error(value, &s->error_target);
     else if (!strcmp(name, "--opacity"))
         bad = parse_opacity(value, o);
     else if (!strcmp(name, "--layers"))

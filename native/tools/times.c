@@ -193,6 +193,9 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
         print_string(times->pass_names[i]);
         printf(": %.4f", median(times->pass_ms[i], times->frames));
     }
-    printf("}, \"layers\": %u, \"skipped\": %s, \"peak_mb\": %.1f}\n", stats->layers,
+    printf("}, \"layers\": %u, \"skipped\": %s, \"peak_mb\": %.1f", stats->layers,
            times->skipped ? times->skipped : "{}", peak_megabytes());
+    printf(", \"spacing_px\": %.4f, \"expected_error\": {\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f}}\n",
+           (double)stats->spacing_px, (double)stats->expected.color, (double)stats->expected.coverage,
+           (double)stats->expected.depth, (double)stats->expected.normal);
 }

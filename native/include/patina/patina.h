@@ -280,6 +280,8 @@ typedef struct patina_settings {
                                // than 1/512 of the light comes through. Paper [D 4, 5]
     uint32_t layer_passes;     // bits 1 << PATINA_PASS_COMBINED, _DEPTH, _NORMAL: kept of every layer for patina_frame_read_layer;
                                // all layers are then peeled, behind opaque surfaces too, and 0 layers means 8. 0 = none
+    float error_target;        // > 0: quality and fill are chosen, the cheapest whose expected colour error is not above this;
+                               // where none is, the best. 0 = quality and fill as they are set
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -315,6 +317,16 @@ enum patina_pass {
         PATINA_PASS_COUNT
 };
 
+// What a picture of scattered points is expected to be off by, as measured on known shapes at the same spacing on screen
+// (build/curves): a sphere and a torus. Sheets close behind each other make it more, a gyroid 3.6 times; points off their
+// surface, by noise or registration, come on top.
+typedef struct patina_expected_error {
+    float color;    // root mean square over the pixels that are or should be covered, sRGB over grey, shares of white
+    float coverage; // 1 - shared pixels / pixels covered by either
+    float depth;    // root mean square, spacings of the points
+    float normal;   // mean angle, degrees
+} patina_expected_error;
+
 typedef struct patina_frame_stats {
     size_t struct_size;
     uint32_t width, height;     // of the passes (the region's)
@@ -324,6 +336,8 @@ typedef struct patina_frame_stats {
     double ms;                  // whole render call
     uint64_t plane_bytes;       // planes held by the frame
     uint32_t layers;            // of surface that show something; 1 without peeling, 0 where nothing is in view
+    float spacing_px;           // of points on screen, that 95% of the covered area stays below
+    patina_expected_error expected;
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
