@@ -54,8 +54,8 @@ class Mode:
 # The papers' columns. A mode whose fields the library lacks is listed as not built yet.
 MODES = {
     "surface": Mode(),
-    "3 layers": Mode(settings={"layers": 3}, style={"opacity": 0.5}),
-    "6 layers": Mode(settings={"layers": 6}, style={"opacity": 0.5}),
+    "3 layers": Mode(settings={"layers": 3}, style={"transparency": 0.5}),
+    "6 layers": Mode(settings={"layers": 6}, style={"transparency": 0.5}),
     "shadows 1": Mode(settings={"shadow_samples": 1}, light={"shadows": 1}),
     "shadows 5": Mode(settings={"shadow_samples": 5}, light={"shadows": 1, "angle": 0.1}),
     "shadows 10": Mode(settings={"shadow_samples": 10}, light={"shadows": 1, "angle": 0.1}),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -18,39 +19,109 @@ QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "poin
 
 def _line(row: Row) -> list[str]:
     e = row["error"]
-    ours = row["group"] != "peers"
-    device = NAMES.get(name_of(row), name_of(row)) if ours else row["device"]
-    depth = f"{e['depth_rms_spacings']:.2f}" if "depth_rms_spacings" in e else "–"
-    normal = f"{e['normal_mean_degrees']:.2f}" if "normal_mean_degrees" in e else "–"
-    return [device, count(row["points"]), QUALITIES.get(row["quality"], row["quality"]),
-            f"**{row['ms_median']:.1f}**" if ours else f"{row['ms_median']:.0f}",
-            f"{100 * e['false_holes']:.3f}", f"{100 * e['false_growth']:.2f} ({100 * e['outer_growth']:.2f})", depth, normal,
-            f"{e['color_rms']:.4f}", f"{e['color_psnr']:.1f}", f"{e['color_ssim']:.3f}"]
+    return [NAMES.get(name_of(row), name_of(row)), count(row["points"]), QUALITIES.get(row["quality"], row["quality"]),
+            f"{row['ms_median']:.1f}", f"{100 * e['false_holes']:.3f}",
+            f"{100 * e['false_growth']:.2f} ({100 * e['outer_growth']:.2f})", f"{e['depth_rms_spacings']:.2f}",
+            f"{e['normal_mean_degrees']:.2f}", f"{e['color_rms']:.4f}", f"{e['color_psnr']:.1f}", f"{e['color_ssim']:.3f}"]
 
 
 def speed(result: dict[str, Any]) -> str:
-    rows = [row for row in joined(result, "headline", "points", "peers")
-            if row["error"] and row["width"] == 1024 and row["points"] >= 100_000 and row["scene"] == "torus"]
-    head = ["drawn by", "points", "quality", "ms a frame", "open, %", "grown, % (off the outline)",
+    rows = [row for row in joined(result, "headline", "points")
+            if row["group"] == "headline" or (row["points"] > 10_000 and row["device"] == result["rows"][0]["device"])]
+    head = ["device", "points", "quality", "ms a frame", "open, %", "grown, % (off the outline)",
             "depth rms, spacings", "normal mean, °", "colour rms", "PSNR, dB", "SSIM"]
     return (f"Measured on {result['date']}, version {result['version']}: {result['processor']}, {result['cores']} cores.\n\n"
             + table(head, [_line(row) for row in rows]))
 
 
+def aims(result: dict[str, Any]) -> str:
+    rows = {(row["device"], row["quality"]): row for row in joined(result, "headline")}
+    row = rows[joined(result, "headline")[0]["device"], "refined"]
+    return (f"The processor's {row['ms_median']:.1f} ms at a million points are {row['ms_median'] / row['floor_ms']:.1f} times "
+            f"what moving the bytes alone would take at the {result['bandwidth']:.0f} GB/s that a copy on "
+            f"{result['cores']} threads moves here.")
+
+
+def others(result: dict[str, Any]) -> str:
+    """How many times as long other programs take, and what they leave wrong."""
+    rows = joined(result, "peers")
+    library = next(row for row in joined(result, "headline") if row["quality"] == "refined")
+    ours = {row["quality"]: row["ms_median"] for row in rows if row["device"].startswith("Patina")}
+    body = []
+    for row in [library, *rows]:
+        e, mine = row["error"], row["device"].startswith("Patina") or row is library
+        same_way = ours.get(row["quality"])
+        depth = f"{e['depth_rms_spacings']:.2f}" if "depth_rms_spacings" in e else "–"
+        blender = not row["device"].startswith("VTK") and not mine and same_way
+        body.append(["Patina's library" if row is library else row["device"],
+                     "moving camera" if row is library else row["quality"], f"{row['ms_median']:.0f}",
+                     "" if row is library else f"{row['ms_median'] / library['ms_median']:.1f}×",
+                     f"{row['ms_median'] / same_way:.1f}×" if blender else "",
+                     f"{100.0 * (1.0 - e['coverage_iou']):.2f}", depth, f"{e['color_psnr']:.1f}"])
+    head = ["program", "what", "ms", "against the library", "against Patina in Blender", "coverage wrong, %",
+            "depth rms, spacings", "PSNR, dB"]
+    return table(head, body)
+
+
+def holes(program: Path) -> str:
+    """The table that tests/scenes/test_holes prints."""
+    said = subprocess.run([str(program), "--device", "cpu"], capture_output=True, text=True).stdout
+    body = []
+    for line in said.splitlines():
+        cells = line.replace("|", " ").split()
+        if len(cells) == 8 and re.fullmatch(r"[\d.]+", cells[0]):
+            none, paper, paper_grown, closed, closed_grown = (float(cell) for cell in cells[1:6])
+            body.append([cells[0], f"{none:.2f}", f"{paper:.3f}", f"{paper_grown:.3f}", f"{closed:.3f}",
+                         f"{closed_grown:.3f}"])
+    return table(["points a pixel", "unfilled: open, %", "paper: open, %", "paper: grown, %", "closed: open, %",
+                  "closed: grown, %"], body)
+
+
+def hard(rows: str) -> str:
+    """The verdicts of the table of hard cases, in two sentences."""
+    verdicts: dict[str, list[str]] = {}
+    for line in rows.splitlines()[2:]:
+        case, *_, verdict = (cell.strip() for cell in line.strip("|").split("|"))
+        verdicts.setdefault(verdict, [])
+        verdicts[verdict] += [case] * (case not in verdicts[verdict])
+    told = [f"{len(verdicts.pop('holds', []))} hold on every device tried, the table in `bench.html` says by how much."]
+    told += [f"{verdict[0].upper() + verdict[1:]}: {'; '.join(cases)}." for verdict, cases in verdicts.items()]
+    return " ".join(told)
+
+
+def memory(result: dict[str, Any]) -> str:
+    row = joined(result, "headline")[0]
+    return (f"**Memory and upload.** {row['cloud_bytes'] / row['points']:.1f} bytes a point at rest with colour and normal, "
+            f"8 more while building, beside the caller's own arrays. The planes of a picture take "
+            f"{row['plane_bytes'] / 2**20:.0f} MB at 1024 × 1024. Taking in a million points takes "
+            f"{row['upload_ms'] / 1e3:.2f} s.")
+
+
 def update(result: dict[str, Any], root: Path) -> str:
-    """Returns what was written, in a sentence."""
+    """Writes what the run holds and the README has marks for; returns what, in a sentence."""
     against = [row for row in joined(result, "headline", "peers") if row["points"] == 1_000_000 and row["error"]]
     title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
     plots.pareto(against, root / ".pictures/pareto.png", title)
     parts = {"speed": speed(result)}
+    if joined(result, "headline"):
+        parts |= {"aims": aims(result), "memory": memory(result)}
+        if joined(result, "peers"):
+            parts["others"] = others(result)
     for quality in ("paper", "refined"):
         if papers.ratios(result, quality):
             parts[f"papers {quality}"] = papers.table(result, quality)
+    program = root / "build/out/release/tests/scenes/test_holes"
+    if program.is_file():
+        parts["holes"] = holes(program)
+    if result.get("hard"):
+        parts["hard"] = hard(result["hard"])
     path = root / "README.md"
     text, written = path.read_text(), []
     for name, part in parts.items():
-        marks = re.compile(rf"(<!-- bench {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        text, times = marks.subn(lambda match: f"{match[1]}{part}\n{match[2]}", text)  # noqa: B023
-        written += [name] * bool(times)
+        begin, end = f"<!-- bench {name} -->\n", "<!-- end -->"
+        if begin in text:
+            before, rest = text.split(begin, 1)
+            text = before + begin + part + "\n" + rest[rest.index(end):]
+            written.append(name)
     path.write_text(text)
     return f"README.md: {', '.join(written) or 'no marks found'}; .pictures/pareto.png"

@@ -79,7 +79,7 @@ class Bench(unittest.TestCase):
         self.assertIn("speed", readme.update(self.result, self.out))
         text = path.read_text()
         self.assertTrue(text.startswith("before\n<!-- bench speed -->\n") and text.endswith("\n<!-- end -->\nafter\n"))
-        self.assertIn("drawn by", text)
+        self.assertIn("depth rms", text)
         self.assertNotIn("old", text)
 
 
