@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speed against error: known scenes on every device, the exact picture beside every time, other programs, the paper's table.
+"""Speed against error: known scenes on every device, the exact picture beside every time, other programs, the paper's
+table.
 
     build/bench [--quick | --full] [--compare OLD.json] [--device NAME]... [--only GROUP]... [--out FOLDER] [--readme]
 
 Writes bench.md, bench.json, plots and bench.html, which shows them all, to build/out/bench. Times are figures, never
-verdicts: nothing here passes or fails. bench.json: "rows" hold scene, mode, device, width, height, points, quality, threads,
-ms_median, ms_min, ms_max, peak_mb, passes {name: ms}, error {metric: value}; "details" hold what else is known of them, in
-the same order; "absent" what could not be measured, and why.
+verdicts: nothing here passes or fails. bench.json: "rows" hold scene, mode, device, width, height, points, quality,
+threads, ms_median, ms_min, ms_max, peak_mb, passes {name: ms}, error {metric: value}; "details" hold what else is known
+of them, in the same order; "absent" what could not be measured, and why.
 
     --quick   one size and density of each scene: within two minutes
     --full    scenes x devices x qualities x sizes x densities, and 10^8 points where memory allows: hours
@@ -39,9 +40,9 @@ SURFACES = list(stage.scenes.SURFACES)
 GROUPS = ("headline", "points", "pixels", "threads", "scenes", "patterns", "steady", "papers", "peers", "hard")
 
 
-def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0, density: float = 0,
-            quality: str = "refined", threads: int = 0, frames: int = 24, pattern: str = "random", noise: float = 0.0,
-            **more: Any) -> dict[str, Any]:
+def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
+            density: float = 0, quality: str = "refined", threads: int = 0, frames: int = 24, pattern: str = "random",
+            noise: float = 0.0, **more: Any) -> dict[str, Any]:
     label = surface + (f" {pattern}" if pattern != "random" else "") + (f" noise {noise:g}" if noise else "")
     return {"group": group, "scene": label, "surface": surface, "mode": "surface", "device": device, "width": size,
             "height": size, "points": points or stage.density_count(surface, density, size), "density": density,
@@ -113,7 +114,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     stage.tidy()
     result = {
         "date": datetime.date.today().isoformat(), "processor": machine.processor(), "cores": machine.cores(),
-        "load": os.getloadavg()[0], "version": cases.native.library().patina_version().decode(), "frames": options.frames,
+        "load": os.getloadavg()[0], "version": cases.native.library().patina_version().decode(),
+        "frames": options.frames,
         "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
         "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
         "rows": [], "details": [], "absent": [], "hard": "",
@@ -159,13 +161,14 @@ def main() -> int:
     amount.add_argument("--quick", action="store_true", help="at most two minutes")
     amount.add_argument("--full", action="store_true", help="the whole product: hours")
     parser.add_argument("--compare", type=Path, metavar="OLD.json", help="print ratios to an older run")
-    parser.add_argument("--device", action="append", help="default: cpu, gl-egl, gl-osmesa; the first carries most cases")
+    parser.add_argument("--device", action="append", help="default: cpu, gl-egl, gl-osmesa; the first has most cases")
     parser.add_argument("--only", action="append", choices=GROUPS, help="these groups of cases")
     parser.add_argument("--frames", type=int, default=24, help="measured frames a case, at most (default 24)")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/bench")
     parser.add_argument("--library", type=Path, default=ROOT / "build/out/release/libpatina.so")
     parser.add_argument("--readme", action="store_true", help="write the figures into README.md and .pictures/")
-    parser.add_argument("--from", dest="source", type=Path, metavar="BENCH.json", help="measure nothing: tables of that run")
+    parser.add_argument("--from", dest="source", type=Path, metavar="BENCH.json",
+                        help="measure nothing: tables of that run")
     options = parser.parse_args()
     options.library = options.library.resolve()
     options.device = options.device or ["cpu", "gl-egl"] + ["gl-osmesa"] * (not options.quick)

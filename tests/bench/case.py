@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One case of the bench: a scene on a device, timed, and held against the exact picture. Runs in a process of its own, so
-that its peak memory is its own."""
+"""One case of the bench: a scene on a device, timed, and held against the exact picture. Runs in a process of its own,
+so that its peak memory is its own."""
 
 from __future__ import annotations
 
@@ -113,7 +113,8 @@ def steadiness(frame: native.Frame, make: Any, shown: stages.Stage, width: int, 
 
 
 def measure(case: dict[str, Any]) -> dict[str, Any]:
-    """The row's fields and more. All passes are asked for where there is a truth to hold them against, else colour alone."""
+    """The row's fields and more. All passes are asked for where there is a truth to hold them against, else colour
+    alone."""
     base = machine.memory_now()
     mode = MODES[case["mode"]]
     if mode.missing():

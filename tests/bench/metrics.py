@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What separates a picture from the exact one. Every figure is an error except coverage_iou, color_psnr and color_ssim."""
+"""What separates a picture from the exact one. Every figure is an error except coverage_iou, color_psnr and
+color_ssim."""
 
 from __future__ import annotations
 
@@ -38,8 +39,8 @@ GREY = 0.2140  # linear; sRGB 0.5
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """A renderer's picture, row 0 at the bottom: rgba (h, w, 4) linear premultiplied; depth (h, w) to the camera plane, inf
-    where nothing is, or None; normal (h, w, 3) in world space, or None."""
+    """A renderer's picture, row 0 at the bottom: rgba (h, w, 4) linear premultiplied; depth (h, w) to the camera plane,
+    inf where nothing is, or None; normal (h, w, 3) in world space, or None."""
 
     rgba: np.ndarray
     depth: np.ndarray | None = None
@@ -89,7 +90,8 @@ def errors(exact: Picture, shown: Shown, spacing: float) -> dict[str, float]:
         if shown.normal is not None:
             dots = np.sum(shown.normal[inner].astype(np.float64) * exact.normal[inner], axis=1)
             view = np.degrees(np.arccos(np.clip(dots, -1.0, 1.0)))
-            result |= {"normal_mean_degrees": float(np.mean(view)), "normal_p99_degrees": float(np.quantile(view, 0.99))}
+            result["normal_mean_degrees"] = float(np.mean(view))
+            result["normal_p99_degrees"] = float(np.quantile(view, 0.99))
         plain = shown.rgba[inner][:, :3] / np.maximum(alpha[inner], 1e-6)[:, None]
         whole = exact.rgba[inner][:, :3] / np.maximum(exact.rgba[inner][:, 3:4], 1e-6)
         result["color_rms"] = _rms(plain - whole)
@@ -117,8 +119,8 @@ def transmittance(exact: Picture, shown: Shown, inner: np.ndarray) -> dict[str, 
 
 
 def shadow(exact: Picture, unshadowed: Picture, ambient: np.ndarray, shown: Shown) -> dict[str, float]:
-    """Light that shadows leave: (colour - ambient) as a share of (full light - ambient), where the full light is more than
-    0.02. ambient: linear colour (h, w, 3) without any light. For opaque scenes."""
+    """Light that shadows leave: (colour - ambient) as a share of (full light - ambient), where the full light is more
+    than 0.02. ambient: linear colour (h, w, 3) without any light. For opaque scenes."""
     span = (unshadowed.color - ambient).sum(axis=2)
     inner = (around(np.isfinite(exact.depth)) == 9) & shown.covered & (span > 0.02)
     plain = shown.rgba[inner][:, :3] / np.maximum(shown.rgba[inner][:, 3:4].astype(np.float64), 1e-6)

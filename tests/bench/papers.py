@@ -146,7 +146,8 @@ def stage(name: str) -> Stage:
         return type(one)(**{**vars(one), "near": 0.1 * size, "far": 10.0 * size})
 
     sun = {"type": 1, "power": np.pi, "direction": [-0.36, 0.48, -0.8]}
-    return Stage(position, normal, None, size / np.sqrt(count), camera, {"lighting": 2, "cull_back": int(closed)}, (sun,))
+    style = {"lighting": 2, "cull_back": int(closed)}
+    return Stage(position, normal, None, size / np.sqrt(count), camera, style, (sun,))
 
 
 # ---- the table -----------------------------------------------------------------------------------------------------
@@ -185,7 +186,8 @@ def table(result: dict[str, Any], quality: str) -> str:
 def markdown(result: dict[str, Any]) -> str:
     text = ["## [D Table 3]: frames a second on a GTX 260 → ours", "",
             "1024×1024. A dash is a mode that is not built yet, or not in this run."]
-    for quality, title in (("paper", "The paper's settings, one iteration of each filter"), ("refined", "Our defaults")):
+    for quality, title in (("paper", "The paper's settings, one iteration of each filter"),
+                           ("refined", "Our defaults")):
         if ratios(result, quality):
             text += ["", f"### {title}", "", table(result, quality)]
     return "\n".join(text)

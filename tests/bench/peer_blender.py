@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender draws a cloud: blender -b --factory-startup --python peer_blender.py -- MODE IN.npz OUT.npz ADDON. Run by peers.py.
+"""Blender draws a cloud: blender -b --factory-startup --python peer_blender.py -- MODE IN.npz OUT.npz ADDON. Run by
+peers.py.
 
-MODE: cycles (native points, 1 sample), eevee (oriented quads: it draws no points), workbench (native points), patina. IN as for
-peer_vtk.py. OUT: rgba, depth of the first camera. Prints as JSON the times of whole renders (F12), each from a new camera, and
-with `persistent` data where the engine can keep it. No shadows; ambient light is emission: nothing is left to chance."""
+MODE: cycles (native points, 1 sample), eevee (oriented quads: it draws no points), workbench (native points), patina.
+IN as for peer_vtk.py. OUT: rgba, depth of the first camera. Prints as JSON the times of whole renders (F12), each from
+a new camera, and with `persistent` data where the engine can keep it. No shadows; ambient light is emission: nothing is
+left to chance."""
 
 import json
 import resource

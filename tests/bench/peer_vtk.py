@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """VTK draws a cloud: peer_vtk.py MODE IN.npz OUT.npz. Run by peers.py with the system's Python, which has python3-vtk9.
 
-IN: position, normal, color (linear, float32), matrix (frames, 4, 4) world from camera, fov, near, far, size, towards, power,
-world, spacing. OUT: rgba, depth of the first camera. Prints the times of the frames as JSON."""
+IN: position, normal, color (linear, float32), matrix (frames, 4, 4) world from camera, fov, near, far, size, towards,
+power, world, spacing. OUT: rgba, depth of the first camera. Prints the times of the frames as JSON."""
 
 from __future__ import annotations
 
@@ -92,7 +92,6 @@ def main() -> None:
         renderer.SetPass(edl)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     times = []
-    pixel = np.zeros(4, np.float32)
     for index, matrix in enumerate(data["matrix"]):
         aim(renderer.GetActiveCamera(), matrix, data)
         start = time.perf_counter()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other programs in the same run: the same points, camera and truth. One that is not installed is a line that says so."""
+"""Other programs in the same run: the same points, camera and truth. One that is not installed is a line that says
+so."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bench's plots: speed against error, time against points, pixels and threads, time by pass, error against density."""
+"""The bench's plots: speed against error, time against points, pixels and threads, time by pass, error against
+density."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ def front(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def pareto(rows: list[Row], path: Path, title: str) -> bool:
-    """1M random torus points at 1024 x 1024: time against the error of coverage, colour and depth. Depth only of pictures
-    that are less than 5 % open: a few right pixels are no picture."""
+    """1M random torus points at 1024 x 1024: time against the error of coverage, colour and depth. Depth only of
+    pictures that are less than 5 % open: a few right pixels are no picture."""
     shown = (("1 − IoU of coverage", lambda e: 1.0 - e["coverage_iou"]),
              ("colour rms over the whole picture, sRGB", lambda e: 10.0 ** (-e["color_psnr"] / 20.0)),
              ("depth rms, spacings", lambda e: e["depth_rms_spacings"] if e["false_holes"] < 0.05 else None))
@@ -133,15 +134,15 @@ def densities(rows: list[Row], path: Path) -> bool:
     rows = [row for row in rows if row["device"] == rows[0]["device"] and row["width"] == rows[0]["width"]]
     if len({row["density"] for row in rows}) < 2:
         return False
-    shown = (("false_holes", "open, share"), ("false_growth", "grown, share"), ("depth_rms_spacings", "depth rms, spacings"),
-             ("color_psnr", "colour PSNR, dB"))
+    shown = (("false_holes", "open, share"), ("false_growth", "grown, share"),
+             ("depth_rms_spacings", "depth rms, spacings"), ("color_psnr", "colour PSNR, dB"))
     figure, axes = plt.subplots(2, 4, figsize=(17, 8), sharex=True)
     for line, quality in zip(axes, ("refined", "paper")):
         for axis, (name, label) in zip(line, shown):
             for scene in dict.fromkeys(row["scene"] for row in rows):
                 some = sorted((row for row in rows if row["scene"] == scene and row["quality"] == quality
                                and name in row["error"]), key=lambda row: row["density"])
-                axis.plot([row["density"] for row in some], [row["error"][name] for row in some], marker=".", label=scene)
+                axis.plot([row["density"] for row in some], [row["error"][name] for row in some], ".-", label=scene)
             axis.set(xscale="log", xlabel="points a pixel", ylabel=label, title=f"{quality}: {label}")
             if name != "color_psnr":
                 axis.set_yscale("symlog", linthresh=1e-4 if name.startswith("false") else 0.1)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a run's figures into README.md, between <!-- bench NAME --> and <!-- end -->, and its plots into .pictures/."""
+"""Writes a run's figures into README.md, between <!-- bench NAME --> and <!-- end -->, and its plots into
+.pictures/."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ def _line(row: Row) -> list[str]:
     return [NAMES.get(name_of(row), name_of(row)), count(row["points"]), QUALITIES.get(row["quality"], row["quality"]),
             f"{row['ms_median']:.1f}", f"{100 * e['false_holes']:.3f}",
             f"{100 * e['false_growth']:.2f} ({100 * e['outer_growth']:.2f})", f"{e['depth_rms_spacings']:.2f}",
-            f"{e['normal_mean_degrees']:.2f}", f"{e['color_rms']:.4f}", f"{e['color_psnr']:.1f}", f"{e['color_ssim']:.3f}"]
+            f"{e['normal_mean_degrees']:.2f}", f"{e['color_rms']:.4f}", f"{e['color_psnr']:.1f}",
+            f"{e['color_ssim']:.3f}"]
 
 
 def speed(result: dict[str, Any]) -> str:
@@ -30,15 +32,16 @@ def speed(result: dict[str, Any]) -> str:
             if row["group"] == "headline" or (row["points"] > 10_000 and row["device"] == result["rows"][0]["device"])]
     head = ["device", "points", "quality", "ms a frame", "open, %", "grown, % (off the outline)",
             "depth rms, spacings", "normal mean, °", "colour rms", "PSNR, dB", "SSIM"]
-    return (f"Measured on {result['date']}, version {result['version']}: {result['processor']}, {result['cores']} cores.\n\n"
-            + table(head, [_line(row) for row in rows]))
+    return (f"Measured on {result['date']}, version {result['version']}: {result['processor']}, "
+            f"{result['cores']} cores.\n\n" + table(head, [_line(row) for row in rows]))
 
 
 def aims(result: dict[str, Any]) -> str:
     rows = {(row["device"], row["quality"]): row for row in joined(result, "headline")}
     row = rows[joined(result, "headline")[0]["device"], "refined"]
-    return (f"The processor's {row['ms_median']:.1f} ms at a million points are {row['ms_median'] / row['floor_ms']:.1f} times "
-            f"what moving the bytes alone would take at the {result['bandwidth']:.0f} GB/s that a copy on "
+    return (f"The processor's {row['ms_median']:.1f} ms at a million points are "
+            f"{row['ms_median'] / row['floor_ms']:.1f} times what moving the bytes alone would take at the "
+            f"{result['bandwidth']:.0f} GB/s that a copy on "
             f"{result['cores']} threads moves here.")
 
 
@@ -91,8 +94,8 @@ def hard(rows: str) -> str:
 
 def memory(result: dict[str, Any]) -> str:
     row = joined(result, "headline")[0]
-    return (f"**Memory and upload.** {row['cloud_bytes'] / row['points']:.1f} bytes a point at rest with colour and normal, "
-            f"8 more while building, beside the caller's own arrays. The planes of a picture take "
+    return (f"**Memory and upload.** {row['cloud_bytes'] / row['points']:.1f} bytes a point at rest with colour and "
+            f"normal, 8 more while building, beside the caller's own arrays. The planes of a picture take "
             f"{row['plane_bytes'] / 2**20:.0f} MB at 1024 × 1024. Taking in a million points takes "
             f"{row['upload_ms'] / 1e3:.2f} s.")
 

@@ -68,12 +68,14 @@ def times_table(rows: list[Row]) -> str:
 def errors_table(rows: list[Row]) -> str:
     names = [name for name in MEANING if any(name in row["error"] for row in rows)]
     head = ["scene", "device", "size", "points", "quality", "ms", *(name.replace("_", " ") for name in names)]
-    return table(head, [[*_what(r), f"{r['ms_median']:.2f}", *(_cell(name, r["error"]) for name in names)] for r in rows])
+    body = [[*_what(r), f"{r['ms_median']:.2f}", *(_cell(name, r["error"]) for name in names)] for r in rows]
+    return table(head, body)
 
 
 def passes_table(rows: list[Row]) -> str:
     names = pass_names(rows)
-    body = [[*_what(r), *(f"{r['passes'][name]:.2f}" if name in r["passes"] else "–" for name in names)] for r in rows]
+    body = [[*_what(r), *(f"{r['passes'][name]:.2f}" if name in r["passes"] else "–" for name in names)]
+            for r in rows]
     return table(["scene", "device", "size", "points", "quality", *names], body)
 
 
@@ -81,17 +83,19 @@ def markdown(result: dict[str, Any]) -> str:
     timed = joined(result, "headline", "points", "pixels", "threads")
     text = [f"# Bench, {result['date']}", "",
             f"{result['processor']}, {result['cores']} cores. Patina {result['version']}. Lit by a sun; the camera "
-            f"{result['distance']} away, {result['elevation']}° up, field of view {result['fov']}°; each frame a degree "
-            "further, medians after a warm-up. Scenes, their exact pictures and the points are those of tests/truth. "
+            f"{result['distance']} away, {result['elevation']}° up, field of view {result['fov']}°; each frame a "
+            "degree further, medians after a warm-up. Scenes, their exact pictures and the points are those of "
+            "tests/truth. "
             f"Load average when it began: {result['load']:.1f} (other programs' share of the processor shows in the "
             "maxima).", "",
             f"Floor: 12 bytes a point and the bytes of all planes ÷ {result['bandwidth']:.1f} GB/s, what a copy by "
-            f"numpy on {result['cores']} threads moves (read + written); a single thread: {result['bandwidth_one']:.1f} "
-            "GB/s. Work: processor time of all threads. Peak: resident memory beyond what the program held before.", ""]
+            f"numpy on {result['cores']} threads moves (read + written); a single thread: "
+            f"{result['bandwidth_one']:.1f} GB/s. Work: processor time of all threads. Peak: resident memory "
+            "beyond what the program held before.", ""]
     if timed:
         text += ["## Time", "", times_table(timed), "", "## Milliseconds by pass", "", passes_table(timed), "",
-                 "## Error beside time", "", "Truth: rays through pixel centres, edges averaged over 64 rays; spacing = "
-                 "1/√(points per area).", "", errors_table(timed), ""]
+                 "## Error beside time", "", "Truth: rays through pixel centres, edges averaged over 64 rays; spacing "
+                 "= 1/√(points per area).", "", errors_table(timed), ""]
     against = [row for row in joined(result, "headline", "peers") if row["points"] == 1_000_000]
     if joined(result, "peers"):
         text += ["## Other programs, the same points, camera and truth", "", errors_table(against), "",
@@ -110,9 +114,10 @@ def markdown(result: dict[str, Any]) -> str:
         text += ["Left out: " + "; ".join(f"*{name}*: {reason}" for name, reason in sorted(skipped.items())) + ".", ""]
     if result["absent"]:
         text += ["## Not measured", ""]
-        text += [f"- {row['group']}: {row['scene']}, {row['mode']}, {row['device']}, {count(row['points'] or 0)} points, "
-                 f"{row['quality']}: {row['unavailable']}" for row in result["absent"]]
-    text += ["", "## What the errors mean", ""] + [f"- {name.replace('_', ' ')}: {text}" for name, text in MEANING.items()]
+        text += [f"- {row['group']}: {row['scene']}, {row['mode']}, {row['device']}, {count(row['points'] or 0)} "
+                 f"points, {row['quality']}: {row['unavailable']}" for row in result["absent"]]
+    text += ["", "## What the errors mean", ""]
+    text += [f"- {name.replace('_', ' ')}: {meaning}" for name, meaning in MEANING.items()]
     return "\n".join(text) + "\n"
 
 

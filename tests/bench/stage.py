@@ -58,8 +58,8 @@ def kept(name: str, make: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.n
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """position, normal float32 (n, 3); color uint8 sRGB (n, 3) or None; spacing: world units. style, lights: fields of the
-    descriptors. camera: of a turn in degrees. scene: the surfaces, None where they are not known."""
+    """position, normal float32 (n, 3); color uint8 sRGB (n, 3) or None; spacing: world units. style, lights: fields of
+    the descriptors. camera: of a turn in degrees. scene: the surfaces, None where they are not known."""
 
     position: np.ndarray
     normal: np.ndarray
@@ -114,8 +114,8 @@ def analytic(case: dict[str, Any]) -> Stage:
     points = points_of(name, scene, case["points"], case.get("pattern", "random"), case.get("noise", 0.0))
     return Stage(points.position, points.normal, points.color, points.spacing,
                  lambda turn: orbit(turn, ELEVATION, DISTANCE, FOV),
-                 {"lighting": 2, "cull_back": int(name in CLOSED)}, tuple(light.fields() for light in scene.lights), scene,
-                 name + ("" if case.get("opaque", True) else "-clear"))
+                 {"lighting": 2, "cull_back": int(name in CLOSED)}, tuple(light.fields() for light in scene.lights),
+                 scene, name + ("" if case.get("opaque", True) else "-clear"))
 
 
 def stage_of(case: dict[str, Any]) -> Stage:

@@ -34,8 +34,8 @@ class Bench(unittest.TestCase):
 
     @classmethod
     def bench(cls, *options: str) -> str:
-        done = subprocess.run([sys.executable, str(HERE / "bench.py"), "--device", "cpu", "--out", str(cls.out), *options],
-                              capture_output=True, text=True, timeout=300)
+        done = subprocess.run([sys.executable, str(HERE / "bench.py"), "--device", "cpu", "--out", str(cls.out),
+                               *options], capture_output=True, text=True, timeout=300)
         if done.returncode:
             raise AssertionError(done.stderr)
         return done.stdout
@@ -52,7 +52,8 @@ class Bench(unittest.TestCase):
         self.assertGreater(row["error"]["temporal_variance"], 0.0)
 
     def test_an_unknown_device_is_a_line(self) -> None:
-        text = self.bench("--quick", "--only", "headline", "--device", "no-such-device", "--out", str(self.out / "absent"))
+        text = self.bench("--quick", "--only", "headline", "--device", "no-such-device", "--out",
+                          str(self.out / "absent"))
         self.assertIn("no-such-device", text)
         result = json.loads((self.out / "absent/bench.json").read_text())
         self.assertTrue(all(row["device"] == "cpu" for row in result["rows"]))

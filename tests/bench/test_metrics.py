@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The metrics bite: the exact picture scores as exact, and each kind of damage is worse on its own metric, the more so the
-more of it there is."""
+"""The metrics bite: the exact picture scores as exact, and each kind of damage is worse on its own metric, the more so
+the more of it there is."""
 
 from __future__ import annotations
 
@@ -114,16 +114,19 @@ class Bite(unittest.TestCase):
         self.assertGreater(sharp - soft, 0.2)
 
     def test_holed(self) -> None:
-        self.ladder(holed, (0.001, 0.01, 0.1), ("coverage_iou", "false_holes", "inner_holes", "color_psnr", "color_ssim"),
+        self.ladder(holed, (0.001, 0.01, 0.1),
+                    ("coverage_iou", "false_holes", "inner_holes", "color_psnr", "color_ssim"),
                     ("false_growth", "depth_rms_spacings"))
 
     def test_grown(self) -> None:
-        self.ladder(grown, (1, 2, 4), ("coverage_iou", "false_growth", "color_psnr"), ("false_holes", "depth_rms_spacings"))
+        self.ladder(grown, (1, 2, 4), ("coverage_iou", "false_growth", "color_psnr"),
+                    ("false_holes", "depth_rms_spacings"))
         self.assertGreater(errors(EXACT, grown(3), SPACING)["outer_growth"], 0.01)
         self.assertEqual(errors(EXACT, grown(1), SPACING)["outer_growth"], 0.0)
 
     def test_depth_and_normals(self) -> None:
-        self.ladder(deeper, (0.1, 0.5, 2.0), ("depth_rms_spacings", "depth_p999_spacings"), ("coverage_iou", "color_psnr"))
+        self.ladder(deeper, (0.1, 0.5, 2.0), ("depth_rms_spacings", "depth_p999_spacings"),
+                    ("coverage_iou", "color_psnr"))
         self.assertAlmostEqual(errors(EXACT, deeper(0.5), SPACING)["depth_rms_spacings"], 0.5, 1)
         self.ladder(leaning, (0.1, 1.0, 10.0), ("normal_mean_degrees", "normal_p99_degrees"), ("coverage_iou",))
         self.assertAlmostEqual(errors(EXACT, leaning(5.0), SPACING)["normal_mean_degrees"], 5.0, 6)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The hard cases (SPEC 9), each on each device, against float64: what is off, by how much, and whether that is within the limit
-that the case states. What the library cannot do yet is in the table too.
+"""The hard cases (SPEC 9), each on each device, against float64: what is off, by how much, and whether that is within
+the limit that the case states. What the library cannot do yet is in the table too.
 
     hard.py [--device NAME]... [--library libpatina.so] [--programs FOLDER]
 
-Ends with "N passed, N failed, N skipped"; the cases that are not built yet are the skipped ones. --programs: where the C tests
-lie that stand for cases which need more than the binding gives (ids, layers to the last bit)."""
+Ends with "N passed, N failed, N skipped"; the cases that are not built yet are the skipped ones. --programs: where the
+C tests lie that stand for cases which need more than the binding gives (ids, layers to the last bit)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "tests")]
 
 import native  # noqa: E402
-from truth import Camera, Light, Scene, look, scenes  # noqa: E402
+from truth import Camera, Light, Scene, look, orbit  # noqa: E402
 from truth.surfaces import Rectangle, Sphere  # noqa: E402
 
 EMPTY = 0x7F800000FFFFFFFF
@@ -108,9 +108,9 @@ OFF = {"fill": 2, "smooth": 3, "antialias": 2}  # measured pixels alone
 
 def projected(shown: Shown, camera: Camera, world: np.ndarray, width: int, height: int, margin: float = 1e-3
               ) -> dict[str, float]:
-    """Measured pixels against float64: worst z error (world units, and as a share of z), how far the true place of a shown
-    point lies outside its pixel, by how much a nearer point was missed, pixels that should show a point and do not, and
-    ids or depths that cannot be."""
+    """Measured pixels against float64: worst z error (world units, and as a share of z), how far the true place of a
+    shown point lies outside its pixel, by how much a nearer point was missed, pixels that should show a point and do
+    not, and ids or depths that cannot be."""
     at = camera.project(world, width, height)
     first = 0.0 if camera.orthographic else camera.near
     last = camera.far - camera.near if camera.orthographic else camera.far
@@ -133,7 +133,8 @@ def projected(shown: Shown, camera: Camera, world: np.ndarray, width: int, heigh
     late = true[:, 2] - nearest[rows, columns]
     return {"pixels": len(rows), "z": float(np.abs(z - true[:, 2]).max(initial=0.0)),
             "share": float((np.abs(z - true[:, 2]) / np.maximum(true[:, 2], 1e-300)).max(initial=0.0)),
-            "stray": float(outside.max(initial=0.0)), "late": float(np.where(np.isfinite(late), late, 0.0).max(initial=0.0)),
+            "stray": float(outside.max(initial=0.0)),
+            "late": float(np.where(np.isfinite(late), late, 0.0).max(initial=0.0)),
             "missed": int((~full & np.isfinite(nearest)).sum()), "wrong": wrong}
 
 
@@ -223,7 +224,8 @@ def camera_plane(device: native.Device) -> tuple[str, bool]:
     world[0] = 0.0
     camera = look(np.zeros(3), np.array([0.0, 0.0, -1.0]), 90.0, 200 / 120)
     camera = Camera(**{**vars(camera), "near": 0.01, "far": 10.0})
-    return checked(projected(draw(device, [cloud_of(world)], camera, 200, 120, **OFF), camera, world, 200, 120), 8 * ULP)
+    shown = draw(device, [cloud_of(world)], camera, 200, 120, **OFF)
+    return checked(projected(shown, camera, world, 200, 120), 8 * ULP)
 
 
 @hard("orthographic scale 10⁻⁶ and 10⁶, near = −far")
@@ -232,7 +234,8 @@ def scales(device: native.Device) -> tuple[str, bool]:
     for scale in (1e-6, 1e6):
         world = np.random.default_rng(5).uniform(-0.55, 0.55, (20_000, 3)) * scale
         camera = look(np.array([0.1, -0.2, 0.3]) * scale, np.zeros(3))
-        camera = Camera(camera.matrix, -0.5 * scale, 0.5 * scale, -0.5 * scale, 0.5 * scale, -2.0 * scale, 2.0 * scale, True)
+        half = 0.5 * scale
+        camera = Camera(camera.matrix, -half, half, -half, half, -2.0 * scale, 2.0 * scale, True)
         one = projected(draw(device, [cloud_of(world)], camera, 256, 256, **OFF), camera, world, 256, 256)
         one["z"] /= scale
         one["late"] /= scale
@@ -299,7 +302,8 @@ def one_point(device: native.Device) -> tuple[str, bool]:
 
 @hard("no points")
 def nothing(device: native.Device) -> tuple[str, bool]:
-    shown = draw(device, [cloud_of(np.zeros((0, 3), np.float32)), cloud_of(np.full((3, 3), np.nan, np.float32))], VIEW, 67, 45)
+    empty, unreal = np.zeros((0, 3), np.float32), np.full((3, 3), np.nan, np.float32)
+    shown = draw(device, [cloud_of(empty), cloud_of(unreal)], VIEW, 67, 45)
     return same("pixels", float((shown.keys != EMPTY).sum() + (shown.rgba != 0).sum()), 0.0, shown)
 
 
@@ -324,7 +328,8 @@ def matrices(device: native.Device) -> tuple[str, bool]:
     for diagonal in ((-1, 1, 1), (-1, -1, -1), (1, 1, 0), (1, 0, 0), (0, 0, 0), (1e-12,) * 3, (1e-30, 1e30, 1)):
         matrix = np.diag([*map(float, diagonal), 1.0])
         style = {"world_from_object": matrix.ravel().tolist()}
-        culled = draw(device, [cloud_of(position, normal)], VIEW, 90, 90, (SUN,), {**style, "lighting": 2, "cull_back": 1})
+        culled = draw(device, [cloud_of(position, normal)], VIEW, 90, 90, (SUN,),
+                      {**style, "lighting": 2, "cull_back": 1})
         problems += [sane(culled)] * bool(sane(culled))
         shown = draw(device, [cloud_of(position)], VIEW, 90, 90, (), style, **OFF)
         if max(np.abs(diagonal)) <= 1.0:
@@ -388,7 +393,7 @@ def falling(device: native.Device) -> tuple[str, bool]:
     random = np.random.default_rng(9)
     long, high, dense, ratio = 640, 160, 30.0, 300.0
     share = random.random(int(dense * long * high * (1.0 - 1.0 / ratio) / np.log(ratio)))
-    x = -np.log(1.0 - share * (1.0 - 1.0 / ratio)) / np.log(ratio) * long  # density falls by the same factor every pixel
+    x = -np.log(1.0 - share * (1.0 - 1.0 / ratio)) / np.log(ratio) * long  # falls by the same factor every pixel
     world = np.stack([x, random.uniform(0, high, len(x)), np.zeros(len(x))], axis=1)
     camera = look(np.array([0.0, 0.0, 10.0]), np.zeros(3))
     camera = Camera(camera.matrix, -10.0, long + 10.0, -10.0, high + 10.0, 0.1, 100.0, True)
@@ -408,7 +413,7 @@ def lit_ball(device: native.Device, light: Light, surface: Any = None, limit: fl
     surface = surface or Sphere()
     scene = Scene((surface,), (light,), world=0.05, albedo=lambda owner, point: np.full(point.shape, 0.8))
     position, normal = surface.sample(400_000, np.random.default_rng(10))
-    camera = scenes_camera()
+    camera = orbit()
     shown = draw(device, [cloud_of(position, normal)], camera, 200, 200, (light,), {"lighting": 2},
                  world_color=[0.05] * 3)
     exact = scene.picture(camera, 200, 200, antialias=0)
@@ -419,11 +424,6 @@ def lit_ball(device: native.Device, light: Light, surface: Any = None, limit: fl
     scale = max(float(exact.color[inner].max()), 0.1)
     off = np.sqrt(np.mean((shown.rgba[inner][:, :3] - exact.color[inner]) ** 2)) / scale
     return same("colour rms, share of the brightest", float(off), limit, shown)
-
-
-def scenes_camera() -> Camera:
-    from truth import orbit
-    return orbit()
 
 
 @hard("light inside the cloud")

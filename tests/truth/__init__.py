@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes whose exact picture is known without points, and points sampled from them. float64, numpy alone (blue noise: scipy).
+"""Scenes whose exact picture is known without points, and points sampled from them. float64, numpy alone (blue noise:
+scipy).
 
     from truth import scenes, orbit, sample
     scene = scenes.build("tori")
@@ -15,5 +16,5 @@ from .light import Light, places, visibility
 from .sampling import PATTERNS, Points, count_for, sample
 from .scene import Material, Picture, Scene, linear, srgb_bytes
 
-__all__ = ["PATTERNS", "Camera", "Light", "Material", "Picture", "Points", "Scene", "count_for", "linear", "look", "orbit",
-           "parallel", "places", "sample", "scenes", "srgb_bytes", "visibility"]
+__all__ = ["PATTERNS", "Camera", "Light", "Material", "Picture", "Points", "Scene", "count_for", "linear", "look",
+           "orbit", "parallel", "places", "sample", "scenes", "srgb_bytes", "visibility"]

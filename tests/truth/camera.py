@@ -10,7 +10,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Camera:
-    """matrix: world from camera, looking down -z; the window lies at distance 1, or is in world units (orthographic)."""
+    """matrix: world from camera, looking down -z; the window lies at distance 1, or is in world units
+    (orthographic)."""
 
     matrix: np.ndarray
     left: float

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Light:
     """A sun of irradiance `power` W/m2 from the unit vector `towards`, or a point light of `power` W at `position`. Its
-    area: a sun's disc of `angle` radians across, a disc of `radius` that faces the point it lights, or the parallelogram
-    that the half edges `across` span around `position`."""
+    area: a sun's disc of `angle` radians across, a disc of `radius` that faces the point it lights, or the
+    parallelogram that the half edges `across` span around `position`."""
 
     power: float
     towards: np.ndarray | None = None
@@ -45,8 +45,8 @@ class Light:
         return way / np.sqrt(squared)[:, None], self.power / (4.0 * np.pi * squared)
 
     def targets(self, point: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """From points (n, 3) to places (2) of the light's area, in the unit disc (sun, ball) or in [-1, 1]^2: vectors whose
-        end is the light (for a sun: far out)."""
+        """From points (n, 3) to places (2) of the light's area, in the unit disc (sun, ball) or in [-1, 1]^2: vectors
+        whose end is the light (for a sun: far out)."""
         if self.across is not None:
             return self.position + place[0] * self.across[0] + place[1] * self.across[1] - point
         way = np.broadcast_to(self.towards, point.shape) if self.towards is not None else self.position - point
@@ -83,9 +83,9 @@ def _rim(light: Light) -> np.ndarray:
 
 
 def visibility(scene: Scene, light: Light, point: np.ndarray, samples: int = 1024) -> np.ndarray:
-    """m in [0, 1] at points (n, 3) of the scene's surfaces: the share of the light's area that they see, uniform in area. A
-    surface of opacity a lets 1 - a through. Points that 36 places within the area and 24 on its border agree on are in
-    full light or full shadow; the others take all `samples`."""
+    """m in [0, 1] at points (n, 3) of the scene's surfaces: the share of the light's area that they see, uniform in
+    area. A surface of opacity a lets 1 - a through. Points that 36 places within the area and 24 on its border agree on
+    are in full light or full shadow; the others take all `samples`."""
     def mean(points: np.ndarray, quadrature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         total, least, most = np.zeros(len(points)), np.ones(len(points)), np.zeros(len(points))
         for place in quadrature:

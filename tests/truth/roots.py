@@ -11,7 +11,8 @@ Function = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def polish(f: Function, slope: Function, rows: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The root of f(row, t) in each bracket [a, b] with a change of sign: Newton, kept within the bracket by bisection."""
+    """The root of f(row, t) in each bracket [a, b] with a change of sign: Newton, kept within the bracket by
+    bisection."""
     a, b = a.copy(), b.copy()
     rising = f(rows, b) > 0.0
     t = 0.5 * (a + b)
@@ -34,8 +35,9 @@ def polish(f: Function, slope: Function, rows: np.ndarray, a: np.ndarray, b: np.
 
 
 def polynomial(c: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Roots in [low, high] of polynomials c (n, degree + 1), ascending powers: (n, degree), ascending, NaN where there is
-    none. Between the roots of the derivative a polynomial is monotone: a change of sign is a root, and the only one."""
+    """Roots in [low, high] of polynomials c (n, degree + 1), ascending powers: (n, degree), ascending, NaN where there
+    is none. Between the roots of the derivative a polynomial is monotone: a change of sign is a root, and the only
+    one."""
     n, degree = len(c), c.shape[1] - 1
     if degree == 1:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -66,9 +68,9 @@ def polynomial(c: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def smooth(f: Function, slope: Function, bend: np.ndarray, low: np.ndarray, high: np.ndarray, steps: int) -> np.ndarray:
-    """Roots in [low, high] of functions whose second derivative nowhere exceeds `bend` (n): (n, most), ascending, padded
-    with NaN. Intervals are halved until each surely holds none or surely is monotone, so that none is missed, but for
-    pairs closer than about 1e-7 of the range."""
+    """Roots in [low, high] of functions whose second derivative nowhere exceeds `bend` (n): (n, most), ascending,
+    padded with NaN. Intervals are halved until each surely holds none or surely is monotone, so that none is missed,
+    but for pairs closer than about 1e-7 of the range."""
     n = len(low)
     share = np.linspace(0.0, 1.0, steps + 1)
     grid = low[:, None] + (high - low)[:, None] * share

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points of a scene's surfaces: uniform random, blue noise (Poisson discs), or scan lines; with noise along the normal."""
+"""Points of a scene's surfaces: uniform random, blue noise (Poisson discs), or scan lines; with noise along the
+normal."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ PATTERNS = ("random", "blue", "scan")
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """position, normal float32 (n, 3); color uint8 sRGB (n, 3); surface: index (n). spacing: 1 / sqrt(points per area)."""
+    """position, normal float32 (n, 3); color uint8 sRGB (n, 3); surface: index (n). spacing: 1 / sqrt(points per
+    area)."""
 
     position: np.ndarray
     normal: np.ndarray
@@ -93,8 +95,8 @@ def _blue(scene: Scene, count: int, random: np.random.Generator) -> tuple[np.nda
 
 
 def _scan(scene: Scene, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Seven registered range scans in parallel light, lines four times as far apart as the samples in them; a sample counts
-    where it meets the surface at less than 75 degrees. Uneven on purpose: scans overlap, slopes are sparse."""
+    """Seven registered range scans in parallel light, lines four times as far apart as the samples in them; a sample
+    counts where it meets the surface at less than 75 degrees. Uneven on purpose: scans overlap, slopes are sparse."""
     ways = np.array([[0.31, -0.76, 0.57], [-0.82, -0.39, 0.42], [0.77, 0.48, 0.43], [-0.36, 0.80, 0.48],
                      [0.05, 0.11, 0.99], [0.54, -0.37, -0.76], [-0.61, 0.33, -0.72]])
     reach = max(float(np.linalg.norm(surface.place[:3, 3])) + surface.radius for surface in scene.surfaces)

@@ -61,7 +61,8 @@ class Scene:
         return np.array([surface.opacity for surface in self.surfaces])
 
     def crossings(self, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Every t at which the lines origin + t direction meet a surface, ascending (n, most), inf-padded, and whose."""
+        """Every t at which the lines origin + t direction meet a surface, ascending (n, most), inf-padded, and
+        whose."""
         tables = [surface.crossings(origin, direction) for surface in self.surfaces]
         owner = np.repeat(np.arange(len(tables)), [table.shape[1] for table in tables])
         t = np.concatenate(tables, axis=1)
@@ -70,8 +71,8 @@ class Scene:
         return np.take_along_axis(t, order, axis=1), owner[order]
 
     def passage(self, point: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Share of light that passes from point (n, 3) to point + way; surfaces nearer than 1e-6 units do not count, nor
-        does what lies behind the way's end."""
+        """Share of light that passes from point (n, 3) to point + way; surfaces nearer than 1e-6 units do not count,
+        nor does what lies behind the way's end."""
         result = np.ones(len(point))
         through = 1.0 - self.opacities
         for begin in range(0, len(point), CHUNK):
@@ -93,7 +94,8 @@ class Scene:
 
     def shade(self, surface: np.ndarray, point: np.ndarray, viewer: np.ndarray, shadow_samples: int = 0
               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Normals, colours (n, 3) and m of each light (n, lights) at points of surfaces. shadow_samples 0: no shadows."""
+        """Normals, colours (n, 3) and m of each light (n, lights) at points of surfaces. shadow_samples 0: no
+        shadows."""
         normal = self.normals(surface, point)
         lit = [visibility(self, light, point, shadow_samples) if shadow_samples else np.ones(len(point))
                for light in self.lights]
@@ -102,9 +104,9 @@ class Scene:
 
     def picture(self, camera: Camera, width: int, height: int, layers: int = 1, antialias: int = 8,
                 shadow_samples: int = 0) -> Picture:
-        """The exact picture: the first `layers` surfaces along each pixel's central ray, front to back; what lies deeper
-        is cut. antialias: edges are averaged over that many rays squared (0: `smooth` is `rgba`). shadow_samples: 0 no
-        shadows, else quadrature places on each light's area."""
+        """The exact picture: the first `layers` surfaces along each pixel's central ray, front to back; what lies
+        deeper is cut. antialias: edges are averaged over that many rays squared (0: `smooth` is `rgba`).
+        shadow_samples: 0 no shadows, else quadrature places on each light's area."""
         y, x = np.divmod(np.arange(width * height), width)
         taken = self._take(camera, x + 0.5, y + 0.5, width, height, layers, shadow_samples)
         shape = (height, width)
@@ -127,7 +129,8 @@ class Scene:
 
     def _take(self, camera: Camera, x: np.ndarray, y: np.ndarray, width: int, height: int, layers: int,
               shadow_samples: int) -> tuple[np.ndarray, ...]:
-        """depth, surface, normal, color, lit of each layer (layers, n, ...), transmittance behind it, blended rgba (n, 4)."""
+        """depth, surface, normal, color, lit of each layer (layers, n, ...), transmittance behind it, blended rgba (n,
+        4)."""
         n = len(x)
         depth, surface = np.full((layers, n), np.inf), np.full((layers, n), -1, np.int16)
         normal, color = np.zeros((layers, n, 3)), np.zeros((layers, n, 3))
@@ -229,10 +232,10 @@ def _differs(values: np.ndarray, limit: float) -> np.ndarray:
 @dataclass(frozen=True, eq=False)
 class Picture:
     """Exact, row 0 at the bottom. At pixel centres, of the first surface: depth (h, w), +inf where nothing is; normal,
-    world space, and colour, linear, not premultiplied (h, w, 3); m of each light (h, w, lights). rgba: the layers blended,
-    premultiplied, background transparent; smooth: the same, averaged over each pixel's area where an edge crosses it
-    (alpha is then its exact coverage). layer_depth, layer_transmittance (behind the layer), layer_color (layers, h, w, ...)
-    of the k-th surface along the ray."""
+    world space, and colour, linear, not premultiplied (h, w, 3); m of each light (h, w, lights). rgba: the layers
+    blended, premultiplied, background transparent; smooth: the same, averaged over each pixel's area where an edge
+    crosses it (alpha is then its exact coverage). layer_depth, layer_transmittance (behind the layer), layer_color
+    (layers, h, w, ...) of the k-th surface along the ray."""
 
     depth: np.ndarray
     normal: np.ndarray

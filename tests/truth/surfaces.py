@@ -28,8 +28,8 @@ def translation(x: float, y: float, z: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Placed by a rigid matrix, world from object. A subclass knows its own object space: _roots, _normal, _sample, area
-    and radius (of a ball around its origin that holds it)."""
+    """Placed by a rigid matrix, world from object. A subclass knows its own object space: _roots, _normal, _sample,
+    area and radius (of a ball around its origin that holds it)."""
 
     opacity: float = field(default=1.0, kw_only=True)
     place: np.ndarray = field(default_factory=lambda: np.eye(4), kw_only=True)
@@ -275,7 +275,8 @@ class Saddle(Surface):
 
 @dataclass(frozen=True, eq=False)
 class Gyroid(Surface):
-    """sin kx cos ky + sin ky cos kz + sin kz cos kx = level within a ball, k waves a unit times 2 pi. Both sides show."""
+    """sin kx cos ky + sin ky cos kz + sin kz cos kx = level within a ball, k waves a unit times 2 pi. Both sides
+    show."""
 
     radius: float = 1.2
     waves: float = 0.8

@@ -115,8 +115,8 @@ class Pictures(unittest.TestCase):
             rows, columns = np.nonzero(np.isfinite(picture.depth))
             origin, direction = camera.rays(columns + 0.5, rows + 0.5, 40, 30)
             point = origin + picture.depth[rows, columns][:, None] * direction
-            np.testing.assert_allclose(camera.project(point, 40, 30),
-                                       np.stack([columns + 0.5, rows + 0.5, picture.depth[rows, columns]], 1), atol=1e-9)
+            expected = np.stack([columns + 0.5, rows + 0.5, picture.depth[rows, columns]], 1)
+            np.testing.assert_allclose(camera.project(point, 40, 30), expected, atol=1e-9)
 
     def test_layers_of_three_tori(self) -> None:
         """Straight down on the tubes: outer, middle, inner, then the inner torus is opaque."""
