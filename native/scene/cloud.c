@@ -37,6 +37,30 @@ static int read_normal(const patina_array *array, uint64_t index, double n[3])
     return finite3(n) && (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0);
 }
 
+// In 1/255, rounded; what is not a number is opaque.
+static uint8_t read_opacity(const patina_array *array, uint64_t index)
+{
+    const uint8_t *at = element(array, index);
+    double value = 1.0;
+    float f;
+    uint16_t v;
+    switch (array->type) {
+    case PATINA_UINT8:
+        return *at;
+    case PATINA_UINT16:
+        memcpy(&v, at, sizeof v);
+        value = v / 65535.0;
+        break;
+    case PATINA_FLOAT32:
+        memcpy(&f, at, sizeof f);
+        value = (double)f;
+        break;
+    default:
+        memcpy(&value, at, sizeof value);
+    }
+    return isnan(value) ? 255 : (uint8_t)(255.0 * fmin(fmax(value, 0.0), 1.0) + 0.5);
+}
+
 // ---- the build -----------------------------------------------------------------------------------------------------
 
 struct build {
@@ -53,7 +77,7 @@ struct build {
     double box_min[3], box_max[3];
     struct block {
         uint32_t drawn, offset, translucent;
-        uint64_t invalid_normals, invalid_colors;
+        uint64_t invalid_positions, invalid_normals, invalid_colors;
         double box_min[3], box_max[3];
     } *blocks;
     uint32_t block_count;
@@ -68,6 +92,12 @@ static void position(const struct build *build, uint64_t index, double p[3])
     read_vector(&build->desc.position, index, p);
     for (int i = 0; i < 3; i++)
         p[i] += build->desc.origin[i];
+}
+
+// Points of opacity 0 would be layers that show nothing.
+static int is_drawn(const struct build *build, uint64_t index, const double p[3])
+{
+    return finite3(p) && (!build->desc.opacity.data || read_opacity(&build->desc.opacity, index));
 }
 
 static void box_reset(double box_min[3], double box_max[3])
@@ -98,7 +128,8 @@ static void measure_blocks(void *context, uint32_t begin, uint32_t end, uint32_t
         for (uint64_t i = first; i < last; i++) {
             double p[3];
             position(build, i, p);
-            if (!finite3(p))
+            block->invalid_positions += !finite3(p);
+            if (!is_drawn(build, i, p))
                 continue;
             box_add(block->box_min, block->box_max, p, p);
             block->drawn++;
@@ -136,7 +167,7 @@ static void code_blocks(void *context, uint32_t begin, uint32_t end, uint32_t th
         for (uint64_t i = first; i < last; i++) {
             double p[3];
             position(build, i, p);
-            if (finite3(p))
+            if (is_drawn(build, i, p))
                 *out++ = (uint64_t)grid_code(build, p) << 32 | i;
         }
     }
@@ -450,30 +481,6 @@ static void read_color(const patina_array *array, uint64_t index, float rgb[3])
     }
 }
 
-// In 1/255, rounded; what is not a number is opaque.
-static uint8_t read_opacity(const patina_array *array, uint64_t index)
-{
-    const uint8_t *at = element(array, index);
-    double value = 1.0;
-    float f;
-    uint16_t v;
-    switch (array->type) {
-    case PATINA_UINT8:
-        return *at;
-    case PATINA_UINT16:
-        memcpy(&v, at, sizeof v);
-        value = v / 65535.0;
-        break;
-    case PATINA_FLOAT32:
-        memcpy(&f, at, sizeof f);
-        value = (double)f;
-        break;
-    default:
-        memcpy(&value, at, sizeof value);
-    }
-    return isnan(value) ? 255 : (uint8_t)(255.0 * fmin(fmax(value, 0.0), 1.0) + 0.5);
-}
-
 static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct build *build = context;
@@ -629,6 +636,7 @@ static int build_cloud(struct build *build)
         return PATINA_ERROR_CANCELLED;
     drop_opaque(cloud, build);
     for (uint32_t b = 0; b < build->block_count; b++) {
+        cloud->info.invalid_positions += build->blocks[b].invalid_positions;
         cloud->info.invalid_normals += build->blocks[b].invalid_normals;
         cloud->info.invalid_colors += build->blocks[b].invalid_colors;
     }
@@ -636,7 +644,6 @@ static int build_cloud(struct build *build)
     memcpy(cloud->info.box_max, build->box_max, sizeof build->box_max);
     cloud->info.drawn = build->drawn;
     cloud->info.chunks = cloud->chunk_count;
-    cloud->info.invalid_positions = cloud->info.count - build->drawn;
     pt_progress_set(build->progress, 1.0);
     return PATINA_OK;
 }

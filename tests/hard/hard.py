@@ -56,7 +56,6 @@ NOT_BUILT = {
     "d = 0 and d = r in the density integral": "soft transparency",
     "r → 0, r ≫ scene": "soft transparency",
     "10⁴ soft fragments in one pixel": "soft transparency",
-    "opacity 0 and 1 exactly": "transparency",
     "light inside the cloud, at a point, behind the plane: its shadows": "shadows",
     "sun at grazing angle: its shadows": "shadows",
 }
@@ -403,6 +402,30 @@ def falling(device: native.Device) -> tuple[str, bool]:
     grown = (full.sum() - full[10:-10, 10:-10].sum()) / (long * high)
     text = f"open {100 * hole:.3f} % (≤ 1), grown {100 * grown:.3f} % (≤ 0.1)"
     return text, hole <= 0.01 and grown <= 1e-3 and not sane(shown)
+
+
+@hard("opacity 0 and 1 exactly")
+def opacities(device: native.Device) -> tuple[str, bool]:
+    """A ball of opacity 0 in front of one of opacity 1, by style and by point: as if the first were not there."""
+    position, normal = Sphere(radius=0.5).sample(60_000, np.random.default_rng(11))
+    ball_, ghost = position.astype(np.float32), (position + VIEW.matrix[:3, 2]).astype(np.float32)
+    normal = normal.astype(np.float32)
+    alone = draw(device, [cloud_of(ball_, normal)], VIEW, 150, 150, (SUN,), {"lighting": 2}, layers=8)
+    wrong = 0
+    for by_style in (True, False):
+        scene = native.Scene()
+        scene.add_cloud(cloud_of(ball_, normal), lighting=2)
+        clear = np.zeros((len(ghost), 1), np.float32)
+        cloud = cloud_of(ghost, normal) if by_style else native.Cloud(ghost, normal, opacities=clear)
+        scene.add_cloud(cloud, lighting=2, transparency=float(by_style))
+        scene.add_light(**SUN.fields())
+        scene.set_camera(**VIEW.fields())
+        scene.set_settings(width=150, height=150, film_transparent=1, layers=8)
+        frame = native.Frame(device)
+        frame.render(scene)
+        wrong += int((frame.read("COMBINED") != alone.rgba).any(axis=2).sum())
+    solid = int(((alone.rgba[..., 3] != 1.0) & (alone.source >= 1.0)).sum())
+    return f"pixels that differ {wrong} (≤ 0), pixels not solid {solid} (≤ 0)", not wrong and not solid
 
 
 # ---- light ---------------------------------------------------------------------------------------------------------

@@ -161,7 +161,7 @@ typedef struct patina_cloud_desc {
 typedef struct patina_cloud_info {
     size_t struct_size;
     uint64_t count;          // points as given; ids are 0 .. count-1 in the given order
-    uint64_t drawn;          // of them with finite positions
+    uint64_t drawn;          // of them with finite positions and opacity above 0
     uint64_t chunks;
     uint64_t bytes;          // anonymous memory held at rest
     double box_min[3], box_max[3]; // over the drawn points; an empty cloud has min > max
