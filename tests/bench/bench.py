@@ -37,7 +37,7 @@ import stage
 ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
-GROUPS = ("headline", "points", "pixels", "threads", "scenes", "patterns", "steady", "papers", "peers", "hard")
+GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers", "peers", "hard")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -78,6 +78,11 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
                     found += [case_of("scenes", surface, device, size, density=density, quality=quality, frames=frames)
                               for device in options.device
                               if device == main or full or (density == 1.0 and not quick)]
+    found += [case_of("layers", "tori", device, 256, density=density, mode="layers", clear=1, frames=frames)
+              for density in ([3.0] if quick else [0.3, 1.0, 3.0, 10.0]) for device in options.device
+              if device == main or not quick]
+    found += [case_of("shadows", "shadow", main, 256, density=3.0, mode=mode, frames=frames)
+              for mode in ("shadows 1", "shadows 10")]
     if not quick:
         found += [case_of("patterns", surface, main, 512, density=density, pattern=pattern, noise=noise, frames=frames)
                   for surface in ("torus", "corner") for density in (0.3, 1.0, 4.0)

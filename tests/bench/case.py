@@ -27,6 +27,7 @@ WARM_UP = 4
 PATIENCE = 6.0  # seconds of frames, after which a slow case stops at five
 QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill": 1, "fill_iterations": 1},
              "unfilled": {"quality": 1, "fill": 2}}
+LAYERS = 8  # rays through the nested tori meet up to eight surfaces
 STEADY_FRAMES, STEADY_STEP = 8, 0.05  # pictures and degrees between them: a third of a pixel at 1024
 FIELDS = ("scene", "mode", "device", "width", "height", "points", "quality", "threads", "ms_median", "ms_min", "ms_max",
           "peak_mb", "passes", "error")  # of a row, as the README and other programs know it
@@ -54,6 +55,7 @@ class Mode:
 # The papers' columns. A mode whose fields the library lacks is listed as not built yet.
 MODES = {
     "surface": Mode(),
+    "layers": Mode(settings={"layers": LAYERS}),
     "3 layers": Mode(settings={"layers": 3}, style={"transparency": 0.5}),
     "6 layers": Mode(settings={"layers": 6}, style={"transparency": 0.5}),
     "shadows 1": Mode(settings={"shadow_samples": 1}, light={"shadows": 1}),
@@ -112,6 +114,17 @@ def steadiness(frame: native.Frame, make: Any, shown: stages.Stage, width: int, 
     return steady.result()
 
 
+def errors(shown: stages.Stage, case: dict[str, Any], mode: Mode, planes: metrics.Shown, spacing: float
+           ) -> dict[str, float]:
+    size = case["width"], case["height"]
+    if not mode.light:
+        return metrics.errors(shown.exact(0.0, *size, LAYERS if case["mode"] == "layers" else 1), planes, spacing)
+    angle = mode.light.get("angle", 0.0)
+    exact = shown.exact(0.0, *size, 1, 1024 if angle else 1, angle)
+    bare, dark = shown.exact(0.0, *size), shown.exact(0.0, *size, dark=True)
+    return metrics.errors(exact, planes, spacing) | metrics.shadow(exact, bare, dark.color, planes)
+
+
 def measure(case: dict[str, Any]) -> dict[str, Any]:
     """The row's fields and more. All passes are asked for where there is a truth to hold them against, else colour
     alone."""
@@ -124,10 +137,11 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
     upload_ms = []
     for _ in range(3 if case["points"] <= 1_000_000 and case.get("uploads") else 1):
         start = time.perf_counter()
-        cloud = native.Cloud(shown.position, shown.normal, shown.color)
+        cloud = native.Cloud(shown.position, shown.normal, shown.color, opacities=shown.opacity)
         upload_ms.append(1e3 * (time.perf_counter() - start))
     spacing, count, scene_known = shown.spacing, len(shown.position), shown.scene is not None
-    shown = stages.Stage(**{**vars(shown), "position": None, "normal": None, "color": None})  # the cloud has its own
+    shown = stages.Stage(**{**vars(shown), "position": None, "normal": None, "color": None,
+                            "opacity": None})  # the cloud has its own
     machine.reset_peak()
 
     def make(turn: float) -> native.Scene:
@@ -148,8 +162,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
         start = time.perf_counter()
         planes = picture(frame)
         read_ms = 1e3 * (time.perf_counter() - start)
-    if scene_known and mode == MODES["surface"]:
-        error = metrics.errors(shown.exact(0.0, case["width"], case["height"]), planes, spacing)
+        error = errors(shown, case, mode, planes, spacing)
         if case.get("steady"):
             error |= steadiness(frame, make, shown, case["width"], case["height"])
     return {**case, "points": count, **timing, "peak_mb": peak, "error": error, "device_name": device.name,

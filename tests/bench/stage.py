@@ -8,7 +8,7 @@ import hashlib
 import shutil
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from truth import Camera, Picture, Points, Scene, count_for, orbit, sample, scenes  # noqa: E402
+from truth import Camera, Picture, Points, Scene, orbit, sample, scenes  # noqa: E402
 
 DISTANCE, ELEVATION, FOV = 3.6, 40.0, 45.8
 CLOSED = ("sphere", "torus", "tori", "corner", "fin", "shadow")  # back faces are never seen: culled
@@ -70,17 +70,22 @@ class Stage:
     lights: tuple[dict[str, Any], ...] = ()
     scene: Scene | None = None
     name: str = ""
+    opacity: np.ndarray | None = None  # float32 (n, 1); None: opaque
 
-    def exact(self, turn: float, width: int, height: int, layers: int = 1, shadow_samples: int = 0) -> Picture:
-        """The picture at a turn of the camera, float32, without its layers but for the last transmittance."""
+    def exact(self, turn: float, width: int, height: int, layers: int = 1, shadow_samples: int = 0,
+              sun_angle: float = 0.0, dark: bool = False) -> Picture:
+        """The picture at a turn of the camera, float32, without its layers but for the last transmittance. dark: as if no
+        light shone but the world's."""
         def make() -> dict[str, np.ndarray]:
-            picture = self.scene.picture(self.camera(turn), width, height, layers, 8, shadow_samples)
+            lights = () if dark else tuple(replace(one, angle=sun_angle) for one in self.scene.lights)
+            scene = replace(self.scene, lights=lights)
+            picture = scene.picture(self.camera(turn), width, height, layers, 8, shadow_samples)
             arrays = {one.name: getattr(picture, one.name) for one in fields(Picture)}
             arrays["layer_transmittance"] = arrays["layer_transmittance"][-1:]
             arrays["layer_depth"] = arrays["layer_color"] = arrays["surface"] = np.empty(0)
             return {name: array.astype(np.float32) for name, array in arrays.items()}
 
-        name = f"{self.name}-{width}x{height}-{turn:g}-{layers}-{shadow_samples}"
+        name = f"{self.name}-{width}x{height}-{turn:g}-{layers}-{shadow_samples}-{sun_angle:g}{'-dark' * dark}"
         return Picture(**kept(name, make))
 
 
@@ -88,12 +93,12 @@ def points_of(name: str, scene: Scene, count: int, pattern: str, noise: float) -
     if count > KEPT and pattern == "random":
         arrays: dict[str, np.ndarray] = {}
         for begin in range(0, count, BLOCK):
-            size = min(BLOCK, count - begin)
-            part = sample(scene, size, pattern, noise, 1 + begin // BLOCK)
-            for key in ("position", "normal", "color"):
-                arrays.setdefault(key, np.empty((count, 3), getattr(part, key).dtype))[begin : begin + size] = getattr(
-                    part, key)
-        return Points(**arrays, surface=np.empty(0), spacing=float(np.sqrt(scene.area / count)))
+            part = sample(scene, min(BLOCK, count - begin), pattern, noise, 1 + begin // BLOCK)
+            for key in ("position", "normal", "color", "surface"):
+                values = getattr(part, key)
+                whole = arrays.setdefault(key, np.empty((count, *values.shape[1:]), values.dtype))
+                whole[begin : begin + len(values)] = values
+        return Points(**arrays, spacing=float(np.sqrt(scene.area / count)))
     arrays = kept(f"{name}-{pattern}-{noise:g}-{count}", lambda: vars(sample(scene, count, pattern, noise)))
     return Points(**{**arrays, "spacing": float(arrays["spacing"])})
 
@@ -106,16 +111,16 @@ def density_count(name: str, density: float, height: int) -> int:
 
 
 def analytic(case: dict[str, Any]) -> Stage:
-    name = case["surface"]
+    name, clear = case["surface"], bool(case.get("clear"))
     scene = scenes.build(name)
-    if case.get("opaque", True):
-        scene = Scene(tuple(type(one)(**{**vars(one), "opacity": 1.0}) if one.opacity < 1.0 else one
-                            for one in scene.surfaces), scene.lights)
     points = points_of(name, scene, case["points"], case.get("pattern", "random"), case.get("noise", 0.0))
+    opacity = scene.opacities.astype(np.float32)[points.surface][:, None] if clear else None
+    if not clear:
+        scene = Scene(tuple(replace(one, opacity=1.0) for one in scene.surfaces), scene.lights)
     return Stage(points.position, points.normal, points.color, points.spacing,
                  lambda turn: orbit(turn, ELEVATION, DISTANCE, FOV),
-                 {"lighting": 2, "cull_back": int(name in CLOSED)}, tuple(light.fields() for light in scene.lights),
-                 scene, name + ("" if case.get("opaque", True) else "-clear"))
+                 {"lighting": 2, "cull_back": int(name in CLOSED and not clear)},
+                 tuple(light.fields() for light in scene.lights), scene, name + "-clear" * clear, opacity)
 
 
 def stage_of(case: dict[str, Any]) -> Stage:
