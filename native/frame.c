@@ -264,12 +264,13 @@ static int run_pass(struct render *render, const struct pt_pass *pass)
     return error;
 }
 
-// The plan's tail as one: the planes between its passes are neither made nor written.
-static int run_finish(struct render *render)
+// Planes that pass from layer to layer.
+static int peeled(enum pt_plane plane) { return plane >= PT_PLANE_LIMIT && plane <= PT_PLANE_TILES; }
+
+// Passes as one: the planes between them are neither made nor written.
+static int run_together(struct render *render, const struct pt_pass *passes)
 {
-    const struct pt_plan *plan = render->plan;
-    const struct pt_pass *passes = plan->passes + plan->finish;
-    uint32_t count = plan->pass_count - plan->finish, refs = 0;
+    uint32_t count = passes->together, refs = 0;
     for (uint32_t i = 0; i < count; i++)
         refs += passes[i].ref_count;
     struct pt_bound_pass *bound = calloc(count, sizeof *bound);
@@ -277,8 +278,12 @@ static int run_finish(struct render *render)
     int error = bound && buffers ? PATINA_OK : pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t i = 0; i < count && !error; i++) {
         bound[i] = (struct pt_bound_pass){ passes[i].kernel, passes[i].arguments, next, passes[i].ref_count };
-        for (uint32_t k = 0; k < passes[i].ref_count; k++)
-            *next++ = buffer_of(render, &passes[i].refs[k]);
+        for (uint32_t k = 0; k < passes[i].ref_count && !error; k++) {
+            const struct pt_ref *ref = &passes[i].refs[k];
+            if (!ref->of_instance && peeled(ref->which))
+                error = ensure_plane(render->frame, render->plan, ref->which, ref->index);
+            *next++ = buffer_of(render, ref);
+        }
     }
     if (!error)
         error = render->frame->device->ops->finish_picture(render->frame->device, bound, count);
@@ -308,23 +313,24 @@ static int run_plan(struct render *render)
             continue;
         if (!writing && atomic_load(&frame->cancel))
             return PATINA_ERROR_CANCELLED;
-        int together = i == plan->finish && frame->device->ops->finish_picture != NULL;
-        if (!writing && (together || is_output(&plan->passes[i]))) {
+        const struct pt_pass *pass = &plan->passes[i], *last = pass;
+        if (pass->together && frame->device->ops->finish_picture)
+            last += pass->together - 1;
+        if (!writing && is_output(last)) {
             if ((error = ensure_picture(frame, plan)))
                 return error;
             writing = 1;
         }
-        if ((error = together ? run_finish(render) : run_pass(render, &plan->passes[i]))) {
+        if ((error = last > pass ? run_together(render, pass) : run_pass(render, pass))) {
             frame->picture_valid &= !writing; // half a picture is none: the device failed
             return error;
         }
-        if (plan->passes[i].kernel == PT_KERNEL_peel)
+        if (last->kernel == PT_KERNEL_peel)
             error = end_layer(render);
         double now = milliseconds();
-        note_time(frame, together ? "finish" : plan->passes[i].name, now - before);
+        note_time(frame, last > pass ? "finish" : pass->name, now - before);
         before = now;
-        if (together)
-            i = plan->pass_count - 1;
+        i = (uint32_t)(last - plan->passes);
         atomic_store(&frame->progress, (float)(i + 1) / (float)plan->pass_count);
     }
     return error;

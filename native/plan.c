@@ -25,6 +25,7 @@ struct builder {
     struct pt_plan *plan;
     uint32_t room;
     uint32_t layer; // that passes are added for; 0: the whole picture
+    uint32_t finish; // first shading pass of the last layer planned
     int failed;
 };
 
@@ -429,29 +430,45 @@ static enum pt_plane plan_layer(struct builder *builder)
     if (!estimate)
         skip(builder, "normals", "every cloud in view has normals");
     plan_filling(builder);
-    if (plan->layers == 1 && !plan->transparent && !builder->scene->settings.layer_passes)
-        plan->finish = plan->pass_count;
+    uint32_t finish = plan->pass_count;
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count)
             plan_shade(builder, i);
-    return plan_image_filters(builder);
+    enum pt_plane color = plan_image_filters(builder);
+    if (plan->layers > 1)
+        plan_peel(builder, color);
+    builder->finish = finish;
+    return color;
+}
+
+// From shading on, passes may run as one where nobody asks for what lies between them.
+static void put_together(const struct builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    const patina_settings *settings = &builder->scene->settings;
+    const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE; // are taken from its planes, at the end
+    if (settings->layer_passes || (plan->layers == 1 && plan->transparent) ||
+        (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
+        return;
+    plan->passes[builder->finish].together = plan->pass_count - builder->finish;
 }
 
 static void plan_points(struct builder *builder)
 {
-    struct pt_plan *plan = builder->plan;
+    const struct pt_plan *plan = builder->plan;
     enum pt_plane color = PT_PLANE_COLOR_A;
-    plan->finish = UINT32_MAX;
     for (builder->layer = 1; builder->layer <= plan->layers; builder->layer++) {
         color = plan_layer(builder);
         if (plan->layers > 1)
-            plan_peel(builder, color);
+            put_together(builder);
         plan_layer_passes(builder, color);
     }
     builder->layer = 0;
     if (plan->layers == 1)
         skip(builder, "peel", plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
+    if (plan->layers == 1)
+        put_together(builder);
 }
 
 static void plan_nothing(struct builder *builder, const char *reason)
@@ -461,6 +478,7 @@ static void plan_nothing(struct builder *builder, const char *reason)
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         skip(builder, names[i], reason);
     plan_output(builder, PT_PLANE_COLOR_A);
+    put_together(builder);
 }
 
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)

@@ -65,6 +65,7 @@ struct pt_pass {
     size_t argument_size;
     const struct pt_ref *refs;
     uint32_t ref_count;
+    uint32_t together; // so many passes from this one on may run as one: nothing else reads the planes between them. 0: alone
 };
 
 struct pt_skipped {
@@ -96,8 +97,6 @@ struct pt_plan {
     uint32_t instance_count;
     struct pt_pass *passes;
     uint32_t pass_count;
-    uint32_t finish; // the passes from this one on make the picture: nothing else reads the planes between them, and a device
-                     // may run them as one. Opaque scenes only: else UINT32_MAX
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     uint64_t points, points_scattered, chunks, chunks_culled;

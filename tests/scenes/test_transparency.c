@@ -467,6 +467,18 @@ static void test_first_layer(void **state)
     assert_memory_not_equal(glass.combined, opaque.combined, pixels * 16);
     picture_free(&opaque);
 
+    settings.passes = 1u << PATINA_PASS_COMBINED; // passes may then run as one from the first layer on
+    patina_frame *frame = NULL;
+    float *combined = malloc(pixels * 16);
+    CHECK(patina_scene_set_settings(scene, &settings), scene);
+    CHECK(patina_frame_create(device, &frame), device);
+    CHECK(patina_frame_render(frame, scene), frame);
+    CHECK(patina_frame_read(frame, PATINA_PASS_COMBINED, combined, pixels * 16), frame);
+    assert_memory_equal(combined, glass.combined, pixels * 16);
+    free(combined);
+    patina_frame_destroy(frame);
+    settings.passes = 0;
+
     settings.layers = 16; // peeling has ended by itself before the default's 8
     opaque = picture_render(device, scene, &camera, &settings);
     picture_assert_identical(&opaque, &glass, 0, 0, "16 layers against 8");

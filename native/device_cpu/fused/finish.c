@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// finish: shade, smooth, antialias, compose and extract as one walk over rows. The planes between them stay in rings of
+// finish: shade, smooth, antialias, then peel or compose and extract as one walk over rows. The planes between them stay in rings of
 // rows that the second-level cache holds: nothing but the picture is written. Same functions, same numbers as the kernels.
-// Of opaque scenes only: alpha is 1 but for edges.
+// Where nothing is peeled the scene is opaque: alpha is 1 but for edges.
 #include "device_cpu/kernels/antialias.h"
 #include "device_cpu/kernels/compose.h"
 #include "device_cpu/kernels/extract.h"
+#include "device_cpu/kernels/peel.h"
 #include "device_cpu/kernels/shade.h"
 #include "device_cpu/kernels/smooth.h"
 
-enum { UNIT = 16, RING = 4, CHANNELS_SEEN = 5, CHANNELS_COLOR = 3 };
+enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 5, CHANNELS_COLOR = 4 };
 // Row s is shaded when s + reach has been seen, s - 1 is smoothed then, s - 2 finished: anti-aliasing reads s - 3 too.
 enum { SEEN_MOST = 2 * PT_BLEND_MOST + 1 };
 
@@ -20,6 +21,12 @@ struct finish {
     const struct compose_args *compose;
     const struct extract_args *extract;       // NULL: nothing beside the colour
     float *combined, *depth, *normals, *source;
+    const struct peel_args *peel;             // NULL: the picture is composed
+    const float *through;                     // of the layers before; NULL before the first
+    struct pt_peeled peeled;
+    struct pt_tile_value *tiles;
+    int channels;                             // of colours: 3, or 4 with alpha
+    int32_t base, end;                        // rows that are finished
     struct pt_planes planes;
     int32_t reach;
     int with_normals;
@@ -36,7 +43,8 @@ struct walk {
     struct pt_seen_row seen[SEEN_MOST];
     int any[SEEN_MOST];             // whether the row holds anything
     struct pt_color_row shaded[RING], smoothed[RING];
-    float *shown[RING][3];          // normals
+    float *shown[RING][4];          // normals, opacities
+    struct pt_tile_sum *tiles;      // of the row of tiles at hand
 };
 
 static struct pt_seen_row *seen_row(const struct finish *finish, struct walk *walk, int32_t y)
@@ -58,10 +66,10 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
     for (uint32_t i = 0; i < finish->ring; i++, at += CHANNELS_SEEN * s)
         walk->seen[i] = (struct pt_seen_row){ at, at + s, { at + 2 * s, at + 3 * s, at + 4 * s } };
     for (uint32_t i = 0; i < RING; i++, at += 3 * CHANNELS_COLOR * s) {
-        walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s, NULL } };
-        walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 3 * s, at + 4 * s, at + 5 * s, NULL } };
-        for (uint32_t k = 0; k < 3; k++)
-            walk->shown[i][k] = at + (6 + k) * s;
+        walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s, at + 3 * s } };
+        walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s } };
+        for (uint32_t k = 0; k < 4; k++)
+            walk->shown[i][k] = at + (8 + k) * s;
     }
 }
 
@@ -100,6 +108,48 @@ static void see(const struct finish *finish, struct walk *walk, int32_t y)
         ask_for_colors(finish, y);
 }
 
+// Opacity into the row's colours.
+static void make_translucent(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_color_row *row,
+                             float *opacities, int32_t y)
+{
+    const struct shade_args *args = call->arguments;
+    const uint32_t width = finish->planes.view->width;
+    for (uint32_t x = 0; x < width; x += PT_LANES) {
+        vi id;
+        vm ours = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
+        if (!vm_bits(ours))
+            continue;
+        vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 7), id, ours);
+        for (uint32_t k = 0; k < 3; k++)
+            vf_store(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
+        vf_store(row->color[3] + x, opacity, ours);
+        vf_store(opacities + x, opacity, ours);
+    }
+}
+
+static void shade_lit(const struct finish *finish, struct walk *walk, const struct shade_args *args, int32_t y)
+{
+    const struct view_args *view = finish->planes.view;
+    const struct pt_color_row *out = &walk->shaded[slot(y)];
+    const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
+    const int reach = (int)args->blend;
+    for (int32_t k = -reach; k <= reach; k++)
+        around[reach + k] = seen_row(finish, walk, y + k);
+    for (uint32_t x = 0; x < view->width; x += PT_LANES) {
+        vf color[3] = { vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x) }, normal[3];
+        vi id;
+        vm ours = pt_of_instance(finish->planes.keys + (size_t)y * view->width + x, &args->instance,
+                                 pt_lanes_left(x, view->width), &id);
+        if (!vm_bits(ours))
+            continue;
+        pt_shade_pixels(args, &finish->planes, around, finish->weights, x, (uint32_t)y, ours, color, normal);
+        for (uint32_t k = 0; k < 3; k++) {
+            vf_store(out->color[k] + x, color[k], ours);
+            vf_store(walk->shown[slot(y)][k] + x, normal[k], ours);
+        }
+    }
+}
+
 static void shade(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct view_args *view = finish->planes.view;
@@ -107,10 +157,6 @@ static void shade(const struct finish *finish, struct walk *walk, int32_t y)
     out->z = seen_row(finish, walk, y)->z;
     for (uint32_t i = 0; i < finish->shade_count && anything(finish, walk, y); i++) {
         const struct shade_args *args = finish->shades[i].call.arguments;
-        const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
-        const int reach = (int)args->blend;
-        for (int32_t k = -reach; k <= reach; k++)
-            around[reach + k] = seen_row(finish, walk, y + k);
         // a tight loop of its own: colours lie in file order, each is a cache miss, and many are under way at a time
         for (uint32_t x = 0; x < view->width; x += PT_LANES) {
             vf albedo[3];
@@ -123,21 +169,10 @@ static void shade(const struct finish *finish, struct walk *walk, int32_t y)
             for (uint32_t k = 0; k < 3; k++)
                 vf_store(out->color[k] + x, albedo[k], ours);
         }
-        if (!finish->with_normals)
-            continue;
-        for (uint32_t x = 0; x < view->width; x += PT_LANES) {
-            vf color[3] = { vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x) }, normal[3];
-            vi id;
-            vm ours = pt_of_instance(finish->planes.keys + (size_t)y * view->width + x, &args->instance,
-                                     pt_lanes_left(x, view->width), &id);
-            if (!vm_bits(ours))
-                continue;
-            pt_shade_pixels(args, &finish->planes, around, finish->weights, x, (uint32_t)y, ours, color, normal);
-            for (uint32_t k = 0; k < 3; k++) {
-                vf_store(out->color[k] + x, color[k], ours);
-                vf_store(walk->shown[slot(y)][k] + x, normal[k], ours);
-            }
-        }
+        if (finish->with_normals)
+            shade_lit(finish, walk, args, y);
+        if (finish->channels == 4)
+            make_translucent(finish, &finish->shades[i].call, out, walk->shown[slot(y)][3], y);
     }
 }
 
@@ -163,8 +198,11 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         vf color[4];
         if (!vm_bits(some))
             continue;
-        pt_smooth_pixels(finish->smooth, rows, 3, x, vf_load(limits + x), some, color);
-        for (uint32_t k = 0; k < 3; k++)
+        if (finish->channels == 4)
+            pt_smooth_pixels(finish->smooth, rows, 4, x, vf_load(limits + x), some, color);
+        else
+            pt_smooth_pixels(finish->smooth, rows, 3, x, vf_load(limits + x), some, color);
+        for (int k = 0; k < finish->channels; k++)
             vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
     }
 }
@@ -192,11 +230,16 @@ static vm mix_edges(const struct finish *finish, const struct around *around, co
         if (y + (uint32_t)pt_cross[d][1] >= view->height || !vm_bits(far))
             continue; // beyond the plane all is unknown: no edge
         far = vm_and(far, vi_lt_unsigned(vi_add(vi_set(qx), vi_lanes()), vi_set(view->width)));
+        if (finish->through) { // where no pixel shows, peeling leaves what comes through as it is
+            vi at = vi_add(vi_set((y + (uint32_t)pt_cross[d][1]) * view->width + qx), vi_lanes());
+            vm hidden = vf_lt(vf_gather(finish->through, at, far), vf_set(PT_SPENT));
+            far = vm_and(far, vm_not(vm_and(hidden, vf_le(empty, z))));
+        }
         count = vf_add_where(far, count, one);
         far = vm_and(far, vf_lt(z, empty));
         for (uint32_t k = 0; k < 3; k++)
             sum[k] = vf_add_where(far, sum[k], vf_load(row->color[k] + (int32_t)qx));
-        sum[3] = vf_add_where(far, sum[3], one);
+        sum[3] = vf_add_where(far, sum[3], finish->channels == 4 ? vf_load(row->color[3] + (int32_t)qx) : one);
     }
     vm edges = vf_lt(vf_zero(), count);
     if (!vm_bits(edges))
@@ -262,15 +305,46 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
     }
 }
 
+// ---- 3'. or what is peeled ---------------------------------------------------------------------------------------------------
+
+static void peel_row(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    const struct around around = { { &walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)] } };
+    const uint32_t *rect = finish->peel->view.rect, first = rect[0] / PT_TILE, width = finish->planes.view->width;
+    const uint32_t columns = (width + PT_TILE - 1) / PT_TILE, last = (rect[2] + PT_TILE - 1) / PT_TILE;
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    for (uint32_t tx = first; tx < last && y % PT_TILE == 0; tx++)
+        walk->tiles[tx] = pt_tile_begin();
+    for (uint32_t x = first * PT_TILE; x < rect[2]; x += PT_LANES) {
+        vm lanes = vm_first(pt_lanes_left(x, rect[2]));
+        vf z = vf_load(seen->z + x), color[4] = { empty, empty, empty, empty };
+        vm some = vm_and(lanes, vf_lt(z, empty));
+        if (vm_bits(some)) {
+            for (uint32_t k = 0; k < 4; k++)
+                color[k] = vf_load(around.row[1]->color[k] + x);
+            if (finish->antialias)
+                mix_edges(finish, &around, seen->limit, x, (uint32_t)y, some, color);
+        }
+        // keys of what was filled across a layer already taken stay: nothing reads them any more
+        pt_peel_pixels(finish->peel, &finish->peeled, (size_t)y * width + x, lanes, some, z, color,
+                       vf_load(walk->shown[slot(y)][3] + x), vf_load(seen->limit + x), &walk->tiles[x / PT_TILE]);
+    }
+    if (y % PT_TILE != PT_TILE - 1 && y != finish->end - 1)
+        return;
+    for (uint32_t tx = first; tx < last; tx++)
+        finish->tiles[(size_t)(y / PT_TILE) * columns + tx] = pt_tile_end(&walk->tiles[tx]);
+}
+
 // ---- the walk ----------------------------------------------------------------------------------------------------------------
 
 static void finish_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct finish *finish = context;
-    const struct compose_args *args = finish->compose;
     struct walk *walk = &finish->walks[thread];
-    const int32_t reach = finish->reach, first = (int32_t)(args->crop_y + begin * UNIT);
-    int32_t last = (int32_t)(args->crop_y + (end * UNIT < args->crop_height ? end * UNIT : args->crop_height));
+    const int32_t reach = finish->reach, first = finish->base + (int32_t)(begin * UNIT);
+    int32_t last = finish->base + (int32_t)(end * UNIT);
+    last = last < finish->end ? last : finish->end;
     int32_t y = first;
     if (first != walk->next) { // not where this thread stopped: begin anew
         walk->first = first;
@@ -282,7 +356,9 @@ static void finish_rows(void *context, uint32_t begin, uint32_t end, uint32_t th
             shade(finish, walk, y + 2);
         if (y + 1 >= walk->first - 1)
             smooth(finish, walk, y + 1);
-        if (y >= walk->first)
+        if (y >= walk->first && finish->peel)
+            peel_row(finish, walk, y);
+        else if (y >= walk->first)
             put_row(finish, walk, y);
     }
     walk->next = last;
@@ -304,11 +380,26 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.planes.deff = pt_cpu_data(call, 3);
             break;
         case PT_KERNEL_smooth: finish.smooth = call->arguments; break;
-        case PT_KERNEL_antialias: finish.antialias = call->arguments; break;
+        case PT_KERNEL_antialias:
+            finish.antialias = call->arguments;
+            finish.through = finish.antialias->behind ? pt_cpu_data(call, 4) : NULL;
+            break;
+        case PT_KERNEL_peel:
+            finish.peel = call->arguments;
+            finish.planes.keys = pt_cpu_data(call, 0);
+            finish.planes.view = &finish.peel->view;
+            finish.peeled = (struct pt_peeled){ pt_cpu_data(call, 5), pt_cpu_data(call, 6), pt_cpu_data(call, 7) };
+            finish.tiles = pt_cpu_data(call, 8);
+            finish.base = (int32_t)(finish.peel->view.rect[1] / PT_TILE * PT_TILE);
+            finish.end = (int32_t)finish.peel->view.rect[3];
+            break;
         case PT_KERNEL_compose:
             finish.compose = call->arguments;
             finish.planes.keys = pt_cpu_data(call, 0);
             finish.combined = pt_cpu_data(call, 2);
+            finish.planes.view = &finish.compose->view;
+            finish.base = (int32_t)finish.compose->crop_y;
+            finish.end = finish.base + (int32_t)finish.compose->crop_height;
             break;
         default: // extract
             finish.extract = call->arguments;
@@ -321,20 +412,24 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
     }
     if (finish.shade_count)
         finish.planes.from = pt_cpu_data(shared, 1);
-    finish.planes.view = &finish.compose->view;
+    finish.channels = finish.peel ? 4 : 3;
     finish.stride = pt_row_stride(finish.planes.view->width);
     finish.ring = (uint32_t)(2 * finish.reach > finish.reach + 3 ? 2 * finish.reach : finish.reach + 3) + 1;
     finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * 3 * CHANNELS_COLOR) * finish.stride;
     pt_blend_weights(finish.weights);
     uint32_t threads = pt_pool_threads(shared->pool);
     finish.memory = pt_cpu_scratch(shared, 0, threads * finish.thread_floats * sizeof(float));
-    finish.walks = pt_cpu_scratch(shared, 1, threads * sizeof *finish.walks);
+    // sums of tiles behind the walks, on a cache line
+    size_t columns = (finish.planes.view->width + PT_TILE - 1) / PT_TILE, walks = (threads * sizeof *finish.walks + 63) / 64 * 64;
+    finish.walks = pt_cpu_scratch(shared, 1, walks + threads * columns * sizeof(struct pt_tile_sum));
     if (!finish.memory || !finish.walks)
         return PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < threads; i++) {
         lay_out(&finish, i, &finish.walks[i]);
         finish.walks[i].next = INT32_MIN;
+        finish.walks[i].tiles = (struct pt_tile_sum *)(void *)((char *)finish.walks + walks) + i * columns;
     }
-    pt_parallel(shared->pool, (finish.compose->crop_height + UNIT - 1) / UNIT, 1, finish_rows, &finish);
+    if (finish.end > finish.base)
+        pt_parallel(shared->pool, (uint32_t)(finish.end - finish.base + UNIT - 1) / UNIT, 1, finish_rows, &finish);
     return PATINA_OK;
 }
