@@ -69,10 +69,10 @@ def write_ply(name, points, colors=None, normals=None, kind="float"):
     return name
 
 
-def wall(name, color, count=120):
-    """A square of 2 x 2 in the plane y = 0, upright, `color(x, z)`."""
+def wall(name, color, count=120, y=0.0):
+    """A square of 2 x 2 in the plane y, upright, `color(x, z)`."""
     step = 2 / (count - 1)
-    points = [(x * step - 1, 0.0, z * step - 1) for x in range(count) for z in range(count)]
+    points = [(x * step - 1, y, z * step - 1) for x in range(count) for z in range(count)]
     return write_ply(name, points, [color(x, z) for x, _, z in points], [(0, -1, 0)] * len(points))
 
 
@@ -117,6 +117,9 @@ def test_wrong_use_is_told():
                       ["render", "use.ply", "-o", "x.png", "--threads", "-1"],
                       ["render", "use.ply", "-o", "x.png", "--repeat", "0"],
                       ["render", "use.ply", "-o", "x.png", "--stats", "xml"],
+                      ["render", "use.ply", "-o", "x.png", "--opacity", "1.5"],
+                      ["render", "use.ply", "-o", "x.png", "--opacity", "0.5,-1"],
+                      ["render", "use.ply", "-o", "x.png", "--layers", "17"],
                       ["render", "use.ply", "-o", "x.png", "--background", "1,1"]):
         done = run(*arguments, code=2)
         assert done.stderr.startswith("patina: ") and not done.stdout, arguments
@@ -212,6 +215,24 @@ def test_transparent_film_is_not_premultiplied():
     partial = [pixel for row in rows for pixel in row if 0 < pixel[3] < 255]
     for pixel in partial:  # an edge is as orange as the middle
         assert all(abs(a - b) <= 3 for a, b in zip(pixel, (200, 100, 50))), pixel
+
+
+def test_opacity_of_each_file():
+    wall("glass.ply", lambda x, z: (200, 100, 50))
+    wall("behind.ply", lambda x, z: (10, 120, 255), y=2.0)
+    view = (*FRONT, "--transparent")
+    seen = {}
+    for opacity, alpha in (("0.5,1", 255), ("0.5", 191), ("0,1", 255), ("1,0.3", 255)):
+        run("render", "glass.ply", "behind.ply", "-o", "glass.png", *view, "--opacity", opacity)
+        pixel = read_png("glass.png")[3][32][32]
+        assert abs(pixel[3] - alpha) <= 1, (opacity, pixel)
+        seen[opacity] = pixel[:3]
+    assert seen["0,1"] == (10, 120, 255) and seen["1,0.3"] == (200, 100, 50), seen
+    assert seen["0.5,1"] not in (seen["0,1"], seen["1,0.3"])
+    run("render", "glass.ply", "behind.ply", "-o", "glass.png", *view, "--opacity", "0.5,1", "--layers", "1")
+    assert abs(read_png("glass.png")[3][32][32][3] - 128) <= 1
+    stats = json.loads(run("render", "glass.ply", "behind.ply", *view, "--opacity", "0.5,1", "--stats", "json").stdout)
+    assert stats["layers"] == 2, stats
 
 
 def test_background():
