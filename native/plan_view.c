@@ -257,6 +257,23 @@ struct survey {
     uint32_t *seen_count;
 };
 
+// How many of a chunk's points the settings ask for: whole vectors, for the processor draws no part of one.
+static uint32_t drawn_points(const struct patina_scene *scene, const struct pt_chunk *chunk)
+{
+    uint32_t strata = scene->settings.strata;
+    if (!strata || strata == PT_STRATA)
+        return chunk->count;
+    uint32_t count = (pt_chunk_prefix(chunk, strata) + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
+    return count < chunk->count ? count : chunk->count;
+}
+
+// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2.
+static double thinning(const struct patina_scene *scene)
+{
+    uint32_t strata = scene->settings.strata;
+    return strata ? sqrt((double)(1u << (PT_STRATA - strata))) : 1.0;
+}
+
 static int is_transparent(const struct pt_instance *instance)
 {
     return instance->style.transparency > 0.0f || instance->cloud->info.has_opacities;
@@ -290,8 +307,11 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered;
         double footprint = fmax(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
-        seen.spacing_px = (double)chunk->spacing * object->scale / footprint * sqrt(chunk_cosine(known, angle, spread));
-        seen.area_px = chunk->count * seen.spacing_px * seen.spacing_px;
+        uint32_t count = drawn_points(scene, chunk);
+        double thinned = sqrt((double)chunk->count / count);
+        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / footprint *
+                          sqrt(chunk_cosine(known, angle, spread));
+        seen.area_px = count * seen.spacing_px * seen.spacing_px;
         list[survey->seen_count[i]++] = seen;
     }
     plan->transparent |= transparent && survey->seen_count[i] > 0;
@@ -429,7 +449,7 @@ static void set_view(const struct camera *camera, struct view_args *view)
 // ---- what kernels get ----------------------------------------------------------------------------------------------------
 
 static void set_chunk(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
-                      const struct pt_chunk *chunk, uint32_t cull, struct chunk_view *out)
+                      const struct pt_chunk *chunk, uint32_t count, uint32_t cull, struct chunk_view *out)
 {
     double rows[9], translation[3], eye[4] = { 0 };
     chunk_product(camera, object, chunk, rows, translation);
@@ -444,7 +464,7 @@ static void set_chunk(const struct camera *camera, const struct object *object, 
     for (int k = 0; k < 4; k++)
         out->eye[k] = (float)eye[k];
     out->first = chunk->first;
-    out->count = chunk->count;
+    out->count = count;
     out->padded = chunk->padded;
     out->cull = cull;
     out->id_base = instance->id_base;
@@ -453,7 +473,7 @@ static void set_chunk(const struct camera *camera, const struct object *object, 
 #define LARGEST_LAYER 1e30f
 
 static void set_instance(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
-                         struct instance_args *args)
+                         double thinned, struct instance_args *args)
 {
     const struct patina_cloud *cloud = instance->cloud;
     const patina_cloud_style *style = &instance->style;
@@ -473,7 +493,8 @@ static void set_instance(const struct camera *camera, const struct object *objec
     args->d_min = fminf(style->d_min, LARGEST_LAYER);
     normal_matrix(camera, object, args->normal_matrix);
     for (uint32_t k = 0; k < PT_SPACINGS; k++)
-        args->spacing[k] = (float)fmin(cloud->spacing_base * pt_spacing_of_class(k) * object->scale, LARGEST_LAYER);
+        args->spacing[k] = (float)fmin(thinned * cloud->spacing_base * pt_spacing_of_class(k) * object->scale,
+                                       LARGEST_LAYER);
 }
 
 static void join_rect(uint32_t rect[4], const uint32_t other[4])
@@ -508,7 +529,7 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     const struct pt_instance *instance = &scene->instances[i];
     struct pt_plan_instance *out = &plan->instances[i];
     out->instance = instance;
-    set_instance(&survey->camera, &survey->objects[i], instance, &out->args);
+    set_instance(&survey->camera, &survey->objects[i], instance, thinning(scene), &out->args);
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
     if (!out->chunks || !out->bounds)
@@ -522,10 +543,12 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         if (!chunk_bounds(&survey->camera, chunk, rows, translation, bounds, &z, &beyond) ||
             !rect_in_window(&plan->view, bounds, rect))
             continue;
+        uint32_t count = drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)beyond, INFINITY);
-        set_chunk(&survey->camera, &survey->objects[i], instance, chunk, seen->cull, &out->chunks[out->chunk_count++]);
+        set_chunk(&survey->camera, &survey->objects[i], instance, chunk, count, seen->cull,
+                  &out->chunks[out->chunk_count++]);
         join_rect(out->rect, rect);
-        plan->points_scattered += chunk->count;
+        plan->points_scattered += count;
     }
     join_rect(plan->view.rect, out->rect);
     plan->chunks += instance->cloud->chunk_count;

@@ -24,9 +24,20 @@ static void forget_dead(struct pt_residency *residency, struct patina_device *de
     }
 }
 
-static int upload(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+// The colours as they are now, in place of what the buffer holds.
+static int upload_colors(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
     static const uint32_t color_bytes[] = { 0, 3, 12 };
+    device->ops->buffer_destroy(device, &resident->buffers[PT_COLORS]);
+    resident->colors = atomic_load(&cloud->alive->colors);
+    if (!cloud->colors)
+        return PATINA_OK;
+    return device->ops->buffer_create(device, cloud->info.count * color_bytes[cloud->color_format], cloud->colors, 1,
+                                      &resident->buffers[PT_COLORS]);
+}
+
+static int upload(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
     const struct {
         enum pt_instance_buffer which;
         const void *data;
@@ -35,7 +46,6 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         { PT_POSITIONS, cloud->positions, cloud->slots * 12 },
         { PT_IDS, cloud->ids, cloud->slots * 4 },
         { PT_SURFACE, cloud->surface, cloud->info.count * 4 },
-        { PT_COLORS, cloud->colors, cloud->info.count * color_bytes[cloud->color_format] },
         { PT_OPACITIES, cloud->opacities, cloud->info.count },
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
@@ -45,7 +55,7 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         if (error)
             return error;
     }
-    return PATINA_OK;
+    return upload_colors(device, cloud, resident);
 }
 
 int pt_residency_take(struct pt_residency *residency, struct patina_device *device, const struct patina_cloud *cloud,
@@ -55,7 +65,8 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
     for (struct pt_resident *resident = residency->first; resident; resident = resident->next)
         if (resident->alive == cloud->alive) {
             *out = resident;
-            return PATINA_OK;
+            return resident->colors == atomic_load(&cloud->alive->colors) ? PATINA_OK
+                                                                          : upload_colors(device, cloud, resident);
         }
     struct pt_resident *resident = calloc(1, sizeof *resident);
     if (!resident)

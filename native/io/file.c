@@ -50,7 +50,7 @@ static int read_input(const struct pt_input *input, patina_file **out)
     if (!file)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
     pt_handle_init(&file->handle);
-    int code = pt_ply_read(file, input);
+    int code = pt_text_is(input) ? pt_text_read(file, input) : pt_ply_read(file, input);
     if (code) {
         patina_file_destroy(file);
         return code;

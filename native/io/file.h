@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A file of points, read whole into columns in file order. Every reader (PLY now) fills this one struct.
+// A file of points, read whole into columns in file order. Every reader fills this one struct.
 #ifndef PT_FILE_H
 #define PT_FILE_H
 
 #include "../error.h"
+
+#include <stdbool.h>
 
 // A scalar of every point that is neither position, normal nor colour.
 struct pt_column {
@@ -39,6 +41,9 @@ struct pt_input {
 
 // Readers: fill a zeroed file. On failure the caller destroys what was filled.
 int pt_ply_read(struct patina_file *file, const struct pt_input *input);
+int pt_text_read(struct patina_file *file, const struct pt_input *input); // XYZ, CSV, PTS, PTX
+// Whether the first line that is no comment begins with a number, or names x, y and z.
+bool pt_text_is(const struct pt_input *input);
 
 // Takes over `staged`, 3 float64 a point from malloc: chooses the origin, narrows to file->position in place.
 // file->count must be set, file->origin holds what the file already declared (or 0) and is added to.

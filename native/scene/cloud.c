@@ -378,45 +378,6 @@ static uint32_t class_of_spacing(double spacing, double base) // rounded up: a l
 
 // ---- normals -------------------------------------------------------------------------------------------------------
 
-static void decode_normal(uint32_t word, double n[3])
-{
-    double x = ((double)(word & 0x1FFFu) - 4095.0) / 4095.0;
-    double y = ((double)(word >> 13 & 0x1FFFu) - 4095.0) / 4095.0;
-    double z = 1.0 - fabs(x) - fabs(y), fold = fmax(-z, 0.0);
-    n[0] = x >= 0.0 ? x - fold : x + fold;
-    n[1] = y >= 0.0 ? y - fold : y + fold;
-    n[2] = z;
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int i = 0; i < 3; i++)
-        n[i] /= length;
-}
-
-uint32_t pt_encode_normal(const double n[3])
-{
-    double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-    double v[3] = { n[0] / largest, n[1] / largest, n[2] / largest };
-    double sum = fabs(v[0]) + fabs(v[1]) + fabs(v[2]);
-    double x = v[0] / sum, y = v[1] / sum;
-    if (v[2] < 0.0) {
-        double folded = (1.0 - fabs(y)) * (x >= 0.0 ? 1.0 : -1.0);
-        y = (1.0 - fabs(x)) * (y >= 0.0 ? 1.0 : -1.0);
-        x = folded;
-    }
-    double gx = floor((x + 1.0) * 4095.0), gy = floor((y + 1.0) * 4095.0), best = -2.0;
-    uint32_t word = 0;
-    for (int k = 0; k < 4; k++) { // the nearest of the four grid directions around
-        double cx = fmin(gx + (k & 1), 8190.0), cy = fmin(gy + (k >> 1), 8190.0), c[3];
-        uint32_t candidate = (uint32_t)cx | (uint32_t)cy << 13;
-        decode_normal(candidate, c);
-        double dot = c[0] * v[0] + c[1] * v[1] + c[2] * v[2];
-        if (dot > best) {
-            best = dot;
-            word = candidate;
-        }
-    }
-    return word;
-}
-
 // Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
 static void surface_chunk(struct build *build, struct pt_chunk *chunk)
 {
@@ -430,7 +391,7 @@ static void surface_chunk(struct build *build, struct pt_chunk *chunk)
         if (build->desc.normal.data) {
             if (read_normal(&build->desc.normal, ids[i], n)) {
                 bits = pt_encode_normal(n);
-                decode_normal(bits, n);
+                pt_decode_normal(bits, n);
                 for (int k = 0; k < 3; k++)
                     axis[k] += n[k];
             } else {
@@ -448,7 +409,7 @@ static void surface_chunk(struct build *build, struct pt_chunk *chunk)
         chunk->cone_axis[k] = (float)axis[k];
     }
     for (uint32_t i = 0; i < chunk->count; i++) {
-        decode_normal(cloud->surface[ids[i]] & PT_NORMAL_BITS, n);
+        pt_decode_normal(cloud->surface[ids[i]] & PT_NORMAL_BITS, n);
         cosine = fmin(cosine, n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2]);
     }
     chunk->cone_cosine = (float)(cosine - 1e-6);
@@ -492,7 +453,7 @@ static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32
         uint64_t last = first + BLOCK_POINTS < build->desc.count ? first + BLOCK_POINTS : build->desc.count;
         for (uint64_t i = first; i < last; i++) {
             double n[3];
-            if (cloud->opacities) {
+            if (build->desc.opacity.data && cloud->opacities) {
                 cloud->opacities[i] = read_opacity(&build->desc.opacity, i);
                 build->blocks[b].translucent |= cloud->opacities[i] < 255;
             }
@@ -692,6 +653,11 @@ static int check_desc(patina_cloud_desc *desc)
     return check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 3, 4);
 }
 
+static enum pt_color_format color_format(const patina_array *color)
+{
+    return !color->data ? PT_COLOR_NONE : color->type == PATINA_UINT8 ? PT_COLOR_SRGB8 : PT_COLOR_FLOAT;
+}
+
 int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out)
 {
     struct build build = { .progress = progress };
@@ -720,9 +686,7 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
                                            .has_colors = desc->color.data != NULL,
                                            .has_opacities = desc->opacity.data != NULL };
         memcpy(cloud->info.origin, desc->origin, sizeof desc->origin);
-        cloud->color_format = !desc->color.data                    ? PT_COLOR_NONE
-                              : desc->color.type == PATINA_UINT8 ? PT_COLOR_SRGB8
-                                                                   : PT_COLOR_FLOAT;
+        cloud->color_format = color_format(&desc->color);
         build.cloud = cloud;
         error = build_cloud(&build);
     }
@@ -746,6 +710,52 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
     }
     *out = cloud;
     return PATINA_OK;
+}
+
+// Puts new colours in the place of the old ones; these go only when nothing can fail any more.
+static int replace_colors(struct build *build)
+{
+    struct patina_cloud *cloud = build->cloud;
+    size_t old_bytes = color_bytes(cloud);
+    enum pt_color_format old_format = cloud->color_format;
+    void *old = cloud->colors;
+    build->block_count = (uint32_t)((cloud->info.count + BLOCK_POINTS - 1) / BLOCK_POINTS);
+    build->blocks = calloc(build->block_count ? build->block_count : 1, sizeof *build->blocks);
+    build->pool = pt_pool_create(0, 0);
+    cloud->color_format = color_format(&build->desc.color);
+    cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
+    if (!build->blocks || !build->pool || (cloud->color_format && !cloud->colors)) {
+        pt_pages_free(cloud->colors, color_bytes(cloud));
+        cloud->color_format = old_format;
+        cloud->colors = old;
+        return PATINA_ERROR_MEMORY;
+    }
+    pt_parallel(build->pool, build->block_count, 1, attribute_blocks, build);
+    cloud->info.invalid_colors = 0;
+    for (uint32_t b = 0; b < build->block_count; b++)
+        cloud->info.invalid_colors += build->blocks[b].invalid_colors;
+    cloud->info.bytes += (cloud->colors ? color_bytes(cloud) : 0) - (old ? old_bytes : 0);
+    cloud->info.has_colors = cloud->color_format != PT_COLOR_NONE;
+    atomic_fetch_add(&cloud->alive->colors, 1);
+    pt_pages_free(old, old_bytes);
+    return PATINA_OK;
+}
+
+int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
+{
+    if (!cloud || !color)
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_colors: bad arguments");
+    struct build build = { .cloud = cloud, .desc = { .count = cloud->info.count, .color = *color } };
+    const uint32_t types = 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32;
+    int error = check_array(&build.desc.color, "color", types, 3, 4);
+    if (error)
+        return pt_fail_again(&cloud->handle, error);
+    error = replace_colors(&build);
+    pt_pool_destroy(build.pool);
+    free(build.blocks);
+    return error ? pt_fail(&cloud->handle, error, "new colours of %llu points: out of memory",
+                           (unsigned long long)cloud->info.count)
+                 : PATINA_OK;
 }
 
 void pt_alive_release(struct pt_alive *alive)

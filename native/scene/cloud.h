@@ -24,6 +24,7 @@ struct pt_chunk {
 // Whether a cloud still lives, shared with the devices that hold its buffers.
 struct pt_alive {
     atomic_int references, alive;
+    atomic_uint colors; // counts how often they were set
 };
 
 enum pt_color_format { PT_COLOR_NONE = 0, PT_COLOR_SRGB8 = 1, PT_COLOR_FLOAT = 2 };
@@ -52,6 +53,7 @@ double pt_spacing_of_class(uint32_t index);
 
 // Octahedral encoding of any non-zero finite vector: 26 bits, nearest of the four roundings.
 uint32_t pt_encode_normal(const double n[3]);
+void pt_decode_normal(uint32_t word, double n[3]);
 
 // Local spacing by sampled nearest neighbours among the `count` points x, y, z.
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);

@@ -188,6 +188,8 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
     if (!(s.error_target >= 0.0f) || !isfinite(s.error_target))
         return fail(scene, "settings: error_target is negative or not finite");
+    if (s.strata > PT_STRATA)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u strata; the most is %d", s.strata, PT_STRATA);
     if (!isfinite(s.world_color[0] + s.world_color[1] + s.world_color[2]))
         return fail(scene, "settings: world_color is not finite");
     if (s.layers > PATINA_MAX_LAYERS)

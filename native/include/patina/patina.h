@@ -178,6 +178,9 @@ typedef struct patina_cloud_info {
 // at rest (position 12, id 4, colour 3, normal and spacing 4, opacity 1), at most 16 more while building.
 PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
 PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
+// Gives a cloud other colours (as in the descriptor, count elements; NULL data: none) and leaves all else as it is, so
+// that painting uploads colours alone. The one change a cloud allows: no frame may be rendering it meanwhile.
+PATINA_API int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
 PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
 
 // ---- files -----------------------------------------------------------------------------------------------------
@@ -201,7 +204,8 @@ typedef struct patina_file_attribute {
     uint32_t type; // as in the file
 } patina_file_attribute;
 
-// Reads a PLY file (ascii, both byte orders) whole. Errors name the byte offset (binary) or line (ascii).
+// Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS or PTX file whole; formats are told apart by content. Errors name
+// the byte offset (binary) or line (text).
 PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
 PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
 PATINA_API void patina_file_destroy(patina_file *file);
@@ -282,6 +286,8 @@ typedef struct patina_settings {
                                // all layers are then peeled, behind opaque surfaces too, and 0 layers means 8. 0 = none
     float error_target;        // > 0: quality and fill are chosen, the cheapest whose expected colour error is not above this;
                                // where none is, the best. 0 = quality and fill as they are set
+    uint32_t strata;           // 1..6: draw only every 32nd, 16th, .. 1st point of each chunk, rounded up to 16 points:
+                               // a quick picture while navigating, filling closes the gaps. 0 = all
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16

@@ -1,0 +1,480 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Points as lines of numbers: XYZ and CSV with or without a line of names, PTS (a line of how many points follow), PTX
+// (scans with a matrix each, after Leica's description of the format). Words are parted by blanks, commas or semicolons.
+//
+// What a column is follows from its name, else from how many columns there are and what the first rows hold: 4: x y z
+// intensity; 6: x y z and colour bytes, or unit normals; 7: x y z intensity colour; 9: colour bytes and normals. What is
+// none of these becomes an attribute.
+#include "../progress.h"
+#include "file.h"
+#include "number.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+enum { MOST_COLUMNS = 32, SAMPLES = 1000, POLL_LINES = 8192, NAME_SIZE = 64 };
+
+enum role { ATTRIBUTE, X, Y, Z, NX, NY, NZ, RED, GREEN, BLUE, ALPHA };
+
+struct text {
+    const struct pt_input *input;
+    struct patina_file *file;
+    locale_t c_locale;
+    const uint8_t *at, *end;
+    uint64_t line;               // of `at`, from 1
+    uint32_t columns;            // words of a row
+    char names[MOST_COLUMNS][NAME_SIZE];
+    bool named, ptx, pts;
+    enum role roles[MOST_COLUMNS];
+    bool float_colors;           // 0..1
+    double maximum;              // of integer colours: 255 or 65535
+    double *staged;
+    float *scan;                 // of a PTX: each point's scan number, from 0
+    float **attributes;          // a column each, in the order of the columns
+};
+
+// ---- lines -----------------------------------------------------------------------------------------------------------
+
+static bool parts(uint8_t c) { return pt_is_blank(c) || c == ',' || c == ';'; }
+
+static bool is_comment(const uint8_t *at, const uint8_t *end)
+{
+    return at < end && (*at == '#' || *at == '!' || (*at == '/' && at + 1 < end && at[1] == '/'));
+}
+
+// Comes to the next line that holds something; false at the end.
+static bool find_line(struct text *t)
+{
+    for (;;) {
+        while (t->at < t->end && (parts(*t->at) || pt_is_line_end(*t->at))) {
+            t->line += *t->at == '\n' || (*t->at == '\r' && (t->at + 1 == t->end || t->at[1] != '\n'));
+            t->at++;
+        }
+        if (t->at == t->end || !is_comment(t->at, t->end))
+            return t->at < t->end;
+        while (t->at < t->end && !pt_is_line_end(*t->at))
+            t->at++;
+    }
+}
+
+// The words of the line at t->at as numbers; t->at comes to its end. Words that are no numbers are counted in *strange.
+static uint32_t read_line(struct text *t, double values[MOST_COLUMNS], uint32_t *strange)
+{
+    uint32_t count = 0;
+    *strange = 0;
+    while (t->at < t->end && !pt_is_line_end(*t->at)) {
+        if (parts(*t->at)) {
+            t->at++;
+            continue;
+        }
+        const uint8_t *word = t->at;
+        while (t->at < t->end && !parts(*t->at) && !pt_is_line_end(*t->at))
+            t->at++;
+        double value = NAN;
+        if (pt_parse_number(word, t->at, t->c_locale, &value) != t->at) {
+            value = NAN;
+            (*strange)++;
+        }
+        if (count < MOST_COLUMNS)
+            values[count] = value;
+        count++;
+    }
+    return count < MOST_COLUMNS ? count : MOST_COLUMNS;
+}
+
+static int fail_at(const struct text *t, const char *what)
+{
+    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: line %llu: %s", t->input->name, (unsigned long long)t->line, what);
+}
+
+// ---- what the columns are ----------------------------------------------------------------------------------------------
+
+static void read_names(struct text *t, const uint8_t *at)
+{
+    uint32_t column = 0;
+    t->named = true;
+    while (at < t->end && !pt_is_line_end(*at) && column < MOST_COLUMNS) {
+        if (parts(*at) || *at == '"') {
+            at++;
+            continue;
+        }
+        size_t length = 0;
+        for (; at < t->end && !parts(*at) && !pt_is_line_end(*at) && *at != '"'; at++)
+            if (length + 1 < NAME_SIZE)
+                t->names[column][length++] = (char)*at;
+        column++;
+    }
+}
+
+static const struct {
+    const char *name;
+    enum role role;
+} known_names[] = {
+    { "x", X }, { "y", Y }, { "z", Z }, { "easting", X }, { "northing", Y }, { "elevation", Z }, { "height", Z },
+    { "nx", NX }, { "ny", NY }, { "nz", NZ }, { "normal_x", NX }, { "normal_y", NY }, { "normal_z", NZ },
+    { "r", RED }, { "g", GREEN }, { "b", BLUE }, { "a", ALPHA },
+    { "red", RED }, { "green", GREEN }, { "blue", BLUE }, { "alpha", ALPHA },
+};
+
+static bool has(const struct text *t, enum role first)
+{
+    uint32_t found = 0;
+    for (uint32_t c = 0; c < t->columns; c++)
+        for (uint32_t k = 0; k < 3; k++)
+            found |= (uint32_t)(t->roles[c] == first + k) << k;
+    return found == 7;
+}
+
+// A name that comes twice, or a family that is not whole, stays an attribute.
+static void name_roles(struct text *t)
+{
+    for (uint32_t c = 0; c < t->columns; c++)
+        for (size_t k = 0; k < sizeof known_names / sizeof *known_names; k++) {
+            bool taken = false;
+            for (uint32_t other = 0; other < c; other++)
+                taken |= t->roles[other] == known_names[k].role;
+            if (!taken && !strcasecmp(t->names[c], known_names[k].name))
+                t->roles[c] = known_names[k].role;
+        }
+    for (uint32_t c = 0; c < t->columns; c++) {
+        bool normal = t->roles[c] >= NX && t->roles[c] <= NZ, color = t->roles[c] >= RED;
+        if ((normal && !has(t, NX)) || (color && !has(t, RED)))
+            t->roles[c] = ATTRIBUTE;
+    }
+}
+
+static void set_three(struct text *t, uint32_t column, enum role first)
+{
+    for (uint32_t k = 0; k < 3; k++)
+        t->roles[column + k] = first + k;
+}
+
+// Whether three columns of the sampled rows look like unit normals: nine of ten have a length within 2% of 1.
+static bool are_normals(double (*rows)[MOST_COLUMNS], uint32_t count, uint32_t column)
+{
+    uint32_t good = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        const double *n = rows[i] + column;
+        good += fabs(sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) - 1.0) < 0.02;
+    }
+    return 10 * good >= 9 * count;
+}
+
+static void guess_roles(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t count)
+{
+    set_three(t, 0, X);
+    if (t->columns == 7) {
+        snprintf(t->names[3], NAME_SIZE, "intensity");
+        set_three(t, 4, RED);
+    } else if (t->columns == 4) {
+        snprintf(t->names[3], NAME_SIZE, "intensity");
+    }
+    if (t->columns != 6 && t->columns < 9)
+        return;
+    for (uint32_t column = 3; column <= 6 && column + 3 <= t->columns; column += 3)
+        set_three(t, column, are_normals(rows, count, column) && !has(t, NX) ? NX : has(t, RED) ? ATTRIBUTE : RED);
+    for (uint32_t c = 3; c < t->columns; c++)
+        t->roles[c] = t->roles[c] > ALPHA || (c > 8) ? ATTRIBUTE : t->roles[c];
+}
+
+// Colours that stay at or below 1 with parts of it are shares of 1; above 255 they have 16 bits.
+static void guess_colors(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t count)
+{
+    double most = 0.0;
+    bool whole = true;
+    for (uint32_t i = 0; i < count; i++)
+        for (uint32_t c = 0; c < t->columns; c++)
+            if (t->roles[c] >= RED && t->roles[c] <= BLUE && isfinite(rows[i][c])) {
+                most = fmax(most, rows[i][c]);
+                whole &= rows[i][c] == floor(rows[i][c]);
+            }
+    t->float_colors = most <= 1.0 && !whole;
+    t->maximum = t->float_colors ? 1.0 : most > 255.0 ? 65535.0 : 255.0;
+}
+
+// ---- the scans of a PTX --------------------------------------------------------------------------------------------------
+
+struct scan {
+    uint64_t left;     // points still to come
+    double matrix[16]; // as in the file: rows of the transposed
+};
+
+// Reads "columns, rows, position, three axes, four rows of a matrix"; false when the lines are not that.
+static bool read_scan(struct text *t, struct scan *scan)
+{
+    double values[MOST_COLUMNS], size[2] = { 0 };
+    uint32_t strange;
+    for (int i = 0; i < 10; i++) {
+        uint32_t wanted = i < 2 ? 1 : i < 6 ? 3 : 4;
+        if (!find_line(t) || read_line(t, values, &strange) != wanted || strange)
+            return false;
+        if (i < 2)
+            size[i] = values[0];
+        else if (i >= 6)
+            memcpy(scan->matrix + 4 * (i - 6), values, 4 * sizeof *values);
+    }
+    if (!(size[0] >= 0 && size[1] >= 0 && size[0] * size[1] < 4294967295.0))
+        return false;
+    scan->left = (uint64_t)(size[0] * size[1]);
+    return true;
+}
+
+// ---- rows ------------------------------------------------------------------------------------------------------------------
+
+static void place(const struct scan *scan, double p[3])
+{
+    double q[3];
+    for (int k = 0; k < 3; k++)
+        q[k] = p[0] * scan->matrix[k] + p[1] * scan->matrix[4 + k] + p[2] * scan->matrix[8 + k] + scan->matrix[12 + k];
+    memcpy(p, q, sizeof q);
+}
+
+static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
+{
+    struct patina_file *file = t->file;
+    uint32_t attribute = 0;
+    for (uint32_t c = 0; c < t->columns; c++) {
+        enum role role = t->roles[c];
+        double v = values[c];
+        if (role == ATTRIBUTE) {
+            t->attributes[attribute++][i] = (float)v;
+        } else if (role <= Z) {
+            t->staged[3 * i + (role - X)] = v;
+        } else if (role <= NZ) {
+            file->normal[3 * i + (role - NX)] = (float)v;
+        } else if (t->float_colors) {
+            double s = v > 0.0 ? v : 0.0; // text colours of 0..1 are sRGB too
+            ((float *)file->color)[4 * i + (role - RED)] =
+                (float)(role == ALPHA ? s : s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+        } else {
+            double clamped = v > 0.0 ? (v < t->maximum ? v + 0.5 : t->maximum) : 0.0;
+            if (file->color_type == PATINA_UINT8)
+                ((uint8_t *)file->color)[4 * i + (role - RED)] = (uint8_t)clamped;
+            else
+                ((uint16_t *)file->color)[4 * i + (role - RED)] = (uint16_t)clamped;
+        }
+    }
+}
+
+// Goes over all rows; stores them, or only counts them and keeps the first ones.
+static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], uint64_t *count)
+{
+    struct scan scan = { 0 };
+    uint64_t i = 0, scans = 0, polled = 0;
+    uint32_t strange;
+    while (find_line(t)) {
+        double values[MOST_COLUMNS] = { 0 };
+        if (++polled % POLL_LINES == 0) {
+            float half = 0.5f * (float)((double)(t->at - t->input->data) / (double)t->input->size);
+            pt_progress_set(t->input->progress, storing ? 0.5f + half : half);
+            if (pt_progress_cancelled(t->input->progress))
+                return pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: reading was cancelled", t->input->name);
+        }
+        if (t->ptx && !scan.left) {
+            if (!read_scan(t, &scan))
+                return fail_at(t, "the header of a PTX scan was expected");
+            scans++;
+            continue;
+        }
+        uint32_t words = read_line(t, values, &strange);
+        if (t->pts && words == 1 && !strange)
+            continue; // how many points follow: the lines say it themselves
+        if (!t->columns)
+            t->columns = words;
+        if (strange || words < t->columns) {
+            char what[96];
+            snprintf(what, sizeof what, strange ? "a word is no number" : "%u numbers; %u were expected", words, t->columns);
+            return fail_at(t, what);
+        }
+        if (t->ptx) {
+            scan.left--;
+            if (values[0] == 0.0 && values[1] == 0.0 && values[2] == 0.0)
+                continue; // the beam met nothing
+            place(&scan, values);
+        }
+        if (sample && i < SAMPLES)
+            memcpy(sample[i], values, sizeof values);
+        if (storing) {
+            store(t, i, values);
+            if (t->scan)
+                t->scan[i] = (float)(scans - 1);
+        }
+        i++;
+    }
+    if (scan.left)
+        return fail_at(t, "the file ends within a scan");
+    *count = i;
+    return PATINA_OK;
+}
+
+static void rewind_text(struct text *t, const uint8_t *body, uint64_t line)
+{
+    t->at = body;
+    t->line = line;
+}
+
+// ---- columns -----------------------------------------------------------------------------------------------------------------
+
+static int add_attribute(struct text *t, const char *name, float **data)
+{
+    struct pt_column *column = &t->file->attributes[t->file->attribute_count];
+    column->data = *data = malloc(t->file->count * sizeof(float) + 1);
+    column->type = PATINA_FLOAT32;
+    snprintf(column->name, sizeof column->name, "%s", name);
+    t->file->attribute_count += *data != NULL;
+    return *data ? PATINA_OK : PATINA_ERROR_MEMORY;
+}
+
+static int make_columns(struct text *t)
+{
+    struct patina_file *file = t->file;
+    uint32_t attribute = 0;
+    t->attributes = calloc(MOST_COLUMNS, sizeof *t->attributes);
+    file->attributes = calloc(MOST_COLUMNS + 1, sizeof *file->attributes);
+    t->staged = malloc(file->count * 3 * sizeof *t->staged + 1);
+    if (!t->attributes || !file->attributes || !t->staged)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t c = 0; c < t->columns; c++) {
+        if (!t->names[c][0])
+            snprintf(t->names[c], NAME_SIZE, "column_%u", c + 1);
+        if (t->roles[c] == ATTRIBUTE && add_attribute(t, t->names[c], &t->attributes[attribute++]))
+            return PATINA_ERROR_MEMORY;
+    }
+    if (t->ptx && add_attribute(t, "scan", &t->scan))
+        return PATINA_ERROR_MEMORY;
+    if (has(t, NX) && !(file->normal = malloc(file->count * 3 * sizeof(float) + 1)))
+        return PATINA_ERROR_MEMORY;
+    if (!has(t, RED))
+        return PATINA_OK;
+    file->color_type = t->float_colors ? PATINA_FLOAT32 : t->maximum > 255.0 ? PATINA_UINT16 : PATINA_UINT8;
+    size_t size = pt_type_size(file->color_type);
+    file->color = malloc(file->count * 4 * size + 1);
+    if (!file->color)
+        return PATINA_ERROR_MEMORY;
+    if (file->color_type == PATINA_FLOAT32)
+        for (uint64_t i = 0; i < 4 * file->count; i++)
+            ((float *)file->color)[i] = 1.0f;
+    else
+        memset(file->color, 0xFF, file->count * 4 * size);
+    return PATINA_OK;
+}
+
+// ---- the whole -----------------------------------------------------------------------------------------------------------------
+
+// Looks at the first lines: which of the formats this is, and where its rows begin.
+static int look(struct text *t, const uint8_t **body, uint64_t *line)
+{
+    double values[MOST_COLUMNS];
+    uint32_t strange;
+    struct scan scan;
+    if (!find_line(t))
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: neither a PLY file nor lines of numbers: there is nothing in it",
+                       t->input->name);
+    const uint8_t *first = *body = t->at;
+    *line = t->line;
+    t->ptx = read_scan(t, &scan);
+    rewind_text(t, first, *line);
+    if (t->ptx)
+        return PATINA_OK;
+    uint32_t words = read_line(t, values, &strange);
+    t->pts = words == 1 && !strange;
+    if (!t->pts && strange) {
+        if (words < 3 || strange < 3)
+            return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: neither a PLY file nor lines of numbers", t->input->name);
+        read_names(t, first);
+        find_line(t);
+        *body = t->at;
+        *line = t->line;
+        return PATINA_OK;
+    }
+    if (!t->pts)
+        rewind_text(t, first, *line);
+    return PATINA_OK;
+}
+
+static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
+{
+    uint32_t count = t->file->count < SAMPLES ? (uint32_t)t->file->count : SAMPLES;
+    if (t->columns < 3)
+        return fail_at(t, "fewer than three numbers");
+    name_roles(t);
+    if (t->named && !has(t, X))
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: the line of names has no x, y and z", t->input->name);
+    if (!t->named)
+        guess_roles(t, sample, count);
+    guess_colors(t, sample, count);
+    if (t->ptx && has(t, RED)) {
+        t->float_colors = false;
+        t->maximum = 255.0;
+    }
+    return PATINA_OK;
+}
+
+static int read_all(struct text *t)
+{
+    double (*sample)[MOST_COLUMNS] = calloc(SAMPLES, sizeof *sample);
+    const uint8_t *body = t->at;
+    uint64_t line = 1, count;
+    int code = sample ? look(t, &body, &line) : PATINA_ERROR_MEMORY;
+    if (!code) {
+        rewind_text(t, body, line);
+        code = walk(t, false, sample, &t->file->count);
+    }
+    if (!code && t->file->count > UINT32_MAX - 1)
+        code = pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points, more than 2^32 - 2", t->input->name,
+                       (unsigned long long)t->file->count);
+    if (!code && t->file->count && !(code = choose_roles(t, sample)) && !(code = make_columns(t))) {
+        rewind_text(t, body, line);
+        code = walk(t, true, NULL, &count);
+    }
+    free(sample);
+    if (code == PATINA_ERROR_MEMORY)
+        pt_fail(NULL, code, "%s: no memory for %llu points", t->input->name, (unsigned long long)t->file->count);
+    return code;
+}
+
+int pt_text_read(struct patina_file *file, const struct pt_input *input)
+{
+    struct text t = { .input = input, .file = file, .at = input->data, .end = input->data + input->size, .line = 1 };
+    t.c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    if (!t.c_locale)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
+    if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
+        t.at += 3;
+    int code = read_all(&t);
+    freelocale(t.c_locale);
+    free(t.attributes);
+    if (code || !t.staged) {
+        free(t.staged);
+        if (!code && !(file->position = malloc(1)))
+            code = PATINA_ERROR_MEMORY;
+    } else {
+        pt_file_place(file, t.staged);
+    }
+    if (!code) {
+        snprintf(file->format, sizeof file->format, "%s", t.ptx ? "PTX" : t.pts ? "PTS" : t.named ? "CSV" : "XYZ");
+        file->position_type = PATINA_FLOAT64;
+        pt_file_measure(file);
+        pt_progress_set(input->progress, 1);
+    }
+    return code;
+}
+
+bool pt_text_is(const struct pt_input *input)
+{
+    struct text t = { .input = input, .at = input->data, .end = input->data + input->size, .line = 1 };
+    if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
+        t.at += 3;
+    if (!input->size || !find_line(&t))
+        return false;
+    if ((*t.at >= '0' && *t.at <= '9') || *t.at == '-' || *t.at == '+' || *t.at == '.')
+        return true;
+    read_names(&t, t.at);
+    t.columns = MOST_COLUMNS;
+    name_roles(&t);
+    return has(&t, X);
+}

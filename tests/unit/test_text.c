@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Points as lines of numbers: what each column is taken for, scans in their places, what is refused.
+#include <patina/patina.h>
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static patina_file *read(const char *text)
+{
+    patina_file *file = NULL;
+    char message[256] = "";
+    if (patina_file_open_memory(text, strlen(text), &file)) {
+        patina_message(NULL, message, sizeof message);
+        fail_msg("%s", message);
+    }
+    return file;
+}
+
+static patina_file_info info_of(const patina_file *file)
+{
+    patina_file_info info = {.struct_size = sizeof info};
+    assert_int_equal(patina_file_get_info(file, &info), PATINA_OK);
+    return info;
+}
+
+static void expect(const char *text, const char *format, uint64_t count, uint32_t color_type, uint32_t normals,
+                   const char *attributes)
+{
+    patina_file *file = read(text);
+    patina_file_info info = info_of(file);
+    char names[256] = "";
+    for (uint32_t i = 0; i < info.attributes; i++) {
+        patina_file_attribute attribute = {.struct_size = sizeof attribute};
+        assert_int_equal(patina_file_get_attribute(file, i, &attribute), PATINA_OK);
+        snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", i ? " " : "", attribute.name);
+    }
+    assert_string_equal(info.format, format);
+    assert_int_equal(info.count, count);
+    assert_int_equal(info.color_type, color_type);
+    assert_int_equal(info.has_normals, normals);
+    assert_string_equal(names, attributes);
+    patina_file_destroy(file);
+}
+
+static void test_columns(void **state)
+{
+    (void)state;
+    expect("1 2 3\n4 5 6\n", "XYZ", 2, PATINA_NONE, 0, "");
+    expect("# a comment\n\n1 2 3 0.5\r\n4 5 6 0.25\r\n", "XYZ", 2, PATINA_NONE, 0, "intensity");
+    expect("1 2 3 255 0 9\n4 5 6 1 2 3\n", "XYZ", 2, PATINA_UINT8, 0, "");
+    expect("1 2 3 65535 0 9\n4 5 6 1 2 3", "XYZ", 2, PATINA_UINT16, 0, "");
+    expect("1 2 3 0.5 0 0.25\n", "XYZ", 1, PATINA_FLOAT32, 0, "");
+    expect("1 2 3 0 0 1\n4 5 6 0.6 0.8 0\n", "XYZ", 2, PATINA_NONE, 1, "");
+    expect("1,2,3,10,20,30,0,0,1\n", "XYZ", 1, PATINA_UINT8, 1, "");
+    expect("1 2 3 0 1 0 10 20 30\n", "XYZ", 1, PATINA_UINT8, 1, "");
+    expect("1 2 3 7 8\n", "XYZ", 1, PATINA_NONE, 0, "column_4 column_5");
+    expect("2\n1 2 3 -120 1 2 3\n4 5 6 -7 1 2 3\n", "PTS", 2, PATINA_UINT8, 0, "intensity");
+    expect("1\n1 2 3\n1\n4 5 6\n", "PTS", 2, PATINA_NONE, 0, "");
+    expect("time;\"X\";Y;z;Red;green;blue;class\n1;2;3;4;5;6;7;8\n", "CSV", 1, PATINA_UINT8, 0, "time class");
+    expect("x,y,z,nx,ny\n1,2,3,0,1\n", "CSV", 1, PATINA_NONE, 0, "nx ny");
+}
+
+static void test_values(void **state)
+{
+    (void)state;
+    patina_file *file = read("x y z r g b gps\n500000.125 4100000.25 7 1 2 3 0.5\n500001.125 4100001.25 8 4 5 6 1.5\n");
+    patina_file_info info = info_of(file);
+    float xyz[6], gps[2];
+    uint8_t rgba[8];
+    assert_int_equal(patina_file_read_positions(file, xyz, sizeof xyz), PATINA_OK);
+    assert_true(info.origin[0] + xyz[0] == 500000.125 && info.origin[1] + xyz[1] == 4100000.25 && xyz[3] - xyz[0] == 1);
+    assert_int_equal(patina_file_read_colors_u8(file, rgba, sizeof rgba), PATINA_OK);
+    assert_memory_equal(rgba, ((const uint8_t[]){1, 2, 3, 255, 4, 5, 6, 255}), 8);
+    assert_int_equal(patina_file_read_attribute(file, 0, gps, sizeof gps), PATINA_OK);
+    assert_true(gps[0] == 0.5f && gps[1] == 1.5f);
+    patina_file_destroy(file);
+}
+
+// Two scans: the second is turned by 90 degrees around z and moved; a beam that met nothing is left out.
+static void test_ptx(void **state)
+{
+    (void)state;
+    patina_file *file = read("1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 0 0 1\n"
+                             "1 2 3 0.5 255 128 0\n0 0 0 0.5 0 0 0\n"
+                             "1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n0 0 5 1\n"
+                             "1 0 0 0.25 1 1 1\n");
+    patina_file_info info = info_of(file);
+    float xyz[6], intensity[2], scan[2];
+    assert_string_equal(info.format, "PTX");
+    assert_int_equal(info.count, 2);
+    assert_int_equal(info.color_type, PATINA_UINT8);
+    assert_int_equal(patina_file_read_positions(file, xyz, sizeof xyz), PATINA_OK);
+    const double wanted[6] = {11, 2, 3, 0, 1, 5};
+    for (int k = 0; k < 6; k++)
+        assert_true(fabs((double)xyz[k] + info.origin[k % 3] - wanted[k]) < 1e-6);
+    assert_int_equal(patina_file_read_attribute(file, 0, intensity, sizeof intensity), PATINA_OK);
+    assert_int_equal(patina_file_read_attribute(file, 1, scan, sizeof scan), PATINA_OK);
+    assert_true(intensity[0] == 0.5f && intensity[1] == 0.25f && scan[0] == 0.0f && scan[1] == 1.0f);
+    patina_file_destroy(file);
+}
+
+static void refuse(const char *text, const char *part)
+{
+    patina_file *file = NULL;
+    char message[256] = "";
+    assert_int_equal(patina_file_open_memory(text, strlen(text), &file), PATINA_ERROR_FORMAT);
+    patina_message(NULL, message, sizeof message);
+    if (!strstr(message, part))
+        fail_msg("'%s' is not in '%s'", part, message);
+}
+
+static void test_refused(void **state)
+{
+    (void)state;
+    refuse("1 2 3\n4 5\n", "line 2: 2 numbers; 3 were expected");
+    refuse("1 2 3\n\n4 5 red\n", "line 3: a word is no number");
+    refuse("1 2\n3 4\n", "fewer than three numbers");
+    refuse("1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 0 0 1\n1 2 3 0.5\n", "within a scan");
+    refuse("hello world\n", "not a PLY file");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_columns),
+        cmocka_unit_test(test_values),
+        cmocka_unit_test(test_ptx),
+        cmocka_unit_test(test_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
