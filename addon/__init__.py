@@ -14,26 +14,38 @@ bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
 import bpy
 from bpy.app.handlers import persistent
 
-from . import engine, operators, properties, render, ui
+from . import engine, operators, properties, render, ui, viewport
 from .sync import clouds
 
 _MODULES = (properties, engine, operators, ui)
+_UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 
 
 @persistent
 def _forget(*_) -> None:
     """Another file: its data may carry the names of the last one's."""
+    viewport.close_all()
     clouds.CACHE.clear()
+
+
+@persistent
+def _undone(*_) -> None:
+    viewport.forget_points()
 
 
 def register() -> None:
     for module in _MODULES:
         module.register()
     bpy.app.handlers.load_pre.append(_forget)
+    for handlers in _UNDO:
+        handlers.append(_undone)
 
 
 def unregister() -> None:
     bpy.app.handlers.load_pre.remove(_forget)
+    for handlers in _UNDO:
+        handlers.remove(_undone)
+    viewport.close_all()
     for module in reversed(_MODULES):
         module.unregister()
     clouds.CACHE.clear()

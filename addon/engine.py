@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 
-from . import native, passes, render, sync
+from . import native, passes, render, sync, viewport
 
 BUILDING = 0.5  # share of the progress bar for reading the scene; the rest is the picture
 
@@ -23,8 +24,9 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True  # Material Preview
 
-    # No __init__: Blender 4.4+ demands *args and **kwargs there. No state on the instance either: instances come
-    # and go with every render; what lasts is in sync.clouds.CACHE and render.device_for.
+    # No __init__: Blender 4.4+ demands *args and **kwargs there. Instances come and go with every render and change of
+    # shading; what lasts is in sync.clouds.CACHE and render.device_for.
+    _viewport: viewport.Viewport | None = None  # of an instance that draws a 3D view
 
     def update_render_passes(self, scene: bpy.types.Scene | None = None,
                              renderlayer: bpy.types.ViewLayer | None = None) -> None:
@@ -33,26 +35,52 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Renders one view layer. Failures become messages, never exceptions; then nothing is written."""
         try:
-            self._render(depsgraph)
+            with sync.clouds.CACHE.final_render():
+                self._render(depsgraph)
         except native.PatinaCancelled:
             pass
-        except (native.PatinaError, sync.CameraError) as error:
-            self._fail(str(error))
-        except Exception as error:  # a bug of ours must not reach Blender's console as a traceback
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            self._fail(f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})")
+        except Exception as error:
+            self._fail(_text(error))
+
+    def view_update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """The scene that a 3D view shows has changed."""
+        if self._viewport is None:
+            self._viewport = viewport.Viewport(self)
+        self._guard(lambda: self._viewport.update(context, depsgraph))
+
+    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Draws the last finished picture; never waits for one."""
+        if self._viewport:
+            self._guard(lambda: self.update_stats("Patina", self._viewport.draw(context, depsgraph)))
+
+    def _guard(self, work: Callable[[], None]) -> None:
+        """A viewport shows what failed, and its last picture."""
+        try:
+            work()
+        except Exception as error:
+            self._viewport.message = _text(error)
+            self.update_stats("Patina", self._viewport.message)
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        for eye in passes.eyes(depsgraph.scene_eval.render):
+            self._render_eye(depsgraph, eye)
+
+    def _render_eye(self, depsgraph: bpy.types.Depsgraph, eye: str) -> None:
         layer = depsgraph.view_layer_eval
-        view = sync.final_view(self.camera_override or depsgraph.scene_eval.camera, depsgraph)
+        camera, place = self.camera_override or depsgraph.scene_eval.camera, None
+        if eye and camera:
+            self.active_view_set(eye)
+            place = (self.camera_model_matrix(camera), self.camera_shift_x(camera))
+        view = sync.final_view(camera, depsgraph, place)
         description = sync.describe(depsgraph, view, self._poll_reading)
         for notice in description.notices:
             self._tell('WARNING', notice)
         self._status("Rendering", BUILDING)
-        picture = render.draw(description, {item.plane for item in passes.enabled(layer)}, self._poll_drawing)
+        picture = render.draw(description, {item.plane for item in passes.enabled(layer)}, self._poll_drawing,
+                              depsgraph.scene_eval.patina.tile_size)
         if picture.notice:
             self._tell('WARNING', picture.notice)
-        passes.write(self, layer, description.camera, picture.planes)
+        passes.write(self, layer, description, picture.planes, eye)
         layers = picture.stats["layers"]
         self._status(f"{picture.stats['points']:,} points, {picture.stats['ms']:.1f} ms, {picture.device}" +
                      (f", {layers} layers" if layers > 1 else ""), 1.0)
@@ -79,6 +107,14 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         self._tell('ERROR', text)
         if bpy.app.version < (4, 5, 0):  # later ones report it once more
             self.error_set(f"Patina: {text}")
+
+
+def _text(error: Exception) -> str:
+    """A sentence for the artist; a bug of ours must not reach Blender's console as a traceback."""
+    if isinstance(error, (native.PatinaError, sync.CameraError)):
+        return str(error)
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
 
 
 def register() -> None:

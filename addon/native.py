@@ -128,7 +128,8 @@ class _Settings(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
                 ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
                 ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
-                ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float)]
+                ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
+                ("strata", c_uint32)]
 
 
 class _ExpectedError(Structure):
@@ -160,6 +161,7 @@ _CALLS = {
     "patina_device_get_info": (c_void_p, POINTER(_DeviceInfo)),
     "patina_cloud_create": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_cloud_destroy": (c_void_p,),
+    "patina_cloud_set_colors": (c_void_p, POINTER(_Array)),
     "patina_cloud_get_info": (c_void_p, POINTER(_CloudInfo)),
     "patina_file_open": (c_char_p, c_void_p, _OUT),
     "patina_file_destroy": (c_void_p,),
@@ -182,6 +184,7 @@ _CALLS = {
     "patina_frame_cancel": (c_void_p,),
     "patina_frame_progress": (c_void_p,),
     "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
+    "patina_frame_read_keys": (c_void_p, c_void_p, c_size_t),
     "patina_frame_read_layer": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
@@ -351,6 +354,11 @@ class Cloud(_Handle):
         self.has_normals = bool(info.has_normals)
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
 
+    def set_colors(self, colors: np.ndarray | None) -> None:
+        """Other colours for the same points; waits for a picture that is being drawn."""
+        with _RENDERING:
+            self._call("set_colors", byref(_view(colors, self.count)))
+
 
 class File(_Handle):
     """An opened point file. Arrays are float32, 8-bit colours uint8 RGBA (sRGB), other colours float32 (linear)."""
@@ -418,6 +426,10 @@ class Scene(_Handle):
         self._call("set_settings", byref(_Settings(**settings)))
 
 
+# Held while a picture is drawn, so that no cloud changes under it. Frames of a device take turns anyway.
+_RENDERING = threading.Lock()
+
+
 class Frame(_Handle):
     """Renders scenes on a device and keeps the planes; closes before its device."""
 
@@ -430,8 +442,9 @@ class Frame(_Handle):
     def render(self, scene: Scene) -> None:
         if not self._finalizer.alive:
             raise PatinaError("this frame is closed")
-        _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
-               self._device._handle)
+        with _RENDERING:
+            _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
+                   self._device._handle)
 
     def cancel(self) -> None:
         library().patina_frame_cancel(self._handle)
@@ -451,6 +464,13 @@ class Frame(_Handle):
         else:
             self._call("read", number, pixels.ctypes.data, pixels.nbytes)
         return pixels
+
+    def read_keys(self) -> np.ndarray:
+        """What each pixel shows, (height, width, 1) uint64: float bits of z << 32 | id."""
+        stats = self.stats()
+        keys = np.empty((stats["height"], stats["width"], 1), np.uint64)
+        self._call("read_keys", keys.ctypes.data, keys.nbytes)
+        return keys
 
     def stats(self) -> dict[str, Any]:
         stats = _FrameStats()

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from .native import MOST_LAYERS
-from .sync import Camera
+from .sync import SceneDescription
 
 # What Blender's engines write where nothing is: infinity would make NaN in the compositor's arithmetic.
 DEPTH_OF_NOTHING = np.float32(1e10)
@@ -24,13 +24,63 @@ class RenderPass:
     kind: str  # of compositor socket
     plane: str  # in the library
     enabled: Callable[[bpy.types.ViewLayer], bool]
-    convert: Callable[[np.ndarray, Camera], np.ndarray] = lambda plane, camera: plane
+    # the library's plane, the described scene, the planes' region → the pass
+    convert: Callable[[np.ndarray, SceneDescription], np.ndarray] = lambda plane, scene: plane
 
 
-def _depth(plane: np.ndarray, camera: Camera) -> np.ndarray:
+def _depth(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
     """Distance to the camera's plane, as in Blender's engines; the library measures orthographic z from near."""
-    start = np.float32(camera.near_clip if camera.orthographic else 0.0)
-    return np.where(np.isfinite(plane), plane + start, DEPTH_OF_NOTHING)
+    return np.where(np.isfinite(plane), plane + np.float32(_start(scene)), DEPTH_OF_NOTHING)
+
+
+def _start(scene: SceneDescription) -> float:
+    return scene.camera.near_clip if scene.camera.orthographic else 0.0
+
+
+def _rays(scene: SceneDescription) -> tuple[np.ndarray, np.ndarray]:
+    """x (width,) and y (height, 1) of the pixels' centres in the camera's window."""
+    camera, settings = scene.camera, scene.settings
+    x0, y0, x1, y1 = settings.region
+    x = camera.left + (np.arange(x0, x1) + 0.5) * (camera.right - camera.left) / settings.width
+    y = camera.bottom + (np.arange(y0, y1) + 0.5) * (camera.top - camera.bottom) / settings.height
+    return x, y[:, None]
+
+
+def _position(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
+    """World coordinates, 0 where nothing is. Row by row: float64 only where needed."""
+    x, y = _rays(scene)
+    matrix = np.array(scene.camera.world_from_camera).reshape(4, 4)
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    out = np.zeros((*plane.shape[:2], 3), np.float32)
+    for row, z in enumerate(plane[..., 0]):
+        some = np.isfinite(z)
+        z = z[some].astype(np.float64) + _start(scene)
+        grow = 1.0 if scene.camera.orthographic else z
+        view = np.stack([x[some] * grow, y[row, 0] * grow * np.ones_like(z), -z], 1)
+        out[row, some] = view @ axes.T + matrix[:3, 3]
+    return out
+
+
+def _mist(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
+    """0 where it begins, 1 where everything has vanished, by distance from the camera (its plane, orthographic)."""
+    if scene.mist is None:
+        return np.ones_like(plane)
+    distance = plane[..., 0] + np.float32(_start(scene))
+    if not scene.camera.orthographic:
+        x, y = _rays(scene)
+        distance = distance * np.sqrt(1.0 + x * x + y * y)
+    share = np.clip((distance - scene.mist.start) / max(scene.mist.depth, 1e-6), 0.0, 1.0)
+    power = {'QUADRATIC': 2.0, 'LINEAR': 1.0, 'INVERSE_QUADRATIC': 0.5}[scene.mist.falloff]
+    return (share ** power)[..., None].astype(np.float32)
+
+
+def _object_index(keys: np.ndarray, scene: SceneDescription) -> np.ndarray:
+    """The pass index of the object that each pixel shows."""
+    ids = (keys[..., 0] & np.uint64(0xFFFFFFFF)).astype(np.int64)
+    bases = np.cumsum([0, *(item.cloud.count for item in scene.clouds)])
+    indices = np.array([*(item.pass_index for item in scene.clouds), 0], np.float32)
+    found = np.searchsorted(bases, ids, side='right') - 1
+    return indices[np.minimum(found, len(indices) - 1)][..., None]
 
 
 def _of_layer(number: int) -> tuple[RenderPass, ...]:
@@ -46,10 +96,24 @@ def _of_layer(number: int) -> tuple[RenderPass, ...]:
 PASSES = (
     RenderPass("Combined", 4, "RGBA", 'COLOR', "COMBINED", lambda layer: True),
     RenderPass("Depth", 1, "Z", 'VALUE', "DEPTH", lambda layer: layer.use_pass_z, _depth),
+    RenderPass("Mist", 1, "Z", 'VALUE', "DEPTH", lambda layer: layer.use_pass_mist, _mist),
+    RenderPass("Position", 3, "XYZ", 'VECTOR', "DEPTH", lambda layer: layer.use_pass_position, _position),
     RenderPass("Normal", 3, "XYZ", 'VECTOR', "NORMAL", lambda layer: layer.use_pass_normal),
+    RenderPass("IndexOB" if bpy.app.version < (5, 0, 0) else "Object Index", 1, "X", 'VALUE', "KEYS",
+               lambda layer: layer.use_pass_object_index, _object_index),
     RenderPass("Source", 1, "X", 'VALUE', "SOURCE", lambda layer: layer.patina.use_pass_source),
     *(item for number in range(1, MOST_LAYERS + 1) for item in _of_layer(number)),
 )
+
+
+def eyes(settings: bpy.types.RenderSettings) -> list[str]:
+    """The stereo views that are rendered; one without a name where there is no stereo."""
+    if not settings.use_multiview:
+        return [""]
+    wanted = [view.name for view in settings.views if view.use]
+    if settings.views_format == 'STEREO_3D':
+        wanted = [name for name in wanted if name in {"left", "right"}]
+    return wanted or [""]
 
 
 def enabled(layer: bpy.types.ViewLayer) -> list[RenderPass]:
@@ -62,15 +126,15 @@ def register(engine: bpy.types.RenderEngine, scene: bpy.types.Scene, layer: bpy.
         engine.register_pass(scene, layer, item.name, item.channels, item.channel_ids, item.kind)
 
 
-def write(engine: bpy.types.RenderEngine, layer: bpy.types.ViewLayer, camera: Camera,
-          planes: dict[str, np.ndarray]) -> None:
-    """Hands the planes of a whole picture (a render border counts as one) to Blender."""
+def write(engine: bpy.types.RenderEngine, layer: bpy.types.ViewLayer, scene: SceneDescription,
+          planes: dict[str, np.ndarray], eye: str = "") -> None:
+    """Hands the planes of a whole picture (a render border counts as one) to Blender. eye: the name of a stereo view."""
     height, width = planes["COMBINED"].shape[:2]
     items = enabled(layer)
     for item in items:
         if item.name != "Combined":
             engine.add_pass(item.name, item.channels, item.channel_ids, layer=layer.name)
-    result = engine.begin_result(0, 0, width, height, layer=layer.name)
+    result = engine.begin_result(0, 0, width, height, layer=layer.name, view=eye)
     if result is None:
         return
     try:
@@ -78,8 +142,8 @@ def write(engine: bpy.types.RenderEngine, layer: bpy.types.ViewLayer, camera: Ca
             raise RuntimeError(f"Blender asks for {result.resolution_x} x {result.resolution_y} pixels, "
                                f"{width} x {height} were rendered")
         for item in items:
-            pixels = np.ascontiguousarray(item.convert(planes[item.plane], camera), np.float32)
-            for target in result.layers[0].passes:  # more than one of a name in stereo
+            pixels = np.ascontiguousarray(item.convert(planes[item.plane], scene), np.float32)
+            for target in result.layers[0].passes:
                 if target.name == item.name:
                     _set_pixels(target, pixels)
     finally:

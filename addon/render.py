@@ -11,7 +11,13 @@ from typing import Any
 import numpy as np
 
 from . import jobs, native
-from .sync import DeviceChoice, SceneDescription
+from .sync import Camera, DeviceChoice, SceneDescription
+
+ANTIALIAS_OFF = 2  # PATINA_ANTIALIAS_OFF
+
+# Planes take some 130 bytes a pixel: 2 GB for a picture of that size. Larger ones are made in tiles.
+LARGE_PICTURE = 1 << 24  # pixels
+LARGE_TILE = 4096  # pixels a side
 
 
 @dataclass(frozen=True)
@@ -42,13 +48,14 @@ def forget_device() -> None:
         _device = None
 
 
-def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool]) -> Picture:
+def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool],
+         tile_size: int = 0) -> Picture:
     """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel.
     Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
     wanted = list(planes)
     device = _open(description.device, poll)
     try:
-        return _draw_on(device, description, wanted, poll)
+        return _draw_on(device, description, wanted, poll, tile_size)
     except native.PatinaCancelled:
         raise
     except native.PatinaError as error:
@@ -56,7 +63,7 @@ def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[f
             raise
         reason = str(error)  # the error itself would keep the whole picture alive
     forget_device()
-    picture = _draw_on(_open(replace(description.device, name="cpu"), poll), description, wanted, poll)
+    picture = _draw_on(_open(replace(description.device, name="cpu"), poll), description, wanted, poll, tile_size)
     return replace(picture, notice=f"{device.name} failed, the CPU drew this picture: {reason}")
 
 
@@ -64,29 +71,92 @@ def _open(choice: DeviceChoice, poll: Callable[[float], bool]) -> native.Device:
     return jobs.run(lambda: device_for(choice), lambda: None, lambda: poll(0.0))
 
 
-def _draw_on(device: native.Device, description: SceneDescription, wanted: list[str],
-             poll: Callable[[float], bool]) -> Picture:
+def _draw_on(device: native.Device, description: SceneDescription, wanted: list[str], poll: Callable[[float], bool],
+             tile_size: int) -> Picture:
+    """Tile by tile, each the mean of its samples: a tile's pixels are those of the whole picture (the library keeps a
+    guard band around it), so tiles only save memory."""
+    if description.samples > 1:
+        description = replace(description, settings=replace(description.settings, antialias=ANTIALIAS_OFF))
+    regions = tiles(description.settings.region, tile_size)
+    x0, y0, x1, y1 = description.settings.region
+    picture: dict[str, np.ndarray] = {}
     # The frame is made and closed on this thread, so that poll never meets a dead handle.
-    with native.Scene() as scene, native.Frame(device) as frame:
-        _describe(scene, description, wanted)
+    with native.Frame(device) as frame:
+        done, stats = 0, {}
 
-        def work() -> Picture:
+        def work() -> None:
+            nonlocal done
+            for region in regions:
+                tile = replace(description, settings=replace(description.settings, region=region))
+                for name, pixels in _draw_tile(frame, tile, wanted, stats).items():
+                    if len(regions) == 1:
+                        picture[name] = pixels
+                        continue
+                    if name not in picture:
+                        picture[name] = np.empty((y1 - y0, x1 - x0, pixels.shape[2]), pixels.dtype)
+                    picture[name][region[1] - y0:region[3] - y0, region[0] - x0:region[2] - x0] = pixels
+                done += 1
+
+        jobs.run(work, frame.cancel, lambda: poll((done + frame.progress()) / len(regions)))
+        return Picture(picture, stats, device.name)
+
+
+def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[str],
+               stats: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Planes of one region. stats: milliseconds add up, the rest is of the last picture."""
+    planes: dict[str, np.ndarray] = {}
+    for sample in range(description.samples):
+        with native.Scene() as scene:
+            describe(scene, replace(description, camera=shifted(description, sample)), wanted)
             frame.render(scene)
-            return Picture({name: frame.read(name) for name in wanted}, frame.stats(), device.name)
+        before = stats.get("ms", 0.0)
+        stats.update(frame.stats())
+        stats["ms"] += before
+        if sample == 0:
+            planes = {name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted}
+        else:
+            planes["COMBINED"] += frame.read("COMBINED")
+    if description.samples > 1:
+        planes["COMBINED"] /= np.float32(description.samples)
+    return planes
 
-        return jobs.run(work, frame.cancel, lambda: poll(frame.progress()))
+
+def tiles(region: tuple[int, int, int, int], size: int) -> list[tuple[int, int, int, int]]:
+    """Regions that make up a region, rows from the bottom. size 0: one, unless the picture is large."""
+    x0, y0, x1, y1 = region
+    if not size:
+        size = LARGE_TILE if (x1 - x0) * (y1 - y0) > LARGE_PICTURE else max(x1 - x0, y1 - y0)
+    return [(x, y, min(x + size, x1), min(y + size, y1)) for y in range(y0, y1, size) for x in range(x0, x1, size)]
+
+
+def shifted(description: SceneDescription, sample: int) -> Camera:
+    """The camera of a sample: the first looks straight, the others are up to half a pixel aside (Halton's points)."""
+    camera, settings = description.camera, description.settings
+    x = ((_halton(sample, 2) + 0.5) % 1.0 - 0.5) * (camera.right - camera.left) / settings.width
+    y = ((_halton(sample, 3) + 0.5) % 1.0 - 0.5) * (camera.top - camera.bottom) / settings.height
+    return replace(camera, left=camera.left + x, right=camera.right + x, bottom=camera.bottom + y, top=camera.top + y)
+
+
+def _halton(index: int, base: int) -> float:
+    value, share = 0.0, 1.0 / base
+    while index:
+        value += share * (index % base)
+        index //= base
+        share /= base
+    return value
 
 
 def _bits(planes: Iterable[str]) -> int:
     return sum(1 << native.PLANES[name][0] for name in set(planes))
 
 
-def _describe(scene: native.Scene, description: SceneDescription, wanted: list[str]) -> None:
-    planes = {native.split_plane(plane) for plane in ["COMBINED", *wanted]}
+def describe(scene: native.Scene, description: SceneDescription, wanted: Iterable[str]) -> None:
+    """Fills a native scene; the description's clouds must be built."""
+    planes = {native.split_plane(plane) for plane in {"COMBINED", *wanted} - {"KEYS"}}
     settings = asdict(description.settings)
     settings["passes"] = _bits(name for name, layer in planes if not layer)
     settings["layer_passes"] = _bits(name for name, layer in planes if layer)
-    settings["layers"] = max(settings["layers"], *(layer for _, layer in planes))  # a pass wants its layer peeled
+    settings["layers"] = max(settings["layers"], *(layer for _, layer in planes), 0)  # a pass wants its layer peeled
     scene.set_settings(**settings)
     scene.set_camera(**asdict(description.camera))
     for light in description.lights:

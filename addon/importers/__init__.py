@@ -3,10 +3,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 
 import bpy
 import numpy as np
+
+from ..native import PatinaError
+from . import conf, e57, las, library, pcd
+from .reading import Filter, PointFile, Progress
+
+__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "preview", "reader", "to_mesh"]
 
 # One colour and one normal attribute, under names that every Blender from 3.4 on allows ("normal" is reserved
 # before 4.0) and that sync.attributes looks for.
@@ -14,15 +21,25 @@ COLOR_NAME = "Col"
 NORMAL_NAME = "Normal"
 
 
-@dataclass(frozen=True)
-class PointFile:
-    name: str
-    positions: np.ndarray  # (n, 3) float32, relative to origin
-    normals: np.ndarray | None  # (n, 3) float32
-    colors: np.ndarray | None  # (n, 4) uint8 sRGB or float32 linear
-    scalars: dict[str, np.ndarray]  # (n,) float32 by name
-    origin: tuple[float, float, float]  # float64
-    invalid: int  # positions that are not finite
+# ending → module with read(path, filter, progress) and preview(path)
+FORMATS = {".ply": library, ".xyz": library, ".txt": library, ".csv": library, ".asc": library, ".pts": library,
+           ".ptx": library, ".las": las, ".laz": las, ".e57": e57, ".pcd": pcd, ".conf": conf}
+
+
+def reader(path: Path) -> ModuleType:
+    """The module for a file's ending; PatinaError names those there are."""
+    module = FORMATS.get(path.suffix.lower())
+    if module is None:
+        raise PatinaError(f"'{path.suffix}' is none of {' '.join(FORMATS)}", -5)
+    return module
+
+
+def preview(path: Path) -> list[str]:
+    """What is inside, a few lines, without reading the points. Never raises."""
+    try:
+        return reader(path).preview(path)
+    except (PatinaError, OSError, ValueError) as error:
+        return [str(error)]
 
 
 def to_mesh(points: PointFile) -> bpy.types.Mesh:
@@ -36,6 +53,8 @@ def to_mesh(points: PointFile) -> bpy.types.Mesh:
         _add(mesh, NORMAL_NAME, 'FLOAT_VECTOR').data.foreach_set("vector", points.normals.reshape(-1))
     for name, values in points.scalars.items():
         _add(mesh, name, 'FLOAT').data.foreach_set("value", values)
+    for name, value in points.notes.items():
+        mesh[f"patina_{name}"] = value
     mesh.update()
     return mesh
 

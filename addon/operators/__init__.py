@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
-from . import import_ply
+from . import export_points, import_points, plan, view_transform
+
+_MODULES = (import_points, export_points, plan, view_transform)
 
 
 def register() -> None:
-    import_ply.register()
+    for module in _MODULES:
+        module.register()
 
 
 def unregister() -> None:
-    import_ply.unregister()
+    for module in reversed(_MODULES):
+        module.unregister()

@@ -70,6 +70,19 @@ class PatinaSceneProperties(PropertyGroup):
         name="Threads", override=_OVERRIDE, default=0, min=0, max=1024,
         description="Processor threads; 0 follows Blender's own setting. Never changes the picture")
 
+    samples: IntProperty(
+        name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
+        description="Pictures, each shifted by a part of a pixel, that a final render takes the mean of. More than one stand "
+                    "in for anti-aliasing; data passes come from the first")
+    tile_size: IntProperty(
+        name="Tile Size", override=_OVERRIDE, default=0, min=0, max=16384, subtype='PIXEL',
+        description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: tiles of 4096 "
+                    "pixels for pictures of more than 16 million")
+    navigation_ms: IntProperty(
+        name="Navigation", override=_OVERRIDE, default=50, min=5, soft_max=200, max=1000,
+        description="Milliseconds that a picture of the viewport may take while the view moves; fewer points and pixels "
+                    "are drawn until it fits. At rest the whole picture follows")
+
 
 class PatinaObjectProperties(PropertyGroup):
     lighting: EnumProperty(

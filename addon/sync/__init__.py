@@ -2,7 +2,7 @@
 """Blender's depsgraph → a description of the scene that needs Blender no more.
 
 What crosses is in dataclasses whose fields are those of the library's descriptors. Reading Blender happens on the
-calling thread; building clouds happens on a worker, polled.
+calling thread; building clouds happens on a worker.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ from dataclasses import dataclass
 import bpy
 
 from . import clouds, lights, settings, world
-from .camera import Camera, CameraError, View, final_view
-from .clouds import CloudItem, CloudStyle
+from .camera import Camera, CameraError, View, final_view, viewport_view
+from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners
 from .lights import Light
 from .settings import DeviceChoice, Settings
+from .world import Mist
 
-__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "SceneDescription",
-           "Settings", "View", "describe", "final_view"]
+__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Mist", "Pending", "SceneDescription",
+           "Settings", "Trusted", "View", "changed_owners", "describe", "describe_viewport", "final_view",
+           "viewport_view"]
 
 
 @dataclass(frozen=True)
@@ -29,19 +31,42 @@ class SceneDescription:
     camera: Camera
     settings: Settings
     device: DeviceChoice
+    samples: int  # of a final picture
+    mist: Mist | None
     notices: list[str]  # what the artist should know about things left out, a sentence each
 
 
 def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, float], bool]) -> SceneDescription:
-    """Reads the scene. poll(what, progress of it) is called during long steps and returns True to cancel."""
+    """Reads the scene of a final render. poll(what, progress of it) is called during long steps and returns True to
+    cancel."""
     notices: list[str] = []
+    return _describe(depsgraph, view, notices, clouds.collect(depsgraph, clouds.taking_now(poll, notices), notices))
+
+
+def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trusted,
+                      space: bpy.types.SpaceView3D) -> SceneDescription:
+    """Reads the scene for a viewport: only points that changed; clouds are left to a worker."""
+    notices: list[str] = []
+
+    def visible(instance: bpy.types.DepsgraphObjectInstance) -> bool:  # local view, local collections
+        obj = instance.parent if instance.is_instance else instance.object
+        return obj.visible_in_viewport_get(space)
+
+    return _describe(depsgraph, view, notices,
+                     clouds.collect(depsgraph, trusted.take(notices), notices, visible))
+
+
+def _describe(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str],
+              items: list[CloudItem]) -> SceneDescription:
     scene = depsgraph.scene_eval
     background = world.background(scene.world, notices)
     return SceneDescription(
-        clouds=clouds.collect(depsgraph, poll, notices),
+        clouds=items,
         lights=lights.collect(depsgraph, notices),
         camera=view.camera,
         settings=settings.read(scene, view, background),
         device=settings.device(scene),
+        samples=settings.samples(scene),
+        mist=world.mist(scene.world),
         notices=notices,
     )

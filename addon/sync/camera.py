@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 
 class CameraError(Exception):
@@ -38,8 +39,10 @@ class View:
     camera: Camera
 
 
-def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) -> View:
-    """The view of a final render through the evaluated camera object."""
+def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
+               eye: tuple[Matrix, float] | None = None) -> View:
+    """The view of a final render through the evaluated camera object. eye: one of a stereo pair, its matrix and its shift in
+    Blender's units."""
     if camera is None or camera.type != 'CAMERA':
         raise CameraError("the scene has no camera")
     render = depsgraph.scene_eval.render
@@ -51,11 +54,61 @@ def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph) 
         kind = data.bl_rna.properties["type"].enum_items[data.type].name.lower()
         raise CameraError(f"'{camera.name}' is a {kind} camera: Patina draws perspective and orthographic ones")
     left, right, bottom, top = window(matrix, data.type == 'ORTHO')
+    place, shift = eye or (camera.matrix_world, data.shift_x)
+    wide = width * render.pixel_aspect_x >= height * render.pixel_aspect_y
+    across = data.sensor_fit == 'HORIZONTAL' or data.sensor_fit == 'AUTO' and wide
+    moved = (shift - data.shift_x) * (right - left if across else top - bottom)
     return View(width, height, border_region(render, width, height), Camera(
         orthographic=int(data.type == 'ORTHO'),
-        world_from_camera=row_major(camera.matrix_world),
-        left=left, right=right, bottom=bottom, top=top,
+        world_from_camera=row_major(place),
+        left=left + moved, right=right + moved, bottom=bottom, top=top,
         near_clip=data.clip_start, far_clip=data.clip_end))
+
+
+def viewport_view(region: bpy.types.Region, space: bpy.types.SpaceView3D, rv3d: bpy.types.RegionView3D,
+                  scene: bpy.types.Scene) -> View:
+    """What a 3D view shows: through its camera (with zoom, offset and shift) or freely."""
+    matrix = rv3d.window_matrix
+    orthographic = matrix[3][3] == 1.0
+    left, right, bottom, top = window(matrix, orthographic)
+    a, b = float(matrix[2][2]), float(matrix[2][3])
+    clips = ((b + 1.0) / a, (b - 1.0) / a) if orthographic else (b / (a - 1.0), b / (a + 1.0))
+    return View(region.width, region.height, viewport_region(region, space, rv3d, scene), Camera(
+        orthographic=int(orthographic),
+        world_from_camera=tuple(np.linalg.inv(np.array(rv3d.view_matrix, np.float64)).ravel().tolist()),
+        left=left, right=right, bottom=bottom, top=top, near_clip=clips[0], far_clip=clips[1]))
+
+
+def viewport_region(region: bpy.types.Region, space: bpy.types.SpaceView3D, rv3d: bpy.types.RegionView3D,
+                    scene: bpy.types.Scene) -> tuple[int, int, int, int]:
+    """The part of a 3D view that is rendered: the camera's border, or the view's own; else all of it."""
+    width, height = region.width, region.height
+    whole = (0, 0, width, height)
+    if rv3d.view_perspective == 'CAMERA':
+        render = scene.render
+        camera = space.camera or scene.camera
+        if not render.use_border or camera is None or camera.type != 'CAMERA':
+            return whole
+        frame = camera_frame(region, rv3d, camera, scene)
+        x = [frame[0] + (frame[2] - frame[0]) * share for share in (render.border_min_x, render.border_max_x)]
+        y = [frame[1] + (frame[3] - frame[1]) * share for share in (render.border_min_y, render.border_max_y)]
+    elif space.use_render_border:
+        x = [width * share for share in (space.render_border_min_x, space.render_border_max_x)]
+        y = [height * share for share in (space.render_border_min_y, space.render_border_max_y)]
+    else:
+        return whole
+    x0, x1 = (int(min(max(value, 0), width)) for value in x)
+    y0, y1 = (int(min(max(value, 0), height)) for value in y)
+    return (x0, y0, x1, y1) if x0 < x1 and y0 < y1 else whole
+
+
+def camera_frame(region: bpy.types.Region, rv3d: bpy.types.RegionView3D, camera: bpy.types.Object,
+                 scene: bpy.types.Scene) -> tuple[float, float, float, float]:
+    """x0, y0, x1, y1 of the camera's picture in a view through it, pixels from the region's bottom left."""
+    to_screen = np.array(rv3d.perspective_matrix, np.float64) @ np.array(camera.matrix_world.normalized(), np.float64)
+    corners = np.array([(*corner, 1.0) for corner in camera.data.view_frame(scene=scene)]) @ to_screen.T
+    places = (corners[:, :2] / corners[:, 3:] * 0.5 + 0.5) * (region.width, region.height)
+    return (*places.min(axis=0), *places.max(axis=0))
 
 
 def row_major(matrix: Sequence[Sequence[float]]) -> tuple[float, ...]:

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import bpy
@@ -30,14 +32,19 @@ class PointArrays:
     colors: np.ndarray | None  # (n, 4) uint8 sRGB, or (n, 3|4) float32 linear
     opacities: np.ndarray | None  # (n, 1) float32
 
-    def fingerprint(self) -> bytes:
-        """Of the content: what Blender's update tags miss (undo, geometry nodes, scripts) still shows. 1 GB/s."""
-        digest = hashlib.blake2b(digest_size=16)
-        for array in (self.positions, self.normals, self.colors, self.opacities):
-            digest.update(b"-" if array is None else f"{array.dtype}{array.shape}".encode())
-            if array is not None:
-                digest.update(array)
-        return digest.digest()
+    def fingerprint(self) -> tuple[bytes, bytes]:
+        """Of the places, normals and opacities, and of the colours: what Blender's update tags miss (undo, geometry
+        nodes, scripts) still shows. 1 GB/s."""
+        return _digest(self.positions, self.normals, self.opacities), _digest(self.colors)
+
+
+def _digest(*arrays: np.ndarray | None) -> bytes:
+    digest = hashlib.blake2b(digest_size=16)
+    for array in arrays:
+        digest.update(b"-" if array is None else f"{array.dtype}{array.shape}".encode())
+        if array is not None:
+            digest.update(array)
+    return digest.digest()
 
 
 @dataclass(frozen=True)
@@ -56,36 +63,81 @@ class CloudStyle:
     transparency: float
 
 
+class Pending:
+    """Points that were read and wait for a worker to make a cloud of them. Shared by descriptions of one viewport."""
+
+    def __init__(self, name: str, identity: tuple, arrays: PointArrays) -> None:
+        self.name = name
+        self._identity = identity
+        self._arrays: PointArrays | None = arrays
+        self._cloud: native.Cloud | None = None
+
+    @property
+    def built(self) -> native.Cloud | None:
+        return self._cloud
+
+    def resolve(self, progress: native.Progress) -> native.Cloud:
+        """The cloud; built at the first call. One thread at a time."""
+        if self._cloud is None:
+            self._cloud = CACHE.obtain(self._identity, self._arrays, progress, recolor=True)
+            self._arrays = None
+        return self._cloud
+
+
 @dataclass(frozen=True)
 class CloudItem:
-    cloud: native.Cloud
+    cloud: native.Cloud | Pending
     style: CloudStyle
+    pass_index: int  # of the object
 
 
 class CloudCache:
-    """Clouds by the identity of the data they were built from. A scene that uses a cloud keeps it alive itself."""
+    """Clouds by the identity of the data they were built from. A scene that uses a cloud keeps it alive itself.
+    For any thread; calls take turns."""
 
     def __init__(self) -> None:
-        self._entries: dict[tuple, tuple[bytes, native.Cloud]] = {}  # least recently used first
+        self._entries: dict[tuple, tuple[tuple[bytes, bytes], native.Cloud]] = {}  # least recently used first
+        self._lock = threading.RLock()
+        self._finals = 0
 
-    def obtain(self, identity: tuple, arrays: PointArrays, build: Callable[[], native.Cloud]) -> native.Cloud:
+    @contextlib.contextmanager
+    def final_render(self) -> Iterator[None]:
+        """While one runs, clouds that it may have taken keep their colours."""
+        with self._lock:
+            self._finals += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._finals -= 1
+
+    def obtain(self, identity: tuple, arrays: PointArrays, progress: native.Progress | None = None,
+               recolor: bool = False) -> native.Cloud:
+        """The cloud of these points: the one that is there, that one with new colours (recolor), or a new one."""
         fingerprint = arrays.fingerprint()
-        entry = self._entries.pop(identity, None)
-        if entry is None or entry[0] != fingerprint:
-            entry = None  # frees the old cloud before the new one is built
-            entry = (fingerprint, build())
-        self._entries[identity] = entry
-        return entry[1]
+        with self._lock:
+            known, cloud = self._entries.pop(identity, ((b"", b""), None))
+            if fingerprint != known:
+                if recolor and not self._finals and known[0] == fingerprint[0]:
+                    cloud.set_colors(arrays.colors)
+                else:
+                    cloud = None  # frees the old one before the new one is built
+                    cloud = native.Cloud(arrays.positions, arrays.normals, arrays.colors, progress,
+                                         opacities=arrays.opacities)
+            self._entries[identity] = (fingerprint, cloud)
+            return cloud
 
     def trim(self, used: set[tuple]) -> None:
-        idle = sum(cloud.bytes for identity, (_, cloud) in self._entries.items() if identity not in used)
-        for identity in [identity for identity in self._entries if identity not in used]:
-            if idle <= IDLE_BYTES:
-                break
-            idle -= self._entries.pop(identity)[1].bytes
+        with self._lock:
+            idle = sum(cloud.bytes for identity, (_, cloud) in self._entries.items() if identity not in used)
+            for identity in [identity for identity in self._entries if identity not in used]:
+                if idle <= IDLE_BYTES:
+                    break
+                idle -= self._entries.pop(identity)[1].bytes
 
     def clear(self) -> None:
-        self._entries.clear()
+        with self._lock:
+            self._entries.clear()
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -94,11 +146,15 @@ class CloudCache:
 CACHE = CloudCache()
 
 
-def collect(depsgraph: bpy.types.Depsgraph, poll: Callable[[str, float], bool],
-            notices: list[str]) -> list[CloudItem]:
+# What collect() asks for each object with points: (object, identity) → its cloud, or None without points.
+Take = Callable[[bpy.types.Object, tuple], "native.Cloud | Pending | None"]
+
+
+def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
+            visible: Callable[[bpy.types.DepsgraphObjectInstance], bool] = lambda instance: True) -> list[CloudItem]:
     """Every visible cloud, instances too. Iterates the depsgraph only; keeps no reference into it."""
     items: list[CloudItem] = []
-    built: dict[tuple, native.Cloud | None] = {}  # by place in memory, which holds while the depsgraph does
+    taken: dict[tuple, native.Cloud | Pending | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
     distances: dict[str, float] = {}
@@ -106,16 +162,23 @@ def collect(depsgraph: bpy.types.Depsgraph, poll: Callable[[str, float], bool],
         obj = instance.object
         if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera:
             continue
+        if not visible(instance):
+            continue
         if obj.type == 'MESH' and len(obj.data.polygons):
             faces.add(obj.name)
             continue
         place = (obj.data.as_pointer(), *_attribute_names(obj))
-        if place not in built:
-            built[place] = _cloud(obj, used, poll, notices)
-        if built[place]:
-            items.append(CloudItem(built[place], _style(obj, instance.matrix_world)))
-            scale = max(map(abs, instance.matrix_world.to_scale()))
-            distances[obj.original.name_full] = built[place].layer_distance * scale
+        if place not in taken:
+            identity = _identity(obj, used)
+            used.add(identity)
+            taken[place] = take(obj, identity)
+        cloud = taken[place]
+        if cloud:
+            items.append(CloudItem(cloud, _style(obj, instance.matrix_world), obj.pass_index))
+            built = cloud.built if isinstance(cloud, Pending) else cloud
+            if built:
+                scale = max(map(abs, instance.matrix_world.to_scale()))
+                distances[obj.original.name_full] = built.layer_distance * scale
     CACHE.trim(used)
     estimates.keep(distances)
     if not items:
@@ -126,26 +189,71 @@ def collect(depsgraph: bpy.types.Depsgraph, poll: Callable[[str, float], bool],
     return items
 
 
-def _cloud(obj: bpy.types.Object, used: set[tuple], poll: Callable[[str, float], bool],
-           notices: list[str]) -> native.Cloud | None:
-    arrays = _read(obj, notices)
-    if arrays is None:
-        return None
-    identity = _identity(obj, used)
-    used.add(identity)
-    name = obj.name
+def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
+    """Builds each cloud at once, polling; content decides whether it is built anew."""
 
-    def build() -> native.Cloud:
+    def take(obj: bpy.types.Object, identity: tuple) -> native.Cloud | None:
+        arrays = _read(obj, notices)
+        if arrays is None:
+            return None
+        name = obj.name
         with native.Progress() as progress:
-            return jobs.run(
-                lambda: native.Cloud(arrays.positions, arrays.normals, arrays.colors, progress,
-                                     opacities=arrays.opacities),
-                progress.cancel, lambda: poll(f"Reading points of '{name}'", progress.value()))
+            cloud = jobs.run(lambda: CACHE.obtain(identity, arrays, progress), progress.cancel,
+                             lambda: poll(f"Reading points of '{name}'", progress.value()))
+        if cloud.invalid_positions:
+            notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
+        return cloud
 
-    cloud = CACHE.obtain(identity, arrays, build)
-    if cloud.invalid_positions:
-        notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
-    return cloud
+    return take
+
+
+class Trusted:
+    """Clouds of a viewport, read again only after Blender said that their data changed."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple, tuple[Pending | None, list[str]]] = {}
+        self._used: set[tuple] = set()
+        self.reads = 0  # how often points were read, for tests
+
+    def forget(self, owners: set[tuple[str, str]] | None = None) -> None:
+        """Data that changed, as (type name, full name) of object or data; None: all."""
+        self._known = {} if owners is None else {
+            identity: known for identity, known in self._known.items() if not owners.intersection(identity[-1])}
+
+    def take(self, notices: list[str]) -> Take:
+        self._known = {key: known for key, known in self._known.items() if key in self._used}  # objects go
+        self._used = set()
+
+        def take(obj: bpy.types.Object, identity: tuple) -> Pending | None:
+            key = (*identity, ((_kind(obj), obj.original.name_full), (_kind(obj.data), obj.data.original.name_full)))
+            self._used.add(key)
+            if key not in self._known:
+                self.reads += 1
+                said: list[str] = []
+                arrays = _read(obj, said)
+                self._known[key] = (Pending(obj.name, identity, arrays) if arrays else None, said)
+            pending, said = self._known[key]
+            notices.extend(said)
+            return pending
+
+        return take
+
+
+def _kind(item: bpy.types.ID) -> str:
+    return type(item.original).__name__
+
+
+def changed_owners(depsgraph: bpy.types.Depsgraph) -> set[tuple[str, str]]:
+    """Objects and data whose points Blender says have changed, for Trusted.forget."""
+    owners = set()
+    for update in depsgraph.updates:
+        item = update.id.original
+        if isinstance(item, bpy.types.Object):
+            if update.is_updated_geometry:
+                owners.add((_kind(item), item.name_full))
+        elif update.is_updated_geometry or isinstance(item, (bpy.types.Mesh, bpy.types.PointCloud)):
+            owners.add((_kind(item), item.name_full))
+    return owners
 
 
 def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from .. import options
 from ..properties import enum_number
 from .camera import View
 
@@ -35,13 +36,16 @@ class Settings:
     film_transparent: int
     world_color: tuple[float, float, float]
     layers: int
+    strata: int = 0  # of 6 that are drawn; 0: all
 
 
 def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:
     patina = scene.patina
+    forced = options.read()
+    quality = forced.get("quality")
     return Settings(
         width=view.width, height=view.height, region=view.region,
-        quality=enum_number(patina, "quality"),
+        quality=enum_number(patina, "quality") if quality is None else _number(patina, "quality", quality),
         fill=enum_number(patina, "fill"),
         fill_iterations=patina.fill_iterations,
         smooth=enum_number(patina, "smooth"),
@@ -51,8 +55,18 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         layers=patina.layers)
 
 
+def samples(scene: bpy.types.Scene) -> int:
+    """Of a final picture, for each pixel."""
+    return int(options.read().get("samples", scene.patina.samples)) or 1
+
+
+def _number(group: bpy.types.PropertyGroup, name: str, item: str) -> int:
+    return group.bl_rna.properties[name].enum_items[item].value
+
+
 def device(scene: bpy.types.Scene) -> DeviceChoice:
-    return DeviceChoice(DEVICES[scene.patina.device], _threads(scene))
+    forced = options.read()
+    return DeviceChoice(DEVICES[forced.get("device", scene.patina.device)], forced.get("threads") or _threads(scene))
 
 
 def _threads(scene: bpy.types.Scene) -> int:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 
 BLACK = (0.0, 0.0, 0.0)
@@ -26,6 +28,22 @@ def background(world: bpy.types.World | None, notices: list[str]) -> tuple[float
     if color.is_linked or strength.is_linked:
         notices.append("what is linked to the world's Background node is not drawn yet, only its own colour is")
     return tuple(max(value * strength.default_value, 0.0) for value in color.default_value[:3])
+
+
+@dataclass(frozen=True)
+class Mist:
+    """How far away things vanish, as Blender's world says."""
+
+    start: float
+    depth: float
+    falloff: str
+
+
+def mist(world: bpy.types.World | None) -> Mist | None:
+    if world is None:
+        return None
+    settings = world.mist_settings
+    return Mist(settings.start, settings.depth, settings.falloff)
 
 
 def _source(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from . import panels, standard
+from . import panels, presets, standard, statistics
 
-_MODULES = (panels, standard)
+_MODULES = (presets, panels, statistics, standard)
 
 
 def register() -> None:

@@ -7,6 +7,8 @@ import bpy
 from bpy.types import Context, Panel, Scene
 
 from ..engine import PatinaRenderEngine
+from ..operators import view_transform
+from .presets import PATINA_PT_presets
 from ..sync import estimates
 
 
@@ -40,6 +42,9 @@ class PATINA_PT_surface(_PatinaPanel, Panel):
     bl_label = "Surface"
     bl_context = "render"
 
+    def draw_header_preset(self, _context: Context) -> None:
+        PATINA_PT_presets.draw_panel_header(self.layout)
+
     def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
@@ -52,7 +57,10 @@ class PATINA_PT_surface(_PatinaPanel, Panel):
         row.active = patina.fill != 'OFF'
         row.prop(patina, "fill_iterations")
         layout.prop(patina, "smooth")
-        layout.prop(patina, "antialias")
+        row = layout.row()
+        row.active = patina.samples == 1
+        row.prop(patina, "antialias")
+        layout.prop(patina, "samples")
 
 
 class PATINA_PT_transparency(_PatinaPanel, Panel):
@@ -74,6 +82,10 @@ class PATINA_PT_film(_PatinaPanel, Panel):
     def draw(self, context: Context) -> None:
         self.layout.use_property_split = True
         self.layout.prop(context.scene.render, "film_transparent", text="Transparent")
+        if view_transform.changes_colors(context.scene):
+            column = self.layout.column()
+            column.label(text=f"{context.scene.view_settings.view_transform} changes the colors of scans", icon='INFO')
+            column.operator(view_transform.PATINA_OT_true_colors.bl_idname)
 
 
 class PATINA_PT_performance(_PatinaPanel, Panel):
@@ -87,6 +99,8 @@ class PATINA_PT_performance(_PatinaPanel, Panel):
         layout.use_property_decorate = False
         layout.prop(context.scene.patina, "device")
         layout.prop(context.scene.patina, "threads")
+        layout.prop(context.scene.patina, "tile_size")
+        layout.prop(context.scene.patina, "navigation_ms", text="Viewport, ms")
 
 
 class PATINA_PT_passes(_PatinaPanel, Panel):
@@ -100,7 +114,10 @@ class PATINA_PT_passes(_PatinaPanel, Panel):
         layer = context.view_layer
         column = layout.column(heading="Include")
         column.prop(layer, "use_pass_z", text="Depth")
+        column.prop(layer, "use_pass_mist")
+        column.prop(layer, "use_pass_position")
         column.prop(layer, "use_pass_normal")
+        column.prop(layer, "use_pass_object_index")
         column.prop(layer.patina, "use_pass_source")
         layout.prop(layer.patina, "pass_layers")
 

@@ -45,9 +45,9 @@ def import_ply(*paths, **options):
     """Imports and returns the new objects."""
     before = set(bpy.data.objects)
     if len(paths) == 1:
-        bpy.ops.import_scene.patina_ply(filepath=str(paths[0]), **options)
+        bpy.ops.import_scene.patina_points(filepath=str(paths[0]), **options)
     else:
-        bpy.ops.import_scene.patina_ply(directory=str(paths[0].parent), files=[{"name": path.name} for path in paths],
+        bpy.ops.import_scene.patina_points(directory=str(paths[0].parent), files=[{"name": path.name} for path in paths],
                                         **options)
     return sorted(set(bpy.data.objects) - before, key=lambda obj: obj.name)
 

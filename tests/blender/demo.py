@@ -49,7 +49,7 @@ def load_addon(folder):
 def import_points(path):
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
-    bpy.ops.import_scene.patina_ply(filepath=str(path))
+    bpy.ops.import_scene.patina_points(filepath=str(path))
     return bpy.context.view_layer.objects.active
 
 

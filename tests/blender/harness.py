@@ -38,6 +38,7 @@ from patina import engine, passes  # noqa: E402
 
 reports: list[tuple[str, str]] = []  # (kind, message) of the last render
 stats: list[str] = []
+written: list[tuple[str, dict[str, np.ndarray]]] = []  # (stereo view, planes) of the last render
 _pixels: dict[str, dict[str, np.ndarray]] = {}
 
 
@@ -51,8 +52,9 @@ def _record_status(self, text, progress):
     _status(self, text, progress)
 
 
-def _record_write(self, layer, camera, planes):
-    _write(self, layer, camera, planes)
+def _record_write(self, layer, scene, planes, eye=""):
+    _write(self, layer, scene, planes, eye)
+    written.append((eye, planes))
     result = self.get_result()  # what Blender holds now, not what we think we gave
     size = (result.resolution_y, result.resolution_x)
     _pixels[layer.name] = {item.name: _rect(item, *size) for item in result.layers[layer.name].passes}
@@ -162,7 +164,7 @@ def render():
 
 
 def render_layers():
-    for record in (reports, stats, _pixels):
+    for record in (reports, stats, written, _pixels):
         record.clear()
     bpy.context.view_layer.update()
     bpy.ops.render.render()

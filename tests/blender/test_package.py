@@ -46,6 +46,13 @@ def test_install():
     inside = os.environ["BLENDER_USER_SCRIPTS" if LEGACY else "BLENDER_USER_EXTENSIONS"]
     assert Path(inside).resolve() in folder().parents, folder()
     assert (folder() / "LICENSE").is_file()
+    if not LEGACY and list((ROOT / "build/out/wheels").glob("*.whl")):
+        import laspy
+        import lazrs
+        import pye57
+        inside = Path(os.environ["BLENDER_USER_EXTENSIONS"]).resolve()
+        for module in (laspy, lazrs, pye57):
+            assert inside in Path(module.__file__).resolve().parents, module.__file__
 
 
 def test_render():

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""PLY, XYZ, CSV, PTS and PTX files through the library's readers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .. import native
+from .reading import Filter, PointFile, Progress
+
+
+def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
+    """Reads a file whole, then filters. PatinaError when it cannot be read."""
+    with progress.inner() as inner, native.File(str(path), inner) as file:
+        return PointFile(
+            name=path.stem,
+            positions=file.positions(),
+            normals=file.normals(),
+            colors=file.colors(),
+            scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
+            origin=file.origin,
+            invalid=file.invalid_positions).filtered(wanted)
+
+
+def preview(path: Path) -> list[str]:
+    """What the head of the file says: a PLY's header, else the first lines."""
+    with open(path, "rb") as file:
+        head = file.read(65536)
+    if not head.startswith(b"ply"):
+        lines = head.decode("utf-8", "replace").splitlines()
+        return [f"{path.stat().st_size / 1e6:,.1f} MB of text", *(line[:60] for line in lines[:4])]
+    lines, inside = [], False
+    for line in head.split(b"end_header")[0].decode("utf-8", "replace").splitlines():
+        words = line.split()
+        if words[:1] == ["format"]:
+            lines.append(f"PLY {words[1]}")
+        elif words[:1] == ["element"] and len(words) == 3:
+            inside = words[1] in {"vertex", "vertices", "point", "points"}
+            if inside:
+                lines.append(f"{int(words[2]):,} points" if words[2].isdigit() else words[2])
+        elif words[:1] == ["property"] and inside and words[1] != "list":
+            lines.append(f"{words[-1]}: {words[1]}")
+    return lines

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""PCD, the Point Cloud Library's format: ascii, binary and binary_compressed (LZF)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .. import native
+from .reading import Filter, PointFile, Progress, origin_of
+
+_KINDS = {("F", 4): "<f4", ("F", 8): "<f8", ("U", 1): "u1", ("U", 2): "<u2", ("U", 4): "<u4", ("U", 8): "<u8",
+          ("I", 1): "i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8"}
+
+
+def _fail(path: Path, what: str) -> native.PatinaError:
+    return native.PatinaError(f"{path.name}: {what}", -4)
+
+
+def _header(path: Path, head: bytes) -> tuple[dict[str, list[str]], int]:
+    """The header's words by key, and where the data begin."""
+    words: dict[str, list[str]] = {}
+    at = 0
+    while at < len(head) and "DATA" not in words:
+        end = head.find(b"\n", at)
+        if end < 0:
+            break
+        line = head[at:end].decode("utf-8", "replace").split("#")[0].split()
+        if line:
+            words[line[0]] = line[1:]
+        at = end + 1
+    if "DATA" not in words or not words.get("FIELDS"):
+        raise _fail(path, "not a PCD file: its header has no FIELDS or no DATA")
+    return words, at
+
+
+def _columns(path: Path, words: dict[str, list[str]]) -> np.dtype:
+    fields = words["FIELDS"]
+    counts = words.get("COUNT", ["1"] * len(fields))
+    try:
+        kinds = [_KINDS[kind, int(size)] for kind, size in zip(words["TYPE"], words["SIZE"], strict=True)]
+        return np.dtype([(f"{name}.{i}" if name in fields[:i] or name == "_" else name, kind, (int(count),))
+                         for i, (name, kind, count) in enumerate(zip(fields, kinds, counts, strict=True))])
+    except (KeyError, ValueError) as error:
+        raise _fail(path, f"FIELDS, SIZE, TYPE and COUNT do not fit together: {error}") from None
+
+
+def _count(path: Path, words: dict[str, list[str]]) -> int:
+    try:
+        return int(words["POINTS"][0]) if "POINTS" in words else int(words["WIDTH"][0]) * int(words["HEIGHT"][0])
+    except (KeyError, IndexError, ValueError):
+        raise _fail(path, "says not how many points it holds") from None
+
+
+def preview(path: Path) -> list[str]:
+    with open(path, "rb") as file:
+        words, _ = _header(path, file.read(65536))
+    return [f"PCD {' '.join(words['DATA'])}", f"{_count(path, words):,} points", " ".join(words["FIELDS"])]
+
+
+def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
+    words, at = _header(path, data[:1 << 20])
+    kind, count, form = _columns(path, words), _count(path, words), words["DATA"][0]
+    if form == "ascii":
+        table = _ascii(path, data[at:], kind, count)
+    elif form == "binary":
+        if len(data) - at < count * kind.itemsize:
+            raise _fail(path, f"ends after {(len(data) - at) // kind.itemsize:,} of {count:,} points")
+        rows = np.frombuffer(data, kind, count, at)
+        table = {name: rows[name] for name in kind.names}
+    elif form == "binary_compressed":
+        table = _compressed(path, data, at, kind, count, progress)
+    else:
+        raise _fail(path, f"DATA {form} is not ascii, binary or binary_compressed")
+    return _assemble(path, table, wanted)
+
+
+def _ascii(path: Path, text: bytes, kind: np.dtype, count: int) -> dict[str, np.ndarray]:
+    width = sum(kind[name].shape[0] for name in kind.names)
+    try:
+        words = np.array(text.split(), np.float64)
+    except ValueError as error:
+        raise _fail(path, str(error)) from None
+    if len(words) < count * width:
+        raise _fail(path, f"ends after {len(words) // width:,} of {count:,} points")
+    rows, table, at = words[:count * width].reshape(count, width), {}, 0
+    for name in kind.names:
+        size = kind[name].shape[0]
+        table[name] = rows[:, at:at + size].astype(kind[name].base)
+        at += size
+    return table
+
+
+def _compressed(path: Path, data: bytes, at: int, kind: np.dtype, count: int, progress: Progress) \
+        -> dict[str, np.ndarray]:
+    packed, size = (int(value) for value in np.frombuffer(data, "<u4", 2, at)) if len(data) >= at + 8 else (0, 0)
+    if size != count * kind.itemsize or len(data) < at + 8 + packed:
+        raise _fail(path, "its compressed part is cut short or of another size than its points")
+    plain = _unpack(path, data[at + 8:at + 8 + packed], size, progress)
+    table, at = {}, 0
+    for name in kind.names:  # one column after the other
+        table[name] = np.frombuffer(plain, kind[name].base, count * kind[name].shape[0], at).reshape(count, -1)
+        at += table[name].nbytes
+    return table
+
+
+def _unpack(path: Path, packed: bytes, size: int, progress: Progress) -> bytearray:
+    """Marc Lehmann's LZF: runs of bytes, and copies of up to 264 bytes from the last 8192."""
+    plain, at, end, polled = bytearray(), 0, len(packed), 0
+    try:
+        while at < end:
+            control = packed[at]
+            at += 1
+            if control < 32:
+                plain += packed[at:at + control + 1]
+                at += control + 1
+                continue
+            length = control >> 5
+            if length == 7:
+                length += packed[at]
+                at += 1
+            back = ((control & 31) << 8) + packed[at] + 1
+            at += 1
+            start, length = len(plain) - back, length + 2
+            if start < 0:
+                raise _fail(path, "its compressed part is damaged")
+            if back >= length:
+                plain += plain[start:start + length]
+            else:
+                plain += (plain[start:] * (length // back + 1))[:length]
+            polled += 1
+            if polled % 65536 == 0:
+                progress.step(at / end)
+    except IndexError:
+        raise _fail(path, "its compressed part is cut short") from None
+    if len(plain) != size:
+        raise _fail(path, f"unpacks to {len(plain):,} bytes instead of {size:,}")
+    return plain
+
+
+def _assemble(path: Path, table: dict[str, np.ndarray], wanted: Filter) -> PointFile:
+    if not all(axis in table for axis in "xyz"):
+        raise _fail(path, "has no fields x, y and z")
+    positions = np.concatenate([table.pop(axis)[:, :1].astype(np.float64) for axis in "xyz"], 1)
+    keep = wanted.mask(0, positions) & np.isfinite(positions).all(axis=1)  # organised clouds hold rows of NaN
+    positions = positions[keep]
+    table = {name: values[keep] for name, values in table.items()}
+    bounds = (positions.min(axis=0), positions.max(axis=0)) if len(positions) else (np.zeros(3),) * 2
+    origin = origin_of(*bounds, 1e-4)
+    colors = None
+    for name in ("rgb", "rgba"):
+        if name in table and table[name].dtype.itemsize == 4:
+            words = np.ascontiguousarray(table.pop(name)[:, 0])
+            words = words.view(np.uint32) if words.dtype.kind == "f" else words.astype(np.uint32)
+            colors = np.stack([words >> 16 & 255, words >> 8 & 255, words & 255, np.full_like(words, 255)], 1)
+            colors = colors.astype(np.uint8)
+    normals = None
+    if all(f"normal_{axis}" in table for axis in "xyz"):
+        normals = np.concatenate([table.pop(f"normal_{axis}")[:, :1].astype(np.float32) for axis in "xyz"], 1)
+    scalars = {name: values[:, 0].astype(np.float32) for name, values in table.items()
+               if values.shape[1] == 1 and not name.startswith("_")}
+    return PointFile(path.stem, (positions - origin).astype(np.float32), normals, colors, scalars, origin, 0)

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every reader of point files takes and gives. Nothing here knows Blender: reading may run on any thread."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .. import native
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which points are kept while reading."""
+
+    every: int = 1  # each so-manieth in file order
+    box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None  # file coordinates
+
+    def keeps_all(self) -> bool:
+        return self.every == 1 and self.box is None
+
+    def mask(self, first: int, positions: np.ndarray, origin: tuple[float, float, float] = ZERO) -> np.ndarray:
+        """(n,) bool, of points first, first + 1, ... at positions + origin."""
+        keep = np.ones(len(positions), bool)
+        if self.every > 1:
+            keep[:] = False
+            keep[-first % self.every::self.every] = True
+        if self.box:
+            lower, upper = (np.asarray(corner) - origin for corner in self.box)
+            keep &= ((positions >= lower) & (positions <= upper)).all(axis=1)
+        return keep
+
+
+@dataclass(frozen=True)
+class PointFile:
+    name: str
+    positions: np.ndarray  # (n, 3) float32, relative to origin
+    normals: np.ndarray | None  # (n, 3) float32
+    colors: np.ndarray | None  # (n, 4) uint8 sRGB or float32 linear
+    scalars: dict[str, np.ndarray]  # (n,) float32 by name
+    origin: tuple[float, float, float]  # float64
+    invalid: int  # positions that are not finite
+    notes: dict[str, str | float] = field(default_factory=dict)  # kept with the mesh: "crs", "gps_time_start"
+
+    def filtered(self, wanted: Filter) -> PointFile:
+        if wanted.keeps_all():
+            return self
+        keep = wanted.mask(0, self.positions, self.origin)
+        return replace(
+            self, positions=self.positions[keep],
+            normals=None if self.normals is None else self.normals[keep],
+            colors=None if self.colors is None else self.colors[keep],
+            scalars={name: values[keep] for name, values in self.scalars.items()},
+            invalid=int((~np.isfinite(self.positions[keep]).all(axis=1)).sum()))
+
+
+class Progress:
+    """Of one file; value() and cancel() from any thread."""
+
+    def __init__(self) -> None:
+        self._value = 0.0
+        self._cancelled = False
+        self._native: native.Progress | None = None
+
+    def value(self) -> float:
+        inner = self._native
+        return inner.value() if inner else self._value
+
+    def cancel(self) -> None:
+        self._cancelled = True
+        inner = self._native
+        if inner:
+            inner.cancel()
+
+    def step(self, value: float) -> None:
+        """Readers call it often. PatinaCancelled when nobody wants the file any more."""
+        self._value = value
+        if self._cancelled:
+            raise native.PatinaCancelled("reading was cancelled", native.CANCELLED)
+
+    @contextlib.contextmanager
+    def inner(self) -> Iterator[native.Progress]:
+        """For a call of the library. Stays open until this object goes, for other threads may look at it."""
+        self._native = native.Progress()
+        if self._cancelled:
+            self._native.cancel()
+        yield self._native
+
+
+def colors_of(rgb: np.ndarray) -> np.ndarray:
+    """(n, 3) uint16 sRGB → (n, 4): bytes where no detail is lost (8 bits in the low or in the high byte), else linear
+    floats."""
+    most = int(rgb.max()) if rgb.size else 0
+    if most <= 255:
+        return _opaque(rgb.astype(np.uint8), 255)
+    high = rgb >> 8
+    if not ((rgb & 255) != 0).any() or (rgb == high * 257).all():
+        return _opaque(high.astype(np.uint8), 255)
+    s = (np.arange(65536) / 65535.0)
+    linear = np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return _opaque(linear[rgb], 1.0)
+
+
+def _opaque(rgb: np.ndarray, one: float) -> np.ndarray:
+    rgba = np.full((len(rgb), 4), one, rgb.dtype)
+    rgba[:, :3] = rgb
+    return rgba
+
+
+def origin_of(lower: np.ndarray, upper: np.ndarray, detail: float) -> tuple[float, float, float]:
+    """An origin for a file's box: none where float32 keeps half its detail, else the lower corner in whole units."""
+    most = float(np.abs([lower, upper]).max()) if np.isfinite([lower, upper]).all() else 0.0
+    if most * 2.0 ** -24 <= 0.5 * detail:
+        return ZERO
+    return tuple(float(value) for value in np.floor(lower))

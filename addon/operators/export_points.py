@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""File > Export > Point Cloud: PLY and LAS, in the coordinates that the points came from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.types import Context, Operator
+from bpy_extras.io_utils import ExportHelper
+
+from .. import exporters
+from ..importers import origin
+from ..sync import attributes
+
+
+class PATINA_OT_export_points(Operator, ExportHelper):
+    """Export the points of mesh and point cloud objects with colours, normals and scalars, the origin added back"""
+
+    bl_idname = "export_scene.patina_points"
+    bl_label = "Export Points"
+    bl_options = {'PRESET'}
+
+    kind: EnumProperty(
+        name="Format", default='PLY',
+        items=(('PLY', "PLY", "Binary, with all scalars and float64 positions", 0),
+               ('LAS', "LAS", "LAS 1.2, point format 3; the scalars that it has a place for", 1)))
+    selected: BoolProperty(name="Selected Only", default=True, description="Leave out objects that are not selected")
+    filter_glob: StringProperty(default="*.ply;*.las", options={'HIDDEN'})
+    filename_ext = ""
+
+    def check(self, _context: Context) -> bool:
+        path = Path(self.filepath)
+        if path.suffix.lower() in {".ply", ".las"} and path.suffix.lower()[1:] == self.kind.lower():
+            return False
+        self.filepath = str(path.with_suffix(f".{self.kind.lower()}"))
+        return True
+
+    def execute(self, context: Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath)).with_suffix(f".{self.kind.lower()}")
+        depsgraph = context.evaluated_depsgraph_get()
+        objects = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
+                   if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and
+                   (obj.select_get() or not self.selected)]
+        scene_origin = np.array(context.scene.get(origin.PROPERTY, origin.ZERO))
+        points = _join([item for obj in objects if (item := _read(obj, scene_origin))])
+        if points is None:
+            self.report({'ERROR'}, "Patina: no selected object has points" if self.selected
+                        else "Patina: no visible object has points")
+            return {'CANCELLED'}
+        try:
+            left = [] if self.kind == 'PLY' else exporters.write_las(path, points, _gps_start(objects))
+            if self.kind == 'PLY':
+                exporters.write_ply(path, points)
+        except OSError as error:
+            self.report({'ERROR'}, f"Patina: {path.name} cannot be written: {error.strerror}")
+            return {'CANCELLED'}
+        if left:
+            self.report({'WARNING'}, f"LAS has no place for {', '.join(left)}")
+        self.report({'INFO'}, f"Exported {len(points.positions):,} points to {path.name}")
+        return {'FINISHED'}
+
+
+def _gps_start(objects: list[bpy.types.Object]) -> float:
+    return next((obj.data.original["patina_gps_time_start"] for obj in objects
+                 if "patina_gps_time_start" in obj.data.original), 0.0)
+
+
+def _read(obj: bpy.types.Object, scene_origin: np.ndarray) -> exporters.Points | None:
+    data = obj.data
+    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    local = attributes.positions(data, count) if count else None
+    if local is None:
+        return None
+    matrix = np.array(obj.matrix_world, np.float64)
+    own = np.array(obj.original.get(origin.PROPERTY, scene_origin), np.float64)
+    # an object that still lies where its import put it goes back to its file's coordinates to the last bit
+    at_place = np.allclose(matrix[:3, 3], own - scene_origin, rtol=0, atol=1e-3 + 1e-6 * np.abs(own - scene_origin).max())
+    move = own if at_place or not any(scene_origin) else scene_origin + matrix[:3, 3]
+    positions = local.astype(np.float64) @ matrix[:3, :3].T + move
+    if not at_place and not any(scene_origin):
+        positions += matrix[:3, 3]
+    normals = attributes.normals(data, count, obj.patina.normal_attribute)
+    colors = attributes.colors(data, count, obj.patina.color_attribute)
+    if normals is not None:
+        normals = normals @ np.linalg.inv(matrix[:3, :3]) if np.linalg.det(matrix[:3, :3]) else normals
+    if colors is not None and colors.dtype != np.uint8:
+        c = np.clip(colors[:, :3], 0.0, 1.0)
+        colors = np.rint(np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055) * 255).astype(np.uint8)
+    return exporters.Points(positions, normals, None if colors is None else colors[:, :3], _scalars(data, count),
+                            str(data.original.get("patina_crs", "")))
+
+
+def _scalars(data: bpy.types.ID, count: int) -> dict[str, np.ndarray]:
+    found = {}
+    for attribute in data.attributes:
+        if attribute.domain == 'POINT' and attribute.data_type in {'FLOAT', 'INT'} and len(attribute.data) == count and \
+                not attribute.name.startswith("."):
+            values = np.empty(count, np.float32 if attribute.data_type == 'FLOAT' else np.int32)
+            attribute.data.foreach_get("value", values)
+            found[attribute.name] = values.astype(np.float32)
+    return found
+
+
+def _join(parts: list[exporters.Points]) -> exporters.Points | None:
+    """One set of columns; what a part lacks is 0."""
+    if not parts:
+        return None
+
+    def column(values: list[np.ndarray | None], width: tuple[int, ...]) -> np.ndarray | None:
+        if all(value is None for value in values):
+            return None
+        kind = next(value.dtype for value in values if value is not None)
+        return np.concatenate([np.zeros((len(part.positions), *width), kind) if value is None else value
+                               for part, value in zip(parts, values, strict=True)])
+
+    names = {name: None for part in parts for name in part.scalars}
+    return exporters.Points(
+        np.concatenate([part.positions for part in parts]), column([part.normals for part in parts], (3,)),
+        column([part.colors for part in parts], (3,)),
+        {name: column([part.scalars.get(name) for part in parts], ()) for name in names},
+        next((part.crs for part in parts if part.crs), ""))
+
+
+def _menu(self: bpy.types.Menu, _context: Context) -> None:
+    self.layout.operator(PATINA_OT_export_points.bl_idname, text="Point Cloud (.ply/.las)")
+
+
+def register() -> None:
+    bpy.utils.register_class(PATINA_OT_export_points)
+    bpy.types.TOPBAR_MT_file_export.append(_menu)
+
+
+def unregister() -> None:
+    bpy.types.TOPBAR_MT_file_export.remove(_menu)
+    bpy.utils.unregister_class(PATINA_OT_export_points)

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""File > Import > Point Cloud, and dropping files into a view (Blender 4.1 and later)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.types import Context, Operator, OperatorFileListElement
+from bpy_extras.io_utils import ImportHelper
+
+from .. import importers, jobs, native
+from ..importers import PointFile, origin
+
+_previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked at last
+
+
+class PATINA_OT_import_points(Operator, ImportHelper):
+    """Import point files with colours, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf"""
+
+    bl_idname = "import_scene.patina_points"
+    bl_label = "Import Points"
+    bl_options = {'REGISTER', 'UNDO', 'PRESET'}
+
+    filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in importers.FORMATS), options={'HIDDEN'})
+    files: CollectionProperty(type=OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
+    directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
+    origin: EnumProperty(
+        name="Origin", default='SHARED',
+        description="Where files with large (georeferenced) coordinates go",
+        items=(
+            ('SHARED', "Shared", "All files of the scene share one origin and keep their places to each other", 0),
+            ('OWN', "Own", "Each file goes near zero and remembers its own origin", 1)))
+    every: IntProperty(
+        name="Keep Every", default=1, min=1, soft_max=100,
+        description="Keep each so-manieth point: 1 keeps all, 10 a tenth")
+    use_box: BoolProperty(name="Only Within a Box", default=False, description="Leave out points outside of a box")
+    box_min: FloatVectorProperty(name="From", subtype='XYZ', precision=3,
+                                 description="Lower corner, in the file's own coordinates")
+    box_max: FloatVectorProperty(name="To", subtype='XYZ', precision=3, default=(1.0, 1.0, 1.0),
+                                 description="Upper corner, in the file's own coordinates")
+
+    def draw(self, _context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "origin")
+        layout.prop(self, "every")
+        layout.prop(self, "use_box")
+        if self.use_box:
+            layout.prop(self, "box_min")
+            layout.prop(self, "box_max")
+        lines = _preview(self._paths()[0])
+        if lines:
+            column = layout.box().column(align=True)
+            for line in lines:
+                column.label(text=line)
+
+    def execute(self, context: Context) -> set[str]:
+        points = [read for path in self._paths() if (read := self._read(context, path))]
+        if not points:
+            return {'CANCELLED'}
+        bpy.ops.object.select_all(action='DESELECT') if bpy.ops.object.select_all.poll() else None
+        shared = origin.shared(context.scene, [item.origin for item in points]) if self.origin == 'SHARED' else None
+        for item in points:
+            obj = bpy.data.objects.new(item.name, importers.to_mesh(item))
+            warning = origin.place(obj, item.origin, shared)
+            if warning:
+                self.report({'WARNING'}, warning)
+            context.collection.objects.link(obj)
+            obj.select_set(True)
+            context.view_layer.objects.active = obj
+        count = sum(len(item.positions) for item in points)
+        self.report({'INFO'}, f"Imported {count:,} points from {len(points)} file{'s' * (len(points) > 1)}")
+        return {'FINISHED'}
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
+        if self.directory and any(item.name for item in self.files):  # dropped
+            return self.execute(context)
+        return super().invoke(context, event)
+
+    def _paths(self) -> list[Path]:
+        if self.directory and any(item.name for item in self.files):
+            return [Path(bpy.path.abspath(self.directory)) / item.name for item in self.files]
+        return [Path(bpy.path.abspath(self.filepath))]
+
+    def _filter(self) -> importers.Filter:
+        return importers.Filter(self.every, (tuple(self.box_min), tuple(self.box_max)) if self.use_box else None)
+
+    def _read(self, context: Context, path: Path) -> PointFile | None:
+        """A file's points, or None and a message. Reads on a worker thread and shows progress at the cursor."""
+        manager = context.window_manager
+        wanted, progress = self._filter(), importers.Progress()
+
+        def poll() -> bool:
+            manager.progress_update(progress.value())
+            return False
+
+        manager.progress_begin(0.0, 1.0)
+        try:
+            module = importers.reader(path)
+            points = jobs.run(lambda: module.read(path, wanted, progress), progress.cancel, poll)
+        except native.PatinaError as error:
+            text = str(error)
+            self.report({'ERROR'}, f"Patina: {text}" if path.name in text else f"Patina: {path.name}: {text}")
+            return None
+        finally:
+            manager.progress_end()
+        if points.invalid:
+            self.report({'WARNING'}, f"{path.name}: {points.invalid:,} points without a finite position are "
+                                     "kept, but never drawn")
+        if not len(points.positions):
+            left = "" if wanted.keeps_all() else " that the filters keep"
+            self.report({'ERROR'}, f"Patina: {path.name} holds no points{left}")
+            return None
+        return points
+
+
+def _preview(path: Path) -> list[str]:
+    """What the file dialog shows of the chosen file; read once, for panels are drawn often."""
+    try:
+        key = (str(path), path.stat().st_mtime if path.is_file() else 0.0)
+    except OSError:
+        return []
+    if not key[1]:
+        return []
+    if key not in _previews:
+        _previews.clear()
+        _previews[key] = importers.preview(path)
+    return _previews[key]
+
+
+def _menu(self: bpy.types.Menu, _context: Context) -> None:
+    self.layout.operator(PATINA_OT_import_points.bl_idname, text="Point Cloud (.ply/.las/.laz/.e57/.pts/...)")
+
+
+_CLASSES: list[type] = [PATINA_OT_import_points]
+
+if hasattr(bpy.types, "FileHandler"):  # Blender 4.1
+    class PATINA_FH_points(bpy.types.FileHandler):
+        bl_idname = "PATINA_FH_points"
+        bl_label = "Point Cloud"
+        bl_import_operator = PATINA_OT_import_points.bl_idname
+        bl_file_extensions = ";".join(ending for ending in importers.FORMATS if ending not in {".txt", ".csv"})
+
+        @classmethod
+        def poll_drop(cls, context: Context) -> bool:
+            return context.area is not None and context.area.type in {'VIEW_3D', 'OUTLINER'}
+
+    _CLASSES.append(PATINA_FH_points)
+
+
+def register() -> None:
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.TOPBAR_MT_file_import.append(_menu)
+
+
+def unregister() -> None:
+    bpy.types.TOPBAR_MT_file_import.remove(_menu)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Presets of the render settings: the artist's own, saved by the button at the panel's head."""
+
+from __future__ import annotations
+
+import bpy
+from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
+from bpy.types import Operator, Panel
+
+from ..engine import PatinaRenderEngine
+
+FOLDER = "patina/render"
+
+
+class PATINA_OT_preset_add(AddPresetBase, Operator):
+    """Save the surface settings under a name, or remove the chosen preset"""
+
+    bl_idname = "render.patina_preset_add"
+    bl_label = "Patina Preset"
+    preset_menu = "PATINA_PT_presets"
+    preset_defines = ["patina = bpy.context.scene.patina"]
+    preset_values = [f"patina.{name}" for name in ("quality", "fill", "fill_iterations", "smooth", "antialias", "samples")]
+    preset_subdir = FOLDER
+
+
+class PATINA_PT_presets(PresetPanel, Panel):
+    bl_label = "Surface Presets"
+    preset_subdir = FOLDER
+    preset_operator = "script.execute_preset"
+    preset_add_operator = PATINA_OT_preset_add.bl_idname
+    COMPAT_ENGINES = {PatinaRenderEngine.bl_idname}
+
+
+_CLASSES = (PATINA_OT_preset_add, PATINA_PT_presets)
+
+
+def register() -> None:
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar of a 3D view: what its last picture took, and why passes were left out."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.types import Context, Panel, UILayout
+
+from .. import pace, viewport
+from ..engine import PatinaRenderEngine
+
+
+class _SidebarPanel:
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "Patina"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.engine == PatinaRenderEngine.bl_idname
+
+
+class PATINA_PT_statistics(_SidebarPanel, Panel):
+    bl_label = "Statistics"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        found = viewport.of_area(context.area)
+        if found and found.message:
+            _lines(layout, found.message, 'ERROR')
+        if not found or not found.shown:
+            layout.label(text="Switch to Rendered shading to see figures")
+            return
+        shown = found.shown
+        stats, level = shown.stats, shown.wish.level
+        rows = [("Points", f"{stats['points']:,}"), ("Drawn", f"{stats['points_scattered']:,}"),
+                ("Chunks", f"{stats['chunks'] - stats['chunks_culled']:,} of {stats['chunks']:,}"),
+                ("Picture", f"{stats['width']} x {stats['height']}"), ("Time", f"{stats['ms']:.1f} ms"),
+                ("Planes", f"{stats['plane_bytes'] / 1e6:,.0f} MB"),
+                ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]
+        if level != pace.FULL:
+            rows.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
+        _table(layout, rows)
+        for notice in found.notices:
+            _lines(layout, notice, 'INFO')
+
+
+class PATINA_PT_statistics_passes(_SidebarPanel, Panel):
+    bl_label = "Passes"
+    bl_parent_id = "PATINA_PT_statistics"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        found = viewport.of_area(context.area)
+        if not found or not found.shown:
+            return
+        passes = found.shown.passes
+        _table(self.layout, [(name, f"{ms:.2f} ms") for name, ms in passes["passes"].items()])
+        for name, reason in passes["skipped"].items():
+            _lines(self.layout, f"no {name}: {reason}", 'NONE')
+
+
+def _table(layout: UILayout, rows: list[tuple[str, str]]) -> None:
+    column = layout.column(align=True)
+    for name, value in rows:
+        split = column.split(factor=0.4)
+        split.label(text=name)
+        split.label(text=value)
+
+
+def _lines(layout: UILayout, text: str, icon: str, width: int = 38) -> None:
+    """A sentence on as many lines as a sidebar needs."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    line = ""
+    for word in [*text.split(), ""]:
+        if line and (not word or len(line) + len(word) >= width):
+            column.label(text=line, icon=icon)
+            line, icon = "", 'BLANK1' if icon != 'NONE' else 'NONE'
+        line = f"{line} {word}".strip()
+
+
+_CLASSES = (PATINA_PT_statistics, PATINA_PT_statistics_passes)
+
+
+def register() -> None:
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

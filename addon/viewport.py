@@ -1,0 +1,384 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The 3D viewport in Rendered mode.
+
+Blender's thread reads the scene where it changed, asks for pictures and draws the last finished one; a worker of each
+viewport renders. While the view moves, pictures are made in a time budget (pace.py); when it rests, the whole one follows,
+which is the picture that a final render would make. A timer tells Blender to draw again: the worker never calls Blender.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from . import native, pace, render, sync
+
+TICK = 0.008  # seconds between two looks at the workers
+REST = 0.12  # seconds without motion after which the whole picture is drawn
+LARGEST = np.float32(65000.0)  # half floats end at 65504; what overflows turns the viewport black
+FAR = np.float32(1e30)  # depth of nothing
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A picture that the viewport would like to have."""
+
+    scene: sync.SceneDescription
+    view: sync.View
+    level: pace.Level
+
+    def description(self, clouds: list[sync.CloudItem]) -> sync.SceneDescription:
+        shrink = self.level.shrink
+        x0, y0, x1, y1 = self.view.region
+        settings = replace(
+            self.scene.settings, width=-(-self.view.width // shrink), height=-(-self.view.height // shrink),
+            region=(x0 // shrink, y0 // shrink, -(-x1 // shrink), -(-y1 // shrink)),
+            strata=pace.WHOLE if self.level.strata == pace.STRATA else self.level.strata)
+        return replace(self.scene, clouds=clouds, camera=self.view.camera, settings=settings)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A finished picture."""
+
+    wish: Wish
+    clouds: list[sync.CloudItem]  # built
+    color: np.ndarray  # (height, width, 4), premultiplied, scene-linear
+    depth: np.ndarray  # (height, width, 1), linear z that hides overlays
+    place: tuple[float, float, float, float]  # of the viewport that it covers, 0..1
+    stats: dict[str, Any]
+    passes: dict[str, Any]
+    device: str
+    seconds: float
+
+
+class Viewport:
+    """One 3D view region. Everything but _work runs on Blender's thread."""
+
+    def __init__(self, engine: bpy.types.RenderEngine) -> None:
+        self.engine = weakref.ref(engine, lambda _: self.close())
+        self.area = 0  # where it is, to find its statistics
+        self.message = ""  # what went wrong last
+        self.notices: list[str] = []
+        self.shown: Shown | None = None
+        self.pictures = 0  # finished so far
+        self.trusted = sync.Trusted()
+        self.pace = pace.Pace(0.05)
+        self._scene: sync.SceneDescription | None = None
+        self._view: sync.View | None = None
+        self._moved = 0.0  # when
+        self._local = False  # in local view
+        self._last: Wish | None = None  # that was asked for
+        self._lock = threading.Lock()  # of what follows
+        self._wanted: Wish | None = None
+        self._working: Wish | None = None
+        self._frame_cancel: Callable[[], None] | None = None  # while it renders
+        self._build_cancel: Callable[[], None] | None = None  # while it makes clouds
+        self._closed = False
+        self._news = False
+        self._thread: threading.Thread | None = None
+        self._frame: tuple[native.Device, native.Frame] | None = None  # the worker's
+        self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture] | None = None
+        _VIEWPORTS.add(self)
+
+    # ---- Blender's thread
+
+    def update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """The scene changed."""
+        self.trusted.forget(sync.changed_owners(depsgraph) if self._scene else None)
+        view = self._read_view(context)
+        scene = sync.describe_viewport(depsgraph, view, self.trusted, context.space_data)
+        self.notices = scene.notices
+        self.pace.budget = depsgraph.scene.patina.navigation_ms / 1000.0
+        self._scene = scene
+        self._view = view
+        self._local = context.space_data.local_view is not None
+        self._moved = time.monotonic()
+        self._ask(self.pace.level)
+
+    def draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> str:
+        """Draws the last picture, asks for another one if the view moved. Returns a line of status."""
+        self.area = context.area.as_pointer() if context.area else 0
+        if self._scene and self._local != (context.space_data.local_view is not None):  # Blender says nothing of it
+            self.update(context, depsgraph)
+        view = self._read_view(context)
+        if self._scene and view != self._view:
+            self._view = view
+            self._moved = time.monotonic()
+            self._ask(self.pace.level)
+        if self.shown:
+            self._draw_picture(context)
+        return self._status()
+
+    def tick(self) -> bool:
+        """Called by the timer. Whether it has to come again."""
+        engine = self.engine()
+        if engine is None:
+            return False
+        with self._lock:
+            news, self._news = self._news, False
+            idle = not self._working and not self._wanted
+        due = self._last is not None and self._last.level != pace.FULL
+        if due and idle and time.monotonic() - self._moved > REST:
+            self._ask(pace.FULL)
+        if news:
+            try:
+                engine.tag_redraw()
+            except ReferenceError:  # Blender has freed it
+                self.close()
+                return False
+            if not due:
+                _redraw_panels(self.area)
+        return not idle or due or news
+
+    def close(self) -> None:
+        """Stops the worker soon and for good."""
+        with self._lock:
+            self._closed, self._wanted = True, None
+            stops, thread = (self._frame_cancel, self._build_cancel), self._thread
+        for stop in filter(None, stops):
+            stop()
+        if thread:
+            thread.join()
+        self._drawn = self._frame = None  # here, for textures go on Blender's thread
+        _VIEWPORTS.discard(self)
+
+    def _read_view(self, context: bpy.types.Context) -> sync.View:
+        return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
+
+    def _ask(self, level: pace.Level) -> None:
+        wish = self._last = Wish(self._scene, self._view, level)
+        with self._lock:
+            self._wanted = wish
+            # a quick picture of the moment before is worth its end, a whole one is not
+            stop = self._frame_cancel if self._working and self._working.level == pace.FULL else None
+            start = not self._thread and not self._closed
+            if start:
+                self._thread = threading.Thread(target=self._work, name="patina viewport", daemon=True)
+        if stop:
+            stop()
+        if start:
+            self._thread.start()
+        if not bpy.app.timers.is_registered(_tick):
+            bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+
+    def _status(self) -> str:
+        if self.message:
+            return self.message
+        with self._lock:
+            working = self._working
+        if working and any(isinstance(item.cloud, sync.Pending) and not item.cloud.built for item in
+                           working.scene.clouds):
+            return "Reading points"
+        if not self.shown:
+            return ""
+        return f"{self.shown.stats['points']:,} points, {self.shown.stats['ms']:.0f} ms, {self.shown.device}"
+
+    def _draw_picture(self, context: bpy.types.Context) -> None:
+        if self._drawn is None or self._drawn[0] is not self.shown:
+            self._drawn = (self.shown, _texture(np.minimum(self.shown.color, LARGEST), 'RGBA16F'),
+                           _texture(np.minimum(self.shown.depth, FAR), 'R32F'))
+        shown, color, depth = self._drawn
+        projection = context.region_data.window_matrix
+        camera = shown.wish.view.camera
+        near = camera.near_clip if camera.orthographic else 0.0
+        shader = _shader()
+        x0, y0, x1, y1 = (2.0 * share - 1.0 for share in shown.place)
+        batch = batch_for_shader(shader, 'TRI_STRIP', {"pos": ((x0, y0), (x1, y0), (x0, y1), (x1, y1)),
+                                                       "uv": ((0, 0), (1, 0), (0, 1), (1, 1))})
+        state = gpu.state
+        shader.bind()
+        shader.uniform_sampler("picture", color)
+        shader.uniform_sampler("depths", depth)
+        shader.uniform_float("projection", (projection[2][2], projection[2][3], near, camera.orthographic))
+        state.blend_set('ALPHA_PREMULT')
+        # the colour over everything, the depth where nothing of Blender's is nearer, so that overlays are hidden rightly
+        for share, test, mask in ((1.0, 'ALWAYS', False), (0.0, 'LESS_EQUAL', True)):
+            state.depth_test_set(test)
+            state.depth_mask_set(mask)
+            shader.uniform_float("share", share)
+            batch.draw(shader)
+        state.depth_test_set('NONE')
+        state.depth_mask_set(False)
+        state.blend_set('NONE')
+
+    # ---- the worker
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                wish, self._wanted = self._wanted, None
+                self._working = wish
+                if wish is None or self._closed:
+                    self._working, self._thread = None, None
+                    return
+            shown, message = None, ""
+            cancelled = False
+            try:
+                shown = self._render(wish)
+            except native.PatinaCancelled:
+                message, cancelled = self.message, True
+            except Exception as error:  # shown in the viewport; the last good picture stays
+                message = str(error) or type(error).__name__
+            with self._lock:
+                self.message = message
+                self._news = True
+                if cancelled and not self._wanted and not self._closed:
+                    self._wanted = wish  # the cancel was meant for the picture before
+                if shown:
+                    self.shown = shown
+                    self.pictures += 1
+
+    def _render(self, wish: Wish) -> Shown:
+        start = time.monotonic()
+        with native.Progress() as progress:
+            self._build_cancel = progress.cancel
+            try:
+                clouds = [replace(item, cloud=item.cloud.resolve(progress)) for item in wish.scene.clouds]
+            finally:
+                self._build_cancel = None
+        description = wish.description(clouds)
+        try:
+            return self._render_on(render.device_for(description.device), wish, description, start)
+        except native.PatinaCancelled:
+            raise
+        except native.PatinaError:
+            if not self._frame or not self._frame[0].name.startswith("gl"):
+                raise
+            self._frame = None
+        return self._render_on(render.device_for(replace(description.device, name="cpu")), wish, description, start)
+
+    def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription, start: float) -> Shown:
+        if self._frame is None or self._frame[0] is not device:
+            self._frame = (device, native.Frame(device))
+        frame = self._frame[1]
+        with native.Scene() as scene:
+            render.describe(scene, description, ["DEPTH"])
+            with self._lock:
+                if self._closed or self._wanted and wish.level == pace.FULL:
+                    raise native.PatinaCancelled("a newer picture is wanted", native.CANCELLED)
+                self._frame_cancel = frame.cancel
+            try:
+                frame.render(scene)
+            finally:
+                with self._lock:
+                    self._frame_cancel = None
+        settings, stats, passes = description.settings, frame.stats(), frame.pass_stats()
+        points = passes["passes"].get("scatter", 0.0) / 1000.0
+        seconds = time.monotonic() - start
+        self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
+        x0, y0, x1, y1 = settings.region
+        pixel = (wish.view.camera.right - wish.view.camera.left) / settings.width
+        return Shown(wish, description.clouds, frame.read("COMBINED"), _cover(frame.read("DEPTH"), pixel, wish.view.camera.orthographic),
+                     (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
+                     stats, passes, device.name, seconds)
+
+
+_VIEWPORTS: set[Viewport] = set()
+_compiled: list[gpu.types.GPUShader] = []  # none or one
+
+
+def of_area(area: bpy.types.Area) -> Viewport | None:
+    """The viewport that draws in an area, for its statistics."""
+    place = area.as_pointer() if area else 0
+    return next((viewport for viewport in _VIEWPORTS if viewport.area == place and viewport.engine()), None)
+
+
+def forget_points() -> None:
+    """After undo: what was read may be of another state."""
+    for viewport in _VIEWPORTS:
+        viewport.trusted.forget()
+
+
+def close_all() -> None:
+    for viewport in list(_VIEWPORTS):
+        viewport.close()
+    _compiled.clear()
+
+
+def _tick() -> float | None:
+    again = False
+    for viewport in list(_VIEWPORTS):
+        again |= viewport.tick()
+    return TICK if again else None
+
+
+def _redraw_panels(area_pointer: int) -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.as_pointer() == area_pointer:
+                for region in area.regions:
+                    if region.type == 'UI':
+                        region.tag_redraw()
+
+
+def _cover(depth: np.ndarray, pixel: float, orthographic: int) -> np.ndarray:
+    """The depth behind which overlays hide: two pixels wider than the surface and four pixels' width nearer. Blender draws
+    the vertices of our points as dots over every engine's picture; these lie just behind it."""
+    for axis in (0, 1):
+        near = depth.copy()
+        for step in (1, 2):
+            for first, second in ((slice(step, None), slice(None, -step)), (slice(None, -step), slice(step, None))):
+                to, source = [slice(None)] * 3, [slice(None)] * 3
+                to[axis], source[axis] = first, second
+                np.minimum(near[tuple(to)], depth[tuple(source)], out=near[tuple(to)])
+        depth = near
+    return depth - np.float32(4.0 * pixel) * (np.float32(1.0) if orthographic else depth.clip(max=FAR))
+
+
+def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
+    height, width = pixels.shape[:2]
+    flat = np.ascontiguousarray(pixels, np.float32).reshape(-1)
+    return gpu.types.GPUTexture((width, height), format=kind, data=gpu.types.Buffer('FLOAT', flat.size, flat))
+
+
+_VERTEX = """
+void main()
+{
+    place = uv;
+    gl_Position = vec4(pos, 0.0, 1.0);
+}
+"""
+
+# z of the picture is linear; Blender's depth buffer is the projection's, projection.xy its third row.
+_FRAGMENT = """
+void main()
+{
+    ivec2 size = textureSize(depths, 0);
+    float z = texelFetch(depths, min(ivec2(place * vec2(size)), size - 1), 0).r;
+    float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z)
+                                   : projection.y / z - projection.x;
+    gl_FragDepth = z < 1e29 ? clamp(0.5 * ndc + 0.5, 0.0, 1.0) : 1.0;
+    color = share * texture(picture, place);
+}
+"""
+
+
+def _shader() -> gpu.types.GPUShader:
+    if not _compiled:
+        interface = gpu.types.GPUStageInterfaceInfo("patina_picture")
+        interface.smooth('VEC2', "place")
+        info = gpu.types.GPUShaderCreateInfo()
+        info.push_constant('VEC4', "projection")
+        info.push_constant('FLOAT', "share")
+        info.sampler(0, 'FLOAT_2D', "picture")
+        info.sampler(1, 'FLOAT_2D', "depths")
+        info.vertex_in(0, 'VEC2', "pos")
+        info.vertex_in(1, 'VEC2', "uv")
+        info.vertex_out(interface)
+        info.fragment_out(0, 'VEC4', "color")
+        if hasattr(info, "depth_write"):
+            info.depth_write('ANY')
+        info.vertex_source(_VERTEX)
+        info.fragment_source(_FRAGMENT)
+        _compiled.append(gpu.shader.create_from_info(info))
+    return _compiled[0]

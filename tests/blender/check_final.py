@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What final renders have beyond one picture: more passes, samples, tiles, stereo, options of the command line."""
+
+import sys
+import time
+
+import bpy
+import numpy as np
+from check_passes import dense_scene
+from check_points import pixel
+from harness import add_points, check, check_close, new_scene, patina, render, set_world, sphere, written
+from mathutils import Matrix, Vector
+
+from patina import native, options
+from patina import render as drawing
+
+
+def test_position():
+    for kind in ('PERSP', 'ORTHO'):
+        scene = new_scene()
+        scene.view_layers[0].use_pass_position = True
+        scene.camera.data.type = kind
+        scene.camera.matrix_world = Matrix.Translation((10, 20, 5)) @ Matrix.Rotation(0.3, 4, 'Y')
+        point = scene.camera.matrix_world @ Vector((0.21, 0.13, -3.0))
+        add_points([point])
+        bpy.context.view_layer.update()
+        picture = render()["Position"]
+        # the pass tells the pixel's centre at the point's depth: within half a pixel of 64
+        check_close(picture[pixel(scene, point)], point, 0.06, f"{kind} position")
+        picture[pixel(scene, point)] = 0
+        check(not picture.any(), "position where nothing is")
+
+
+def test_mist():
+    scene = new_scene()
+    scene.view_layers[0].use_pass_mist = True
+    world = set_world((0, 0, 0))
+    world.mist_settings.start, world.mist_settings.depth, world.mist_settings.falloff = 2.0, 4.0, 'LINEAR'
+    add_points([(0.01, 0.01, -3), (0.9, 0.4, -3), (0.01, -0.6, -9)])
+    bpy.context.view_layer.update()
+    picture = render()["Mist"][..., 0]
+    check_close(picture[pixel(scene, (0.01, 0.01, -3))], 0.25, 2e-3, "before the camera")
+    aside = (np.linalg.norm((0.9, 0.4, 3)) - 2) / 4
+    check_close(picture[pixel(scene, (0.9, 0.4, -3))], aside, 5e-3, "aside")
+    check_close(picture[pixel(scene, (0.01, -0.6, -9))], 1, 0, "vanished")
+    check(picture[0, 0] == 1, "nothing is far away")
+    world.mist_settings.falloff = 'QUADRATIC'
+    check_close(render()["Mist"][..., 0][pixel(scene, (0.01, 0.01, -3))], 0.0625, 2e-3, "quadratic")
+
+
+def test_object_index():
+    """Every pixel of an object, measured or filled, has its number; instances too."""
+    scene = dense_scene()
+    scene.view_layers[0].use_pass_object_index = True
+    scene.patina.antialias = 'OFF'
+    bpy.data.objects["points"].pass_index = 7
+    positions, colors, normals = sphere(6000, 0.5, (1, 0, -3))
+    add_points(positions, colors, normals, "other").pass_index = 3
+    picture = render()
+    index = picture.get("IndexOB", picture.get("Object Index"))[..., 0]
+    alpha, depth = picture["Combined"][..., 3], picture["Depth"][..., 0]
+    check(set(np.unique(index)) == {0, 3, 7}, f"{np.unique(index)}")
+    check(((index > 0) == (alpha > 0)).all(), "index and alpha disagree")
+    near = [float(depth[index == number].min()) for number in (3, 7)]
+    check(abs(near[0] - 2.5) < 0.02 and abs(near[1] - 3.0) < 0.05, f"nearest {near}")
+
+
+def test_tiles_are_the_whole():
+    scene = dense_scene(97, 71)
+    scene.view_layers[0].use_pass_object_index = True
+    whole = render()
+    scene.patina.tile_size = 32
+    tiled = render()
+    check(set(whole) == set(tiled), f"{set(tiled)}")
+    for name, pixels in whole.items():
+        check((pixels == tiled[name]).all(), f"{name} differs in {np.count_nonzero(pixels != tiled[name])} values")
+
+
+def test_tiles_of_regions():
+    check(drawing.tiles((0, 0, 100, 50), 0) == [(0, 0, 100, 50)], "a small picture is one tile")
+    large = drawing.tiles((0, 0, 16384, 16384), 0)
+    check(len(large) == 16 and large[0] == (0, 0, 4096, 4096), f"{large[:2]}")
+    odd = drawing.tiles((3, 5, 70, 40), 32)
+    check(sum((x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in odd) == 67 * 35, f"{odd}")
+
+
+def test_samples():
+    """More samples come nearer to the share of a pixel that is covered; data passes do not change."""
+    scene = dense_scene(64, 64)
+    scene.patina.antialias = 'OFF'
+    scene.camera.data.sensor_fit = 'HORIZONTAL'
+    one = render()
+    scene.patina.samples = 16
+    many = render()
+    check((one["Depth"] == many["Depth"]).all(), "depth changed")
+    alpha = many["Combined"][..., 3]
+    edges = (alpha > 0.01) & (alpha < 0.99)
+    check(40 < edges.sum() < 400, f"{edges.sum()} soft pixels")
+    check(set(np.unique(one["Combined"][..., 3])) == {0, 1}, "one sample without anti-aliasing is hard")
+    check_close(alpha * 16, np.rint(alpha * 16), 1e-4, "a mean of sixteen hard pictures")
+    areas = [float(picture["Combined"][..., 3].sum()) for picture in (one, many)]
+    check(abs(areas[1] / areas[0] - 1) < 0.01, f"areas {areas}")
+
+
+def test_stereo():
+    scene = new_scene(64, 48)
+    scene.render.use_multiview = True
+    scene.render.views_format = 'STEREO_3D'
+    scene.camera.data.stereo.convergence_mode = 'PARALLEL'
+    scene.camera.data.stereo.interocular_distance = 0.2
+    add_points([(0, 0, -2)])
+    render()
+    check([eye for eye, _ in written] == ["left", "right"], f"{[eye for eye, _ in written]}")
+    columns = [int(np.argwhere(planes["COMBINED"][..., 3] > 0)[0][1]) for _, planes in written]
+    wanted = 64 * scene.camera.data.lens / scene.camera.data.sensor_width * 0.2 / 2
+    check(abs(columns[0] - columns[1] - wanted) <= 1, f"columns {columns}, {wanted:.1f} apart wanted")
+
+
+def test_options():
+    read = options.read
+    check(read(["blender", "-b"]) == {}, "no options")
+    check(read(["blender", "--", "--other", "1", "--patina-device", "cpu", "--patina-samples=4"]) ==
+          {"device": 'CPU', "samples": 4}, "two options")
+    for words, part in ((["--patina-device", "abacus"], "auto, cpu"), (["--patina-colour"], "only device"),
+                        (["--patina-threads", "many"], "a number")):
+        try:
+            read(["--", *words])
+        except native.PatinaError as error:
+            check(part in str(error), str(error))
+        else:
+            check(False, f"{words} was taken")
+    scene = dense_scene()
+    before = sys.argv
+    sys.argv = ["blender", "--", "--patina-device", "cpu-scalar", "--patina-quality", "paper", "--patina-threads", "1"]
+    try:
+        described = []
+        draw, drawing.draw = drawing.draw, lambda item, *rest: described.append(item) or draw(item, *rest)
+        try:
+            render()
+        finally:
+            drawing.draw = draw
+        check((described[0].device.name, described[0].device.threads) == ("cpu-scalar", 1), f"{described[0].device}")
+        check(described[0].settings.quality == 1, "quality")
+        check(scene.patina.device == 'CPU', "the scene itself was changed")
+    finally:
+        sys.argv = before
+        drawing.forget_device()
+
+
+def test_cancel_is_soon():
+    """A large picture stops within 0.2 s of the wish; other programs on the machine are allowed as much again."""
+    scene = dense_scene(3000, 3000)
+    scene.render.film_transparent = False
+    asked = []
+
+    def poll(progress):
+        if progress > 0.2 and not asked:
+            asked.append(time.perf_counter())
+        return bool(asked)
+
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view = patina.engine.sync.final_view(scene.camera, depsgraph)
+    description = patina.engine.sync.describe(depsgraph, view, lambda what, progress: False)
+    try:
+        drawing.draw(description, ["COMBINED"], poll)
+    except native.PatinaCancelled:
+        late = time.perf_counter() - asked[0]
+        check(late < 0.4, f"{late:.2f} s")
+    else:
+        check(bool(asked), "the picture was done before it could be cancelled")
+
+
+def test_animation():
+    """A render of frames: objects, cameras and attributes that move."""
+    scene = new_scene(32, 24)
+    obj = add_points([(0, 0, -2)])
+    obj.location.x = -0.5
+    obj.keyframe_insert("location", frame=1)
+    obj.location.x = 0.5
+    obj.keyframe_insert("location", frame=3)
+    columns = []
+    for frame in (1, 3):
+        scene.frame_set(frame)
+        columns.append(int(np.argwhere(render()["Combined"][..., 3] > 0)[0][1]))
+    check(columns[1] - columns[0] > 10, f"columns {columns}")

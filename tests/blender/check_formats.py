@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Point files of many kinds in, PLY and LAS out: what is kept, what is refused and how."""
+
+import struct
+from pathlib import Path
+
+import bpy
+import numpy as np
+from check_import import import_ply as import_points
+from check_import import attribute_of, positions_of
+from harness import REPOSITORY, SCRATCH, Skip, check, check_close, drawn, new_scene, render
+
+from patina import importers
+from patina.importers import e57, las
+
+DATA = REPOSITORY.parent / "shared/data"
+
+
+def shared(name):
+    path = DATA / name
+    if not path.exists():
+        raise Skip(f"there is no ../shared/data/{name}")
+    return path
+
+
+def with_laspy():
+    try:
+        import laspy  # noqa: F401
+        import lazrs  # noqa: F401
+    except ImportError:
+        raise Skip("laspy and lazrs are not installed here") from None
+
+
+def text_file(name, text):
+    path = SCRATCH / name
+    path.write_text(text)
+    return path
+
+
+def export(path, kind):
+    bpy.ops.export_scene.patina_points(filepath=str(path), kind=kind)
+
+
+def fails(path, part, **options):
+    try:
+        import_points(path, **options)
+    except RuntimeError as error:
+        check(part in str(error), f"'{part}' is not in '{error}'")
+    else:
+        check(False, f"{path.name} was imported")
+
+
+def test_text():
+    """XYZ with colours, and CSV with names: columns are found, and drawn."""
+    new_scene()
+    obj, = import_points(text_file("a.xyz", "".join(f"{x / 9 - 1} {y / 9 - 1} -4 255 {x} 0\n" for x in range(18)
+                                                     for y in range(18))))
+    check(obj.data.attributes["Col"].data_type == 'BYTE_COLOR', "no byte colours")
+    check(len(drawn(render())) > 200, "not drawn")
+    obj, = import_points(text_file("b.csv", "x,y,z,intensity\n500000.5,4100000.25,7,3\n500001.5,4100000.25,7,4\n"))
+    places = np.array(obj["patina_origin"]) + np.array([vertex.co for vertex in obj.data.vertices])
+    check_close(places[0], (500000.5, 4100000.25, 7), 1e-3, "the first point")
+    check_close(attribute_of(obj, "intensity", "value")[:, 0], (3, 4), 0, "intensity")
+
+
+def test_filters():
+    new_scene()
+    path = text_file("line.xyz", "".join(f"{i} 0 0\n" for i in range(100)))
+    obj, = import_points(path, every=10)
+    check_close(positions_of(obj)[:, 0], np.arange(0, 100, 10), 1e-6, "every tenth")
+    obj, = import_points(path, use_box=True, box_min=(9.5, -1, -1), box_max=(14.5, 1, 1))
+    check_close(positions_of(obj)[:, 0], np.arange(10, 15), 1e-6, "in the box")
+    fails(path, "that the filters keep", use_box=True, box_min=(200, 0, 0), box_max=(201, 1, 1))
+
+
+def test_las_round_trip():
+    """What is exported as LAS comes back: positions to 0.1 mm, colours, class, intensity, GPS time, CRS."""
+    new_scene()
+    rng = np.random.default_rng(3)
+    world = rng.uniform(0, 50, (2000, 3)) + (431234.0, 4581234.0, 2240.0)
+    points = importers.PointFile(
+        "scan", (world - (431000, 4581000, 2000)).astype(np.float32), None,
+        np.concatenate([rng.integers(0, 256, (2000, 3)), np.full((2000, 1), 255)], 1).astype(np.uint8),
+        {"intensity": rng.integers(0, 60000, 2000).astype(np.float32), "class": np.full(2000, 6, np.float32),
+         "gps_time": np.arange(2000, dtype=np.float32)}, (431000.0, 4581000.0, 2000.0), 0,
+        {"crs": "PROJCS[\"somewhere\"]", "gps_time_start": 3e8})
+    obj = bpy.data.objects.new("scan", importers.to_mesh(points))
+    importers.origin.place(obj, points.origin, importers.origin.shared(bpy.context.scene, [points.origin]))
+    bpy.context.scene.collection.objects.link(obj)
+    obj.select_set(True)
+    kept = points.positions.astype(np.float64) + points.origin
+    for kind, tolerance in (("las", 6e-5), ("ply", 1e-9)):
+        path = SCRATCH / f"trip.{kind}"
+        export(path, kind.upper())
+        back = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+        check_close(back.positions.astype(np.float64) + back.origin, kept, tolerance + 4e-6, kind)
+        check_close(back.colors, points.colors, 0, f"{kind} colours")
+        for name in ("intensity", "class"):
+            check_close(back.scalars[name], points.scalars[name], 0, f"{kind} {name}")
+    path = SCRATCH / "trip.las"
+    back = las.read(path, importers.Filter(), importers.Progress())
+    check(back.notes["crs"] == points.notes["crs"], f"CRS {back.notes}")
+    check(back.notes["gps_time_start"] == 3e8, f"GPS time from {back.notes}")
+    check_close(back.scalars["gps_time"], points.scalars["gps_time"], 0, "GPS time")
+    check(any("2,000 points" in line for line in las.preview(path)), f"preview {las.preview(path)}")
+
+
+def test_las_refuses():
+    new_scene()
+    bad = SCRATCH / "bad.las"
+    bad.write_bytes(b"LASX" + bytes(400))
+    fails(bad, "not a LAS file")
+    head = bytearray(np.zeros(400, np.uint8).tobytes())
+    head[:4], head[24:26] = b"LASF", b"\x01\x02"
+    struct.pack_into("<HIIBHI", head, 94, 227, 227, 0, 3, 34, 1000)
+    bad.write_bytes(bytes(head))
+    fails(bad, "of 1,000 points")
+
+
+def test_real_las():
+    path = shared("lidar/autzen_trim.las")
+    new_scene()
+    obj, = import_points(path)
+    check(len(obj.data.vertices) == 110000, f"{len(obj.data.vertices)} points")
+    check(obj.data.attributes["Col"].data_type == 'BYTE_COLOR', "8-bit colours in 16 bits stay bytes")
+    check({"intensity", "gps_time", "return_number"} <= set(obj.data.attributes.keys()), f"{obj.data.attributes.keys()}")
+    header = las.read_header(path)
+    places = np.array(obj["patina_origin"]) + positions_of(obj) - np.array(obj.matrix_world.translation)
+    check_close(places.min(axis=0), header.lower, 0.01, "lower corner")
+    check_close(places.max(axis=0), header.upper, 0.01, "upper corner")
+
+
+def test_laz_is_las():
+    with_laspy()
+    packed, plain = shared("lidar/autzen_trim.laz"), shared("lidar/autzen_trim.las")
+    a, b = (las.read(path, importers.Filter(every=7), importers.Progress()) for path in (packed, plain))
+    check_close(a.positions.astype(np.float64) + a.origin, b.positions.astype(np.float64) + b.origin, 0, "positions")
+    check_close(a.colors, b.colors, 0, "colours")
+
+
+def test_missing_packages_are_a_sentence():
+    """Without laspy, LAZ says what to do."""
+    import builtins
+    new_scene()
+    head = bytearray(400)
+    head[:4], head[24:26] = b"LASF", b"\x01\x02"
+    struct.pack_into("<HIIBHI", head, 94, 227, 227, 0, 3 | 0x80, 34, 10)
+    path = SCRATCH / "packed.laz"
+    path.write_bytes(bytes(head))
+    honest = builtins.__import__
+
+    def without(name, *arguments, **options):
+        if name.split(".")[0] in {"laspy", "pye57"}:
+            raise ImportError(name)
+        return honest(name, *arguments, **options)
+
+    builtins.__import__ = without
+    try:
+        fails(path, "pip install --user laspy lazrs")
+        try:
+            e57.read(Path("a.e57"), importers.Filter(), importers.Progress())
+        except importers.PatinaError as error:
+            check("pye57" in str(error), str(error))
+        else:
+            check(False, "an E57 file was read without pye57")
+    finally:
+        builtins.__import__ = honest
+
+
+def test_pcd():
+    new_scene()
+    colors = np.array([0x00FF8001, 0x00000102], np.uint32).view(np.float32)
+    rows = np.zeros(3, [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<f4")])
+    rows["x"], rows["y"], rows["rgb"] = [1, 2, np.nan], [3, 4, 0], [*colors, 0]
+    header = "VERSION .7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA "
+    literal = b"".join(rows[name].tobytes() for name in rows.dtype.names)
+    packed = b"".join(bytes([len(literal[i:i + 32]) - 1]) + literal[i:i + 32] for i in range(0, len(literal), 32))
+    compressed = struct.pack("<II", len(packed), len(literal)) + packed
+    text = "1 3 0 %r\n2 4 0 %r\nnan 0 0 0\n" % tuple(float(value) for value in colors)
+    for form, body in (("binary", rows.tobytes()), ("binary_compressed", compressed), ("ascii", text.encode())):
+        path = SCRATCH / f"{form}.pcd"
+        path.write_bytes(header.encode() + form.encode() + b"\n" + body)
+        obj, = import_points(path)
+        check_close(positions_of(obj), [(1, 3, 0), (2, 4, 0)], 0, form)
+        check_close(attribute_of(obj, "Col", "color_srgb", 4) * 255, [(255, 128, 1, 255), (0, 1, 2, 255)], 1e-3, form)
+
+
+def test_real_pcd():
+    path = shared("lidar/samp11-utm.pcd") if (DATA / "lidar/samp11-utm.pcd").exists() else None
+    path = path or next(iter(sorted((DATA / "lidar").glob("samp11*.pcd"))), None)
+    if path is None:
+        raise Skip("there is no ../shared/data/lidar/samp11*.pcd")
+    points = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+    check(len(points.positions) == 38010, f"{len(points.positions)} points")
+    check(any(points.origin), "UTM coordinates without an origin")
+
+
+def test_conf():
+    """Scans of a .conf lie in their places: the bunny's overlap within 4 mm."""
+    path = shared("stanford/bunny_range/bun.conf")
+    points = importers.reader(path).read(path, importers.Filter(every=20), importers.Progress())
+    whole = importers.reader(shared("stanford/bunny/bun_zipper.ply")).read(
+        shared("stanford/bunny/bun_zipper.ply"), importers.Filter(), importers.Progress())
+    check(len(set(points.scalars["scan"].tolist())) == 10, "ten scans")
+    places = points.positions.astype(np.float64) + points.origin
+    surface = whole.positions.astype(np.float64) + whole.origin
+    far = [np.sqrt(((surface - place) ** 2).sum(axis=1).min()) for place in places[::40]]
+    check(np.mean(np.array(far) < 0.004) > 0.95, f"{np.mean(np.array(far) < 0.004):.0%} within 4 mm")
+
+
+def test_unknown_ending():
+    new_scene()
+    fails(text_file("a.abc", "1 2 3\n"), "is none of .ply")
+
+
+def test_previews():
+    """A few lines on every file, broken ones too."""
+    path = text_file("p.xyz", "1 2 3\n")
+    check(any("text" in line for line in importers.preview(path)), f"{importers.preview(path)}")
+    check(len(importers.preview(SCRATCH / "none.las")) == 1, "a missing file")
+    bad = SCRATCH / "short.las"
+    bad.write_bytes(b"LA")
+    check("not a LAS file" in importers.preview(bad)[0], f"{importers.preview(bad)}")
+
+
+def test_cancel():
+    path = SCRATCH / "long.las"
+    head = bytearray(227)
+    head[:4], head[24:26] = b"LASF", b"\x01\x02"
+    struct.pack_into("<HIIBHI", head, 94, 227, 227, 0, 0, 20, 10)
+    struct.pack_into("<12d", head, 131, 1, 1, 1, 0, 0, 0, 1, 0, 1, 0, 1, 0)
+    path.write_bytes(bytes(head) + bytes(200))
+    progress = importers.Progress()
+    progress.cancel()
+    try:
+        las.read(path, importers.Filter(), progress)
+    except importers.PatinaError as error:
+        check(error.code == -7, str(error))
+    else:
+        check(False, "a cancelled import went on")

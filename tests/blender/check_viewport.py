@@ -1,0 +1,360 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The 3D viewport in Rendered mode, in a real window. See test_window.py for what a yield means."""
+
+import os
+import time
+
+import bpy
+import numpy as np
+from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, sphere
+from mathutils import Matrix, Quaternion
+
+from patina import pace, viewport
+
+KEEP = os.environ.get("PATINA_SCREENSHOTS")  # a folder that keeps them
+
+
+def area():
+    return next(area for area in bpy.context.window.screen.areas if area.type == 'VIEW_3D')
+
+
+def window_region():
+    return next(region for region in area().regions if region.type == 'WINDOW')
+
+
+def view():
+    return area().spaces[0].region_3d
+
+
+def shown():
+    """The viewport's engine, when its whole picture is there."""
+    found = viewport.of_area(area())
+    if found and found.shown and found.shown.wish.level == pace.FULL and found._last is found.shown.wish:
+        return found
+    return None
+
+
+def settled(points):
+    """Whether the whole picture of what the view shows now is there, with so many points in the scene."""
+    found = shown()
+    return found is not None and found.shown.stats["points"] == points and \
+        found.shown.wish.view == viewport.sync.viewport_view(window_region(), area().spaces[0], view(), bpy.context.scene)
+
+
+def newer(than):
+    """Waits for a whole picture after so many."""
+    return lambda: (found := shown()) is not None and found.pictures > than
+
+
+def setup(overlays=False):
+    """A scene in Rendered mode, seen from the front, 6 away."""
+    scene = new_scene()
+    scene.view_settings.view_transform = 'Standard'
+    space = area().spaces[0]
+    space.overlay.show_overlays = overlays
+    space.show_gizmo = False
+    space.shading.type = 'SOLID'
+    rv3d = space.region_3d
+    rv3d.view_perspective = 'PERSP'
+    rv3d.view_location, rv3d.view_distance = (0, 0, 0), 6.0
+    rv3d.view_rotation = Quaternion()
+    space.shading.type = 'RENDERED'
+    return scene
+
+
+def screenshot(name):
+    """The view's pixels as shown, (height, width, 4) 0..1, row 0 at the bottom."""
+    path = os.path.join(KEEP or str(SCRATCH), f"{name}.png")
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
+        bpy.ops.screen.screenshot(filepath=path)
+    image = bpy.data.images.load(path)
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    region = window_region()
+    return pixels.reshape(height, width, 4)[region.y:region.y + region.height, region.x:region.x + region.width]
+
+
+def test_draws_points():
+    """Screen colours of a sphere are its bytes; the background is the world's."""
+    setup()
+    positions, colors, normals = sphere(60000, 1.5, (0, 0, 0))
+    bpy.context.scene.patina.fill = 'CLOSED'
+    bpy.context.scene.render.film_transparent = False
+    add_points(positions, np.full_like(colors, (200, 100, 50, 255)), normals)
+    yield lambda: shown() and shown().shown.stats["points"] == 60000
+    picture = screenshot("draws_points")
+    height, width = picture.shape[:2]
+    check_close(picture[height // 2, width // 2, :3] * 255, (200, 100, 50), 1.01, "the middle")
+    check_close(picture[5, 5, :3], (0, 0, 0), 0.01, "a corner")
+    inside = np.abs(picture[..., :3] * 255 - (200, 100, 50)).max(axis=2) < 3
+    radius = np.sqrt(inside.sum() / np.pi)
+    region, rv3d = window_region(), view()
+    wanted = 1.5 / np.sqrt(36 - 1.5 ** 2) * rv3d.window_matrix[0][0] * region.width / 2
+    check(abs(radius - wanted) < 1.5, f"radius {radius:.1f}, not {wanted:.1f} pixels")
+
+
+def test_same_as_final():
+    """At rest the viewport holds the final render's picture."""
+    scene = setup()
+    positions, colors, normals = sphere(40000, 1.5, (0, 0, 0))
+    add_points(positions, colors, normals)
+    settings = scene.patina
+    settings.fill, settings.smooth, settings.antialias = 'CLOSED', 'ALLEVIATED', 'LAYERS'
+    view().view_rotation = Quaternion((0.8, 0.3, 0.4, 0.2)).normalized()
+    yield lambda: settled(40000)
+    picture = shown().shown
+    region = window_region()
+    scene.render.resolution_x, scene.render.resolution_y = region.width, region.height
+    camera = scene.camera
+    camera.matrix_world = view().view_matrix.inverted()
+    space = area().spaces[0]
+    camera.data.lens, camera.data.sensor_width = space.lens, 72.0  # what a free view stands for
+    camera.data.clip_start, camera.data.clip_end = space.clip_start, space.clip_end
+    final = render()["Combined"]
+    check(final.shape == picture.color.shape, f"{final.shape} against {picture.color.shape}")
+    off = np.abs(final - picture.color).max(axis=2) > 0.02  # Blender's float32 matrices move some points by a pixel
+    check(picture.color[..., 3].mean() > 0.02, "an empty viewport")
+    check(off.mean() < 0.002, f"{off.mean():.2%} of the pixels differ")
+
+
+def test_what_changes_is_read():
+    """The camera, a transform and painting read no more than what changed."""
+    scene = setup()
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    obj = add_points(positions, np.full_like(colors, (0, 255, 0, 255)), normals)
+    other = add_points(positions + (3, 0, 0), colors, normals, "other")
+    yield lambda: shown() and shown().shown.stats["points"] == 40000
+    found = shown()
+    reads = found.trusted.reads
+    native_clouds = [entry[1] for entry in patina.clouds.CACHE._entries.values()]
+    before = found.pictures
+    view().view_rotation = Quaternion((0, 1, 0), 0.3)
+    yield newer(before)
+    check(shown() is found and found.trusted.reads == reads, "moving the view read points")
+    before = found.pictures
+    other.location.x = 1.0
+    yield newer(before)
+    check(found.trusted.reads == reads, "moving an object read points")
+    before = found.pictures
+    obj.data.attributes["Col"].data.foreach_set("color_srgb", np.tile(np.float32([1, 0, 0, 1]), len(positions)))
+    obj.data.update()
+    yield newer(before)
+    check(found.trusted.reads == reads + 1, f"painting read {found.trusted.reads - reads} objects")
+    check([entry[1] for entry in patina.clouds.CACHE._entries.values()] and
+          all(any(entry[1] is cloud for cloud in native_clouds) for entry in patina.clouds.CACHE._entries.values()),
+          "painting built a cloud")
+    picture = screenshot("painted")
+    red = (picture[..., 0] > 0.9) & (picture[..., 1] < 0.1)
+    check(red.mean() > 0.01, f"{red.mean():.2%} of the view is red")
+
+
+def test_navigation_and_rest():
+    """While the view moves, cheaper pictures come; at rest the whole one. Blender is never kept waiting."""
+    scene = setup()
+    rng = np.random.default_rng(1)
+    directions = rng.normal(size=(2_000_000, 3)).astype(np.float32)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    add_points(directions * 1.5, None, directions)
+    scene.patina.fill = 'CLOSED'
+    scene.patina.navigation_ms = 20
+    yield lambda: shown() and shown().shown.stats["points"] == 2_000_000
+    found = shown()
+    levels, longest, seconds, before = set(), 0.0, [], found.pictures
+    start = last = time.perf_counter()
+    while time.perf_counter() - start < 2.0:
+        view().view_rotation = Quaternion((0, 1, 0), time.perf_counter() - start)
+
+        def drawn():
+            return True
+
+        yield drawn
+        now = time.perf_counter()
+        longest, last = max(longest, now - last), now
+        levels.add(found.shown.wish.level)
+        seconds.append(found.shown.seconds)
+    moving = found.pictures - before
+    kinds = ", ".join(f"{level.strata}/6 at 1/{level.shrink}" for level in sorted(levels, key=pace.Level.loss))
+    print(f"  {moving / 2.0:.1f} pictures/s in the window, {np.median(seconds) * 1e3:.0f} ms each for the worker "
+          f"({kinds}); longest {longest:.2f} s between two steps of Blender")
+    check(moving >= 4, f"{moving} pictures in 2 s")
+    stopped = time.perf_counter()
+    yield lambda: settled(2_000_000)
+    waited = time.perf_counter() - stopped
+    print(f"  whole picture {waited:.2f} s after the last motion")
+    check(waited < 3.0, f"the whole picture came after {waited:.2f} s")
+    check(found.shown.stats["points_scattered"] > 1_000_000, f"{found.shown.stats}")
+
+
+def test_overlays_are_hidden_by_points():
+    """An empty's axes behind the points do not show, those before them do."""
+    setup(overlays=True)
+    space = area().spaces[0]
+    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+    space.overlay.show_extras = True
+    space.overlay.show_object_origins = space.overlay.show_cursor = space.overlay.show_text = False
+    space.overlay.show_relationship_lines = space.overlay.show_stats = False
+    bpy.context.scene.patina.fill = 'CLOSED'
+    positions, colors, normals = sphere(100000, 1.0, (0, 0, 0))
+    points = add_points(positions, np.full_like(colors, (0, 255, 0, 255)), normals)
+    empty = bpy.data.objects.new("empty", None)
+    empty.empty_display_type, empty.empty_display_size = 'CUBE', 0.3
+    bpy.context.scene.collection.objects.link(empty)
+    points.hide_select = True
+    counts = []
+    for z in (-2.0, 2.0):
+        empty.location.z = z
+        found = viewport.of_area(area())
+        before = found.pictures if found else 0
+        yield lambda: shown() and shown().pictures > before and shown().shown.stats["points"] == 100000
+        picture = screenshot(f"overlay_{z:.0f}")
+        height, width = picture.shape[:2]
+        middle = picture[height // 2 - 60:height // 2 + 60, width // 2 - 60:width // 2 + 60, :3]
+        counts.append(int((np.abs(middle - (0, 1, 0)).max(axis=2) > 0.2).sum()))
+    check(counts[1] > 50 and counts[0] < counts[1] / 5,
+          f"{counts[0]} pixels of a cube behind the sphere, {counts[1]} of one before it")
+
+
+def test_local_view_and_border():
+    scene = setup()
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    first = add_points(positions, colors, normals, "first")
+    add_points(positions + (2, 0, 0), colors, normals, "second")
+    yield lambda: shown() and shown().shown.stats["points"] == 40000
+    bpy.context.view_layer.objects.active = first
+    first.select_set(True)
+    bpy.data.objects["second"].select_set(False)
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, area=area(), region=window_region()):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield lambda: shown() and shown().shown.stats["points"] == 20000
+    with bpy.context.temp_override(window=window, area=area(), region=window_region()):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield lambda: shown() and shown().shown.stats["points"] == 40000
+    space = area().spaces[0]
+    space.use_render_border = True
+    space.render_border_min_x, space.render_border_max_x = 0.25, 0.5
+    space.render_border_min_y, space.render_border_max_y = 0.25, 0.75
+    region = window_region()
+    yield lambda: shown() and abs(shown().shown.color.shape[1] - region.width / 4) <= 1
+    space.use_render_border = False
+    whole = scene.render
+    whole.use_border = True
+    whole.border_min_x, whole.border_max_x, whole.border_min_y, whole.border_max_y = 0.0, 0.5, 0.0, 1.0
+    scene.camera.matrix_world = Matrix.Translation((0, 0, 6))
+    view().view_perspective = 'CAMERA'
+    before = shown().pictures
+    yield newer(before)
+    frame = viewport.sync.camera.camera_frame(region, view(), scene.camera, scene)
+    check(abs((frame[2] - frame[0]) / (frame[3] - frame[1]) - 64 / 48) < 0.01, f"camera frame {frame}")
+    wanted = (frame[2] - frame[0]) / 2
+    check(abs(shown().shown.color.shape[1] - wanted) <= 1.5, f"{shown().shown.color.shape} for {wanted}")
+
+
+def test_orthographic_view():
+    setup()
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    bpy.context.scene.patina.fill = 'CLOSED'
+    add_points(positions, colors, normals)
+    view().view_perspective = 'ORTHO'
+    yield lambda: shown() and shown().shown.stats["points"] == 20000 and \
+        shown().shown.wish.view.camera.orthographic == 1
+    picture = shown().shown
+    radius = np.sqrt((picture.color[..., 3] > 0.5).sum() / np.pi)
+    wanted = view().window_matrix[0][0] * window_region().width / 2
+    check(abs(radius - wanted) < 1.5, f"radius {radius:.1f}, not {wanted:.1f}")
+
+
+def test_toggling_lets_go():
+    """Leaving Rendered mode ends the engine and its worker."""
+    setup()
+    add_points(*sphere(5000, 1.0, (0, 0, 0)))
+    yield lambda: shown() is not None
+    area().spaces[0].shading.type = 'SOLID'
+    area().tag_redraw()
+    yield lambda: not viewport._VIEWPORTS
+
+
+def test_failure_is_said():
+    """A failing picture leaves the last one and says why."""
+    setup()
+    add_points(*sphere(5000, 1.0, (0, 0, 0)))
+    yield lambda: shown() is not None
+    found, honest = shown(), viewport.native.Frame.render
+    picture = found.shown
+
+    def failing(self, scene):
+        raise viewport.native.PatinaError("no memory left", -2)
+
+    viewport.native.Frame.render = failing
+    view().view_rotation = Quaternion((0, 1, 0), 0.5)
+    try:
+        yield lambda: "no memory left" in found.message
+    finally:
+        viewport.native.Frame.render = honest
+    check(found.shown is picture, "the last good picture went")
+    before = found.pictures
+    view().view_rotation = Quaternion((0, 1, 0), 0.6)
+    yield newer(before)
+    check(not found.message, found.message)
+
+
+class _Layout:
+    """Takes every call of a panel; a property that is not there fails."""
+
+    def __init__(self, said):
+        self.said = said
+
+    def __getattr__(self, name):
+        def call(*arguments, **options):
+            if name.startswith("prop"):
+                check(arguments[1] in arguments[0].bl_rna.properties, f"no property {arguments[1]}")
+            if name == "label":
+                self.said.append(options["text"])
+            return _Layout(self.said)
+        return call
+
+
+def test_sidebar():
+    """The sidebar tells the figures of its view."""
+    from patina.ui import statistics
+    setup()
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    add_points(positions, colors, normals)
+    area().spaces[0].show_region_ui = True
+    yield lambda: settled(20000)
+    said = []
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, area=area(), region=window_region()):
+        for cls in statistics._CLASSES:
+            check(cls.poll(bpy.context), f"{cls.__name__} does not show")
+            cls.draw(type("Panel", (), {"layout": _Layout(said)})(), bpy.context)
+    check("20,000" in said and "scatter" in said, f"{said}")
+    check(any(text.startswith("no ") or "because" in text for text in said), "no reason for a pass that was left out")
+    screenshot("sidebar")
+    area().spaces[0].show_region_ui = False
+
+
+def test_quad_view():
+    """Four views of one area have an engine each, and share the clouds."""
+    setup()
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    add_points(positions, colors, normals)
+    yield lambda: settled(20000)
+    window = bpy.context.window_manager.windows[0]
+
+    def toggle():
+        with bpy.context.temp_override(window=window, area=area(), region=window_region()):
+            bpy.ops.screen.region_quadview()
+
+    toggle()
+    try:
+        yield lambda: len([found for found in viewport._VIEWPORTS if found.engine() and found.shown]) >= 4
+        check(len(patina.clouds.CACHE) == 1, f"{len(patina.clouds.CACHE)} clouds")
+        screenshot("quad")
+    finally:
+        toggle()
+    yield lambda: settled(20000)

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's tests that need a window:
+
+    xvfb-run -a -s "-screen 0 1280x800x24" blender --factory-startup --python tests/blender/test_window.py [-- NAME ...]
+
+A test is a generator: it yields what it waits for, a function that says whether it has come.
+"""
+
+import os
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+PATIENCE = 30.0  # seconds for one thing to come
+
+
+def tests():
+    import check_viewport
+    names = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
+    for name, test in vars(check_viewport).items():
+        if name.startswith("test_") and (not names or any(part in name for part in names)):
+            yield name[len("test_"):], test
+
+
+class Runner:
+    def __init__(self):
+        self.queue = list(tests())
+        self.steps = self.condition = None
+        self.passed = self.failed = 0
+
+    def __call__(self):
+        try:
+            return self.step()
+        except BaseException:
+            traceback.print_exc()
+            finish(1)
+
+    def step(self):
+        if self.steps is None:
+            if not self.queue:
+                print(f"{self.passed} passed, {self.failed} failed, 0 skipped", flush=True)
+                import harness
+                harness.patina.unregister()
+                finish(1 if self.failed or not self.passed else 0)
+            self.name, test = self.queue.pop(0)
+            self.started = time.perf_counter()
+            self.steps, self.condition = test(), None
+        try:
+            if self.condition is None or self.condition():
+                self.condition = next(self.steps)
+                self.asked = time.perf_counter()
+            elif time.perf_counter() - self.asked > PATIENCE:
+                from patina import viewport
+                said = [found.message for found in viewport._VIEWPORTS]
+                raise AssertionError(f"waited {PATIENCE:.0f} s in vain (line {self.steps.gi_frame.f_lineno}; {said})")
+        except StopIteration:
+            self.passed += 1
+            print(f"ok viewport/{self.name} ({time.perf_counter() - self.started:.2f} s)", flush=True)
+            self.steps = None
+        except Exception as error:
+            self.failed += 1
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            print(f"FAIL viewport/{self.name}: {error} ({Path(where.filename).name}:{where.lineno})", flush=True)
+            self.steps = None
+        return 0.01
+
+
+def finish(code):
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+bpy.context.preferences.view.show_splash = False
+bpy.app.timers.register(Runner(), first_interval=0.5)
