@@ -161,6 +161,8 @@ _CALLS = {
     "patina_device_get_info": (c_void_p, POINTER(_DeviceInfo)),
     "patina_cloud_create": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_cloud_destroy": (c_void_p,),
+    "patina_cloud_save": (c_void_p, c_char_p),
+    "patina_cloud_open": (c_char_p, _OUT),
     "patina_cloud_set_colors": (c_void_p, POINTER(_Array)),
     "patina_cloud_get_info": (c_void_p, POINTER(_CloudInfo)),
     "patina_file_open": (c_char_p, c_void_p, _OUT),
@@ -347,12 +349,27 @@ class Cloud(_Handle):
         desc = _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
                           color=_view(colors, count), opacity=_view(opacities, count), threads=threads)
         super().__init__(byref(desc), _handle_of(progress))
+        self._learn()
+
+    @classmethod
+    def open(cls, path: Path) -> Cloud:
+        """A saved cloud, mapped. PatinaError when it is not one of this version."""
+        cloud = cls.__new__(cls)
+        _Handle.__init__(cloud, os.fsencode(path), create="patina_cloud_open")
+        cloud._learn()
+        return cloud
+
+    def save(self, path: Path) -> None:
+        self._call("save", os.fsencode(path))
+
+    def _learn(self) -> None:
         info = _CloudInfo()
         self._call("get_info", byref(info))
         self.count, self.drawn, self.bytes = info.count, info.drawn, info.bytes
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
+        self.box = (tuple(info.box_min), tuple(info.box_max))
 
     def set_colors(self, colors: np.ndarray | None) -> None:
         """Other colours for the same points; waits for a picture that is being drawn."""

@@ -68,6 +68,26 @@ def _gps_start(objects: list[bpy.types.Object]) -> float:
                  if "patina_gps_time_start" in obj.data.original), 0.0)
 
 
+def read_local(obj: bpy.types.Object) -> exporters.Points | None:
+    """An evaluated object's points in its own space, its origin added."""
+    data = obj.data
+    count = len(data.vertices)
+    local = attributes.positions(data, count) if count else None
+    if local is None:
+        return None
+    own = np.array(obj.original.get(origin.PROPERTY, origin.ZERO), np.float64)
+    return exporters.Points(local.astype(np.float64) + own, attributes.normals(data, count, obj.patina.normal_attribute),
+                            _bytes(attributes.colors(data, count, obj.patina.color_attribute)), _scalars(data, count))
+
+
+def _bytes(colors: np.ndarray | None) -> np.ndarray | None:
+    """(n, 3) sRGB bytes of byte or linear colours."""
+    if colors is None or colors.dtype == np.uint8:
+        return None if colors is None else colors[:, :3]
+    c = np.clip(colors[:, :3], 0.0, 1.0)
+    return np.rint(np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055) * 255).astype(np.uint8)
+
+
 def _read(obj: bpy.types.Object, scene_origin: np.ndarray) -> exporters.Points | None:
     data = obj.data
     count = len(data.vertices if obj.type == 'MESH' else data.points)
@@ -86,10 +106,7 @@ def _read(obj: bpy.types.Object, scene_origin: np.ndarray) -> exporters.Points |
     colors = attributes.colors(data, count, obj.patina.color_attribute)
     if normals is not None:
         normals = normals @ np.linalg.inv(matrix[:3, :3]) if np.linalg.det(matrix[:3, :3]) else normals
-    if colors is not None and colors.dtype != np.uint8:
-        c = np.clip(colors[:, :3], 0.0, 1.0)
-        colors = np.rint(np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055) * 255).astype(np.uint8)
-    return exporters.Points(positions, normals, None if colors is None else colors[:, :3], _scalars(data, count),
+    return exporters.Points(positions, normals, _bytes(colors), _scalars(data, count),
                             str(data.original.get("patina_crs", "")))
 
 

@@ -12,6 +12,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native
 from ..importers import PointFile, origin
+from ..sync import linked
 
 _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked at last
 
@@ -32,6 +33,10 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         items=(
             ('SHARED', "Shared", "All files of the scene share one origin and keep their places to each other", 0),
             ('OWN', "Own", "Each file goes near zero and remembers its own origin", 1)))
+    link: BoolProperty(
+        name="Link", default=False,
+        description="Keep the points out of Blender: the object is a box, Patina reads the file itself. For scans too large "
+                    "for a mesh; the filters below do not apply")
     every: IntProperty(
         name="Keep Every", default=1, min=1, soft_max=100,
         description="Keep each so-manieth point: 1 keeps all, 10 a tenth")
@@ -46,11 +51,14 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(self, "origin")
-        layout.prop(self, "every")
-        layout.prop(self, "use_box")
+        layout.prop(self, "link")
+        column = layout.column()
+        column.active = not self.link
+        column.prop(self, "every")
+        column.prop(self, "use_box")
         if self.use_box:
-            layout.prop(self, "box_min")
-            layout.prop(self, "box_max")
+            column.prop(self, "box_min")
+            column.prop(self, "box_max")
         lines = _preview(self._paths()[0])
         if lines:
             column = layout.box().column(align=True)
@@ -58,6 +66,8 @@ class PATINA_OT_import_points(Operator, ImportHelper):
                 column.label(text=line)
 
     def execute(self, context: Context) -> set[str]:
+        if self.link:
+            return self._link(context)
         points = [read for path in self._paths() if (read := self._read(context, path))]
         if not points:
             return {'CANCELLED'}
@@ -74,6 +84,30 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         count = sum(len(item.positions) for item in points)
         self.report({'INFO'}, f"Imported {count:,} points from {len(points)} file{'s' * (len(points) > 1)}")
         return {'FINISHED'}
+
+    def _link(self, context: Context) -> set[str]:
+        found = []
+        for path in self._paths():
+            try:
+                source = linked.source(path)
+                if source is None:
+                    raise native.PatinaError("there is no such file")
+                importers.reader(path)
+                found.append((path, jobs.run(lambda source=source: linked.load(source), lambda: None, lambda: False)))
+            except native.PatinaError as error:
+                self.report({'ERROR'}, f"Patina: {path.name}: {error}")
+        shared = origin.shared(context.scene, [item.origin for _, item in found]) if self.origin == 'SHARED' else None
+        for path, item in found:
+            obj = bpy.data.objects.new(path.stem, linked.box_mesh(path.stem, item.box))
+            obj.patina.linked_file = str(path)
+            warning = origin.place(obj, item.origin, shared)
+            if warning:
+                self.report({'WARNING'}, warning)
+            context.collection.objects.link(obj)
+            obj.select_set(True)
+            context.view_layer.objects.active = obj
+        self.report({'INFO'}, f"Linked {sum(item.cloud.count for _, item in found):,} points")
+        return {'FINISHED'} if found else {'CANCELLED'}
 
     def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
         if self.directory and any(item.name for item in self.files):  # dropped

@@ -110,6 +110,9 @@ class PatinaObjectProperties(PropertyGroup):
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
         description="Colour of points that have none")
+    linked_file: StringProperty(
+        name="Linked File", override=_OVERRIDE, subtype='FILE_PATH',
+        description="Point file that is drawn in place of the object's own vertices; its points never become Blender's")
     color_attribute: StringProperty(
         name="Colors", override=_OVERRIDE,
         description="Point attribute to take colours from; empty: the active colour attribute, or a usual name")

@@ -15,7 +15,7 @@ from mathutils import Matrix
 
 from .. import jobs, native
 from ..properties import enum_number
-from . import attributes, estimates
+from . import attributes, estimates, linked
 from .camera import row_major
 
 # Clouds that the last picture did not use may stay up to this many bytes (24 a point): enough for the other view
@@ -66,7 +66,7 @@ class CloudStyle:
 class Pending:
     """Points that were read and wait for a worker to make a cloud of them. Shared by descriptions of one viewport."""
 
-    def __init__(self, name: str, identity: tuple, arrays: PointArrays) -> None:
+    def __init__(self, name: str, identity: tuple, arrays: PointArrays | None) -> None:
         self.name = name
         self._identity = identity
         self._arrays: PointArrays | None = arrays
@@ -81,6 +81,19 @@ class Pending:
         if self._cloud is None:
             self._cloud = CACHE.obtain(self._identity, self._arrays, progress, recolor=True)
             self._arrays = None
+        return self._cloud
+
+
+class PendingLink(Pending):
+    """A linked cloud that waits for a worker to open it."""
+
+    def __init__(self, source: linked.Source) -> None:
+        super().__init__(source.path.name, source.identity(), None)
+        self._source = source
+
+    def resolve(self, progress: native.Progress) -> native.Cloud:
+        if self._cloud is None:
+            self._cloud = CACHE.obtain_linked(self._source, progress)
         return self._cloud
 
 
@@ -127,6 +140,15 @@ class CloudCache:
             self._entries[identity] = (fingerprint, cloud)
             return cloud
 
+    def obtain_linked(self, source: linked.Source, progress: native.Progress | None = None) -> native.Cloud:
+        """The cloud of a linked file as it is now."""
+        with self._lock:
+            known, cloud = self._entries.pop(source.identity(), ((b"", b""), None))
+            if cloud is None:
+                cloud = linked.load(source, progress).cloud
+            self._entries[source.identity()] = (known, cloud)
+            return cloud
+
     def trim(self, used: set[tuple]) -> None:
         with self._lock:
             idle = sum(cloud.bytes for identity, (_, cloud) in self._entries.items() if identity not in used)
@@ -146,8 +168,8 @@ class CloudCache:
 CACHE = CloudCache()
 
 
-# What collect() asks for each object with points: (object, identity) → its cloud, or None without points.
-Take = Callable[[bpy.types.Object, tuple], "native.Cloud | Pending | None"]
+# What collect() asks for each object with points: (object, identity, linked file) → its cloud, or None without points.
+Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | None"]
 
 
 def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
@@ -167,11 +189,17 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         if obj.type == 'MESH' and len(obj.data.polygons):
             faces.add(obj.name)
             continue
-        place = (obj.data.as_pointer(), *_attribute_names(obj))
+        link = None
+        if obj.patina.linked_file:
+            link = linked.source_of(obj)
+            if link is None:
+                notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
+                continue
+        place = link.identity() if link else (obj.data.as_pointer(), *_attribute_names(obj))
         if place not in taken:
-            identity = _identity(obj, used)
+            identity = place if link else _identity(obj, used)
             used.add(identity)
-            taken[place] = take(obj, identity)
+            taken[place] = take(obj, identity, link)
         cloud = taken[place]
         if cloud:
             items.append(CloudItem(cloud, _style(obj, instance.matrix_world), obj.pass_index))
@@ -192,13 +220,14 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
 def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
     """Builds each cloud at once, polling; content decides whether it is built anew."""
 
-    def take(obj: bpy.types.Object, identity: tuple) -> native.Cloud | None:
-        arrays = _read(obj, notices)
-        if arrays is None:
+    def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> native.Cloud | None:
+        arrays = None if link else _read(obj, notices)
+        if arrays is None and link is None:
             return None
         name = obj.name
         with native.Progress() as progress:
-            cloud = jobs.run(lambda: CACHE.obtain(identity, arrays, progress), progress.cancel,
+            cloud = jobs.run(lambda: CACHE.obtain_linked(link, progress) if link else
+                             CACHE.obtain(identity, arrays, progress), progress.cancel,
                              lambda: poll(f"Reading points of '{name}'", progress.value()))
         if cloud.invalid_positions:
             notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
@@ -224,14 +253,17 @@ class Trusted:
         self._known = {key: known for key, known in self._known.items() if key in self._used}  # objects go
         self._used = set()
 
-        def take(obj: bpy.types.Object, identity: tuple) -> Pending | None:
+        def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | None:
             key = (*identity, ((_kind(obj), obj.original.name_full), (_kind(obj.data), obj.data.original.name_full)))
             self._used.add(key)
             if key not in self._known:
-                self.reads += 1
                 said: list[str] = []
-                arrays = _read(obj, said)
-                self._known[key] = (Pending(obj.name, identity, arrays) if arrays else None, said)
+                if link:
+                    self._known[key] = (PendingLink(link), said)
+                else:
+                    self.reads += 1
+                    arrays = _read(obj, said)
+                    self._known[key] = (Pending(obj.name, identity, arrays) if arrays else None, said)
             pending, said = self._known[key]
             notices.extend(said)
             return pending

@@ -140,10 +140,16 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
             row.label(text=f"automatic: {_length(context.scene, estimate)}")
         layout.prop(patina, "opacity")
         column = layout.column()
+        if patina.linked_file:
+            column.prop(patina, "linked_file")
+            column.operator("object.patina_linked_to_mesh")
+            column.prop(patina, "color")
+            return
         column.prop_search(patina, "color_attribute", data, "attributes")
         column.prop_search(patina, "normal_attribute", data, "attributes")
         column.prop_search(patina, "opacity_attribute", data, "attributes")
         column.prop(patina, "color")
+        column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
 
 
 class PATINA_PT_shading(_PatinaObjectPanel, Panel):

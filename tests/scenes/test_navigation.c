@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { SIDE = 256, POINTS = 400000 };
 
@@ -150,6 +151,65 @@ static void test_colors(void **state)
     free(painted);
 }
 
+// A saved cloud opens with the same picture; damaged files are refused.
+static void test_saved(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/patina-cloud-XXXXXX";
+    close(mkstemp(path));
+    for (unsigned columns = 0; columns < 2; columns++) {
+        struct points points = points_torus(50000, 1.0, 0.4, columns ? POINTS_ALL : 0, 3);
+        patina_cloud *cloud = points_upload(&points), *opened = NULL;
+        assert_int_equal(patina_cloud_save(cloud, path), PATINA_OK);
+        assert_int_equal(patina_cloud_open(path, &opened), PATINA_OK);
+        patina_cloud_info info = {.struct_size = sizeof info};
+        assert_int_equal(patina_cloud_get_info(opened, &info), PATINA_OK);
+        assert_true(info.count == 50000 && info.bytes < 50000);
+        for (uint32_t d = 0; d < support_device_count(); d++) {
+            patina_device *device = support_device_open(support_device_name(d), 0, 0);
+            if (!device)
+                continue;
+            patina_scene *one = scene_of(cloud, NULL), *other = scene_of(opened, NULL);
+            struct picture a = draw(device, one, 0), b = draw(device, other, 0);
+            picture_assert_identical(&b, &a, 0, 0, "opened");
+            picture_free(&a);
+            picture_free(&b);
+            patina_scene_destroy(one);
+            patina_scene_destroy(other);
+            patina_device_destroy(device);
+        }
+        patina_cloud_destroy(cloud);
+        patina_cloud_destroy(opened);
+        points_free(&points);
+    }
+    FILE *file = fopen(path, "r+b");
+    struct pcg random = pcg_seed(9);
+    int refused = 0;
+    for (int i = 0; i < 200; i++) { // a byte of the header or of a chunk: opened or refused, never a crash
+        patina_cloud *opened = NULL;
+        long at = (long)(pcg_u32(&random) % 200) + (i % 2 ? 65536 : 0);
+        fseek(file, at, SEEK_SET);
+        int was = fgetc(file);
+        fseek(file, at, SEEK_SET);
+        fputc(was ^ (int)(1 + pcg_u32(&random) % 255), file);
+        fflush(file);
+        int code = patina_cloud_open(path, &opened);
+        assert_true(code == PATINA_OK || code == PATINA_ERROR_FORMAT || code == PATINA_ERROR_FILE);
+        refused += code != PATINA_OK;
+        patina_cloud_destroy(opened);
+        fseek(file, at, SEEK_SET);
+        fputc(was, file);
+        fflush(file);
+    }
+    assert_true(refused > 190);
+    assert_int_equal(ftruncate(fileno(file), 100000), 0);
+    fclose(file);
+    patina_cloud *opened = NULL;
+    assert_int_equal(patina_cloud_open(path, &opened), PATINA_ERROR_FORMAT);
+    unlink(path);
+    assert_int_equal(patina_cloud_open(path, &opened), PATINA_ERROR_FILE);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
@@ -157,6 +217,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_strata),
         cmocka_unit_test(test_strata_scattered),
         cmocka_unit_test(test_colors),
+        cmocka_unit_test(test_saved),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -181,6 +181,11 @@ PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 // Gives a cloud other colours (as in the descriptor, count elements; NULL data: none) and leaves all else as it is, so
 // that painting uploads colours alone. The one change a cloud allows: no frame may be rendering it meanwhile.
 PATINA_API int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
+// Writes the built cloud to a file, and opens it again by mapping: nothing is read but what is drawn, and the memory stays
+// the file's. A file of another version or machine, or a damaged one, is PATINA_ERROR_FORMAT: build the cloud anew. While a
+// cloud is open its file may be replaced (patina_cloud_save does), not written into.
+PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
+PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
 
 // ---- files -----------------------------------------------------------------------------------------------------

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linked clouds become meshes, and meshes become linked clouds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.props import StringProperty
+from bpy.types import Context, Operator
+from bpy_extras.io_utils import ExportHelper
+
+from .. import exporters, importers, jobs, native
+from ..importers import origin
+from ..sync import linked
+from . import export_points
+
+
+class PATINA_OT_linked_to_mesh(Operator):
+    """Read the linked file's points into Blender, to edit them"""
+
+    bl_idname = "object.patina_linked_to_mesh"
+    bl_label = "Convert to Mesh"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.object is not None and bool(context.object.patina.linked_file)
+
+    def execute(self, context: Context) -> set[str]:
+        obj = context.object
+        path = Path(bpy.path.abspath(obj.patina.linked_file, library=obj.library))
+        try:
+            module = importers.reader(path)
+            points = jobs.run(lambda: module.read(path, importers.Filter(), importers.Progress()), lambda: None,
+                              lambda: False)
+        except native.PatinaError as error:
+            self.report({'ERROR'}, f"Patina: {error}")
+            return {'CANCELLED'}
+        box = obj.data
+        obj.data = importers.to_mesh(points)
+        obj.patina.linked_file = ""
+        if not box.users:
+            bpy.data.meshes.remove(box)
+        return {'FINISHED'}
+
+
+class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
+    """Write the object's points to a PLY file and keep only a link to it"""
+
+    bl_idname = "object.patina_mesh_to_linked"
+    bl_label = "Convert to Linked Cloud"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    filename_ext = ".ply"
+    filter_glob: StringProperty(default="*.ply", options={'HIDDEN'})
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        obj = context.object
+        return obj is not None and obj.type == 'MESH' and not obj.patina.linked_file and not len(obj.data.polygons)
+
+    def execute(self, context: Context) -> set[str]:
+        obj, path = context.object, Path(bpy.path.abspath(self.filepath))
+        points = export_points.read_local(obj.evaluated_get(context.evaluated_depsgraph_get()))
+        if points is None:
+            self.report({'ERROR'}, f"Patina: '{obj.name}' has no points")
+            return {'CANCELLED'}
+        try:
+            exporters.write_ply(path, points)
+            found = jobs.run(lambda: linked.load(linked.source(path)), lambda: None, lambda: False)
+        except (native.PatinaError, OSError) as error:
+            self.report({'ERROR'}, f"Patina: {path.name}: {error}")
+            return {'CANCELLED'}
+        obj.data = linked.box_mesh(obj.name, found.box)
+        # the file's own origin may differ from the object's by what float32 holds
+        obj[origin.PROPERTY] = [float(value) for value in found.origin]
+        obj.patina.linked_file = str(path)
+        return {'FINISHED'}
+
+
+def register() -> None:
+    for cls in (PATINA_OT_linked_to_mesh, PATINA_OT_mesh_to_linked):
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in (PATINA_OT_mesh_to_linked, PATINA_OT_linked_to_mesh):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A built cloud as a file (DESIGN rule 5): its arrays as they lie in memory, each from a multiple of SECTION bytes on, so
+// that opening it maps them and reads nothing but chunks and ids. A cache for this machine's kind: another byte order,
+// version or struct is another file, and the caller builds it anew.
+#include "cloud.h"
+#include "memory.h"
+#include "progress.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { SECTION = 1 << 16, VERSION = 1, SECTIONS = 6 };
+static const char magic[8] = "patina\n\x1a";
+
+struct header {
+    char magic[8];
+    uint32_t version, chunk_size, color_format, chunk_count;
+    uint64_t slots, size; // of the file
+    double spacing_base;
+    patina_cloud_info info;
+    uint64_t check; // of all before it, and of the chunks
+};
+
+struct section {
+    void **data;
+    uint64_t size;
+};
+
+// FNV-1a.
+static uint64_t digest(uint64_t hash, const void *data, size_t size)
+{
+    for (size_t i = 0; i < size; i++)
+        hash = (hash ^ ((const uint8_t *)data)[i]) * 0x100000001B3u;
+    return hash;
+}
+
+static uint64_t check_of(const struct header *header, const struct pt_chunk *chunks)
+{
+    uint64_t hash = digest(0xCBF29CE484222325u, header, offsetof(struct header, check));
+    return digest(hash, chunks, header->chunk_count * sizeof *chunks);
+}
+
+static uint64_t round_section(uint64_t size) { return (size + SECTION - 1) / SECTION * SECTION; }
+
+static void list_sections(struct patina_cloud *cloud, struct section sections[SECTIONS])
+{
+    static const uint32_t color_bytes[] = { [PT_COLOR_NONE] = 0, [PT_COLOR_SRGB8] = 3, [PT_COLOR_FLOAT] = 12 };
+    uint64_t count = cloud->info.count;
+    const struct section list[SECTIONS] = {
+        { (void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks },
+        { (void **)&cloud->positions, cloud->slots * 12 },
+        { (void **)&cloud->ids, cloud->slots * 4 },
+        { (void **)&cloud->surface, count * 4 },
+        { &cloud->colors, cloud->color_format ? count * color_bytes[cloud->color_format] + 4 : 0 },
+        { (void **)&cloud->opacities, cloud->info.has_opacities ? count + 4 : 0 },
+    };
+    memcpy(sections, list, sizeof list);
+}
+
+static uint64_t file_size(const struct section sections[SECTIONS])
+{
+    uint64_t size = SECTION; // the header
+    for (int i = 0; i < SECTIONS; i++)
+        size += round_section(sections[i].size);
+    return size;
+}
+
+static int fail_with(const char *path, const char *what, int error)
+{
+    char buffer[128];
+    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be %s: %s", path, what, strerror_r(error, buffer, sizeof buffer));
+}
+
+// ---- save --------------------------------------------------------------------------------------------------------------
+
+static int write_sections(FILE *file, const struct header *header, const struct section sections[SECTIONS])
+{
+    int good = fwrite(header, sizeof *header, 1, file) == 1;
+    uint64_t at = SECTION;
+    for (int i = 0; i < SECTIONS && good; i++) {
+        good = !fseeko(file, (off_t)at, SEEK_SET) &&
+               (!sections[i].size || fwrite(*sections[i].data, sections[i].size, 1, file) == 1);
+        at += round_section(sections[i].size);
+    }
+    return good && !fflush(file) && !ftruncate(fileno(file), (off_t)header->size);
+}
+
+int patina_cloud_save(const patina_cloud *cloud, const char *path)
+{
+    if (!cloud || !path)
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
+    struct patina_cloud copy = *cloud;
+    struct section sections[SECTIONS];
+    struct header header = { .version = VERSION, .chunk_size = sizeof(struct pt_chunk), .color_format = cloud->color_format,
+                             .chunk_count = cloud->chunk_count, .slots = cloud->slots,
+                             .spacing_base = cloud->spacing_base, .info = cloud->info };
+    list_sections(&copy, sections);
+    memcpy(header.magic, magic, sizeof magic);
+    header.size = file_size(sections);
+    header.check = check_of(&header, cloud->chunks);
+    size_t length = strlen(path);
+    char *beside = malloc(length + 6); // written there first: a file that is mapped must not change, nor be half there
+    if (!beside)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    memcpy(beside, path, length);
+    memcpy(beside + length, ".part", 6);
+    FILE *file = fopen(beside, "wb");
+    int error = file ? 0 : errno;
+    if (file) {
+        errno = 0;
+        int good = write_sections(file, &header, sections);
+        error = good ? 0 : errno ? errno : EIO;
+        if (fclose(file) && !error)
+            error = errno;
+        if (!error && rename(beside, path))
+            error = errno;
+        if (error)
+            unlink(beside);
+    }
+    free(beside);
+    return error ? fail_with(path, "written", error) : PATINA_OK;
+}
+
+// ---- open --------------------------------------------------------------------------------------------------------------
+
+static int refuse(const char *path, const char *what)
+{
+    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: %s", path, what);
+}
+
+// What kernels trust: chunks within the slots, ids within the points.
+static int check_cloud(const char *path, const struct patina_cloud *cloud)
+{
+    uint64_t next = 0, drawn = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        const struct pt_chunk *chunk = &cloud->chunks[c];
+        double sum = (double)chunk->spacing;
+        for (int k = 0; k < 3; k++)
+            sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] + (double)chunk->cone_axis[k];
+        if (chunk->first != next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||
+            chunk->padded > cloud->slots - next || !isfinite(sum) || !isfinite(chunk->cone_cosine))
+            return refuse(path, "a chunk is damaged");
+        next += chunk->padded;
+        drawn += chunk->count;
+    }
+    uint32_t most = 0;
+    for (uint64_t i = 0; i < cloud->slots; i++)
+        most = cloud->ids[i] > most ? cloud->ids[i] : most;
+    if (next != cloud->slots || drawn != cloud->info.drawn || (cloud->slots && most >= cloud->info.count))
+        return refuse(path, "its chunks do not hold its points");
+    return PATINA_OK;
+}
+
+static int check_header(const char *path, const struct header *header, uint64_t size)
+{
+    if (memcmp(header->magic, magic, sizeof magic))
+        return refuse(path, "not a saved cloud");
+    if (header->version != VERSION || header->chunk_size != sizeof(struct pt_chunk) ||
+        header->info.struct_size != sizeof header->info)
+        return refuse(path, "a saved cloud of another version");
+    if (header->size != size)
+        return refuse(path, "a saved cloud that was cut short");
+    if (header->color_format > PT_COLOR_FLOAT || header->info.count > 0x7FFFFFFF || header->info.chunks != header->chunk_count ||
+        header->slots > 2 * header->info.count + 16ull * header->chunk_count || header->chunk_count > header->info.count ||
+        header->info.drawn > header->info.count || header->info.has_colors != (header->color_format != PT_COLOR_NONE) ||
+        header->info.has_opacities > 1 || header->info.has_normals > 1 || !isfinite(header->spacing_base))
+        return refuse(path, "its header is damaged");
+    return PATINA_OK;
+}
+
+// Private and writable pages of the file: what is never written stays the file's own.
+static int map_sections(int descriptor, const struct section sections[SECTIONS])
+{
+    uint64_t at = SECTION;
+    for (int i = 0; i < SECTIONS; i++) {
+        if (sections[i].size) {
+            void *data = mmap(NULL, sections[i].size, PROT_READ | PROT_WRITE, MAP_PRIVATE, descriptor, (off_t)at);
+            if (data == MAP_FAILED)
+                return errno;
+            *sections[i].data = data;
+        }
+        at += round_section(sections[i].size);
+    }
+    return 0;
+}
+
+static int open_descriptor(const char *path, int descriptor, struct patina_cloud *cloud)
+{
+    struct header header;
+    struct section sections[SECTIONS];
+    struct stat status;
+    if (fstat(descriptor, &status) || pread(descriptor, &header, sizeof header, 0) != (ssize_t)sizeof header)
+        return refuse(path, "not a saved cloud");
+    int code = check_header(path, &header, (uint64_t)status.st_size);
+    if (code)
+        return code;
+    cloud->info = header.info;
+    cloud->slots = header.slots;
+    cloud->chunk_count = header.chunk_count;
+    cloud->color_format = header.color_format;
+    cloud->spacing_base = header.spacing_base;
+    list_sections(cloud, sections);
+    if (file_size(sections) != header.size)
+        return refuse(path, "its header is damaged");
+    int error = map_sections(descriptor, sections);
+    if (error)
+        return fail_with(path, "mapped", error);
+    struct pt_chunk *chunks = malloc(sections[0].size + 1); // the one array that is not freed as pages
+    if (cloud->chunks && chunks)
+        memcpy(chunks, cloud->chunks, sections[0].size);
+    pt_pages_free(cloud->chunks, sections[0].size);
+    cloud->chunks = chunks;
+    if (!chunks)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    if (check_of(&header, chunks) != header.check)
+        return refuse(path, "its header or chunks are damaged");
+    cloud->info.bytes = sections[0].size;
+    return check_cloud(path, cloud);
+}
+
+int patina_cloud_open(const char *path, patina_cloud **out)
+{
+    if (!path || !out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_open: bad arguments");
+    *out = NULL;
+    int descriptor = open(path, O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0)
+        return fail_with(path, "read", errno);
+    struct patina_cloud *cloud = calloc(1, sizeof *cloud);
+    struct pt_alive *alive = calloc(1, sizeof *alive);
+    int code = PATINA_ERROR_MEMORY;
+    if (cloud && alive) {
+        pt_handle_init(&cloud->handle);
+        atomic_init(&alive->references, 1);
+        atomic_init(&alive->alive, 1);
+        cloud->alive = alive;
+        code = open_descriptor(path, descriptor, cloud);
+    } else {
+        pt_fail(NULL, code, "%s: out of memory", path);
+        free(alive);
+        free(cloud);
+        cloud = NULL;
+    }
+    close(descriptor);
+    if (code)
+        patina_cloud_destroy(cloud);
+    else
+        *out = cloud;
+    return code;
+}
