@@ -2,8 +2,8 @@
 // shade: id -> colour and normal, Phong. [D 3.1], deferred: only what the picture shows is lit; twin of
 // native/device_cpu/kernels/shade.c
 //
-// STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any window);
-// STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights)
+// STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any
+// window); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights)
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"

@@ -163,8 +163,8 @@ struct antialias_args {
 //   2. color behind what was blended before: over + (1 - over.a) color.
 //   3. through = through (1 - opacity) of the pixel's own point, limit = z + deff[from]; +inf (finished) where the layer is
 //      empty or, with `stop`, through < PT_SPENT.
-//   4. tiles: the least limit of each 2^PT_TILE_LEVEL x 2^PT_TILE_LEVEL pixels (within the rectangle; +inf: all finished) and how
-//      many of them the layer covers.
+//   4. tiles: of each 2^PT_TILE_LEVEL x 2^PT_TILE_LEVEL pixels, as far as they lie in the rectangle, the least limit (+inf:
+//      all finished) and how many the layer covers.
 struct peel_args {
     struct view_args view;
     uint32_t first; // 1: the first layer: through is 1, nothing is limited, nothing was blended

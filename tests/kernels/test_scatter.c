@@ -500,7 +500,8 @@ static void limits(struct harness *h)
         for (int way = 0; way < 4; way++) {
             for (size_t i = 0; i < pixels; i++) {
                 float z = front[i] == REF_EMPTY_KEY ? 4.0f : (float)ref_key_z(front[i]);
-                limit[i] = way == 0 ? (float)rng_range(&rng, 0.0, 6.0) : way == 1 ? z : way == 2 ? float_step(z, -1) : INFINITY;
+                const float limits_of[4] = {(float)rng_range(&rng, 0.0, 6.0), z, float_step(z, -1), INFINITY};
+                limit[i] = limits_of[way];
             }
             const uint64_t *keys = check_scene(h, &scene);
             for (size_t i = 0; i < pixels; i++) {

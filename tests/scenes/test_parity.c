@@ -58,15 +58,18 @@ static void compare(const struct picture *picture, const struct picture *truth, 
     for (uint32_t k = 0; k < truth->layers; k++) {
         const float *a = picture->layer_depth + k * pixels, *b = truth->layer_depth + k * pixels;
         if (farthest(a, b, pixels, &where) > 0.0)
-            support_die(LAYER_DIFFERS, name, scene, "depth", k + 1, (unsigned long long)where, (double)a[where], (double)b[where]);
+            support_die(LAYER_DIFFERS, name, scene, "depth", k + 1, (unsigned long long)where,
+                        (double)a[where], (double)b[where]);
         a = picture->layer_normal + 3 * k * pixels;
         b = truth->layer_normal + 3 * k * pixels;
         if (farthest(a, b, 3 * pixels, &where) > 0.0)
-            support_die(LAYER_DIFFERS, name, scene, "normal", k + 1, (unsigned long long)where, (double)a[where], (double)b[where]);
+            support_die(LAYER_DIFFERS, name, scene, "normal", k + 1, (unsigned long long)where,
+                        (double)a[where], (double)b[where]);
         a = picture->layer_combined + 4 * k * pixels;
         b = truth->layer_combined + 4 * k * pixels;
         if (farthest(a, b, 4 * pixels, &where) > TOL_COLOR * color_scale(truth))
-            support_die(LAYER_DIFFERS, name, scene, "colour", k + 1, (unsigned long long)where, (double)a[where], (double)b[where]);
+            support_die(LAYER_DIFFERS, name, scene, "colour", k + 1, (unsigned long long)where,
+                        (double)a[where], (double)b[where]);
     }
     double colors = farthest(picture->combined, truth->combined, 4 * pixels, &where), scale = color_scale(truth);
     if (colors > TOL_COLOR * scale)

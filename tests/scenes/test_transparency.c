@@ -255,7 +255,8 @@ static void test_nested_tori(void **state)
     for (int layer = 0; layer < CUT; layer++) {
         double spacing = sqrt(area_torus(ring, tube[TORI - 1]) / 2e6);
         struct layer_tally l = compare_layer(truth, &picture, layer, 2.0 * spacing);
-        printf("  layer %d: %.3f%% of %llu interior pixels show its surface, %.3f%% nothing, %.3f%% another; depth rms %.2f spacings\n",
+        printf("  layer %d: %.3f%% of %llu interior pixels show its surface, %.3f%% nothing, %.3f%% another; depth rms %.2f "
+               "spacings\n",
                layer + 1, percent(l.right, l.pixels), (unsigned long long)l.pixels, percent(l.missing, l.pixels),
                percent(l.other, l.pixels), l.depth_rms / spacing);
         assert_true(percent(l.right, l.pixels) >= 99.9);

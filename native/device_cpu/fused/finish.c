@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// finish: shade, smooth, antialias, then peel or compose and extract as one walk over rows. The planes between them stay in rings of
-// rows that the second-level cache holds: nothing but the picture is written. Same functions, same numbers as the kernels.
+// finish: shade, smooth, antialias, then peel or compose and extract as one walk over rows. The planes between them stay
+// in rings of rows that the second-level cache holds: nothing but the picture, or what peeling hands on, is written. Same
+// functions, same numbers as the kernels.
 // Where nothing is peeled the scene is opaque: alpha is 1 but for edges.
 #include "device_cpu/kernels/antialias.h"
 #include "device_cpu/kernels/compose.h"
@@ -420,7 +421,8 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
     uint32_t threads = pt_pool_threads(shared->pool);
     finish.memory = pt_cpu_scratch(shared, 0, threads * finish.thread_floats * sizeof(float));
     // sums of tiles behind the walks, on a cache line
-    size_t columns = (finish.planes.view->width + PT_TILE - 1) / PT_TILE, walks = (threads * sizeof *finish.walks + 63) / 64 * 64;
+    size_t columns = (finish.planes.view->width + PT_TILE - 1) / PT_TILE;
+    size_t walks = (threads * sizeof *finish.walks + 63) / 64 * 64;
     finish.walks = pt_cpu_scratch(shared, 1, walks + threads * columns * sizeof(struct pt_tile_sum));
     if (!finish.memory || !finish.walks)
         return PATINA_ERROR_MEMORY;

@@ -239,7 +239,8 @@ typedef struct patina_cloud_style {
     size_t struct_size;
     double world_from_object[16]; // all zero = identity. Mirrored, non-uniform, singular: all allowed
     uint32_t lighting;            // patina_lighting
-    uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals and for transparent clouds
+    uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals and where the cloud
+                                  // is transparent
     float d_min;                  // the paper's d~, world units: least distance of two layers; 0 = automatic
     float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8); for black 1e-20
     float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
@@ -284,11 +285,11 @@ typedef struct patina_settings {
     uint32_t film_transparent; // 1 = background has alpha 0
     float world_color[3];      // linear; background and ambient light
     uint32_t passes;           // bits 1 << PATINA_PASS_*: passes to make beside the combined one; 0 = all
-    uint32_t layers;           // at most so many layers of surface are peeled and blended, up to PATINA_MAX_LAYERS; 0 = 1 where
-                               // everything in view is opaque, else 8. Peeling ends by itself when a layer is empty or less
-                               // than 1/512 of the light comes through. Paper [D 4, 5]
-    uint32_t layer_passes;     // bits 1 << PATINA_PASS_COMBINED, _DEPTH, _NORMAL: kept of every layer for patina_frame_read_layer;
-                               // all layers are then peeled, behind opaque surfaces too, and 0 layers means 8. 0 = none
+    uint32_t layers;           // at most so many layers of surface are peeled and blended, up to PATINA_MAX_LAYERS;
+                               // 0 = 8. One is enough where everything in view is opaque; else peeling ends when a
+                               // layer is empty or less than 1/512 of the light comes through. Paper [D 4, 5]
+    uint32_t layer_passes;     // bits 1 << PATINA_PASS_COMBINED, _DEPTH, _NORMAL: kept of every layer for
+                               // patina_frame_read_layer; layers are then peeled behind opaque surfaces too. 0 = none
     float error_target;        // > 0: quality and fill are chosen, the cheapest whose expected colour error is not above this;
                                // where none is, the best. 0 = quality and fill as they are set
     uint32_t strata;           // 1..6: draw only every 32nd, 16th, .. 1st point of each chunk, rounded up to 16 points:
