@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from stage import ROOT, Stage, kept
 
-from truth import look, sample, scenes
+from truth import look
 from truth.surfaces import Torus
 
 DATA = ROOT.parent / "shared/data"
@@ -80,12 +80,20 @@ def _volume(name: str) -> tuple[np.ndarray, float]:
     return field / field.max(), 0.25
 
 
-def _isosurface(name: str, count: int) -> dict[str, np.ndarray]:
-    """Points uniform in area on the level's triangles, normals from the field."""
+def _gyroid() -> tuple[np.ndarray, float]:
+    """A 128^3 field: sheets in all directions within a ball."""
+    x, y, z = np.meshgrid(*[np.linspace(-1.0, 1.0, 128)] * 3, indexing="ij")
+    s, c = [np.sin(6.0 * axis) for axis in (x, y, z)], [np.cos(6.0 * axis) for axis in (x, y, z)]
+    field = s[0] * c[1] + s[1] * c[2] + s[2] * c[0]
+    return np.maximum(np.abs(field) - 0.3, 4.0 * (x * x + y * y + z * z - 0.9)), 0.0
+
+
+def _isosurface(field: np.ndarray, level: float, count: int) -> dict[str, np.ndarray]:
+    """Points uniform in area on the level's triangles, within [-1, 1]^3, normals from the field."""
     from skimage.measure import marching_cubes
 
-    corner, face, normal, _ = marching_cubes(*_volume(name))
-    corner = corner / 31.5 - 1.0
+    corner, face, normal, _ = marching_cubes(field, level)
+    corner = corner * 2.0 / (len(field) - 1) - 1.0
     random = np.random.default_rng(2)
     a, b, c = (corner[face[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -109,11 +117,6 @@ def _tori(count: int) -> dict[str, np.ndarray]:
             for k, key in enumerate(("position", "normal"))}
 
 
-def _generated(count: int) -> dict[str, np.ndarray]:
-    points = sample(scenes.build("gyroid"), count)
-    return {"position": points.position, "normal": points.normal}
-
-
 def origin_of(name: str) -> str:
     """What the scene's points are, for the table."""
     if name == "Dragon" and (DATA / "stanford/dragon_range_union").is_dir():
@@ -130,8 +133,8 @@ def stage(name: str) -> Stage:
         if name == "3 nested tori":
             return _tori(count)
         if name in ("Neghip", "Hydrogen"):
-            return _isosurface(name, count)
-        return (_dragon(count) if name == "Dragon" else None) or _generated(count)
+            return _isosurface(*_volume(name), count)
+        return (_dragon(count) if name == "Dragon" else None) or _isosurface(*_gyroid(), count)
 
     closed = name == "3 nested tori" or origin_of(name) == "the scans"
     arrays = kept(f"paper-{name.replace(' ', '-')}-{origin_of(name).split(':')[0].replace(' ', '-')}", make)
@@ -142,7 +145,7 @@ def stage(name: str) -> Stage:
     def camera(turn: float):
         a, rise = np.radians(turn + 20.0), np.radians(20.0)
         back = np.array([np.sin(a) * np.cos(rise), -np.cos(a) * np.cos(rise), np.sin(rise)])
-        one = look(centre + 2.3 * size * back, centre)
+        one = look(centre + 1.9 * size * back, centre)
         return type(one)(**{**vars(one), "near": 0.1 * size, "far": 10.0 * size})
 
     sun = {"type": 1, "power": np.pi, "direction": [-0.36, 0.48, -0.8]}
