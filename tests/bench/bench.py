@@ -37,7 +37,8 @@ import stage
 ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
-GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers", "peers", "hard")
+GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
+          "peers", "hard")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,

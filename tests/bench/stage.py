@@ -74,8 +74,8 @@ class Stage:
 
     def exact(self, turn: float, width: int, height: int, layers: int = 1, shadow_samples: int = 0,
               sun_angle: float = 0.0, dark: bool = False) -> Picture:
-        """The picture at a turn of the camera, float32, without its layers but for the last transmittance. dark: as if no
-        light shone but the world's."""
+        """The picture at a turn of the camera, float32, without its layers but for the last transmittance. dark: no
+        light but the world's."""
         def make() -> dict[str, np.ndarray]:
             lights = () if dark else tuple(replace(one, angle=sun_angle) for one in self.scene.lights)
             scene = replace(self.scene, lights=lights)
