@@ -70,6 +70,16 @@ class PatinaSceneProperties(PropertyGroup):
         name="Threads", override=_OVERRIDE, default=0, min=0, max=1024,
         description="Processor threads; 0 follows Blender's own setting. Never changes the picture")
 
+    meshes: EnumProperty(
+        name="Meshes", override=_OVERRIDE, default='OFF',
+        description="Whether meshes with faces are in the picture",
+        items=(
+            ('OFF', "Not Drawn", "Only points; a warning names the meshes", 0),
+            ('POINTS', "As Points", "Points are spread over the faces, with the material's base color and lit: meshes hide "
+                                    "points and points hide meshes", 1)))
+    mesh_points: IntProperty(
+        name="Points per Mesh", override=_OVERRIDE, default=500000, min=100, soft_max=5000000,
+        description="How many points are spread over each mesh")
     samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
         description="Pictures, each shifted by a part of a pixel, that a final render takes the mean of. More than one stand "

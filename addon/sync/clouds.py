@@ -7,7 +7,7 @@ import contextlib
 import hashlib
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -15,12 +15,14 @@ from mathutils import Matrix
 
 from .. import jobs, native
 from ..properties import enum_number
-from . import attributes, estimates, linked
+from . import attributes, estimates, linked, meshes
 from .camera import row_major
 
 # Clouds that the last picture did not use may stay up to this many bytes (24 a point): enough for the other view
 # layers and scenes of a session, little beside what Blender itself holds for the same points.
 IDLE_BYTES = 1 << 30
+
+LIT = 2  # PATINA_LIGHTING_LIT
 
 NOTHING = 1e-20  # stands for zero where zero would mean "default" to the library
 
@@ -186,7 +188,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             continue
         if not visible(instance):
             continue
-        if obj.type == 'MESH' and len(obj.data.polygons):
+        solid = obj.type == 'MESH' and len(obj.data.polygons) > 0 and not obj.patina.linked_file
+        if solid and depsgraph.scene_eval.patina.meshes == 'OFF':
             faces.add(obj.name)
             continue
         link = None
@@ -195,14 +198,18 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             if link is None:
                 notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
                 continue
-        place = link.identity() if link else (obj.data.as_pointer(), *_attribute_names(obj))
+        count = depsgraph.scene_eval.patina.mesh_points if solid else 0
+        place = link.identity() if link else (obj.data.as_pointer(), count, *_attribute_names(obj))
         if place not in taken:
-            identity = place if link else _identity(obj, used)
+            identity = place if link else (*_identity(obj, used), count)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
         if cloud:
-            items.append(CloudItem(cloud, _style(obj, instance.matrix_world), obj.pass_index))
+            style = _style(obj, instance.matrix_world)
+            if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
+                style = replace(style, lighting=LIT)
+            items.append(CloudItem(cloud, style, obj.pass_index))
             built = cloud.built if isinstance(cloud, Pending) else cloud
             if built:
                 scale = max(map(abs, instance.matrix_world.to_scale()))
@@ -213,7 +220,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         notices.append("no visible object has points to draw")
     if faces:
         notices.append(f"{len(faces)} mesh object{'s' * (len(faces) > 1)} with faces not drawn: "
-                       "Patina draws only points so far")
+                       "Render Properties > Surface > Meshes draws them")
     return items
 
 
@@ -221,7 +228,7 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
     """Builds each cloud at once, polling; content decides whether it is built anew."""
 
     def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> native.Cloud | None:
-        arrays = None if link else _read(obj, notices)
+        arrays = None if link else _read(obj, notices, identity[-1])
         if arrays is None and link is None:
             return None
         name = obj.name
@@ -245,7 +252,7 @@ class Trusted:
         self.reads = 0  # how often points were read, for tests
 
     def forget(self, owners: set[tuple[str, str]] | None = None) -> None:
-        """Data that changed, as (type name, full name) of object or data; None: all."""
+        """Data that changed, as (type name, full name) of object, data or material; None: all."""
         self._known = {} if owners is None else {
             identity: known for identity, known in self._known.items() if not owners.intersection(identity[-1])}
 
@@ -254,7 +261,8 @@ class Trusted:
         self._used = set()
 
         def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | None:
-            key = (*identity, ((_kind(obj), obj.original.name_full), (_kind(obj.data), obj.data.original.name_full)))
+            owners = (obj, obj.data, *(slot.material for slot in obj.material_slots if slot.material))
+            key = (*identity, tuple((_kind(owner), owner.original.name_full) for owner in owners))
             self._used.add(key)
             if key not in self._known:
                 said: list[str] = []
@@ -262,7 +270,7 @@ class Trusted:
                     self._known[key] = (PendingLink(link), said)
                 else:
                     self.reads += 1
-                    arrays = _read(obj, said)
+                    arrays = _read(obj, said, identity[-1])
                     self._known[key] = (Pending(obj.name, identity, arrays) if arrays else None, said)
             pending, said = self._known[key]
             notices.extend(said)
@@ -283,7 +291,7 @@ def changed_owners(depsgraph: bpy.types.Depsgraph) -> set[tuple[str, str]]:
         if isinstance(item, bpy.types.Object):
             if update.is_updated_geometry:
                 owners.add((_kind(item), item.name_full))
-        elif update.is_updated_geometry or isinstance(item, (bpy.types.Mesh, bpy.types.PointCloud)):
+        elif update.is_updated_geometry or isinstance(item, (bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Material)):
             owners.add((_kind(item), item.name_full))
     return owners
 
@@ -306,8 +314,12 @@ def _attribute_names(obj: bpy.types.Object) -> tuple[str, ...]:
     return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute)
 
 
-def _read(obj: bpy.types.Object, notices: list[str]) -> PointArrays | None:
+def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int) -> PointArrays | None:
+    """The object's points; mesh_points > 0: so many on its faces."""
     data = obj.data
+    if mesh_points:
+        found = meshes.sample(obj, mesh_points)
+        return PointArrays(*found, None) if found else None
     count = len(data.vertices if obj.type == 'MESH' else data.points)
     if count == 0:
         return None

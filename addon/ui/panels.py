@@ -61,6 +61,9 @@ class PATINA_PT_surface(_PatinaPanel, Panel):
         row.active = patina.samples == 1
         row.prop(patina, "antialias")
         layout.prop(patina, "samples")
+        layout.prop(patina, "meshes")
+        if patina.meshes == 'POINTS':
+            layout.prop(patina, "mesh_points")
 
 
 class PATINA_PT_transparency(_PatinaPanel, Panel):

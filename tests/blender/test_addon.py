@@ -17,7 +17,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "check_layers", "check_final", "check_plan",
-           "check_import", "check_formats", "check_linked",
+           "check_import", "check_formats", "check_linked", "check_meshes",
            "check_session")
 
 
@@ -33,7 +33,7 @@ def main():
     names = wanted_names()
     passed = failed = skipped = 0
     for module in map(importlib.import_module, MODULES):
-        for name, test in vars(module).items():
+        for name, test in list(vars(module).items()):
             if not name.startswith("test_") or names and not any(part in name for part in names):
                 continue
             label = f"{module.__name__[len('check_'):]}/{name[len('test_'):]}"

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes with faces → points on their faces, evenly spread, with normals and their materials' base colours.
+
+So that meshes hide points and points hide meshes by the one rule of the picture: who is nearer. Faces smaller than the
+spacing of the points come out as their neighbours do.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+WHITE = (0.8, 0.8, 0.8, 1.0)
+
+# The additive recurrence of the plastic number: each next point falls into the largest gap of those before it.
+_STEP = np.array([0.7548776662466927, 0.5698402909980532])
+
+
+def sample(obj: bpy.types.Object, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Positions (n, 3), normals (n, 3) and linear colours (n, 4) of an evaluated object, float32; None without area."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    corners = _get(mesh.loop_triangles, "vertices", 3, np.int32)
+    places = _get(mesh.vertices, "co", 3, np.float32)
+    a, b, c = (places[corners[:, k]].astype(np.float64) for k in range(3))
+    cross = np.cross(b - a, c - a)
+    double_area = np.linalg.norm(cross, axis=1)
+    total = double_area.sum()
+    if not total > 0.0 or not np.isfinite(total):
+        return None
+    ends = np.cumsum(double_area)
+    # points are dealt out along the list of triangles by area, so that each gets its share to within one
+    triangle = np.minimum(np.searchsorted(ends, (np.arange(count) + 0.5) * (total / count)), len(ends) - 1)
+    u, v = (np.arange(count)[:, None] * _STEP % 1.0).T
+    over = u + v > 1.0
+    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    weights = np.stack([1.0 - u - v, u, v], 1)
+    positions = sum(weights[:, k, None] * corner[triangle] for k, corner in enumerate((a, b, c)))
+    normals = cross[triangle] / double_area[triangle, None]
+    smooth = _get(mesh.polygons, "use_smooth", 1, bool)[_get(mesh.loop_triangles, "polygon_index", 1, np.int32)][triangle]
+    if smooth.any():
+        own = _get(mesh.vertices, "normal", 3, np.float32)[corners[triangle[smooth]]]
+        normals[smooth] = (weights[smooth, :, None] * own).sum(axis=1)
+    materials = _get(mesh.loop_triangles, "material_index", 1, np.int32)[triangle]
+    palette = np.array([base_color(slot.material) for slot in obj.material_slots] or [WHITE], np.float32)
+    return (positions.astype(np.float32), normals.astype(np.float32),
+            palette[np.clip(materials, 0, len(palette) - 1)])
+
+
+def base_color(material: bpy.types.Material | None) -> tuple[float, ...]:
+    """Of the Principled or Diffuse node, else the colour that the Solid viewport shows."""
+    if material is None:
+        return WHITE
+    if material.node_tree and (bpy.app.version >= (5, 0, 0) or material.use_nodes):
+        for node in material.node_tree.nodes:
+            name = {'BSDF_PRINCIPLED': "Base Color", 'BSDF_DIFFUSE': "Color"}.get(node.type)
+            if name and not node.inputs[name].is_linked:
+                return tuple(node.inputs[name].default_value)
+    return tuple(material.diffuse_color)
+
+
+def _get(items: bpy.types.bpy_prop_collection, name: str, width: int, kind: type) -> np.ndarray:
+    values = np.empty(len(items) * width, kind)
+    items.foreach_get(name, values)
+    return values.reshape(-1, width) if width > 1 else values
