@@ -36,7 +36,7 @@ class PATINA_PT_statistics(_SidebarPanel, Panel):
         rows = [("Points", f"{stats['points']:,}"), ("Drawn", f"{stats['points_scattered']:,}"),
                 ("Chunks", f"{stats['chunks'] - stats['chunks_culled']:,} of {stats['chunks']:,}"),
                 ("Spacing", f"{stats['spacing_px']:.2f} pixels"),
-                ("Expected Error", f"{stats['expected'].color:.2%} of white"),
+                ("Expected Error", f"{stats['expected']['color']:.2%} of white"),
                 ("Picture", f"{stats['width']} x {stats['height']}"), ("Time", f"{stats['ms']:.1f} ms"),
                 ("Planes", f"{stats['plane_bytes'] / 1e6:,.0f} MB"),
                 ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]
