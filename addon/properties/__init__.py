@@ -22,6 +22,11 @@ def enum_number(group: PropertyGroup, name: str) -> int:
 
 
 class PatinaSceneProperties(PropertyGroup):
+    error_target: FloatProperty(
+        name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
+        precision=1,
+        description="Expected error of colours, in percent of white, that the picture may have: the cheapest quality and "
+                    "hole filling that keep to it are chosen. 0: as they are set below")
     quality: EnumProperty(
         name="Quality", override=_OVERRIDE, default='REFINED',
         description="How filled pixels get their depth and normal",

@@ -36,6 +36,7 @@ class Settings:
     film_transparent: int
     world_color: tuple[float, float, float]
     layers: int
+    error_target: float = 0.0
     strata: int = 0  # of 6 that are drawn; 0: all
 
 
@@ -52,7 +53,8 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         antialias=enum_number(patina, "antialias"),
         film_transparent=int(scene.render.film_transparent),
         world_color=world_color,
-        layers=patina.layers)
+        layers=patina.layers,
+        error_target=0.0 if quality else 0.01 * patina.error_target)
 
 
 def samples(scene: bpy.types.Scene) -> int:

@@ -50,8 +50,10 @@ class PATINA_PT_surface(_PatinaPanel, Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         patina = context.scene.patina
-        layout.prop(patina, "quality")
+        layout.prop(patina, "error_target")
         column = layout.column()
+        column.active = not patina.error_target
+        column.prop(patina, "quality")
         column.prop(patina, "fill")
         row = column.row()
         row.active = patina.fill != 'OFF'

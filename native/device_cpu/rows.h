@@ -69,16 +69,4 @@ static inline vf pt_own_distance(const struct view_args *view, const float *deff
     return vf_select(other, vf_gather(deff, source, other), own);
 }
 
-// Rows of float4 pixels kept as separate vectors, for windows whose taps are plain loads. Every channel of a row has
-// room for PT_RING_PAD floats before its first column and at least as many behind its last.
-enum { PT_RING_PAD = 16, PT_RING_CHANNELS = 4 };
-
-static inline size_t pt_ring_stride(const uint32_t rect[4]) { return rect[2] - rect[0] + 4 * PT_RING_PAD; }
-
-// rows: rings of PT_RING_CHANNELS * stride floats a row; the result is indexed from the rectangle's first column.
-static inline float *pt_ring_channel(float *rows, size_t stride, uint32_t row, uint32_t channel)
-{
-    return rows + (row * PT_RING_CHANNELS + channel) * stride + PT_RING_PAD;
-}
-
 #endif

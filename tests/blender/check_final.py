@@ -48,6 +48,24 @@ def test_mist():
     check_close(render()["Mist"][..., 0][pixel(scene, (0.01, 0.01, -3))], 0.0625, 2e-3, "quadratic")
 
 
+def test_error_target():
+    """A coarse target leaves filling out where it is met without, a fine one keeps it; Quality and Hole Filling give way."""
+    scene = dense_scene()
+    scene.view_layers[0].patina.use_pass_source = True
+
+    def filled():
+        return int((np.abs(render()["Source"]) > 1.0).sum())
+
+    check(filled() > 0, "as set, some pixels are filled")
+    scene.patina.error_target = 50.0
+    check(filled() == 0, "50% is met by measured points alone")
+    scene.patina.fill = 'OFF'
+    scene.patina.error_target = 0.01
+    check(filled() > 0, "0.01% asks for all that there is")
+    scene.patina.error_target = 0.0
+    check(filled() == 0, "as set: filling is off")
+
+
 def test_object_index():
     """Every pixel of an object, measured or filled, has its number; instances too."""
     scene = dense_scene()
