@@ -27,7 +27,7 @@ CANCELLED = -7  # PATINA_ERROR_CANCELLED
 INTERNAL = -10  # PATINA_ERROR_INTERNAL
 
 # patina_pass: plane name → (number, channels)
-PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1)}
+PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1)}
 
 MOST_LAYERS = 16  # PATINA_MAX_LAYERS
 
@@ -110,12 +110,15 @@ class _FileAttribute(_Descriptor):
 class _CloudStyle(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
-                ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float)]
+                ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float),
+                ("shadow_off", c_uint32)]
 
 
 class _LightDesc(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("type", c_uint32), ("color", c_float * 3), ("power", c_float),
-                ("position", c_double * 3), ("direction", c_double * 3)]
+                ("position", c_double * 3), ("direction", c_double * 3), ("side", c_double * 3), ("angle", c_float),
+                ("radius", c_float), ("size", c_float * 2), ("shape", c_uint32), ("cone", c_float),
+                ("blend", c_float), ("shadows", c_uint32)]
 
 
 class _Camera(_Descriptor):
@@ -129,7 +132,8 @@ class _Settings(_Descriptor):
                 ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
                 ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
                 ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
-                ("strata", c_uint32)]
+                ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
+                ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32)]
 
 
 class _ExpectedError(Structure):
@@ -140,7 +144,8 @@ class _FrameStats(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("points", c_uint64),
                 ("points_scattered", c_uint64), ("chunks", c_uint64), ("chunks_culled", c_uint64),
                 ("ms", c_double), ("plane_bytes", c_uint64), ("layers", c_uint32), ("spacing_px", c_float),
-                ("expected", _ExpectedError)]
+                ("expected", _ExpectedError), ("shadow_bytes", c_uint64), ("shadow_maps", c_uint32),
+                ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32)]
 
 
 # ---- the library ---------------------------------------------------------------------------------------------
@@ -188,6 +193,9 @@ _CALLS = {
     "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
     "patina_frame_read_keys": (c_void_p, c_void_p, c_size_t),
     "patina_frame_read_layer": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
+    "patina_frame_bake_shadows": (c_void_p, c_void_p),
+    "patina_frame_save_shadows": (c_void_p, c_char_p),
+    "patina_frame_load_shadows": (c_void_p, c_void_p, c_char_p),
     "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
 }
@@ -462,6 +470,17 @@ class Frame(_Handle):
         with _RENDERING:
             _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
                    self._device._handle)
+
+    def bake_shadows(self, scene: Scene) -> None:
+        """Whole shadow textures of the scene's casting lights, without a picture."""
+        self._call("bake_shadows", scene._handle)
+
+    def save_shadows(self, path: str) -> None:
+        self._call("save_shadows", os.fsencode(path))
+
+    def load_shadows(self, scene: Scene, path: str) -> None:
+        """Raises PatinaError with the reason when the file is damaged, stale, or of another scene."""
+        self._call("load_shadows", scene._handle, os.fsencode(path))
 
     def cancel(self) -> None:
         library().patina_frame_cancel(self._handle)

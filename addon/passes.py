@@ -99,6 +99,8 @@ PASSES = (
     RenderPass("Mist", 1, "Z", 'VALUE', "DEPTH", lambda layer: layer.use_pass_mist, _mist),
     RenderPass("Position", 3, "XYZ", 'VECTOR', "DEPTH", lambda layer: layer.use_pass_position, _position),
     RenderPass("Normal", 3, "XYZ", 'VECTOR', "NORMAL", lambda layer: layer.use_pass_normal),
+    RenderPass("Shadow", 3, "RGB", 'COLOR', "SHADOW", lambda layer: layer.patina.use_pass_shadow,
+               lambda plane, camera: np.repeat(plane, 3, 2)),
     RenderPass("IndexOB" if bpy.app.version < (5, 0, 0) else "Object Index", 1, "X", 'VALUE', "KEYS",
                lambda layer: layer.use_pass_object_index, _object_index),
     RenderPass("Source", 1, "X", 'VALUE', "SOURCE", lambda layer: layer.patina.use_pass_source),

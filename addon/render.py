@@ -64,7 +64,38 @@ def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[f
         reason = str(error)  # the error itself would keep the whole picture alive
     forget_device()
     picture = _draw_on(_open(replace(description.device, name="cpu"), poll), description, wanted, poll, tile_size)
-    return replace(picture, notice=f"{device.name} failed, the CPU drew this picture: {reason}")
+    notice = f"{device.name} failed, the CPU drew this picture: {reason}"
+    return replace(picture, notice=f"{notice}; {picture.notice}" if picture.notice else notice)
+
+
+def bake_shadows(description: SceneDescription, path: str) -> None:
+    """Computes the scene's shadow textures and writes them to a file; PatinaError with the reason when it cannot."""
+    _with_frame(description, lambda frame, scene: (frame.bake_shadows(scene), frame.save_shadows(path)))
+
+
+def check_shadows(description: SceneDescription, path: str) -> None:
+    """PatinaError with the reason unless the file's shadow textures are for this scene as it is."""
+    _with_frame(description, lambda frame, scene: frame.load_shadows(scene, path))
+
+
+def _with_frame(description: SceneDescription, work: Callable[[native.Frame, native.Scene], Any]) -> None:
+    device = device_for(description.device)
+    with native.Scene() as scene, native.Frame(device) as frame:
+        describe(scene, description, [])
+        jobs.run(lambda: work(frame, scene), frame.cancel, lambda: False)
+
+
+def _load_shadows(frame: native.Frame, description: SceneDescription) -> str:
+    """Takes baked shadows where they fit; else the reason why they are computed."""
+    if not description.shadow_file:
+        return ""
+    try:
+        with native.Scene() as scene:
+            describe(scene, description, [])
+            frame.load_shadows(scene, description.shadow_file)
+    except native.PatinaError as error:
+        return f"baked shadows are not used: {error}"
+    return ""
 
 
 def _open(choice: DeviceChoice, poll: Callable[[float], bool]) -> native.Device:
@@ -78,14 +109,17 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
     if description.samples > 1:
         description = replace(description, settings=replace(description.settings, antialias=ANTIALIAS_OFF))
     regions = tiles(description.settings.region, tile_size)
+    if len(regions) > 1 or description.samples > 1:  # all of them take from whole shadow textures
+        description = replace(description, settings=replace(description.settings, shadow_lazy=0))
     x0, y0, x1, y1 = description.settings.region
     picture: dict[str, np.ndarray] = {}
     # The frame is made and closed on this thread, so that poll never meets a dead handle.
     with native.Frame(device) as frame:
-        done, stats = 0, {}
+        done, stats, notice = 0, {}, ""
 
         def work() -> None:
-            nonlocal done
+            nonlocal done, notice
+            notice = _load_shadows(frame, description)
             for region in regions:
                 tile = replace(description, settings=replace(description.settings, region=region))
                 for name, pixels in _draw_tile(frame, tile, wanted, stats).items():
@@ -98,7 +132,7 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
                 done += 1
 
         jobs.run(work, frame.cancel, lambda: poll((done + frame.progress()) / len(regions)))
-        return Picture(picture, stats, device.name)
+        return Picture(picture, stats, device.name, notice)
 
 
 def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[str],

@@ -42,7 +42,8 @@ class Wish:
         settings = replace(
             self.scene.settings, width=-(-self.view.width // shrink), height=-(-self.view.height // shrink),
             region=(x0 // shrink, y0 // shrink, -(-x1 // shrink), -(-y1 // shrink)),
-            strata=pace.WHOLE if self.level.strata == pace.STRATA else self.level.strata)
+            strata=pace.WHOLE if self.level.strata == pace.STRATA else self.level.strata,
+            shadow_lazy=0, shadow_progressive=1)  # one sample after a change of lights, refined at rest
         return replace(self.scene, clouds=clouds, camera=self.view.camera, settings=settings)
 
 
@@ -237,6 +238,8 @@ class Viewport:
                 if shown:
                     self.shown = shown
                     self.pictures += 1
+                    if shown.stats["shadow_pending"] and not self._wanted and not self._closed:
+                        self._wanted = wish  # more samples of soft shadows
 
     def _render(self, wish: Wish) -> Shown:
         start = time.monotonic()

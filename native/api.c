@@ -135,18 +135,59 @@ void patina_frame_destroy(patina_frame *frame)
     free(frame);
 }
 
-int patina_frame_render(patina_frame *frame, const patina_scene *scene)
+// Waits for the device. A cancel must not wait for another frame's turn.
+static int take_turn(patina_frame *frame)
 {
-    if (!frame || !scene)
-        return fail("patina_frame_render: frame or scene is NULL");
-    while (pthread_mutex_trylock(&frame->device->busy)) { // another frame's turn: a cancel must not wait for it
+    while (pthread_mutex_trylock(&frame->device->busy)) {
         if (atomic_exchange(&frame->cancel, 0))
             return pt_fail(&frame->handle, PATINA_ERROR_CANCELLED, "rendering was cancelled");
         nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
     }
-    int error = pt_frame_render(frame, scene);
+    return PATINA_OK;
+}
+
+static int end_turn(patina_frame *frame, int error)
+{
     pthread_mutex_unlock(&frame->device->busy);
     return error;
+}
+
+int patina_frame_render(patina_frame *frame, const patina_scene *scene)
+{
+    if (!frame || !scene)
+        return fail("patina_frame_render: frame or scene is NULL");
+    int error = take_turn(frame);
+    return error ? error : end_turn(frame, pt_frame_render(frame, scene));
+}
+
+int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene)
+{
+    if (!frame || !scene)
+        return fail("patina_frame_bake_shadows: frame or scene is NULL");
+    int error = take_turn(frame);
+    return error ? error : end_turn(frame, pt_shadows_bake(frame, scene));
+}
+
+int patina_frame_load_shadows(patina_frame *frame, const patina_scene *scene, const char *path)
+{
+    if (!frame || !scene || !path)
+        return fail("patina_frame_load_shadows: frame, scene or path is NULL");
+    int error = take_turn(frame);
+    return error ? error : end_turn(frame, pt_shadows_load(frame, scene, path));
+}
+
+int patina_frame_save_shadows(const patina_frame *frame, const char *path)
+{
+    if (!frame || !path)
+        return fail("patina_frame_save_shadows: frame or path is NULL");
+    return pt_shadows_save(frame, path);
+}
+
+int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size)
+{
+    if (!frame || !values)
+        return fail("patina_frame_read_shadows: frame or values is NULL");
+    return pt_shadows_read(frame, instance, light, values, size);
 }
 
 void patina_frame_cancel(patina_frame *frame)

@@ -23,7 +23,7 @@ static const char *const plane_names[PT_PLANE_COUNT] = {
 #undef PT_X
 };
 
-static double milliseconds(void)
+double pt_milliseconds(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
@@ -37,7 +37,7 @@ static uint64_t plane_total(const struct patina_frame *frame)
     uint64_t total = 0;
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int level = 0; level < PT_SLOTS; level++)
-            total += frame->planes[p][level].size;
+            total += frame->planes[p][level].size + frame->shadows.planes[p][level].size;
     return total;
 }
 
@@ -58,12 +58,16 @@ static int check_cap(const struct patina_frame *frame, const struct pt_plan *pla
                    plan->crop[2], plan->crop[3], (unsigned long long)(cap >> 20));
 }
 
-static int ensure_plane(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which, uint32_t level)
+int pt_frame_ensure_plane(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
+                          enum pt_plane which, uint32_t level)
 {
-    struct pt_buffer *plane = &frame->planes[which][level];
+    struct pt_buffer *plane = &planes[which][level];
     size_t bytes = size_of(plan, which, level);
-    if (plane->size == bytes && (plane->data || plane->name))
+    int roomy = planes != frame->planes; // maps of one light differ by a texel or two: not worth new memory each time
+    if ((plane->size == bytes || (roomy && plane->size > bytes && plane->size < 2 * bytes)) && (plane->data || plane->name))
         return PATINA_OK;
+    bytes += roomy ? bytes / 8 : 0;
+    bytes -= bytes % plane_bytes[which];
     frame->device->ops->buffer_destroy(frame->device, plane);
     int error = check_cap(frame, plan, plane_total(frame) + bytes);
     if (!error)
@@ -110,7 +114,8 @@ static void destroy_planes(struct patina_frame *frame)
 
 struct render {
     struct patina_frame *frame;
-    const struct pt_plan *plan;
+    const struct patina_scene *scene;
+    struct pt_plan *plan;
     struct pt_resident **clouds; // per instance
     struct pt_buffer *chunks;    // per instance, of the layer at hand
     struct pt_buffer **bound;    // scratch for one pass
@@ -150,12 +155,14 @@ static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *r
 {
     if (!ref->of_instance)
         return &render->frame->planes[ref->which][ref->index];
+    if (ref->which == PT_MARKS || ref->which == PT_SHADOWS)
+        return pt_shadows_buffer(render->frame, ref->which, ref->index);
     return ref->which == PT_CHUNKS ? &render->chunks[ref->index] : &render->clouds[ref->index]->buffers[ref->which];
 }
 
 static int clear_keys(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which)
 {
-    int error = ensure_plane(frame, plan, which, 0);
+    int error = pt_frame_ensure_plane(frame, frame->planes, plan, which, 0);
     return error ? error
                  : frame->device->ops->buffer_fill(frame->device, &frame->planes[which][0],
                                                    (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
@@ -168,7 +175,7 @@ static int begin_peeling(struct render *render)
 {
     struct patina_frame *frame = render->frame;
     const size_t tiles = size_of(render->plan, PT_PLANE_TILES, PT_TILE_LEVEL);
-    int error = ensure_plane(frame, render->plan, PT_PLANE_THROUGH, 0);
+    int error = pt_frame_ensure_plane(frame, frame->planes, render->plan, PT_PLANE_THROUGH, 0);
     render->tiles = malloc(tiles);
     if (!error && !render->tiles)
         error = pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
@@ -230,7 +237,7 @@ static int turn_to_layer(struct render *render, const struct pt_pass *pass, uint
 
 // ---- passes --------------------------------------------------------------------------------------------------------------
 
-static void note_time(struct patina_frame *frame, const char *name, double ms)
+void pt_frame_note_time(struct patina_frame *frame, const char *name, double ms)
 {
     uint32_t i = 0;
     while (i < frame->timing_count && strcmp(frame->timings[i].name, name) != 0)
@@ -250,7 +257,7 @@ static int run_pass(struct render *render, const struct pt_pass *pass)
     for (uint32_t i = 0; i < pass->ref_count; i++) {
         const struct pt_ref *ref = &pass->refs[i];
         if (!ref->of_instance) {
-            int error = ensure_plane(frame, render->plan, ref->which, ref->index);
+            int error = pt_frame_ensure_plane(frame, frame->planes, render->plan, ref->which, ref->index);
             if (error)
                 return error;
         }
@@ -281,7 +288,7 @@ static int run_together(struct render *render, const struct pt_pass *passes)
         for (uint32_t k = 0; k < passes[i].ref_count && !error; k++) {
             const struct pt_ref *ref = &passes[i].refs[k];
             if (!ref->of_instance && peeled(ref->which))
-                error = ensure_plane(render->frame, render->plan, ref->which, ref->index);
+                error = pt_frame_ensure_plane(render->frame, render->frame->planes, render->plan, ref->which, ref->index);
             *next++ = buffer_of(render, ref);
         }
     }
@@ -296,7 +303,7 @@ static int run_plan(struct render *render)
 {
     struct patina_frame *frame = render->frame;
     const struct pt_plan *plan = render->plan;
-    double before = milliseconds();
+    double before = pt_milliseconds();
     frame->keys_valid = 0;
     frame->layer_count = 0;
     frame->layers[0] = (struct pt_layer){ .points = plan->points_scattered };
@@ -305,12 +312,20 @@ static int run_plan(struct render *render)
         error = begin_peeling(render);
     uint32_t ended = 0; // from this layer on there are none
     int writing = 0;    // the picture: from then on nothing stops it
+    int shadows = 0, marking = pt_shadows_stale(frame, render->scene, plan);
     for (uint32_t i = 0; i < plan->pass_count && !error; i++) {
         int run;
         if ((error = turn_to_layer(render, &plan->passes[i], &ended, &run)))
             return error;
         if (!run)
             continue;
+        if (plan->passes[i].kernel == PT_KERNEL_mark && !marking)
+            continue; // every texture is at hand
+        if (plan->passes[i].kernel == PT_KERNEL_shade && !shadows++) {
+            if ((error = pt_shadows_update(frame, render->scene, render->plan)))
+                return error;
+            before = pt_milliseconds();
+        }
         if (!writing && atomic_load(&frame->cancel))
             return PATINA_ERROR_CANCELLED;
         const struct pt_pass *pass = &plan->passes[i], *last = pass;
@@ -327,8 +342,8 @@ static int run_plan(struct render *render)
         }
         if (last->kernel == PT_KERNEL_peel)
             error = end_layer(render);
-        double now = milliseconds();
-        note_time(frame, last > pass ? "finish" : pass->name, now - before);
+        double now = pt_milliseconds();
+        pt_frame_note_time(frame, last > pass ? "finish" : pass->name, now - before);
         before = now;
         i = (uint32_t)(last - plan->passes);
         atomic_store(&frame->progress, (float)(i + 1) / (float)plan->pass_count);
@@ -355,6 +370,14 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
         frame->stats.layers += frame->layers[i].pixels > 0;
     frame->layer_most = plan->layers;
     frame->layer_passes = scene->settings.layer_passes;
+    frame->stats.shadow_maps = frame->shadow_maps;
+    frame->stats.shadow_width = frame->shadow_size[0];
+    frame->stats.shadow_height = frame->shadow_size[1];
+    for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
+        frame->stats.shadow_bytes += frame->shadows.words[i].size;
+    for (uint32_t i = 0; i < plan->light_count; i++)
+        frame->stats.shadow_pending += frame->shadows.lights[i].samples < plan->lights[i].samples &&
+                                       !frame->shadows.lights[i].settled;
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
     frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
@@ -367,21 +390,24 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene)
 {
     struct pt_plan plan;
-    struct render render = { .frame = frame, .plan = &plan };
-    double start = milliseconds();
+    struct render render = { .frame = frame, .scene = scene, .plan = &plan };
+    double start = pt_milliseconds();
     atomic_store(&frame->progress, 0.0f);
     frame->timing_count = 0;
+    frame->shadow_maps = frame->shadow_size[0] = frame->shadow_size[1] = 0;
     int error = pt_plan_create(scene, &plan);
     if (error) {
         atomic_store(&frame->cancel, 0);
         return pt_fail_again(&frame->handle, error);
     }
-    note_time(frame, "plan", milliseconds() - start);
+    pt_frame_note_time(frame, "plan", pt_milliseconds() - start);
     error = upload(&render);
+    if (!error)
+        error = pt_shadows_open(frame, scene, &plan);
     if (!error)
         error = run_plan(&render);
     if (!error)
-        keep_statistics(frame, scene, &plan, milliseconds() - start);
+        keep_statistics(frame, scene, &plan, pt_milliseconds() - start);
     for (uint32_t i = 0; i < plan.instance_count && render.chunks; i++)
         frame->device->ops->buffer_destroy(frame->device, &render.chunks[i]);
     free(render.clouds);
@@ -409,6 +435,7 @@ static const struct {
     [PATINA_PASS_DEPTH] = { PT_PLANE_DEPTH, 1, "DEPTH" },
     [PATINA_PASS_NORMAL] = { PT_PLANE_NORMALS, 3, "NORMAL" },
     [PATINA_PASS_SOURCE] = { PT_PLANE_SOURCE, 1, "SOURCE" },
+    [PATINA_PASS_SHADOW] = { PT_PLANE_SHADOW, 1, "SHADOW" },
 };
 
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
@@ -523,5 +550,6 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
 void pt_frame_release(struct patina_frame *frame)
 {
     destroy_planes(frame);
+    pt_shadows_release(frame);
     pt_residency_release(&frame->residency, frame->device);
 }

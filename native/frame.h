@@ -2,7 +2,7 @@
 #ifndef PT_FRAME_H
 #define PT_FRAME_H
 
-#include "plan.h"
+#include "frame_shadow.h"
 
 enum { PT_TIMINGS = PT_KERNEL_COUNT + 4 };
 
@@ -28,6 +28,8 @@ struct patina_frame {
     struct patina_device *device;
     struct pt_residency residency;
     struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS];
+    struct pt_shadows shadows;
+    uint32_t shadow_maps, shadow_size[2]; // of this render
     atomic_int cancel;
     _Atomic float progress;
     patina_frame_stats stats; // of the last finished render
@@ -50,6 +52,11 @@ int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size);
 int pt_frame_dump(const struct patina_frame *frame, const char *folder);
+// For its parts (frame_shadow.c).
+int pt_frame_ensure_plane(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
+                          enum pt_plane which, uint32_t level);
+void pt_frame_note_time(struct patina_frame *frame, const char *name, double ms);
+double pt_milliseconds(void);
 void pt_frame_release(struct patina_frame *frame); // planes and resident clouds
 
 #endif

@@ -252,25 +252,51 @@ static void plan_filling(struct builder *builder)
     plan_fill_level(builder, 0);
 }
 
-static void set_lights(const struct patina_scene *scene, struct shade_args *args)
+static void set_vector(const double axes[9], const double vector[3], float out[3])
 {
-    double axes[9], position[3];
+    double view[3];
+    pt_apply(axes, vector, view);
+    for (int k = 0; k < 3; k++)
+        out[k] = (float)view[k];
+}
+
+static void set_light(const struct patina_scene *scene, const patina_light_desc *light, struct light_args *out)
+{
+    const double pi = 3.14159265358979323846;
+    double axes[9], position[3], vector[3], points[3 * PT_AREA_POINTS], strength = (double)light->power;
     pt_camera_axes(&scene->camera, axes, position);
-    for (uint32_t i = 0; i < scene->light_count; i++) { // patina_scene_add_light keeps them to PT_MAX_LIGHTS
-        const patina_light_desc *light = &scene->lights[i];
-        struct light_args *out = &args->lights[args->light_count++];
-        double vector[3], view[3], strength = (double)light->power;
-        double length = sqrt(pt_dot(light->direction, light->direction));
-        for (int k = 0; k < 3; k++)
-            vector[k] = light->type == PATINA_LIGHT_SUN ? -light->direction[k] / length : light->position[k] - position[k];
-        pt_apply(axes, vector, view);
-        if (light->type == PATINA_LIGHT_POINT)
-            strength /= 4.0 * 3.14159265358979323846; // radiant power -> intensity
-        out->type = light->type;
-        for (int k = 0; k < 3; k++) {
-            out->vector[k] = (float)view[k];
-            out->color[k] = (float)((double)light->color[k] * strength);
+    for (int k = 0; k < 3; k++)
+        vector[k] = light->type == PATINA_LIGHT_SUN ? -light->direction[k] : light->position[k] - position[k];
+    set_vector(axes, vector, out->vector);
+    set_vector(axes, light->direction, out->axis);
+    if (light->type == PATINA_LIGHT_POINT || light->type == PATINA_LIGHT_SPOT)
+        strength /= 4.0 * pi; // radiant power -> intensity
+    if (light->type == PATINA_LIGHT_AREA) { // radiance times area, over its points
+        strength /= pi * PT_AREA_POINTS;
+        pt_area_points(light, points);
+        for (int i = 0; i < PT_AREA_POINTS; i++) {
+            for (int k = 0; k < 3; k++)
+                vector[k] = points[3 * i + k] - position[k];
+            set_vector(axes, vector, out->points + 3 * i);
         }
+    }
+    double edge = cos(0.5 * (double)light->cone);
+    out->cone[0] = (float)edge;
+    out->cone[1] = (float)(1.0 / fmax((1.0 - edge) * (double)light->blend, 1e-6));
+    out->type = light->type;
+    for (int k = 0; k < 3; k++)
+        out->color[k] = (float)((double)light->color[k] * strength);
+}
+
+// receives: whether the instance's shadow words are there to be read.
+static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, int receives, struct shade_args *args)
+{
+    uint32_t casting = 0;
+    for (uint32_t i = 0; i < scene->light_count; i++) { // patina_scene_add_light keeps them to PT_MAX_LIGHTS
+        struct light_args *out = &args->lights[args->light_count++];
+        set_light(scene, &scene->lights[i], out);
+        if (casting < plan->light_count && plan->lights[casting].light == &scene->lights[i] && ++casting && receives)
+            out->shadow = casting; // the frame puts the scale in, when it knows how many samples there are
     }
 }
 
@@ -287,11 +313,13 @@ static void plan_shade(struct builder *builder, uint32_t i)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     memcpy(args.world, builder->scene->settings.world_color, sizeof args.world);
     args.eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f;
+    args.arrived = builder->layer <= 1 && (builder->scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
     if (instance->args.lit)
-        set_lights(builder->scene, &args);
+        set_lights(plan, builder->scene, pt_receives(instance->instance), &args);
     REASON(ADD(builder, shade, args,
                { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
-                 buffer(PT_COLORS, i), shading_of(builder), plane(PT_PLANE_COLOR_A, 0), buffer(PT_OPACITIES, i) }),
+                 buffer(PT_COLORS, i), shading_of(builder), plane(PT_PLANE_COLOR_A, 0), buffer(PT_OPACITIES, i),
+                 buffer(PT_SHADOWS, i), plane(PT_PLANE_ARRIVED, 0) }),
            "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
            instance->args.lit ? "lit" : "unlit", args.light_count, args.blend);
 }
@@ -364,7 +392,8 @@ static struct extract_args extract_args(const struct builder *builder, uint32_t 
                                  .crop_height = plan->crop[3],
                                  .depth = passes >> PATINA_PASS_DEPTH & 1u,
                                  .normal = passes >> PATINA_PASS_NORMAL & 1u,
-                                 .source = passes >> PATINA_PASS_SOURCE & 1u };
+                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
+                                 .shadow = passes >> PATINA_PASS_SHADOW & 1u };
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
@@ -387,7 +416,7 @@ static void plan_layer_passes(struct builder *builder, enum pt_plane color)
     if (extract.depth || extract.normal)
         REASON(ADD(builder, extract, extract,
                    { keys_of(builder, 0), from_of(builder, 0), shading_of(builder), plane(depth, slot), plane(normal, slot),
-                     plane(depth, slot) }),
+                     plane(depth, slot), plane(depth, slot), plane(depth, slot) }),
                "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "", extract.normal ? " normal" : "");
 }
 
@@ -405,19 +434,58 @@ static void plan_output(struct builder *builder, enum pt_plane color)
            settings->film_transparent ? "transparent film" : "over the world colour");
 
     struct extract_args extract = extract_args(builder, settings->passes);
-    if (!extract.depth && !extract.normal && !extract.source) {
+    if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {
         skip(builder, "extract", "no pass beside the combined one is asked for");
         return;
     }
     REASON(ADD(builder, extract, extract,
                { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_SHADING, 0),
-                 plane(PT_PLANE_DEPTH, 0), plane(PT_PLANE_NORMALS, 0), plane(PT_PLANE_SOURCE, 0) }),
-           "asked for:%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
-           extract.source ? " source" : "");
+                 plane(PT_PLANE_DEPTH, 0), plane(PT_PLANE_NORMALS, 0), plane(PT_PLANE_SOURCE, 0),
+                 plane(PT_PLANE_ARRIVED, 0), plane(PT_PLANE_SHADOW, 0) }),
+           "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
+           extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
 
-// Returns the plane that holds the layer's colour.
-static enum pt_plane plan_layer(struct builder *builder)
+// Why no light casts a shadow, or NULL.
+static const char *no_shadows(const struct patina_scene *scene)
+{
+    uint32_t casting = 0, receiving = 0, objects = 0;
+    for (uint32_t i = 0; i < scene->light_count; i++)
+        casting += scene->lights[i].shadows != 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        receiving += (uint32_t)pt_receives(&scene->instances[i]);
+        objects += !(scene->instances[i].style.shadow_off & PATINA_SHADOW_NO_CAST);
+    }
+    return !casting     ? "no light casts shadows"
+           : !receiving ? "no lit cloud receives shadows"
+           : !objects   ? "no cloud casts shadows"
+                        : NULL;
+}
+
+static void plan_marks(struct builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    const char *none = no_shadows(builder->scene);
+    int lazy = pt_plan_lazy(builder->scene, plan);
+    if (none || !lazy)
+        skip(builder, "mark", none ? none : plan->layers > 1 ? "what later layers show is not known yet" : "whole shadow textures, to be kept");
+    if (none)
+        skip(builder, "lit", none);
+    for (uint32_t i = 0; i < plan->instance_count && !none && lazy; i++) {
+        const struct pt_plan_instance *instance = &plan->instances[i];
+        if (!instance->chunk_count || !pt_receives(instance->instance))
+            continue;
+        uint32_t margin = (plan->iterations + 2) << plan->levels;
+        struct mark_args args = { .view = view_of(plan, instance, margin),
+                                  .id_base = instance->args.id_base,
+                                  .id_count = instance->args.id_count };
+        REASON(ADD(builder, mark, args, { keys_of(builder, 0), buffer(PT_MARKS, i) }),
+               "only points of instance %u that the picture shows need shadows", i);
+    }
+}
+
+// Scatter, surfaces, filling: what pictures and light maps have in common.
+static void plan_surfaces(struct builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     int estimate = 0;
@@ -430,6 +498,15 @@ static enum pt_plane plan_layer(struct builder *builder)
     if (!estimate)
         skip(builder, "normals", "every cloud in view has normals");
     plan_filling(builder);
+}
+
+// Returns the plane that holds the layer's colour.
+static enum pt_plane plan_layer(struct builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    plan_surfaces(builder);
+    if (builder->layer == 1)
+        plan_marks(builder);
     uint32_t finish = plan->pass_count;
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count)
@@ -446,7 +523,7 @@ static void put_together(const struct builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
-    const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE; // are taken from its planes, at the end
+    const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE | 1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
     if (settings->layer_passes || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
         return;
@@ -473,12 +550,27 @@ static void plan_points(struct builder *builder)
 
 static void plan_nothing(struct builder *builder, const char *reason)
 {
-    static const char *const names[] = { "scatter", "normals", "surface", "pull", "fill", "push", "shade", "smooth",
-                                         "antialias", "peel" };
+    static const char *const names[] = { "scatter", "normals", "surface", "pull", "fill", "push", "mark", "lit", "shade",
+                                         "smooth", "antialias", "peel" };
+    builder->plan->light_count = 0;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         skip(builder, names[i], reason);
     plan_output(builder, PT_PLANE_COLOR_A);
     put_together(builder);
+}
+
+int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan)
+{
+    struct builder builder = { .scene = scene, .plan = plan };
+    *plan = (struct pt_plan){ 0 };
+    int error = pt_plan_view(scene, plan);
+    if (!error && plan->points_scattered) {
+        plan_surfaces(&builder);
+        error = builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+    }
+    if (error)
+        pt_plan_destroy(plan);
+    return error;
 }
 
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
@@ -488,6 +580,8 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
     if (!scene->has_camera)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);
+    if (!error && plan->points_scattered && !no_shadows(scene))
+        error = pt_plan_lights(scene, plan);
     if (!error) {
         if (plan->points_scattered)
             plan_points(&builder);
@@ -538,6 +632,8 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
          (unsigned long long)plan->chunks_culled);
     for (uint32_t i = 0; i < plan->pass_count; i++)
         LINE("run  %-10s %s\n", plan->passes[i].name, plan->passes[i].reason);
+    for (uint32_t i = 0; i < plan->light_count; i++)
+        LINE("run  %-10s %s\n", "lit", plan->lights[i].reason);
     for (uint32_t i = 0; i < plan->skipped_count; i++)
         LINE("skip %-10s %s\n", plan->skipped[i].name, plan->skipped[i].reason);
 #undef LINE

@@ -18,6 +18,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(NORMAL, 16, 0)        \
     X(DEFF, 4, 0)           \
     X(SHADING, 16, 0)       \
+    X(ARRIVED, 4, 0)        \
     X(COLOR_A, 16, 0)       \
     X(COLOR_B, 16, 0)       \
     X(KEYS_BEHIND, 8, 0)    \
@@ -31,6 +32,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(DEPTH, 4, 0)          \
     X(NORMALS, 12, 0)       \
     X(SOURCE, 4, 0)         \
+    X(SHADOW, 4, 0)         \
     X(LAYER_COMBINED, 16, 0) \
     X(LAYER_DEPTH, 4, 0)    \
     X(LAYER_NORMALS, 12, 0)
@@ -47,7 +49,11 @@ enum pt_plane {
 enum { PT_SLOTS = 16 }; // levels or layers that a plane may have
 _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_SLOTS, "planes have too few slots");
 
-enum pt_instance_buffer { PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_INSTANCE_BUFFERS };
+// Those from PT_MARKS on belong to the frame's shadows, not to the cloud.
+enum pt_instance_buffer {
+    PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS, PT_OPACITIES,
+    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS
+};
 
 // What a pass binds: a plane at a level, or a buffer of an instance.
 struct pt_ref {
@@ -79,6 +85,18 @@ struct pt_bounds {
     float z_far;
 };
 
+// A light whose shadow texture the frame needs.
+struct pt_plan_light {
+    const patina_light_desc *light;
+    uint32_t samples;  // wanted
+    uint32_t cube;     // six maps a sample instead of one
+    uint32_t capped;   // its texels are wider than the points' spacing asks for
+    double texel;      // width of a texel: at distance 1, or of suns anywhere
+    uint32_t width, height; // of its first map
+    double axes[9];    // of its maps (not of a cube's): rows x, y, z, looks down -z
+    char reason[128];
+};
+
 struct pt_plan_instance {
     const struct pt_instance *instance;
     struct instance_args args;
@@ -93,14 +111,18 @@ struct pt_plan {
     uint32_t levels;        // coarse levels
     uint32_t crop[4];       // x, y, width, height of the picture in the planes
     uint32_t pixel_offset[2]; // of the crop in the full picture
+    uint32_t guard;           // pixels by which the padded picture is wider on each side
     struct pt_plan_instance *instances;
     uint32_t instance_count;
     struct pt_pass *passes;
     uint32_t pass_count;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
+    struct pt_plan_light lights[PT_MAX_LIGHTS]; // those that cast, in the scene's order
+    uint32_t light_count;
     uint64_t points, points_scattered, chunks, chunks_culled;
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
+    double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
     uint32_t quality, fill; // as set, or as the error target chose them
     patina_expected_error expected;
@@ -121,6 +143,45 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
 
 // plan_view.c: how the camera sees the scene.
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
+// Every chunk of the instance as the plan's view sees it, inside or outside; nothing is culled.
+int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
+                   struct instance_args *args, struct chunk_view **chunks);
+
+// ---- shadows: plan_light.c -----------------------------------------------------------------------------------------------
+
+// The passes of a depth map with its holes filled, and no more: scatter to fill.
+int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan);
+
+// Lists plan->lights, with what their maps are like.
+int pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
+int pt_receives(const struct pt_instance *instance); // shadows, at all
+// Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late.
+int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
+
+// The maps of one sample: those of all opaque casters; of all but one that must not shadow itself, for that one; and of
+// every transparent caster by itself. NO_CASTER: for everyone else.
+struct pt_shadow_group {
+    uint32_t only, without; // instances, or PT_NO_INSTANCE
+    uint32_t loss;          // 1..255
+};
+enum { PT_NO_INSTANCE = 0xFFFFFFFFu };
+uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 2 instances + 1
+int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
+int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
+
+// A scene of the group's casters as a sample of the light sees them, for pt_plan_map. instances: room for the scene's. The
+// window is what of the map counts, in window units: left, bottom, right, top. 0: there is nothing to see.
+int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
+                   double window[4]);
+
+// Where shading gathers an area light's light: PT_AREA_POINTS positions, world.
+void pt_area_points(const patina_light_desc *light, double points[3 * PT_AREA_POINTS]);
+
+// What a light's texture depends on, in a fixed order: integers as such, lengths and angles relative to the light.
+// Returns the count of numbers; writes at most `room`.
+size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *light, double *numbers, size_t room);
+int pt_same_key(const double *a, const double *b, size_t count);
 
 // Memory that lives as long as the plan; zeroed. NULL when memory lacks.
 void *pt_arena_take(struct pt_arena **arena, size_t size);

@@ -160,7 +160,7 @@ static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chun
         error[k] *= 0x1p-21;
     }
     slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
-    *z_middle = fmax(0.5 * (z_min + z_max), z_near);
+    *z_middle = 0.5 * (fmax(z_min, z_near) + fmax(z_max, z_near)); // of the part before the eye
     *z_beyond = z_max + slop;
     if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
         return 0;
@@ -359,6 +359,8 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
         count = weigh_chunks(plan, survey, away, list, &area);
     qsort(list, count, sizeof *list, compare_weighted);
     for (uint32_t k = 0; k < count && sum <= 0.95 * area; k++) {
+        if (sum <= 0.5 * area)
+            plan->spacing_middle = list[k].value;
         sum += list[k].weight;
         plan->spacing_px = list[k].value;
     }
@@ -581,6 +583,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     choose_layers(&scene->settings, plan);
     uint32_t cell = 1u << plan->levels;
     uint32_t guard = round_up(8 + 4 * cell, cell > 16 ? cell : 16);
+    plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
     survey.camera = bare;
     pad_camera(&survey.camera, guard);
@@ -592,4 +595,21 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
     return error;
+}
+
+int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
+                   struct instance_args *args, struct chunk_view **chunks)
+{
+    struct camera camera;
+    struct object object;
+    int error = set_camera(scene, &camera);
+    *chunks = pt_arena_take(&plan->arena, (instance->cloud->chunk_count + 1) * sizeof **chunks);
+    if (error || !*chunks)
+        return error ? error : PATINA_ERROR_MEMORY;
+    pad_camera(&camera, plan->guard);
+    set_object(&camera, instance, &object);
+    set_instance(&camera, &object, instance, 1.0, args);
+    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
+        set_chunk(&camera, &object, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0, &(*chunks)[c]);
+    return PATINA_OK;
 }

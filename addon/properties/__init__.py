@@ -62,6 +62,18 @@ class PatinaSceneProperties(PropertyGroup):
         name="Layers", override=_OVERRIDE, default=8, min=1, max=MOST_LAYERS,
         description="At most so many layers of surface are drawn behind one another where something is transparent. "
                     "Fewer when nothing is left to show: opaque scenes have one")
+    use_shadows: BoolProperty(
+        name="Shadows", override=_OVERRIDE, default=True,
+        description="Points in the shadow of others get no light from lights that cast shadows")
+    shadow_samples: IntProperty(
+        name="Samples", override=_OVERRIDE, default=16, min=1, max=4096, soft_max=256,
+        description="Points of a light's area that shadows are gathered from; sharp lights need one")
+    shadow_resolution: IntProperty(
+        name="Resolution", override=_OVERRIDE, default=4096, min=16, max=16384, subtype='PIXEL',
+        description="Most texels along a side of a light's depth map; it has fewer where the points lie wider")
+    shadow_file: StringProperty(
+        name="Baked", override=_OVERRIDE, subtype='FILE_PATH',
+        description="Shadow textures to take from a file instead of computing them; empty: none")
     device: EnumProperty(
         name="Device", override=_OVERRIDE, default='AUTO',
         description="What computes the picture",
@@ -128,6 +140,12 @@ class PatinaObjectProperties(PropertyGroup):
     linked_file: StringProperty(
         name="Linked File", override=_OVERRIDE, subtype='FILE_PATH',
         description="Point file that is drawn in place of the object's own vertices; its points never become Blender's")
+    cast_shadows: BoolProperty(
+        name="Cast", override=_OVERRIDE, default=True, description="These points throw shadows")
+    receive_shadows: BoolProperty(
+        name="Receive", override=_OVERRIDE, default=True, description="Shadows fall on these points")
+    self_shadows: BoolProperty(
+        name="On Itself", override=_OVERRIDE, default=True, description="These points' shadows fall on themselves")
     color_attribute: StringProperty(
         name="Colors", override=_OVERRIDE,
         description="Point attribute to take colours from; empty: the active colour attribute, or a usual name")
@@ -153,6 +171,9 @@ def _update_passes(_group: PropertyGroup, context: Context) -> None:
 
 
 class PatinaViewLayerProperties(PropertyGroup):
+    use_pass_shadow: BoolProperty(
+        name="Shadow", default=False, update=_update_passes, override=_OVERRIDE,
+        description="Share of the shadow-casting lights that arrives: 1 lit, 0 in shadow")
     use_pass_source: BoolProperty(
         name="Source", default=False, update=_update_passes, override=_OVERRIDE,
         description="What is scan and what is invention: 0 nothing, 1 measured, 1 + distance filled from a "

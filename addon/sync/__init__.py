@@ -33,6 +33,7 @@ class SceneDescription:
     device: DeviceChoice
     samples: int  # of a final picture
     mist: Mist | None
+    shadow_file: str  # baked shadow textures; empty: none
     notices: list[str]  # what the artist should know about things left out, a sentence each
 
 
@@ -68,5 +69,6 @@ def _describe(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str],
         device=settings.device(scene),
         samples=settings.samples(scene),
         mist=world.mist(scene.world),
+        shadow_file=settings.shadow_file(scene),
         notices=notices,
     )

@@ -63,6 +63,7 @@ class CloudStyle:
     specular: float
     shininess: int
     transparency: float
+    shadow_off: int
 
 
 class Pending:
@@ -350,4 +351,12 @@ def _style(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         diffuse=patina.diffuse,
         specular=patina.specular,
         shininess=patina.shininess,
-        transparency=1.0 - patina.opacity)
+        transparency=1.0 - patina.opacity,
+        shadow_off=_shadow_off(obj))
+
+
+def _shadow_off(obj: bpy.types.Object) -> int:
+    """patina_shadow_off; Blender's own ray visibility counts too."""
+    patina = obj.patina
+    casts = patina.cast_shadows and obj.visible_shadow
+    return (not casts) * 1 + (not patina.receive_shadows) * 2 + (not patina.self_shadows) * 4

@@ -36,8 +36,12 @@ class Settings:
     film_transparent: int
     world_color: tuple[float, float, float]
     layers: int
+    shadow_samples: int
+    shadow_resolution: int
+    shadow_lazy: int
     error_target: float = 0.0
     strata: int = 0  # of 6 that are drawn; 0: all
+    shadow_progressive: int = 0
 
 
 def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:
@@ -54,7 +58,18 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         film_transparent=int(scene.render.film_transparent),
         world_color=world_color,
         layers=patina.layers,
-        error_target=0.0 if quality else 0.01 * patina.error_target)
+        error_target=0.0 if quality else 0.01 * patina.error_target,
+        shadow_samples=patina.shadow_samples,
+        shadow_resolution=patina.shadow_resolution,
+        shadow_lazy=1)  # a final picture
+
+
+def shadow_file(scene: bpy.types.Scene) -> str:
+    """Absolute, late, and relative to the library that the scene comes from."""
+    patina = scene.patina
+    if not patina.use_shadows or not patina.shadow_file:
+        return ""
+    return bpy.path.abspath(patina.shadow_file, library=scene.original.library)
 
 
 def samples(scene: bpy.types.Scene) -> int:

@@ -79,6 +79,27 @@ class PATINA_PT_transparency(_PatinaPanel, Panel):
         self.layout.prop(context.scene.patina, "layers")
 
 
+class PATINA_PT_shadows(_PatinaPanel, Panel):
+    bl_label = "Shadows"
+    bl_context = "render"
+
+    def draw_header(self, context: Context) -> None:
+        self.layout.prop(context.scene.patina, "use_shadows", text="")
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        patina = context.scene.patina
+        layout.active = patina.use_shadows
+        layout.prop(patina, "shadow_samples")
+        layout.prop(patina, "shadow_resolution")
+        layout.prop(patina, "shadow_file")
+        row = layout.row(align=True)
+        row.operator("patina.bake_shadows")
+        row.operator("patina.load_shadows")
+
+
 class PATINA_PT_film(_PatinaPanel, Panel):
     bl_label = "Film"
     bl_context = "render"
@@ -122,6 +143,7 @@ class PATINA_PT_passes(_PatinaPanel, Panel):
         column.prop(layer, "use_pass_mist")
         column.prop(layer, "use_pass_position")
         column.prop(layer, "use_pass_normal")
+        column.prop(layer.patina, "use_pass_shadow")
         column.prop(layer, "use_pass_object_index")
         column.prop(layer.patina, "use_pass_source")
         layout.prop(layer.patina, "pass_layers")
@@ -175,6 +197,23 @@ class PATINA_PT_shading(_PatinaObjectPanel, Panel):
         row.prop(patina, "shininess")
 
 
+class PATINA_PT_point_shadows(_PatinaObjectPanel, Panel):
+    bl_label = "Shadows"
+    bl_parent_id = "PATINA_PT_points"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        patina = context.object.patina
+        layout.active = context.scene.patina.use_shadows
+        layout.prop(patina, "cast_shadows")
+        layout.prop(patina, "receive_shadows")
+        row = layout.row()
+        row.active = patina.cast_shadows and patina.receive_shadows
+        row.prop(patina, "self_shadows")
+
+
 class PATINA_PT_light(_PatinaPanel, Panel):
     bl_label = "Light"
     bl_context = "data"
@@ -188,15 +227,25 @@ class PATINA_PT_light(_PatinaPanel, Panel):
         light = context.light
         layout.row().prop(light, "type", expand=True)
         layout.use_property_split = True
-        if light.type not in {'SUN', 'POINT'}:
-            layout.label(text="Patina draws sun and point lights", icon='INFO')
-            return
         layout.prop(light, "color")
         layout.prop(light, "energy", text="Strength" if light.type == 'SUN' else "Power")
+        if light.type == 'SUN':
+            layout.prop(light, "angle")
+        elif light.type == 'AREA':
+            layout.prop(light, "shape")
+            layout.prop(light, "size")
+            if light.shape in {'RECTANGLE', 'ELLIPSE'}:
+                layout.prop(light, "size_y", text="Y")
+        else:
+            layout.prop(light, "shadow_soft_size", text="Radius")
+        if light.type == 'SPOT':
+            layout.prop(light, "spot_size")
+            layout.prop(light, "spot_blend")
+        layout.prop(light, "use_shadow", text="Cast Shadow")
 
 
-_CLASSES = (PATINA_PT_surface, PATINA_PT_transparency, PATINA_PT_film, PATINA_PT_performance, PATINA_PT_passes,
-            PATINA_PT_points, PATINA_PT_shading, PATINA_PT_light)
+_CLASSES = (PATINA_PT_surface, PATINA_PT_transparency, PATINA_PT_shadows, PATINA_PT_film, PATINA_PT_performance,
+            PATINA_PT_passes, PATINA_PT_points, PATINA_PT_shading, PATINA_PT_point_shadows, PATINA_PT_light)
 
 
 def register() -> None:

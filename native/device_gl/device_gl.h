@@ -96,6 +96,9 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
 // Steps that a kernel's own runner shares with the default one.
 int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions);
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what);
+// The kernel's buffers from binding 1 on, and those of them that it reads as textures.
+int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t argument_size,
+                       struct pt_buffer *const *buffers, uint32_t count);
 // Unit 0: keys, 1: from, 2: deff, 3 and 4: float4 planes.
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane);
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);
@@ -115,6 +118,8 @@ void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 // scatter.c, fill.c, pixels.c: kernels of several dispatches. The filters find their buffers bound and tiles listed.
 int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
                   uint32_t count, const atomic_int *cancel);
+int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
+              const atomic_int *cancel);
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
 int pt_gl_antialias(struct pt_gl_device *d);

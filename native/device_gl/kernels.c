@@ -68,7 +68,8 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
     [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3, 6},
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
-    [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},
+    [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},   [PT_KERNEL_mark] = {1},
+    [PT_KERNEL_lit] = {1, 2, 3},
 };
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
@@ -91,7 +92,7 @@ static int tiled(enum pt_kernel kernel)
 {
     return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_fill ||
            kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
-           kernel == PT_KERNEL_push;
+           kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark;
 }
 
 static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
@@ -108,10 +109,10 @@ static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t vari
 
 static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
 {
-    static const char *const definitions[] = {"#define PLANE 0\n", "#define PLANE 1\n", "#define PLANE 2\n"};
-    const uint32_t asked[] = {args->depth, args->normal, args->source};
+    static const char *const definitions[] = {"#define PLANE 0\n", "#define PLANE 1\n", "#define PLANE 2\n", "#define PLANE 3\n"};
+    const uint32_t asked[] = {args->depth, args->normal, args->source, args->shadow};
     int result = PATINA_OK;
-    for (uint32_t i = 0; i < 3 && result == PATINA_OK; i++)
+    for (uint32_t i = 0; i < 4 && result == PATINA_OK; i++)
         if (asked[i])
             result = run_over(d, PT_KERNEL_extract, i, definitions[i], args->crop_width, args->crop_height);
     return result;
@@ -124,7 +125,7 @@ static int run_tiles(struct pt_gl_device *d, enum pt_kernel kernel)
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, kernel, 0, PT_GL_TILES_POINTS) : result;
 }
 
-static int bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t argument_size,
+int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t argument_size,
                         struct pt_buffer *const *buffers, uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
@@ -161,6 +162,7 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     case PT_KERNEL_normals:
     case PT_KERNEL_surface:
     case PT_KERNEL_smooth:
+    case PT_KERNEL_mark:
         return run_tiles(d, kernel);
     case PT_KERNEL_compose: {
         const struct compose_args *args = arguments;
@@ -190,12 +192,14 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
         pt_gl_tiles_forget(d);
         return pt_gl_scatter(d, arguments, buffers, count, cancel);
     }
+    if (kernel == PT_KERNEL_lit)
+        return pt_gl_lit(d, argument_size, buffers, count, cancel);
     int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_extract;
     if (!crops && (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1]))
         return PATINA_OK;
     struct view_args tiles = kernel == PT_KERNEL_push ? pt_gl_coarse_view(arguments) : *view;
     int result = tiled(kernel) ? pt_gl_tiles(d, buffers[0], &tiles) : PATINA_OK;
     if (result == PATINA_OK)
-        result = bind_buffers(d, kernel, argument_size, buffers, count);
+        result = pt_gl_bind_buffers(d, kernel, argument_size, buffers, count);
     return result == PATINA_OK ? run_filter(d, kernel, arguments, cancel) : result;
 }

@@ -65,7 +65,7 @@ static int shade_programs(struct pt_gl_device *d, uint32_t normals, uint32_t col
 // In a uniform array: read once for all lanes, where a block would be read once a lane.
 static void set_lights(struct pt_gl_device *d, const struct shade_args *args, uint32_t colors)
 {
-    GLfloat lights[PT_MAX_LIGHTS][8] = {{0}};
+    GLfloat lights[PT_MAX_LIGHTS][12] = {{0}};
     for (uint32_t i = 0; i < args->light_count && i < PT_MAX_LIGHTS; i++) {
         const struct light_args *light = &args->lights[i];
         for (int k = 0; k < 3; k++) {
@@ -73,8 +73,12 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
             lights[i][4 + k] = light->vector[k];
         }
         lights[i][3] = (GLfloat)light->type;
+        lights[i][8] = light->cone[0];
+        lights[i][9] = light->cone[1];
+        lights[i][10] = (GLfloat)light->shadow;
+        lights[i][11] = light->shadow_scale;
     }
-    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][colors], 16, 2 * PT_MAX_LIGHTS, &lights[0][0]);
+    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][colors], 16, 3 * PT_MAX_LIGHTS, &lights[0][0]);
 }
 
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)

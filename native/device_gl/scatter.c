@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// scatter's runner: two 32-bit passes over all chunks of all instances (or one of 64 bits), in batches where a cloud is
-// larger than a storage block.
+// Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
+// passes over all chunks of all instances (or one of 64 bits); lit: one instance.
 #include "device_gl.h"
 
 #include <stdlib.h>
@@ -11,6 +11,8 @@ enum {
 };
 
 struct instance_buffers {
+    enum pt_kernel kernel;
+    uint32_t binding; // of chunks; positions, ids and surface follow
     const struct pt_buffer *chunks, *positions, *ids, *surface;
 };
 
@@ -21,13 +23,14 @@ struct batch {
 
 static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, const struct batch *batch)
 {
-    int result = pt_gl_bind(d, 2, b->chunks->name, 0, b->chunks->size, "scatter");
+    const char *what = pt_kernel_names[b->kernel];
+    int result = pt_gl_bind(d, b->binding, b->chunks->name, 0, b->chunks->size, what);
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 3, b->positions->name, batch->first_slot * 12, batch->slots * 12, "scatter");
+        result = pt_gl_bind(d, b->binding + 1, b->positions->name, batch->first_slot * 12, batch->slots * 12, what);
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 4, b->ids->name, batch->first_slot * 4, batch->slots * 4, "scatter");
+        result = pt_gl_bind(d, b->binding + 2, b->ids->name, batch->first_slot * 4, batch->slots * 4, what);
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 5, b->surface->name, 0, b->surface->size, "scatter");
+        result = pt_gl_bind(d, b->binding + 3, b->surface->name, 0, b->surface->size, what);
     return result;
 }
 
@@ -39,10 +42,10 @@ static int run_batch(struct pt_gl_device *d, const struct instance_buffers *b, c
         uint32_t groups = batch->chunk_count - done < LONG_RUN ? batch->chunk_count - done : LONG_RUN;
         if (cancel && atomic_load(cancel))
             return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
-        d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_scatter][pass], 0, batch->first_chunk + done);
-        d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_scatter][pass], 1, (GLuint)batch->first_slot);
+        d->gl.ProgramUniform1ui(d->programs[b->kernel][pass], 0, batch->first_chunk + done);
+        d->gl.ProgramUniform1ui(d->programs[b->kernel][pass], 1, (GLuint)batch->first_slot);
         // llvmpipe: 1M points in 21 ms with one, 27 ms with 4: setting a chunk up costs more than idle lanes.
-        result = pt_gl_dispatch(d, PT_KERNEL_scatter, pass, groups, d->base.info.hardware ? SLICES : 1);
+        result = pt_gl_dispatch(d, b->kernel, pass, groups, d->base.info.hardware ? SLICES : 1);
     }
     return result;
 }
@@ -108,10 +111,25 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_scatter, pass, definitions[pass]);
         for (uint32_t i = 0; i < args->instances && 4 * i + 4 < count && result == PATINA_OK; i++) {
-            struct instance_buffers b = {buffers[4 * i + 1], buffers[4 * i + 2], buffers[4 * i + 3],
+            struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[4 * i + 1], buffers[4 * i + 2], buffers[4 * i + 3],
                                          buffers[4 * i + 4]};
             result = run_instance(d, &b, pass, cancel);
         }
     }
     return result;
+}
+
+int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
+              const atomic_int *cancel)
+{
+    // positions and ids are bound in parts, which here would be too large at once
+    static struct pt_buffer none;
+    struct pt_buffer *rest[16];
+    for (uint32_t i = 0; i < count; i++)
+        rest[i] = i == 4 || i == 5 ? &none : buffers[i];
+    int result = pt_gl_kernel_program(d, PT_KERNEL_lit, 0, "");
+    if (result == PATINA_OK)
+        result = pt_gl_bind_buffers(d, PT_KERNEL_lit, argument_size, rest, count);
+    struct instance_buffers b = {PT_KERNEL_lit, 4, buffers[3], buffers[4], buffers[5], buffers[6]};
+    return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
 }

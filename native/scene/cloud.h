@@ -42,6 +42,7 @@ struct patina_cloud {
     void *colors;      // count x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // count, or NULL where every point is opaque
     enum pt_color_format color_format;
+    uint64_t fingerprint; // of positions, ids, normals and spacings
     double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 
@@ -57,6 +58,8 @@ void pt_decode_normal(uint32_t word, double n[3]);
 
 // Local spacing by sampled nearest neighbours among the `count` points x, y, z.
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);
+
+uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);
 
 void pt_alive_release(struct pt_alive *alive);
 

@@ -89,6 +89,10 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         style->color[0] = style->color[1] = style->color[2] = 0.8f;
     if (style->ambient == 0.0f && style->diffuse == 0.0f && style->specular == 0.0f)
         style->ambient = style->diffuse = 1.0f;
+    if (!(style->transparency >= 0.0f) || !(style->transparency <= 1.0f))
+        return fail(scene, "cloud style: transparency must be between 0 and 1");
+    if (style->shadow_off > 7)
+        return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
     return PATINA_OK;
 }
@@ -119,20 +123,45 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     return PATINA_OK;
 }
 
+static int check_light(const patina_scene *scene, patina_light_desc *light)
+{
+    const double pi = 3.14159265358979323846;
+    if (light->type < PATINA_LIGHT_SUN || light->type > PATINA_LIGHT_AREA || light->shape > PATINA_AREA_ELLIPSE)
+        return fail(scene, "light: no such type or shape");
+    if (!all_finite(light->position, 3) || !all_finite(light->direction, 3) || !all_finite(light->side, 3) ||
+        !isfinite(light->power) || !isfinite(light->color[0] + light->color[1] + light->color[2]))
+        return fail(scene, "light: position, direction, side, power and colour must be finite");
+    if (!(light->angle >= 0.0f && light->angle <= (float)pi) || !(light->cone >= 0.0f && light->cone <= (float)pi))
+        return fail(scene, "light: angle and cone must be between 0 and pi");
+    if (!(light->blend >= 0.0f && light->blend <= 1.0f))
+        return fail(scene, "light: blend must be between 0 and 1");
+    if (!(light->radius >= 0.0f) || !(light->size[0] >= 0.0f) || !(light->size[1] >= 0.0f) ||
+        !isfinite(light->radius + light->size[0] + light->size[1]))
+        return fail(scene, "light: radius and size must be finite and 0 or more");
+    if (light->color[0] == 0.0f && light->color[1] == 0.0f && light->color[2] == 0.0f)
+        light->color[0] = light->color[1] = light->color[2] = 1.0f;
+    light->cone = light->cone == 0.0f ? (float)(pi / 4.0) : light->cone;
+    for (int k = 0; k < 2; k++)
+        light->size[k] = light->size[k] == 0.0f ? 1.0f : light->size[k];
+    double length = sqrt(pt_dot(light->direction, light->direction));
+    if (!(length > 0.0) || !isfinite(length)) { // also where it over- or underflows
+        light->direction[0] = light->direction[1] = 0.0;
+        light->direction[2] = -1.0;
+        length = 1.0;
+    }
+    for (int k = 0; k < 3; k++)
+        light->direction[k] /= length;
+    return PATINA_OK;
+}
+
 int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
 {
     if (!scene || !light || light->struct_size != sizeof *light)
         return fail(scene, "patina_scene_add_light: bad arguments");
     patina_light_desc checked = *light;
-    if (checked.type != PATINA_LIGHT_SUN && checked.type != PATINA_LIGHT_POINT)
-        return fail(scene, "light: no such type");
-    if (!all_finite(checked.position, 3) || !all_finite(checked.direction, 3) || !isfinite(checked.power) ||
-        !isfinite(checked.color[0] + checked.color[1] + checked.color[2]))
-        return fail(scene, "light: position, direction, power and colour must be finite");
-    if (checked.color[0] == 0.0f && checked.color[1] == 0.0f && checked.color[2] == 0.0f)
-        checked.color[0] = checked.color[1] = checked.color[2] = 1.0f;
-    if (pt_dot(checked.direction, checked.direction) == 0.0)
-        checked.direction[2] = -1.0;
+    int error = check_light(scene, &checked);
+    if (error)
+        return error;
     if (scene->light_count == PT_MAX_LIGHTS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has %d lights already, the most there can be",
                        PT_MAX_LIGHTS);
@@ -197,6 +226,10 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
                        PATINA_MAX_LAYERS);
     if (s.layer_passes & ~(1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_NORMAL))
         return fail(scene, "settings: layer_passes can be COMBINED, DEPTH and NORMAL only");
+    if (s.shadow_samples > 4096 || s.shadow_resolution > 16384 || s.shadow_lazy > 1 || s.shadow_progressive > 1)
+        return fail(scene, "settings: at most 4096 shadow samples and 16384 texels; shadow_lazy and shadow_progressive are 0 or 1");
+    s.shadow_samples = s.shadow_samples ? s.shadow_samples : 1;
+    s.shadow_resolution = s.shadow_resolution ? s.shadow_resolution : 4096;
     if (!s.passes)
         s.passes = (1u << PATINA_PASS_COUNT) - 1;
     scene->settings = s;

@@ -142,6 +142,16 @@ static int parse_opacity(const char *text, struct tool_options *options)
     return options->opacity_count < 0 ? -1 : 0;
 }
 
+static int parse_sun(const char *text, struct tool_options *options)
+{
+    double n[3] = {0};
+    if (parse_numbers(text, n, 2, 3) < 0 || n[1] < -90 || n[1] > 90 || n[2] < 0 || n[2] > 180)
+        return -1;
+    options->sun = 1;
+    memcpy(options->sun_at, n, sizeof options->sun_at);
+    return 0;
+}
+
 static int parse_width(const char *text, double *width)
 {
     return parse_numbers(text, width, 1, 1) < 0 || *width <= 0 ? -1 : 0;
@@ -158,6 +168,8 @@ static int parse_switch(const char *name, struct tool_options *options)
         options->cull = 1;
     else if (!strcmp(name, "--transparent"))
         options->transparent = 1;
+    else if (!strcmp(name, "--shadows"))
+        options->shadows = 1;
     else if (!strcmp(name, "--dump-plan"))
         options->dump_plan = 1;
     else if (!strcmp(name, "--verbose"))
@@ -192,6 +204,14 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_camera(value, o);
     else if (!strcmp(name, "--look"))
         bad = parse_look(value, o);
+    else if (!strcmp(name, "--sun"))
+        bad = parse_sun(value, o);
+    else if (!strcmp(name, "--save-shadows"))
+        bad = !*(o->save_shadows = value);
+    else if (!strcmp(name, "--load-shadows"))
+        bad = !*(o->load_shadows = value);
+    else if (!strcmp(name, "--samples"))
+        bad = parse_count(value, 1, 4096, &s->shadow_samples);
     else if (!strcmp(name, "--ortho"))
         bad = parse_width(value, &o->ortho_width);
     else if (!strcmp(name, "--quality"))
@@ -258,9 +278,14 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         i++;
     }
     options->settings.film_transparent = options->transparent ? 1 : 0;
+    if (!options->settings.shadow_samples)
+        options->settings.shadow_samples = 16;
+    options->settings.shadow_lazy = 1; // a picture has no use for whole textures, and measured frames are to compute theirs
+    if ((options->save_shadows || options->load_shadows) && !options->shadows)
+        return tool_misuse("--save-shadows and --load-shadows need --shadows");
     if (!options->file_count)
         return tool_misuse("render: no file given");
-    if (!options->output && !options->planes && !options->json && !options->dump_plan && !options->repeat)
+    if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)
         return tool_misuse("render: nothing to do; name the picture with -o OUT.png");
     if (options->json && !options->repeat)
         options->repeat = 1;

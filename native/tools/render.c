@@ -109,13 +109,26 @@ static int set_scene(struct job *job)
     if (!code)
         code = set_view(job, 0, &camera);
     if (!code)
-        code = tool_lights(job->scene, &camera);
+        code = tool_lights(job->scene, &job->options, &camera);
     if (!code)
         code = patina_frame_create(job->device, &job->frame);
     if (code)
         return tool_failed("scene", job->scene, code);
     tool_cancellable(NULL, job->frame);
     return tool_cancelled() ? tool_failed("scene", NULL, PATINA_ERROR_CANCELLED) : TOOL_OK;
+}
+
+static int shadows(struct job *job)
+{
+    const struct tool_options *options = &job->options;
+    int code = PATINA_OK;
+    if (options->load_shadows)
+        code = patina_frame_load_shadows(job->frame, job->scene, options->load_shadows);
+    if (!code && options->save_shadows)
+        code = patina_frame_bake_shadows(job->frame, job->scene);
+    if (!code && options->save_shadows)
+        code = patina_frame_save_shadows(job->frame, options->save_shadows);
+    return code ? tool_failed(options->load_shadows ? options->load_shadows : options->save_shadows, job->frame, code) : TOOL_OK;
 }
 
 static int dump_plan(struct job *job)
@@ -184,6 +197,8 @@ static int run(struct job *job)
         result = set_scene(job);
     if (!result && options->dump_plan)
         result = dump_plan(job);
+    if (!result)
+        result = shadows(job);
     if (result || (!options->output && !options->planes && !options->repeat))
         return result;
 

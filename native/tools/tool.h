@@ -39,7 +39,7 @@ enum { TOOL_OPACITIES = 64 };
 struct tool_options {
     char **files; // into the argument vector
     int file_count;
-    const char *output, *planes; // NULL: not asked for
+    const char *output, *planes, *save_shadows, *load_shadows; // NULL: not asked for
     const char *device;
     uint32_t threads, batch;
     enum tool_view view;
@@ -49,7 +49,8 @@ struct tool_options {
     uint32_t lighting;              // patina_lighting
     double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
     int opacity_count;              // 0: all opaque
-    int cull, transparent, json, dump_plan, verbose;
+    int cull, transparent, shadows, sun, json, dump_plan, verbose;
+    double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
     int repeat; // measured frames; 0 = just the picture
     patina_settings settings;
 };

@@ -119,21 +119,29 @@ int tool_camera(const struct tool_options *options, const patina_scene *scene, c
 }
 
 // A light that shines from `from`, in camera space, of so much power.
-static int add_sun(patina_scene *scene, const patina_camera *camera, const double from[3], const float color[3],
-                   float power)
+static patina_light_desc sun_from(const patina_camera *camera, const double from[3], const float color[3], float power)
 {
     patina_light_desc light = {.struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = power};
     memcpy(light.color, color, sizeof light.color);
     for (int i = 0; i < 3; i++)
         light.direction[i] = -dot(camera->world_from_camera + 4 * i, from);
-    return patina_scene_add_light(scene, &light);
+    return light;
 }
 
-int tool_lights(patina_scene *scene, const patina_camera *camera)
+int tool_lights(patina_scene *scene, const struct tool_options *options, const patina_camera *camera)
 {
     // From over the left shoulder, flat enough that reliefs show; a cool, weak one from the right opens the shadows.
     const double key[3] = {-0.8, 0.75, 0.45}, fill[3] = {0.9, 0.1, 0.6};
     const float warm[3] = {1.0f, 0.97f, 0.92f}, cool[3] = {0.8f, 0.9f, 1.0f};
-    const int code = add_sun(scene, camera, key, warm, 2.8f);
-    return code ? code : add_sun(scene, camera, fill, cool, 0.6f);
+    patina_light_desc sun = sun_from(camera, key, warm, 2.8f), sky = sun_from(camera, fill, cool, 0.6f);
+    if (options->sun) {
+        const double azimuth = options->sun_at[0] * PI / 180, height = options->sun_at[1] * PI / 180;
+        sun.direction[0] = -sin(azimuth) * cos(height);
+        sun.direction[1] = cos(azimuth) * cos(height);
+        sun.direction[2] = -sin(height);
+        sun.angle = (float)(options->sun_at[2] * PI / 180);
+    }
+    sun.shadows = options->shadows ? 1 : 0;
+    const int code = patina_scene_add_light(scene, &sun);
+    return code ? code : patina_scene_add_light(scene, &sky);
 }

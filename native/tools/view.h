@@ -13,6 +13,6 @@ struct tool_box {
 int tool_camera(const struct tool_options *options, const patina_scene *scene, const struct tool_box *box, double turn,
                 patina_camera *camera);
 // A sun over the left shoulder of that camera and a weak one from the right. Returns a patina_error.
-int tool_lights(patina_scene *scene, const patina_camera *camera);
+int tool_lights(patina_scene *scene, const struct tool_options *options, const patina_camera *camera);
 
 #endif

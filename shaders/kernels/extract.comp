@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// extract: the passes beside the colour, into the crop: z, world-space normal, source (SPEC 2.2: scholars must see what
+// extract: the passes beside the colour, into the crop: z, world-space normal, source, shadow (SPEC 2.2: scholars must see what
 // is scan and what is invention); twin of native/device_cpu/kernels/extract.c
 #version 430 core
 #include "lib/math.glsl"
@@ -11,6 +11,8 @@ layout(std430, binding = 0) readonly buffer arguments_block { extract_args args;
 layout(std430, binding = 4) writeonly buffer depth_block { float depth[]; };
 layout(std430, binding = 5) writeonly buffer normal_block { float normal[]; }; // 3 a pixel
 layout(std430, binding = 6) writeonly buffer source_block { float source[]; };
+layout(std430, binding = 7) readonly buffer arrived_block { float arrived[]; };
+layout(std430, binding = 8) writeonly buffer shadow_block { float shadow[]; };
 
 float source_value(uint width, uint word, uint x, uint y)
 {
@@ -47,6 +49,8 @@ void main()
     normal[3u * to] = n.x;
     normal[3u * to + 1u] = n.y;
     normal[3u * to + 2u] = n.z;
+#elif PLANE == 3
+    shadow[to] = some ? arrived[at] : 1.0;
 #else
     uint word = texelFetch(from_plane, int(at)).x;
     source[to] = some ? source_value(width, word, crop_x + x, crop_y + y) : 0.0;

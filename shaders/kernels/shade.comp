@@ -15,6 +15,8 @@ layout(std430, binding = 5) readonly buffer colors_block { uint point_colors[]; 
 layout(std430, binding = 6) writeonly buffer shading_block { vec4 shading[]; };
 layout(std430, binding = 7) writeonly buffer color_block { vec4 color[]; };
 layout(std430, binding = 8) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
+layout(std430, binding = 9) readonly buffer shadows_block { uint shadows[]; };
+layout(std430, binding = 10) writeonly buffer arrived_block { float arrived[]; };
 
 #if STEP == 0
 
@@ -129,7 +131,7 @@ struct pixel {
     vec3 n, albedo;
 };
 
-layout(location = 16) uniform vec4 lights[2 * PT_MAX_LIGHTS]; // colour and type, vector
+layout(location = 16) uniform vec4 lights[3 * PT_MAX_LIGHTS]; // colour and type; vector; cone, shadow and its scale
 
 vec3 gather_albedo(vec3 style, uint id)
 {
@@ -157,18 +159,37 @@ float power(float x, uint exponent)
     return result;
 }
 
-void add_light(vec4 light, vec3 vector, uint shininess, vec3 n, vec3 point, vec3 to_eye, inout vec3 diffuse,
-               inout vec3 specular)
+// Direction to the light at `from` and its falloff there, times what is in falloff; suns have neither.
+vec3 towards(uint light, uint type, vec3 from, vec3 point, inout float falloff)
 {
-    precise vec3 l = vector;
-    vec3 color_of_light = light.xyz;
-    precise float falloff = 0.31830988618; // 1 / pi: radiance of a white Lambert surface under unit irradiance
-    if (light.w == 2.0) {                  // PATINA_LIGHT_POINT
-        l = l - point;
-        float scale = pt_rsqrt(pt_max(pt_dot(l, l), 1e-20));
-        l = l * scale;
-        falloff = falloff * (scale * scale);
+    if (type == 1u) // PATINA_LIGHT_SUN
+        return from;
+    precise vec3 l = from - point;
+    float scale = pt_rsqrt(pt_max(pt_dot(l, l), 1e-20));
+    l = l * scale;
+    precise float less = falloff * (scale * scale);
+    falloff = less;
+    if (type == 2u) // PATINA_LIGHT_POINT
+        return l;
+    vec3 axis = vec3(args.lights[light].axis[0], args.lights[light].axis[1], args.lights[light].axis[2]);
+    float cosine = 0.0 - pt_dot(axis, l);
+    if (type == 4u) { // PATINA_LIGHT_AREA: one side shines, as matt paper
+        falloff = falloff * pt_max(cosine, 0.0);
+        return l;
     }
+    vec4 cone = lights[3u * light + 2u];
+    float edge = pt_min(pt_max((cosine - cone.x) * cone.y, 0.0), 1.0);
+    falloff = falloff * ((edge * edge) * (3.0 - 2.0 * edge));
+    return l;
+}
+
+void add_light(uint light, uint type, vec3 from, float share, uint shininess, vec3 n, vec3 point, vec3 to_eye,
+               inout vec3 diffuse, inout vec3 specular)
+{
+    vec3 color_of_light = lights[3u * light].xyz;
+    precise float falloff = 0.31830988618; // 1 / pi: radiance of a white Lambert surface under unit irradiance
+    precise vec3 l = towards(light, type, from, point, falloff);
+    falloff = falloff * share;
     precise float cosine = pt_dot(n, l);
     precise float lambert = pt_max(cosine, 0.0) * falloff;
     precise vec3 lit = diffuse + color_of_light * lambert;
@@ -182,8 +203,10 @@ void add_light(vec4 light, vec3 vector, uint shininess, vec3 n, vec3 point, vec3
 #endif
 }
 
-// c = albedo (k_a world + k_d sum E max(n.l, 0) / pi) + albedo k_s sum E max(r.v, 0)^shininess / pi
-vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint light_count, pixel p)
+// c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
+// the light. shadow: the mean m of lights that cast.
+vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint light_count, uint id, uint id_count,
+           pixel p, out float shadow)
 {
     precise vec3 point = vec3(p.ray, pt_negate(p.z + eye_z));
     precise vec3 to_eye = vec3(0.0, 0.0, 1.0);
@@ -195,11 +218,30 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
     bool away = pt_dot(p.n, to_eye) < 0.0; // both sides are lit
     vec3 n = away ? 0.0 - p.n : p.n;
     vec3 diffuse = vec3(0.0), specular = vec3(0.0);
-    for (uint i = 0u; i < light_count; i++)
-        add_light(lights[2u * i], lights[2u * i + 1u].xyz, shininess, n, point, to_eye, diffuse, specular);
+    precise float sum = 0.0;
+    uint casting = 0u;
+    for (uint i = 0u; i < light_count; i++) {
+        uint type = uint(lights[3u * i].w);
+        vec4 extra = lights[3u * i + 2u];
+        precise float share = 1.0;
+        if (extra.z != 0.0) {
+            uint lost = shadows[(uint(extra.z) - 1u) * id_count + id] & PT_SHADOW_SUM;
+            share = 1.0 - float(lost) * extra.w;
+            sum = sum + share;
+            casting++;
+        }
+        if (type != 4u)
+            add_light(i, type, lights[3u * i + 1u].xyz, share, shininess, n, point, to_eye, diffuse, specular);
+        for (uint j = 0u; type == 4u && j < PT_AREA_POINTS; j++)
+            add_light(i, type, vec3(args.lights[i].points[3u * j], args.lights[i].points[3u * j + 1u],
+                                    args.lights[i].points[3u * j + 2u]),
+                      share, shininess, n, point, to_eye, diffuse, specular);
+    }
+    precise float mean = sum / float(casting);
+    shadow = casting != 0u ? mean : 1.0;
     precise vec3 light = factors.x * world + factors.y * diffuse;
-    precise vec3 sum = p.albedo * (light + factors.z * specular);
-    return sum;
+    precise vec3 total = p.albedo * (light + factors.z * specular);
+    return total;
 }
 
 void main()
@@ -211,6 +253,7 @@ void main()
     vec3 style = vec3(args.instance.color[0], args.instance.color[1], args.instance.color[2]);
     vec3 world = vec3(args.world[0], args.world[1], args.world[2]);
     float eye_z = args.eye_z;
+    bool write_arrived = args.arrived != 0u;
     uvec2 column = pt_tile_column(view);
     for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
         uint at = y * view.width + column.x;
@@ -225,13 +268,16 @@ void main()
         vec4 shaded = texelFetch(other_float4_plane, int(at));
         p.n = shaded.xyz;
         // 3. light
+        float shadow = 1.0;
 #if LIT
-        vec3 c = phong(view, eye_z, factors, shininess, world, light_count, p);
+        vec3 c = phong(view, eye_z, factors, shininess, world, light_count, id, id_count, p, shadow);
 #else
         vec3 c = p.albedo;
 #endif
         precise vec3 premultiplied = c * shaded.w;
         color[at] = vec4(premultiplied, shaded.w);
+        if (write_arrived)
+            arrived[at] = shadow;
     }
 }
 

@@ -36,6 +36,17 @@
 
 #define PT_SPACINGS 64
 #define PT_MAX_LIGHTS 32
+#define PT_AREA_POINTS 16 // of an area light, where shading gathers its light
+
+// The shadow word of a point and light: what the samples so far take away, in 1/255 a sample, and above it what the maps
+// of the current sample take, 0..255.
+#define PT_SHADOW_SUM 0x000FFFFFu
+#define PT_SHADOW_SHIFT 24
+// lit: a texel is this much wider than it is, so that a plane that crosses it from corner to corner stays within d_eff.
+#define PT_TEXEL_SLACK 1.5f
+// lit: so many of the 8 texels around must shadow the point as well: one or two texels by themselves are a stray point, whose
+// shadow is a speck. A line of texels has them.
+#define PT_SHADOW_SUPPORT 2
 
 // A window of pixels of the full picture, at a level of the pyramid (a pixel of level l is 2^l wide).
 // Ray of the pixel (x, y): u = ray_x0 + ray_xs * X with X = (((origin_x >> level) + x) + 0.5) * 2^level, v likewise.
@@ -126,8 +137,13 @@ struct fill_args {
 // Lights in view space.
 struct light_args {
     uint32_t type;     // patina_light_type
-    float color[3];    // sun: irradiance; point: radiant intensity (W/sr)
-    float vector[3];   // sun: unit, towards the light; point: position
+    float color[3];    // sun: irradiance; point, spot: radiant intensity (W/sr); area: the same of one of its points, head-on
+    float vector[3];   // sun: unit, towards the light; others: position
+    float axis[3];     // spot, area: unit, the way the light travels
+    float cone[2];     // spot: cosine of the half angle; 1 / how far above it the cosine is when the edge has faded
+    uint32_t shadow;   // 1 + its place among the instance's shadow words; 0: casts none, or the instance receives none
+    float shadow_scale; // of a word's sum: 1 / (255 samples)
+    float points[3 * PT_AREA_POINTS]; // area: positions
 };
 
 // shade: id -> colour, normal, Phong. [D 3.1], deferred. A filled pixel's normal (SPEC 2.2, refined) is the blend, over the
@@ -139,8 +155,33 @@ struct shade_args {
     float world[3];     // ambient radiance
     float eye_z;        // orthographic: near, so that view z = -(z + near); perspective: 0
     uint32_t blend;     // radius, 0..8
+    uint32_t arrived;   // 1: written
     uint32_t light_count;
     struct light_args lights[PT_MAX_LIGHTS];
+};
+
+// mark: a byte of 1 for every point that the picture shows, measured or as the source of filled pixels.
+struct mark_args {
+    struct view_args view;
+    uint32_t id_base, id_count;
+};
+
+// lit: points against the filled map of a light [D 6], SPEC 4. A point is in shadow if z > z_map + d_eff, d_eff of the point in
+// this view with a texel PT_TEXEL_SLACK wider. Without a normal, d_eff is at least that of the surface that the map shows there,
+// and z_map the greatest of the 3 x 3 texels around: no slope gives acne, and shadows end a texel early. z > z_map + d_eff
+// must hold at PT_SHADOW_SUPPORT of the 8 texels around, too.
+// Points outside the window or before z_near are lit.
+struct lit_args {
+    struct view_args view;         // of the map
+    struct instance_args instance; // of the receiver: d_min, spacing, normals towards the light
+    float window[4];  // x0, y0, x1, y1: pixels of the full picture that count
+    uint32_t base;    // first of the light's words
+    uint32_t loss;    // 1..255: what the casters of this map take from 255
+    uint32_t alone;   // 1: the sample's only map
+    uint32_t close;   // 1: the sample's last map: its loss goes into the sum. 0 when alone
+    uint32_t samples; // with this one
+    uint32_t compare; // 1: differs[0] becomes 1 unless every point's samples lost the same
+    uint32_t marked;  // 1: only points with a mark
 };
 
 // smooth: 3 x 3 low-pass over non-background neighbours of the same layer. [D 3.4]
@@ -178,11 +219,11 @@ struct compose_args {
     float background[4]; // premultiplied
 };
 
-// extract: depth, world-space normal, source. Any may be left out.
+// extract: depth, world-space normal, source, shadow. Any may be left out.
 struct extract_args {
     struct view_args view;
     uint32_t crop_x, crop_y, crop_width, crop_height;
-    uint32_t depth, normal, source;
+    uint32_t depth, normal, source, shadow;
     float world_from_view[9];
 };
 

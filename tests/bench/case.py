@@ -58,9 +58,9 @@ MODES = {
     "layers": Mode(settings={"layers": LAYERS}),
     "3 layers": Mode(settings={"layers": 3}, style={"transparency": 0.5}),
     "6 layers": Mode(settings={"layers": 6}, style={"transparency": 0.5}),
-    "shadows 1": Mode(settings={"shadow_samples": 1}, light={"shadows": 1}),
-    "shadows 5": Mode(settings={"shadow_samples": 5}, light={"shadows": 1, "angle": 0.1}),
-    "shadows 10": Mode(settings={"shadow_samples": 10}, light={"shadows": 1, "angle": 0.1}),
+    "shadows 1": Mode(settings={"shadow_samples": 1, "shadow_lazy": 1}, light={"shadows": 1}),
+    "shadows 5": Mode(settings={"shadow_samples": 5, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
+    "shadows 10": Mode(settings={"shadow_samples": 10, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
 }
 
 

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 from check_points import pixel
-from harness import add_light, add_points, check, check_close, linear, new_scene, render, reports, set_world
+from harness import Skip, add_light, add_points, check, check_close, linear, new_scene, render, reports, saved, set_world
 
 PIXEL = 2.0 * 36 / 50 / 64  # world size of one at the point, default camera
 POINT = (0.5 * PIXEL, 1.5 * PIXEL, -2.0)  # at a pixel's centre, where deferred shading puts it
@@ -95,13 +95,87 @@ def test_dark_light_is_no_default():
     check_close(shade(scene), (0, 0, 0), 1e-6, "lights without power or colour")
 
 
-def test_other_lights_are_named():
-    lit_point()
-    add_light('AREA', 10.0).name = "panel"
-    add_light('SPOT', 10.0).name = "cone"
-    render()
-    texts = [message for kind, message in reports if "sun and point lights" in message]
-    check(len(texts) == 1 and "'cone', 'panel'" in texts[0], f"reports {reports}")
+def test_spot():
+    """Smoothstep from the cone's edge inwards; outside nothing."""
+    place = np.array((0.5, 0.4, -0.5))
+    toward = place - POINT
+    distance = np.linalg.norm(toward)
+    for tilt in (0.0, 0.3, 0.45, 0.6):
+        aim = -toward / distance
+        aside = np.cross(aim, (0, 0, 1))
+        aim = np.cos(tilt) * aim + np.sin(tilt) * aside / np.linalg.norm(aside)
+        scene = lit_point()
+        light = add_light('SPOT', 80.0, place, direction=aim).data
+        light.spot_size, light.spot_blend = 1.0, 0.4
+        edge = np.cos(0.5)
+        x = np.clip((np.cos(tilt) - edge) / ((1 - edge) * 0.4), 0, 1)
+        cosine = NORMAL @ toward / distance
+        wanted = linear(ALBEDO) / np.pi * cosine * 80.0 / (4 * np.pi * distance ** 2) * x * x * (3 - 2 * x)
+        check_close(shade(scene), wanted, 3e-3 * wanted.max() + 1e-6, f"spot turned by {tilt}")
+
+
+def test_area():
+    """A panel far away is W / pi times both cosines; its size does not matter then. Blender 3.4 radiates pi / 4."""
+    place = np.array((3.0, 2.0, 6.0))
+    toward = place - POINT
+    distance = np.linalg.norm(toward)
+    share = np.pi / 4 if bpy.app.version < (4, 5, 0) else 1.0
+    for shape, size in (('SQUARE', 0.2), ('DISK', 0.3), ('RECTANGLE', 0.1)):
+        scene = lit_point()
+        light = add_light('AREA', 500.0, place, direction=(0, 0, -1)).data
+        light.shape, light.size = shape, size
+        wanted = linear(ALBEDO) / np.pi * (NORMAL @ toward / distance) * (toward[2] / distance)
+        wanted = wanted * share * 500.0 / np.pi / distance ** 2
+        check_close(shade(scene), wanted, 3e-3 * wanted.max(), f"panel, {shape}")
+    scene = lit_point()
+    add_light('AREA', 500.0, place, direction=(0, 0, 1))
+    check_close(shade(scene), (0, 0, 0), 1e-6, "the back of a panel")
+
+
+def matt(albedo):
+    """A Lambert surface."""
+    material = bpy.data.materials.new("matt")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    diffuse, out = tree.nodes.new('ShaderNodeBsdfDiffuse'), tree.nodes.new('ShaderNodeOutputMaterial')
+    diffuse.inputs["Color"].default_value = (albedo, albedo, albedo, 1)
+    tree.links.new(diffuse.outputs[0], out.inputs[0])
+    return material
+
+
+def test_like_cycles():
+    """A wall of points under Patina is as bright as a wall under Cycles, for every kind of light."""
+    try:
+        scene = new_scene(32, 32)
+        scene.render.engine = 'CYCLES'
+        scene.cycles.samples, scene.cycles.max_bounces, scene.cycles.device = 64, 0, 'CPU'
+        scene.cycles.use_denoising = False
+    except (TypeError, AttributeError):
+        raise Skip("this Blender has no Cycles") from None
+    scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', 4.0
+    across = np.linspace(-2.5, 2.5, 251)
+    x, y = (grid.ravel() for grid in np.meshgrid(across, across))
+    add_points(np.stack([x, y, np.full(x.size, -5.0)], 1), normals=np.tile((0.0, 0.0, 1.0), (x.size, 1)))
+    bpy.ops.mesh.primitive_plane_add(size=6, location=(0, 0, -5))
+    wall = bpy.context.object
+    wall.data.materials.append(matt(0.8))
+    spots = {} if bpy.app.version < (4, 5, 0) else {'SPOT': dict(spot_size=1.2, spot_blend=0.5, shadow_soft_size=0.01)}
+    lights = {'SUN': dict(angle=0.1), 'POINT': dict(shadow_soft_size=0.1), 'AREA': dict(shape='DISK', size=1.0), **spots}
+    for kind, properties in lights.items():
+        obj = add_light(kind, 2.0 if kind == 'SUN' else 100.0, (0.5, 0.3, -2.5), direction=(-0.3, 0.2, -1))
+        for name, value in properties.items():
+            setattr(obj.data, name, value)
+        pictures = {}
+        for engine in ('CYCLES', 'PATINA'):
+            scene.render.engine, wall.hide_render = engine, engine == 'PATINA'
+            bpy.ops.render.render()
+            pictures[engine] = saved()[4:-4, 4:-4, 0]
+        bpy.data.objects.remove(obj)
+        bright = pictures['CYCLES'].max()
+        off = np.abs(pictures['PATINA'] - pictures['CYCLES']) / bright
+        check(bright > 0.05 and off.mean() < 0.01 and off.max() < 0.08, f"{kind}: off by {off.mean():.4f}, {off.max():.4f} at most")
 
 
 def background(scene):

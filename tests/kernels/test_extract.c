@@ -21,7 +21,8 @@ static void check(struct harness *h, const struct picture *picture, const float 
                                 .crop_height = crop[3],
                                 .depth = wanted & 1,
                                 .normal = wanted >> 1 & 1,
-                                .source = wanted >> 2 & 1};
+                                .source = wanted >> 2 & 1,
+                                .shadow = wanted >> 3 & 1};
     memcpy(args.world_from_view, matrix, 9 * sizeof *matrix);
     size_t count = picture->count, inside = (size_t)crop[2] * crop[3];
     float *unset = harness_alloc(h, inside * 12);
@@ -32,11 +33,17 @@ static void check(struct harness *h, const struct picture *picture, const float 
     struct pt_buffer *lit = harness_buffer(h, shading, count * 16);
     struct pt_buffer *depth = harness_buffer(h, unset, inside * 4), *normal = harness_buffer(h, unset, inside * 12);
     struct pt_buffer *source = harness_buffer(h, unset, inside * 4);
-    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source);
+    float *shares = harness_alloc(h, count * 4);
+    for (size_t i = 0; i < count; i++)
+        shares[i] = (float)(i % 97) / 96.0f;
+    struct pt_buffer *arrived = harness_buffer(h, shares, count * 4);
+    struct pt_buffer *shadow = harness_buffer(h, unset, inside * 4);
+    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source, arrived, shadow);
     const float *got_depth = harness_read(h, depth), *got_normal = harness_read(h, normal);
-    const float *got_source = harness_read(h, source);
+    const float *got_source = harness_read(h, source), *got_shadow = harness_read(h, shadow);
     struct ref_planes planes = picture_planes(picture);
     planes.shading = shading;
+    planes.arrived = shares;
     for (size_t i = 0; i < inside; i++) {
         int x = (int)(i % crop[2]), y = (int)(i / crop[2]);
         struct ref_extract expected = ref_extract(&args, &planes, x, y);
@@ -48,6 +55,7 @@ static void check(struct harness *h, const struct picture *picture, const float 
                 expected.normal_error);
         compare(h, "source", x, y, got_source[i], args.source ? expected.source : -77.0,
                 TOL_DISTANCE * fabs(expected.source));
+        compare(h, "shadow", x, y, got_shadow[i], args.shadow ? expected.shadow : -77.0, 0.0);
     }
     harness_same(h, "depth", got_depth, inside, 4, 1, crop[2]);
 }
@@ -56,7 +64,7 @@ static void passes(struct harness *h)
 {
     static const uint32_t crops[][4] = {{0, 0, 67, 45}, {5, 3, 40, 30}, {66, 44, 1, 1}};
     for (int kind = 0; kind < PICTURE_KINDS; kind++)
-        for (uint32_t wanted = 1; wanted < 8; wanted++) {
+        for (uint32_t wanted = 1; wanted < 16; wanted++) {
             struct rng rng = {(uint64_t)kind};
             struct picture picture = picture_random(h, &rng, picture_view(67, 45, kind % 2), (enum picture_kind)kind,
                                                     0.5);
@@ -87,7 +95,7 @@ static void shapes(struct harness *h)
         for (size_t i = 0; i < picture.count; i++) // as far away as the plane allows
             picture.from[i] = rng_below(&rng, (uint32_t)picture.count);
         const uint32_t crop[4] = {0, 0, sizes[s][0], sizes[s][1]};
-        check(h, &picture, picture.normal, crop, 7, identity);
+        check(h, &picture, picture.normal, crop, 15, identity);
     }
 }
 

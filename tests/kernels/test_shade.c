@@ -11,6 +11,7 @@ struct setup {
     void *colors;
     size_t colors_size;
     uint8_t *opacities;
+    uint32_t *shadows; // two lights
     float *shading; // before
 };
 
@@ -45,6 +46,10 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
         instance->color[c] = (float)rng_unit(rng);
         s.args.world[c] = (float)rng_unit(rng);
     }
+    s.shadows = harness_alloc(h, (size_t)instance->id_count * 8);
+    for (size_t i = 0; i < (size_t)instance->id_count * 2; i++)
+        s.shadows[i] = rng_below(rng, 255 * 8 + 1) | (uint32_t)rng_next(rng) << PT_SHADOW_SHIFT; // 8 samples
+    s.args.arrived = format != 1;
     s.args.light_count = 4;
     for (uint32_t i = 0; i < s.args.light_count; i++) {
         struct light_args *light = &s.args.lights[i];
@@ -75,13 +80,15 @@ static void check(struct harness *h, const struct setup *s, double most_open)
     struct pt_buffer *normal = harness_buffer(h, picture->normal, count * 16);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, count * 4);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->colors_size);
+    struct pt_buffer *shadows = harness_buffer(h, s->shadows, (size_t)s->args.instance.id_count * 8);
     struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
-    struct pt_buffer *color = harness_buffer(h, unset, count * 16);
+    struct pt_buffer *color = harness_buffer(h, unset, count * 16), *arrived = harness_buffer(h, unset, count * 4);
     struct pt_buffer *opacities = harness_buffer(h, s->opacities, s->opacities ? s->args.instance.id_count : 0);
-    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color, opacities);
-    const float *got = harness_read(h, color), *got_n = harness_read(h, shading);
+    HARNESS_RUN(h, shade, &s->args, keys, from, normal, deff, colors, shading, color, opacities, shadows, arrived);
+    const float *got = harness_read(h, color), *got_n = harness_read(h, shading), *got_share = harness_read(h, arrived);
     struct ref_planes planes = picture_planes(picture);
     planes.colors = s->colors;
+    planes.shadows = s->shadows;
     planes.opacities = s->opacities;
     float *transparent = harness_alloc(h, count * 4);
     for (size_t i = 0; i < count; i++) {
@@ -109,6 +116,8 @@ static void check(struct harness *h, const struct setup *s, double most_open)
         if (!(off <= 2.0 * expected.normal_error))
             harness_fail(h, "normal", x, y, "got (%.7f %.7f %.7f), expected (%.7f %.7f %.7f) +- %.2g", n[0], n[1], n[2],
                          expected.n.x, expected.n.y, expected.n.z, 2.0 * expected.normal_error);
+        if (!harness_near(got_share[i], s->args.arrived ? expected.shadow : -5.0, 8.0 * TOL_UNIT))
+            harness_fail(h, "shadow", x, y, "got %.9g, expected %.9g", got_share[i], expected.shadow);
     }
     harness_same(h, "opacity", transparent, count, 4, 1, picture->view.width);
     harness_unsure(h, open, count, most_open);
@@ -195,6 +204,8 @@ static void lights(struct harness *h)
     for (uint32_t i = 0; i < PT_MAX_LIGHTS; i++) {
         struct light_args *light = &s.args.lights[i];
         light->type = 1 + i % 2;
+        light->shadow = i % 3; // none, the first, the second
+        light->shadow_scale = 1.0f / (255.0f * 8.0f);
         rng_direction(&rng, light->vector);
         for (int c = 0; c < 3; c++) {
             light->color[c] = (float)rng_unit(&rng);
@@ -216,6 +227,27 @@ static void lights(struct harness *h)
     }
 }
 
+// Spots with hard and soft edges, panels near and far, with shadows and without.
+static void shapes(struct harness *h)
+{
+    for (uint64_t seed = 10; seed < 16; seed++) {
+        struct rng rng = {seed};
+        struct setup s = make(h, &rng, seed % 2 ? 1 : 0, PICTURE_SURFACES, 0);
+        for (uint32_t i = 0; i < s.args.light_count; i++) {
+            struct light_args *light = &s.args.lights[i];
+            light->type = 3 + i % 2;
+            light->shadow = (uint32_t)seed % 3;
+            light->shadow_scale = 1.0f / (255.0f * 8.0f);
+            rng_direction(&rng, light->axis);
+            light->cone[0] = (float)rng_range(&rng, 0.0, 0.9);
+            light->cone[1] = (float)rng_range(&rng, 1.0, 20.0);
+            for (int k = 0; k < 3 * PT_AREA_POINTS; k++)
+                light->points[k] = light->vector[k % 3] + (float)rng_range(&rng, -0.3, 0.3);
+        }
+        check(h, &s, TOL_UNSURE_SHARE);
+    }
+}
+
 // Reference alone: a white wall, lit head-on by a sun of irradiance pi, is as bright as a mirror of it: 1.
 static void sanity(struct harness *h)
 {
@@ -225,13 +257,20 @@ static void sanity(struct harness *h)
     struct shade_args args = {.view = {.width = 1, .height = 1}, .light_count = 1};
     args.instance = (struct instance_args){
         .id_count = 1, .has_normals = 1, .opacity = 1.0f, .lit = 1, .shininess = 8, .diffuse = 1.0f, .color = {1, 0.5f, 0}};
-    args.lights[0] = (struct light_args){1, {(float)3.14159265358979, 0.0f, 0.0f}, {0, 0, 1}};
+    args.lights[0] = (struct light_args){.type = 1, .color = {(float)3.14159265358979, 0.0f, 0.0f}, .vector = {0, 0, 1}};
     struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff};
     struct ref_shade out = ref_shade(&args, &planes, 0, 0);
     HARNESS_CHECK(h, fabs(out.color[0] - 1.0) < 1e-6 && out.color[1] == 0.0 && out.color[3] == 1.0);
     args.lights[0].type = 2; // two units before the wall: a quarter
     args.lights[0].vector[2] = 0.0f;
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.25) < 1e-6);
+    uint32_t word = 51; // a fifth of one sample is lost
+    planes.shadows = &word;
+    args.lights[0].shadow = 1;
+    args.lights[0].shadow_scale = 1.0f / 255.0f;
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.2) < 1e-6);
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).shadow - 0.8) < 1e-6);
+    args.lights[0].shadow = 0;
     args.instance.specular = 1.0f; // the highlight doubles it
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.5) < 1e-6);
     HARNESS_CHECK(h, fabs(ref_srgb(188) - 0.502886) < 1e-5 && ref_srgb(255) == 1.0 && ref_srgb(0) == 0.0);
@@ -247,6 +286,7 @@ int main(int argc, char **argv)
         {"opacities", opacities, 0},
         {"materials", materials, 0},
         {"lights", lights, 0},
+        {"spots and panels", shapes, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

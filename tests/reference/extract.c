@@ -9,7 +9,7 @@ struct ref_extract ref_extract(const struct extract_args *args, const struct ref
 {
     uint32_t width = args->view.width, px = (uint32_t)x + args->crop_x, py = (uint32_t)y + args->crop_y;
     size_t pixel = (size_t)py * width + px;
-    struct ref_extract out = {.depth = INFINITY};
+    struct ref_extract out = {.depth = INFINITY, .shadow = 1.0};
     if (planes->keys[pixel] == REF_EMPTY_KEY)
         return out;
     out.depth = ref_key_z(planes->keys[pixel]);
@@ -19,6 +19,7 @@ struct ref_extract ref_extract(const struct extract_args *args, const struct ref
                          m[6] * n.x + m[7] * n.y + m[8] * n.z);
     for (int i = 0; i < 9; i++)
         out.normal_error += TOL_ROTATE * fabs((double)m[i]); // |n| <= 1
+    out.shadow = planes->arrived[pixel];
     uint32_t from = planes->from[pixel] & ~PT_FROM_MIXED;
     double dx = (double)(from % width) - px, dy = (double)(from / width) - py;
     out.source = 1.0 + sqrt(dx * dx + dy * dy);

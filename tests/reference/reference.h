@@ -81,6 +81,14 @@ struct ref_splat {
 struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
                              const uint32_t *ids, const uint32_t *surface, uint32_t slot);
 
+// Where a point is on screen, in pixels of the full picture.
+struct ref_place {
+    int known; // 0: behind the eye, or not finite
+    struct ref_range x, y, z;
+};
+struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
+                           uint32_t slot);
+
 // ---- one pixel of a filter --------------------------------------------------------------------------------------------
 
 // Planes of the view's size; a filter reads those that kernels.def lists.
@@ -92,6 +100,8 @@ struct ref_planes {
     const void *colors;      // by id - id_base
     const uint8_t *opacities; // by id - id_base
     const float *through;    // light that earlier layers let through
+    const float *arrived;
+    const uint32_t *shadows; // words, by light and id - id_base
 };
 
 // Does the key belong to the instance?
@@ -131,11 +141,21 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
 // A whole phase; pixels: width x height, read as the state before it, left as the state after it. 0: out of memory.
 int ref_fill(const struct fill_args *args, const float *normal, const float *deff, struct ref_pixel *pixels);
 
+// Does the picture show the point `id` of the instance somewhere in its rectangle?
+int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint32_t id);
+
+// Is the point of this slot in shadow? planes: of the light's map.
+enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
+                       const float *positions, const uint32_t *ids, uint32_t slot);
+// A shadow word after a sample whose map says so.
+uint32_t ref_shadow_word(const struct lit_args *args, uint32_t word, int shadowed);
+
 struct ref_shade {
     struct ref_vec n; // the normal that lights the pixel
     double normal_error;
     double color[4], color_error[4]; // premultiplied
     double opacity;
+    double shadow; // mean share of the casting lights that arrives
     int written;  // the pixel belongs to the instance
     int unsure;   // float32 may decide otherwise
     int singular; // a light within rounding of the surface: only finite colours are asked for
@@ -165,7 +185,7 @@ struct ref_extract {
     double depth; // +inf: nothing
     struct ref_vec normal;
     double normal_error;
-    double source;
+    double source, shadow;
 };
 struct ref_extract ref_extract(const struct extract_args *args, const struct ref_planes *planes, int x, int y);
 

@@ -55,6 +55,26 @@ static int pixels(struct ref_range screen, int origin, uint32_t size, int *first
     return 1;
 }
 
+struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
+                           uint32_t slot)
+{
+    const float *base = positions + 3 * (size_t)chunk->first;
+    double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]}, error[3];
+    struct ref_place place = {.known = 1};
+    double x = project(chunk, 0, p, &error[0]), y = project(chunk, 1, p, &error[1]), z = project(chunk, 2, p, &error[2]);
+    place.z = (struct ref_range){z - error[2], z + error[2]};
+    place.x = (struct ref_range){x - error[0], x + error[0]};
+    place.y = (struct ref_range){y - error[1], y + error[1]};
+    if (view->perspective && place.z.lo > 0.0) {
+        place.x = divide(x, error[0], place.z);
+        place.y = divide(y, error[1], place.z);
+    } else if (view->perspective) {
+        place.known = 0;
+    }
+    place.known &= isfinite(x) && isfinite(y) && isfinite(z);
+    return place;
+}
+
 struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
                              const uint32_t *ids, const uint32_t *surface, uint32_t slot)
 {

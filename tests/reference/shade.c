@@ -9,7 +9,7 @@
 
 #define PI 3.14159265358979323846
 
-enum { POINT_LIGHT = 2 }; // patina_light_type
+enum { SUN_LIGHT = 1, SPOT_LIGHT = 3, AREA_LIGHT = 4 }; // patina_light_type
 
 static void albedo_of(const struct instance_args *instance, const struct ref_planes *planes, uint32_t id,
                       double albedo[3])
@@ -71,26 +71,75 @@ static void normal_of(const struct shade_args *args, const struct ref_planes *pl
         blend(&args->view, planes, (int)args->blend, x, y, out);
 }
 
-// What a light sends to the pixel, and from where. 0 when the light is too near for float32.
-static int incoming(const struct light_args *light, struct ref_vec position, double position_error, struct ref_vec *l,
-                    double strength[3], double *error)
+// What a light at `from` sends to the pixel, and from where. 0 when the light is too near for float32.
+static int incoming(const struct light_args *light, struct ref_vec from, struct ref_vec position, double position_error,
+                    struct ref_vec *l, double strength[3], double *error)
 {
-    struct ref_vec vector = ref_vec_of(light->vector);
     double gain = 1.0;
-    *l = vector;
+    *l = from;
     *error = TOL_NORMAL;
-    if (light->type == POINT_LIGHT) {
-        struct ref_vec way = ref_add(vector, ref_scale(position, -1.0));
-        double d = ref_length(way), lost = position_error + TOL_SUM * ref_length(vector);
+    if (light->type != SUN_LIGHT) {
+        struct ref_vec way = ref_add(from, ref_scale(position, -1.0));
+        double d = ref_length(way), lost = position_error + TOL_SUM * ref_length(from);
         if (!(d > 200.0 * lost))
             return 0;
         *l = ref_scale(way, 1.0 / d);
         *error += 2.0 * lost / d;
         gain = 1.0 / (d * d);
     }
+    double along = -ref_dot(ref_vec_of(light->axis), *l);
+    if (light->type == AREA_LIGHT)
+        gain *= fmax(along, 0.0);
+    if (light->type == SPOT_LIGHT) { // smoothstep from the cone's edge inwards
+        double edge = fmin(fmax((along - light->cone[0]) * light->cone[1], 0.0), 1.0);
+        gain *= edge * edge * (3.0 - 2.0 * edge);
+    }
     for (int c = 0; c < 3; c++)
         strength[c] = light->color[c] * gain;
     return 1;
+}
+
+// How far the strength may be off because the direction is: absolute, of the light's unfaded strength.
+static double edge_error(const struct light_args *light, double error)
+{
+    return light->type == AREA_LIGHT ? error : light->type == SPOT_LIGHT ? fmin(1.5 * light->cone[1] * error, 1.0) : 0.0;
+}
+
+struct lighting {
+    const struct instance_args *instance;
+    struct ref_vec n, viewer, position;
+    double position_error, light[3], loose[3];
+};
+
+static void add_light(struct lighting *s, const struct light_args *light, struct ref_vec from, double share,
+                      struct ref_shade *out)
+{
+    const struct instance_args *instance = s->instance;
+    struct ref_vec l;
+    double strength[3], error;
+    if (!incoming(light, from, s->position, s->position_error, &l, strength, &error)) {
+        out->singular = 1;
+        return;
+    }
+    double distance = light->type == SUN_LIGHT ? 1.0 : ref_length(ref_add(from, ref_scale(s->position, -1.0)));
+    double fading = edge_error(light, error) / (distance * distance);
+    error += out->normal_error;
+    double cosine = ref_dot(s->n, l);
+    struct ref_vec reflected = ref_add(ref_scale(s->n, 2.0 * cosine), ref_scale(l, -1.0));
+    double shine = fmax(ref_dot(reflected, s->viewer), 0.0), off = TOL_REFLECT + 3.0 * error;
+    double highlight = cosine > 0.0 ? instance->specular * pow(shine, instance->shininess) : 0.0;
+    double steep = instance->specular * instance->shininess *
+                   pow(fmin(shine + off, 1.0), instance->shininess - 1.0);
+    // At the terminator the highlight is switched on or off by the last bit.
+    if (fabs(cosine) <= error + TOL_NORMAL && instance->specular * pow(shine + off, instance->shininess) > 1e-7)
+        out->unsure = 1;
+    for (int c = 0; c < 3; c++) {
+        double e = share * strength[c] / PI, gathered = instance->diffuse * fmax(cosine, 0.0) + highlight;
+        s->light[c] += e * gathered;
+        s->loose[c] += fabs(e) * (TOL_COLOR * gathered + (instance->diffuse + 1e-30) * (error + TOL_NORMAL) + steep * off +
+                                  2.0 * error * gathered) +
+                       fabs(light->color[c]) / PI * fading * gathered;
+    }
 }
 
 struct ref_shade ref_shade(const struct shade_args *args, const struct ref_planes *planes, int x, int y)
@@ -99,7 +148,7 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     const struct instance_args *instance = &args->instance;
     size_t pixel = (size_t)y * view->width + (size_t)x;
     uint64_t key = planes->keys[pixel];
-    struct ref_shade out = {.written = ref_is_of(instance, key)};
+    struct ref_shade out = {.shadow = 1.0, .written = ref_is_of(instance, key)};
     if (!out.written)
         return out;
     struct ref_ray ray = ref_ray(view, x, y);
@@ -129,39 +178,31 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     double position_error = 4.0 * TOL_UNIT *
                                 (fabs(position.x) + fabs(position.y) + fabs(position.z) + fabs((double)args->eye_z)) +
                             (ray.error_u + ray.error_v) * (view->perspective ? z : 1.0);
-    double light[3], loose[3];
+    struct lighting s = {.instance = instance, .n = n, .viewer = viewer, .position = position, .position_error = position_error};
     for (int c = 0; c < 3; c++) {
-        light[c] = (double)instance->ambient * args->world[c];
-        loose[c] = TOL_COLOR * fabs(light[c]);
+        s.light[c] = (double)instance->ambient * args->world[c];
+        s.loose[c] = TOL_COLOR * fabs(s.light[c]);
     }
+    uint32_t casting = 0;
+    double arrived = 0.0;
     for (uint32_t i = 0; i < args->light_count; i++) {
-        struct ref_vec l;
-        double strength[3], error;
-        if (!incoming(&args->lights[i], position, position_error, &l, strength, &error)) {
-            out.singular = 1;
-            continue;
+        const struct light_args *light = &args->lights[i];
+        double share = 1.0;
+        if (light->shadow) {
+            size_t word = (light->shadow - 1) * (size_t)instance->id_count + (ref_key_id(key) - instance->id_base);
+            share -= (planes->shadows[word] & PT_SHADOW_SUM) * (double)light->shadow_scale;
+            arrived += share;
+            casting++;
         }
-        error += out.normal_error;
-        double cosine = ref_dot(n, l);
-        struct ref_vec reflected = ref_add(ref_scale(n, 2.0 * cosine), ref_scale(l, -1.0));
-        double shine = fmax(ref_dot(reflected, viewer), 0.0), off = TOL_REFLECT + 3.0 * error;
-        double highlight = cosine > 0.0 ? instance->specular * pow(shine, instance->shininess) : 0.0;
-        double steep = instance->specular * instance->shininess *
-                       pow(fmin(shine + off, 1.0), instance->shininess - 1.0);
-        // At the terminator the highlight is switched on or off by the last bit.
-        if (fabs(cosine) <= error + TOL_NORMAL && instance->specular * pow(shine + off, instance->shininess) > 1e-7)
-            out.unsure = 1;
-        for (int c = 0; c < 3; c++) {
-            double e = strength[c] / PI;
-            light[c] += e * (instance->diffuse * fmax(cosine, 0.0) + highlight);
-            loose[c] += fabs(e) * (TOL_COLOR * (instance->diffuse * fmax(cosine, 0.0) + highlight) +
-                                   (instance->diffuse + 1e-30) * (error + TOL_NORMAL) + steep * off +
-                                   2.0 * error * (instance->diffuse * fmax(cosine, 0.0) + highlight));
-        }
+        if (light->type != AREA_LIGHT)
+            add_light(&s, light, ref_vec_of(light->vector), share, &out);
+        for (int j = 0; light->type == AREA_LIGHT && j < PT_AREA_POINTS; j++)
+            add_light(&s, light, ref_vec_of(light->points + 3 * j), share, &out);
     }
+    out.shadow = casting ? arrived / casting : 1.0;
     for (int c = 0; c < 3; c++) {
-        out.color[c] = out.opacity * albedo[c] * light[c];
-        out.color_error[c] = out.opacity * fabs(albedo[c]) * loose[c] + TOL_COLOR * fabs(out.color[c]);
+        out.color[c] = out.opacity * albedo[c] * s.light[c];
+        out.color_error[c] = out.opacity * fabs(albedo[c]) * s.loose[c] + TOL_COLOR * fabs(out.color[c]);
     }
     return out;
 }

@@ -327,6 +327,24 @@ def test_stats():
     assert all(isinstance(reason, str) and reason for reason in stats["skipped"].values())
 
 
+def test_shadows():
+    """A ball before a wall throws a shadow on it; kept shadows make the same picture; what does not fit is refused."""
+    ball("ball.ply", origin=(0, -1.6, 0))
+    wall("wall.ply", lambda x, z: (200, 200, 200))
+    view = ("ball.ply", "wall.ply", "--lit", "--size", "64x64", "--look", "-6,-5,0,0,0,0", "--ortho", "6", "--sun", "0,0,4")
+    run("render", *view, "-o", "open.png")
+    run("render", *view, "-o", "dark.png", "--shadows", "--samples", "8")
+    lit, dark = (sum(sum(sum(pixel) for pixel in row) for row in read_png(name)[3]) for name in ("open.png", "dark.png"))
+    assert dark < 0.96 * lit, (lit, dark)
+    run("render", *view, "--shadows", "--samples", "8", "--save-shadows", "kept")
+    run("render", *view, "-o", "kept.png", "--shadows", "--samples", "8", "--load-shadows", "kept")
+    assert read_png("kept.png") == read_png("dark.png")
+    refused = run("render", *view, "-o", "x.png", "--shadows", "--samples", "9", "--load-shadows", "kept", code=1).stderr
+    assert "stale" in refused and "8 samples" in refused, refused
+    assert "need --shadows" in run("render", *view, "--save-shadows", "kept", code=2).stderr
+    assert "no value" in run("render", *view, "-o", "x.png", "--sun", "0,91", code=2).stderr
+
+
 def test_skipped_passes_have_reasons():
     ball("skipped.ply", 500)
     stats = json.loads(run("render", "skipped.ply", "--stats", "json", "--smooth", "off", "--antialias", "off").stdout)

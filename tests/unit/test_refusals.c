@@ -123,6 +123,40 @@ static void test_lights_end_at_32(void **state)
     clear_stage(&stage);
 }
 
+static void test_bad_lights_and_shadows(void **state)
+{
+    (void)state;
+    struct stage stage = set_stage(0);
+    const patina_light_desc good = { .struct_size = sizeof good, .type = PATINA_LIGHT_AREA, .power = 1.0f };
+    patina_light_desc bad[9];
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        bad[i] = good;
+    bad[0].type = 5;
+    bad[1].shape = 2;
+    bad[2].angle = 3.2f;
+    bad[3].cone = -0.1f;
+    bad[4].blend = 1.5f;
+    bad[5].radius = (float)NAN;
+    bad[6].size[1] = -1.0f;
+    bad[7].side[0] = (double)INFINITY;
+    bad[8].power = (float)INFINITY;
+    assert_int_equal(patina_scene_add_light(stage.scene, &good), PATINA_OK);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_equal(patina_scene_add_light(stage.scene, &bad[i]), PATINA_ERROR_ARGUMENT);
+        assert_message(stage.scene, "light: ");
+    }
+    patina_settings settings = { .struct_size = sizeof settings, .shadow_samples = 4097 };
+    assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
+    settings = (patina_settings){ .struct_size = sizeof settings, .shadow_resolution = 16385 };
+    assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
+    assert_message(stage.scene, "shadow samples");
+    float value;
+    assert_int_equal(patina_frame_read_shadows(stage.frame, 0, 0, &value, sizeof value), PATINA_ERROR_EMPTY);
+    assert_int_equal(patina_frame_bake_shadows(stage.frame, stage.scene), PATINA_ERROR_EMPTY);
+    assert_int_equal(patina_frame_save_shadows(stage.frame, "unused"), PATINA_ERROR_EMPTY);
+    clear_stage(&stage);
+}
+
 static void test_planes_too_large(void **state)
 {
     (void)state;
@@ -208,6 +242,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_picture_survives_memory_cap), cmocka_unit_test(test_cancel_ends_with_its_render),
+        cmocka_unit_test(test_bad_lights_and_shadows),
         cmocka_unit_test(test_lights_end_at_32),            cmocka_unit_test(test_planes_too_large),
         cmocka_unit_test(test_opacities),
         cmocka_unit_test(test_cameras),                     cmocka_unit_test(test_statistics_in_any_locale),

@@ -10,7 +10,7 @@
 #include "device_cpu/kernels/shade.h"
 #include "device_cpu/kernels/smooth.h"
 
-enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 5, CHANNELS_COLOR = 4 };
+enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 5, CHANNELS_COLOR = 13 }; // shaded 4, smoothed 4, shown 5
 // Row s is shaded when s + reach has been seen, s - 1 is smoothed then, s - 2 finished: anti-aliasing reads s - 3 too.
 enum { SEEN_MOST = 2 * PT_BLEND_MOST + 1 };
 
@@ -21,7 +21,7 @@ struct finish {
     const struct antialias_args *antialias;   // NULL: off
     const struct compose_args *compose;
     const struct extract_args *extract;       // NULL: nothing beside the colour
-    float *combined, *depth, *normals, *source;
+    float *combined, *depth, *normals, *source, *shadow;
     const struct peel_args *peel;             // NULL: the picture is composed
     const float *through;                     // of the layers before; NULL before the first
     struct pt_peeled peeled;
@@ -44,7 +44,7 @@ struct walk {
     struct pt_seen_row seen[SEEN_MOST];
     int any[SEEN_MOST];             // whether the row holds anything
     struct pt_color_row shaded[RING], smoothed[RING];
-    float *shown[RING][4];          // normals, opacities
+    float *shown[RING][5];          // normals, opacities, what arrives of the lights
     struct pt_tile_sum *tiles;      // of the row of tiles at hand
 };
 
@@ -66,17 +66,18 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
     const size_t s = finish->stride;
     for (uint32_t i = 0; i < finish->ring; i++, at += CHANNELS_SEEN * s)
         walk->seen[i] = (struct pt_seen_row){ at, at + s, { at + 2 * s, at + 3 * s, at + 4 * s } };
-    for (uint32_t i = 0; i < RING; i++, at += 3 * CHANNELS_COLOR * s) {
+    for (uint32_t i = 0; i < RING; i++, at += CHANNELS_COLOR * s) {
         walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s, at + 3 * s } };
         walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s } };
-        for (uint32_t k = 0; k < 4; k++)
+        for (uint32_t k = 0; k < 5; k++)
             walk->shown[i][k] = at + (8 + k) * s;
     }
 }
 
 // ---- 1. colours and normals -------------------------------------------------------------------------------------------------
 
-// The colours of points lie in file order, each is a cache miss of its own: ask for those of a row that is shaded later.
+// The colours and shadows of points lie in file order, each is a cache miss of its own: ask for those of a row that is shaded
+// later.
 static void ask_for_colors(const struct finish *finish, int32_t y)
 {
     static const uint32_t color_bytes[] = { 0, 3, 12 };
@@ -85,7 +86,13 @@ static void ask_for_colors(const struct finish *finish, int32_t y)
         const struct shade_args *args = finish->shades[i].call.arguments;
         const char *colors = pt_cpu_data(&finish->shades[i].call, 4);
         const size_t size = color_bytes[args->instance.color_format];
-        for (uint32_t x = 0; size && x < view->width; x += PT_LANES) {
+        const uint32_t *words[PT_MAX_LIGHTS];
+        uint32_t casting = 0;
+        for (uint32_t l = 0; l < args->light_count; l++)
+            if (args->lights[l].shadow)
+                words[casting++] = (const uint32_t *)pt_cpu_data(&finish->shades[i].call, 8) +
+                                   (size_t)(args->lights[l].shadow - 1) * args->instance.id_count;
+        for (uint32_t x = 0; (size || casting) && x < view->width; x += PT_LANES) {
             size_t at = (size_t)y * view->width + x;
             vi id;
             vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, view->width), &id);
@@ -94,8 +101,13 @@ static void ask_for_colors(const struct finish *finish, int32_t y)
                 continue;
             vi_store(ids, id, vm_first(PT_LANES));
             bits &= ~vm_bits(pt_filled(pt_source(&finish->planes, at), at, ours));
-            for (; bits; bits &= bits - 1)
-                __builtin_prefetch(colors + size * ids[__builtin_ctz(bits)]);
+            for (; bits; bits &= bits - 1) {
+                uint32_t point = ids[__builtin_ctz(bits)];
+                if (size)
+                    __builtin_prefetch(colors + size * point);
+                for (uint32_t l = 0; l < casting; l++)
+                    __builtin_prefetch(words[l] + point);
+            }
         }
     }
 }
@@ -128,8 +140,10 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
     }
 }
 
-static void shade_lit(const struct finish *finish, struct walk *walk, const struct shade_args *args, int32_t y)
+static void shade_lit(const struct finish *finish, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
 {
+    const struct shade_args *args = call->arguments;
+    const uint32_t *shadows = pt_cpu_data(call, 8);
     const struct view_args *view = finish->planes.view;
     const struct pt_color_row *out = &walk->shaded[slot(y)];
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
@@ -143,11 +157,12 @@ static void shade_lit(const struct finish *finish, struct walk *walk, const stru
                                  pt_lanes_left(x, view->width), &id);
         if (!vm_bits(ours))
             continue;
-        pt_shade_pixels(args, &finish->planes, around, finish->weights, x, (uint32_t)y, ours, color, normal);
+        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, shadows, x, (uint32_t)y, id, ours, color, normal);
         for (uint32_t k = 0; k < 3; k++) {
             vf_store(out->color[k] + x, color[k], ours);
             vf_store(walk->shown[slot(y)][k] + x, normal[k], ours);
         }
+        vf_store(walk->shown[slot(y)][4] + x, share, ours);
     }
 }
 
@@ -171,7 +186,7 @@ static void shade(const struct finish *finish, struct walk *walk, int32_t y)
                 vf_store(out->color[k] + x, albedo[k], ours);
         }
         if (finish->with_normals)
-            shade_lit(finish, walk, args, y);
+            shade_lit(finish, walk, &finish->shades[i].call, y);
         if (finish->channels == 4)
             make_translucent(finish, &finish->shades[i].call, out, walk->shown[slot(y)][3], y);
     }
@@ -275,6 +290,12 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
         if (vm_bits(some))
             value = pt_source_value(width, pt_source(&finish->planes, (size_t)py * width + px), mixed, some, px, py);
         vf_put(finish->source + out, value, count);
+    }
+    if (args->shadow) {
+        vf value = vf_set(1.0f);
+        if (finish->with_normals && vm_bits(some))
+            value = vf_select(some, vf_load(walk->shown[slot((int32_t)py)][4] + px), value);
+        vf_put(finish->shadow + out, value, count);
     }
 }
 
@@ -409,6 +430,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.depth = pt_cpu_data(call, 3);
             finish.normals = pt_cpu_data(call, 4);
             finish.source = pt_cpu_data(call, 5);
+            finish.shadow = pt_cpu_data(call, 7);
         }
     }
     if (finish.shade_count)
@@ -416,7 +438,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
     finish.channels = finish.peel ? 4 : 3;
     finish.stride = pt_row_stride(finish.planes.view->width);
     finish.ring = (uint32_t)(2 * finish.reach > finish.reach + 3 ? 2 * finish.reach : finish.reach + 3) + 1;
-    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * 3 * CHANNELS_COLOR) * finish.stride;
+    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR) * finish.stride;
     pt_blend_weights(finish.weights);
     uint32_t threads = pt_pool_threads(shared->pool);
     finish.memory = pt_cpu_scratch(shared, 0, threads * finish.thread_floats * sizeof(float));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// extract: the passes beside the colour, into the crop: z, world-space normal, source (SPEC 2.2: scholars must see what
+// extract: the passes beside the colour, into the crop: z, world-space normal, source, shadow (SPEC 2.2: scholars must see what
 // is scan and what is invention); twin of shaders/kernels/extract.comp
 #include "extract.h"
 
@@ -36,6 +36,16 @@ static void extract_normal(const struct extract_args *args, const uint64_t *keys
     }
 }
 
+// The mean share of the casting lights that arrives; 1 where nothing is.
+static void extract_shadow(const struct extract_args *args, const uint64_t *keys, const float *arrived, float *out)
+{
+    for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
+        vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
+        vm some = vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z)));
+        vf_store(out + x, vf_select(some, vf_load(arrived + x), vf_set(1.0f)), lanes);
+    }
+}
+
 static void extract_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
@@ -51,6 +61,8 @@ static void extract_row(void *context, uint32_t y)
     if (args->source)
         extract_source(args, keys, (const uint32_t *)pt_cpu_data(call, 1) + row, y,
                        (float *)pt_cpu_data(call, 5) + out);
+    if (args->shadow)
+        extract_shadow(args, keys, (const float *)pt_cpu_data(call, 6) + row, (float *)pt_cpu_data(call, 7) + out);
 }
 
 int PT_KERNEL_ENTRY(extract)(const struct pt_cpu_call *call)

@@ -26,7 +26,7 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
 {
     const struct shade_args *args = shade->args;
     const uint32_t *rect = args->view.rect;
-    float *shading = pt_cpu_data(shade->call, 5), *colors = pt_cpu_data(shade->call, 6);
+    float *shading = pt_cpu_data(shade->call, 5), *colors = pt_cpu_data(shade->call, 6), *arrived = pt_cpu_data(shade->call, 9);
     static const uint32_t color_bytes[] = { 0, 3, 12 };
     const uint64_t *keys = shade->planes.keys + (size_t)y * args->view.width;
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
@@ -42,12 +42,15 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         if (!vm_bits(ours))
             continue;
         pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, ours, color);
-        pt_shade_pixels(args, &shade->planes, around, shade->weights, x, y, ours, color, normal);
+        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, pt_cpu_data(shade->call, 8), x, y, id, ours, color,
+                                   normal);
         normal[3] = color[3] = pt_opacity(&args->instance, pt_cpu_data(shade->call, 7), id, ours);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * color[3];
         vf_store4(shading + 4 * at, normal, vm_bits(ours));
         vf_store4(colors + 4 * at, color, vm_bits(ours));
+        if (args->arrived)
+            vf_store(arrived + at, share, ours);
     }
 }
 

@@ -96,21 +96,50 @@ static inline vf pt_power(vf x, uint32_t exponent)
     return result;
 }
 
-static inline void pt_add_light(const struct instance_args *instance, const struct light_args *light,
-                                const struct pt_surface_point *s, vf diffuse[3], vf specular[3])
+// The share of a light that arrives at points, by their shadow words [D 6].
+static inline vf pt_arrives(const struct light_args *light, const uint32_t *shadows, uint32_t id_count, vi id, vm ours)
+{
+    const uint32_t *words = shadows + (size_t)(light->shadow - 1) * id_count;
+    vi sum = vi_and(vi_gather(words, id, ours), vi_set(PT_SHADOW_SUM));
+    return vf_set(1.0f) - vi_convert(sum) * vf_set(light->shadow_scale);
+}
+
+// Direction to the light at `from`, and its falloff there times what is in falloff; suns have none.
+static inline void pt_towards(const struct light_args *light, const float from[3], const struct pt_surface_point *s, vf l[3],
+                              vf *falloff)
+{
+    for (int k = 0; k < 3; k++)
+        l[k] = vf_set(from[k]);
+    if (light->type == 1) // PATINA_LIGHT_SUN
+        return;
+    for (int k = 0; k < 3; k++)
+        l[k] = l[k] - s->position[k];
+    vf scale = vf_rsqrt(vf_max(pt_dot3(l, l), vf_set(1e-20f)));
+    for (int k = 0; k < 3; k++)
+        l[k] = l[k] * scale;
+    *falloff = *falloff * (scale * scale);
+    if (light->type == 2) // PATINA_LIGHT_POINT
+        return;
+    vf axis[3], zero = vf_zero(), one = vf_set(1.0f);
+    for (int k = 0; k < 3; k++)
+        axis[k] = vf_set(light->axis[k]);
+    vf cosine = zero - pt_dot3(axis, l);
+    if (light->type == 4) { // PATINA_LIGHT_AREA: one side shines, as matt paper
+        *falloff = *falloff * vf_max(cosine, zero);
+        return;
+    }
+    vf edge = vf_min(vf_max((cosine - vf_set(light->cone[0])) * vf_set(light->cone[1]), zero), one);
+    *falloff = *falloff * ((edge * edge) * (vf_set(3.0f) - vf_set(2.0f) * edge));
+}
+
+// share: of its light that arrives.
+static inline void pt_add_light(const struct instance_args *instance, const struct light_args *light, const float from[3],
+                                vf share, const struct pt_surface_point *s, vf diffuse[3], vf specular[3])
 {
     const vf zero = vf_zero();
     vf l[3], falloff = vf_set(0.31830988618f); // 1 / pi: radiance of a white Lambert surface under unit irradiance
-    for (int k = 0; k < 3; k++)
-        l[k] = vf_set(light->vector[k]);
-    if (light->type == 2) { // PATINA_LIGHT_POINT
-        for (int k = 0; k < 3; k++)
-            l[k] = l[k] - s->position[k];
-        vf scale = vf_rsqrt(vf_max(pt_dot3(l, l), vf_set(1e-20f)));
-        for (int k = 0; k < 3; k++)
-            l[k] = l[k] * scale;
-        falloff = falloff * (scale * scale);
-    }
+    pt_towards(light, from, s, l, &falloff);
+    falloff = falloff * share;
     vf cosine = pt_dot3(s->n, l);
     vf lambert = vf_max(cosine, zero) * falloff;
     for (int k = 0; k < 3; k++)
@@ -149,29 +178,46 @@ static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z
         s->n[k] = vf_select(away, zero - n[k], n[k]);
 }
 
-// c = albedo (k_a world + k_d sum E max(n.l, 0) / pi) + albedo k_s sum E max(r.v, 0)^shininess / pi. In and out: albedo.
-static inline void pt_phong(const struct shade_args *args, uint32_t x, uint32_t y, vf z, const vf n[3], vf color[3])
+// c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
+// the light. In and out: albedo. Returns the mean m of the lights that cast; 1 where none does.
+static inline vf pt_phong(const struct shade_args *args, const uint32_t *shadows, uint32_t x, uint32_t y, vi id, vm ours, vf z,
+                          const vf n[3], vf color[3])
 {
     const struct instance_args *instance = &args->instance;
     struct pt_surface_point point;
-    vf ray[2], diffuse[3], specular[3];
+    vf ray[2], diffuse[3], specular[3], arrived = vf_zero();
+    uint32_t casting = 0;
     vf_ray(&args->view, x, y, ray);
     pt_place(args, ray, z, n, &point);
     for (int k = 0; k < 3; k++)
         diffuse[k] = specular[k] = vf_zero();
-    for (uint32_t i = 0; i < args->light_count; i++)
-        pt_add_light(instance, &args->lights[i], &point, diffuse, specular);
+    for (uint32_t i = 0; i < args->light_count; i++) {
+        const struct light_args *light = &args->lights[i];
+        vf share = vf_set(1.0f);
+        if (light->shadow) {
+            share = pt_arrives(light, shadows, instance->id_count, id, ours);
+            arrived = arrived + share;
+            casting++;
+        }
+        if (light->type != 4) // PATINA_LIGHT_AREA
+            pt_add_light(instance, light, light->vector, share, &point, diffuse, specular);
+        for (uint32_t j = 0; light->type == 4 && j < PT_AREA_POINTS; j++)
+            pt_add_light(instance, light, light->points + 3 * j, share, &point, diffuse, specular);
+    }
     for (int k = 0; k < 3; k++) {
         vf light = vf_set(instance->ambient * args->world[k]) + vf_set(instance->diffuse) * diffuse[k];
         color[k] = color[k] * (light + vf_set(instance->specular) * specular[k]);
     }
+    if (!casting)
+        return vf_set(1.0f);
+    return arrived * vf_set(1.0f / (float)casting);
 }
 
 // Light on, and shown normals of, PT_LANES pixels of the instance from (x, y) on. color: in albedo. around: rows
-// y - blend ... y + blend.
-static inline void pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes,
-                                   const struct pt_seen_row *const *around, const float *weights, uint32_t x, uint32_t y,
-                                   vm ours, vf color[3], vf normal[3])
+// y - blend ... y + blend. Returns the mean share of the casting lights that arrives.
+static inline vf pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes,
+                                 const struct pt_seen_row *const *around, const float *weights, const uint32_t *shadows,
+                                 uint32_t x, uint32_t y, vi id, vm ours, vf color[3], vf normal[3])
 {
     size_t at = (size_t)y * args->view.width + x;
     const struct pt_seen_row *own = around[args->blend];
@@ -183,7 +229,8 @@ static inline void pt_shade_pixels(const struct shade_args *args, const struct p
             pt_blend_normals(around, (int)args->blend, weights, x, filled, normal);
     }
     if (args->instance.lit)
-        pt_phong(args, x, y, vf_load(own->z + x), normal, color);
+        return pt_phong(args, shadows, x, y, id, ours, vf_load(own->z + x), normal, color);
+    return vf_set(1.0f);
 }
 
 #endif

@@ -235,6 +235,9 @@ PATINA_API int patina_write_ply(const char *path, const patina_cloud_desc *desc)
 enum patina_lighting { PATINA_LIGHTING_AUTO = 0, PATINA_LIGHTING_UNLIT = 1, PATINA_LIGHTING_LIT = 2 };
 // AUTO: clouds with colours are shown unlit (the colours hold the light of the day of the scan), others lit.
 
+// What a cloud leaves out of shadows [D 6].
+enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2, PATINA_SHADOW_NO_SELF = 4 };
+
 typedef struct patina_cloud_style {
     size_t struct_size;
     double world_from_object[16]; // all zero = identity. Mirrored, non-uniform, singular: all allowed
@@ -246,18 +249,29 @@ typedef struct patina_cloud_style {
     float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
     uint32_t shininess;           // Phong exponent; 0 = 32
     float transparency;           // share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn at all.
-                                  // Opacity is 1 - transparency, times the point's own. Paper [D 5]
+                                  // Opacity is 1 - transparency, times the point's own. Paper [D 5]. Its shadow
+                                  // is as much lighter, by this number alone
+    uint32_t shadow_off;          // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
 } patina_cloud_style;
 
-enum patina_light_type { PATINA_LIGHT_SUN = 1, PATINA_LIGHT_POINT = 2 };
+enum patina_light_type { PATINA_LIGHT_SUN = 1, PATINA_LIGHT_POINT = 2, PATINA_LIGHT_SPOT = 3, PATINA_LIGHT_AREA = 4 };
+enum patina_area_shape { PATINA_AREA_RECTANGLE = 0, PATINA_AREA_ELLIPSE = 1 };
 
 typedef struct patina_light_desc {
     size_t struct_size;
     uint32_t type;
     float color[3];     // linear; all zero = white
-    float power;        // sun: irradiance W/m2; point: radiant power W. As in Blender
-    double position[3]; // world, point
-    double direction[3]; // world, sun: the way the light travels; zero = (0,0,-1)
+    float power;        // sun: irradiance W/m2; others: radiant power W, of spots as if they shone all around. As in Blender
+    double position[3]; // world, all but suns; area: its middle
+    double direction[3]; // world, sun, spot, area: the way the light travels; zero = (0,0,-1)
+    double side[3];     // world, area: along its width; zero = any. Made perpendicular to direction
+    float angle;        // sun: radians that its disc spans, 0..pi; 0 = sharp shadows
+    float radius;       // point, spot: of the ball that shines; 0 = sharp shadows. Changes nothing but shadows
+    float size[2];      // area: width along side, and height; 0 = 1
+    uint32_t shape;     // area: patina_area_shape
+    float cone;         // spot: radians between opposite edges, 0..pi; 0 = pi/4
+    float blend;        // spot: share of the cone over which the edge fades, 0..1
+    uint32_t shadows;   // 1 = casts shadows
 } patina_light_desc;
 
 typedef struct patina_camera {
@@ -294,6 +308,13 @@ typedef struct patina_settings {
                                // where none is, the best. 0 = quality and fill as they are set
     uint32_t strata;           // 1..6: draw only every 32nd, 16th, .. 1st point of each chunk, rounded up to 16 points:
                                // a quick picture while navigating, filling closes the gaps. 0 = all
+    // Shadow textures [D 6], of lights that cast: for every point and light the share of the light that arrives.
+    uint32_t shadow_samples;     // of a light's area, 1..4096; 0 = 1: its middle
+    uint32_t shadow_resolution;  // most texels on a side of a light's map; 0 = 4096. Fewer where the points lie wider
+    uint32_t shadow_lazy;        // 1 = only points that the picture shows are tested, and the next frame tests anew: for
+                                 // final pictures. 0 = whole textures, kept until something that they depend on changes
+    uint32_t shadow_progressive; // 1 = one sample after a change, and every further render of the frame doubles them up to
+                                 // shadow_samples (stats: shadow_pending); not with shadow_lazy
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -320,7 +341,8 @@ PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimu
     X(COMBINED, 4, "premultiplied scene-linear colour")                                                        \
     X(DEPTH, 1, "linear z, +inf where nothing is")                                                             \
     X(NORMAL, 3, "world-space unit normal, 0 where nothing is")                                                \
-    X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")
+    X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")   \
+    X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")
 
 enum patina_pass {
 #define PATINA_X(name, channels, text) PATINA_PASS_##name,
@@ -346,10 +368,14 @@ typedef struct patina_frame_stats {
     uint64_t points_scattered;  // in chunks that were not culled
     uint64_t chunks, chunks_culled;
     double ms;                  // whole render call
-    uint64_t plane_bytes;       // planes held by the frame
+    uint64_t plane_bytes;       // planes held by the frame, those of shadow maps too
     uint32_t layers;            // of surface that show something; 1 without peeling, 0 where nothing is in view
     float spacing_px;           // of points on screen, that 95% of the covered area stays below
     patina_expected_error expected;
+    uint64_t shadow_bytes;      // shadow textures held by the frame
+    uint32_t shadow_maps;       // light views drawn for this picture; 0 when every texture was at hand
+    uint32_t shadow_width, shadow_height; // of the largest of them, texels
+    uint32_t shadow_pending;    // progressive: lights that further renders still refine
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
@@ -369,6 +395,21 @@ PATINA_API int patina_frame_read_layer(const patina_frame *frame, uint32_t layer
 // The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone
 // after a render that failed or was cancelled (PATINA_ERROR_EMPTY).
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
+// ---- shadow textures: kept by the frame while points, casters, lights' places and sizes, samples and resolution stay; lights'
+// power and colour, and lights and clouds that move together, change nothing. `light` counts the lights that cast.
+
+// Computes the whole textures of every casting light without a picture (shadow_lazy and shadow_progressive do not count).
+// Blocks; patina_frame_cancel stops it. PATINA_ERROR_EMPTY when no light casts.
+PATINA_API int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene);
+// Copies the share of a light that arrives at each point, 0..1, in file order: count floats, size in bytes must fit exactly.
+// After a lazy render only the points that the picture showed say something; the others are 1.
+PATINA_API int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size);
+// Writes the frame's whole textures to a file, 1, 2 or 4 bytes a point and light, with what they depend on and a checksum.
+PATINA_API int patina_frame_save_shadows(const patina_frame *frame, const char *path);
+// Takes textures from such a file instead of computing them. PATINA_ERROR_FORMAT, and the frame as it was, when the file is
+// damaged, of another version, for other points, or stale: the message says which, and of which light or cloud.
+PATINA_API int patina_frame_load_shadows(patina_frame *frame, const patina_scene *scene, const char *path);
+
 PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
 // Milliseconds by pass, why each other pass was left out, and of each layer the points in chunks that were scattered and
 // the pixels that it covers, as JSON: {"passes":{..},"skipped":{..},"layers":[{"points":..,"pixels":..},..]}; one layer

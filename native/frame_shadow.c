@@ -1,0 +1,485 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Computes shadow textures: for each sample of a light its maps are drawn, as any picture up to filling, and every point is
+// tested against them [D 6].
+#include "frame.h"
+
+#include "residency.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { FIRST_COMPARED = 4 }; // samples after which a light may stop because all agree; then at every doubling
+
+// ---- what is at hand ---------------------------------------------------------------------------------------------------
+
+static void forget_lights(struct pt_shadows *shadows)
+{
+    for (uint32_t i = 0; i < shadows->light_count; i++)
+        free(shadows->lights[i].key);
+    memset(shadows->lights, 0, sizeof shadows->lights);
+    shadows->light_count = 0;
+}
+
+static void forget_instances(struct patina_frame *frame)
+{
+    struct pt_shadows *shadows = &frame->shadows;
+    for (uint32_t i = 0; i < shadows->instance_count; i++) {
+        frame->device->ops->buffer_destroy(frame->device, &shadows->words[i]);
+        frame->device->ops->buffer_destroy(frame->device, &shadows->marks[i]);
+    }
+    free(shadows->words);
+    free(shadows->marks);
+    free(shadows->fingerprints);
+    shadows->words = shadows->marks = NULL;
+    shadows->fingerprints = NULL;
+    shadows->instance_count = 0;
+}
+
+void pt_shadows_release(struct patina_frame *frame)
+{
+    struct pt_shadows *shadows = &frame->shadows;
+    forget_lights(shadows);
+    forget_instances(frame);
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int level = 0; level < PT_SLOTS; level++)
+            frame->device->ops->buffer_destroy(frame->device, &shadows->planes[p][level]);
+    frame->device->ops->buffer_destroy(frame->device, &shadows->differs);
+}
+
+struct pt_buffer *pt_shadows_buffer(struct patina_frame *frame, uint32_t which, uint32_t instance)
+{
+    static struct pt_buffer none; // never written: kernels that bind it do not touch it
+    struct pt_shadows *shadows = &frame->shadows;
+    if (instance >= shadows->instance_count)
+        return &none;
+    return which == PT_MARKS ? &shadows->marks[instance] : &shadows->words[instance];
+}
+
+uint64_t pt_shadows_identity(const struct pt_instance *instance)
+{
+    return pt_receives(instance) ? instance->cloud->fingerprint | 1u : 0; // never 0 of a receiver
+}
+
+// The words are for these instances and so many lights.
+static int same_places(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    int same = shadows->light_count == plan->light_count && shadows->instance_count == scene->instance_count;
+    for (uint32_t i = 0; same && i < scene->instance_count; i++)
+        same = shadows->fingerprints[i] == pt_shadows_identity(&scene->instances[i]);
+    return same;
+}
+
+int pt_shadows_make_places(struct patina_frame *frame, const struct patina_scene *scene, uint32_t light_count)
+{
+    struct pt_shadows *shadows = &frame->shadows;
+    const struct pt_device_ops *ops = frame->device->ops;
+    forget_lights(shadows);
+    forget_instances(frame);
+    shadows->words = calloc(scene->instance_count, sizeof *shadows->words);
+    shadows->marks = calloc(scene->instance_count, sizeof *shadows->marks);
+    shadows->fingerprints = calloc(scene->instance_count, sizeof *shadows->fingerprints);
+    if (!shadows->words || !shadows->marks || !shadows->fingerprints) {
+        forget_instances(frame);
+        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+    }
+    shadows->instance_count = scene->instance_count;
+    shadows->light_count = light_count;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        uint64_t points = scene->instances[i].cloud->info.count;
+        shadows->fingerprints[i] = pt_shadows_identity(&scene->instances[i]);
+        if (!shadows->fingerprints[i])
+            continue;
+        int error = light_count * points > UINT32_MAX
+                        ? pt_fail(&frame->device->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                                  "shadows of %u lights on %llu points: their product must stay below 4294967296",
+                                  light_count, (unsigned long long)points)
+                        : ops->buffer_create(frame->device, light_count * points * 4, NULL, 0, &shadows->words[i]);
+        if (error) {
+            forget_lights(shadows);
+            forget_instances(frame);
+            return pt_fail_again(&frame->handle, error);
+        }
+    }
+    return PATINA_OK;
+}
+
+// Samples that the light has after this render.
+static uint32_t samples_wanted(const struct patina_scene *scene, const struct pt_plan *plan, uint32_t i,
+                               const struct pt_shadow_light *light)
+{
+    const struct pt_plan_light *planned = &plan->lights[i];
+    if (light->settled)
+        return light->samples;
+    if (!scene->settings.shadow_progressive || pt_plan_lazy(scene, plan))
+        return planned->samples;
+    uint32_t next = light->samples ? 2 * light->samples : 1;
+    return next < planned->samples ? next : planned->samples;
+}
+
+int pt_shadows_stale(const struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    for (uint32_t i = 0; i < plan->light_count; i++)
+        if (frame->shadows.lights[i].samples != samples_wanted(scene, plan, i, &frame->shadows.lights[i]))
+            return 1;
+    return 0;
+}
+
+int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    struct pt_shadows *shadows = &frame->shadows;
+    int error = PATINA_OK;
+    if (!plan->light_count)
+        return PATINA_OK;
+    if (!same_places(shadows, scene, plan))
+        error = pt_shadows_make_places(frame, scene, plan->light_count);
+    for (uint32_t i = 0; i < plan->light_count && !error; i++) {
+        struct pt_shadow_light *light = &shadows->lights[i];
+        size_t count = pt_light_key(scene, &plan->lights[i], NULL, 0);
+        double *key = malloc(count * sizeof *key);
+        if (!key)
+            return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+        pt_light_key(scene, &plan->lights[i], key, count);
+        int known = light->key && light->key_count == count && pt_same_key(light->key, key, count);
+        if (!known || light->partial || (light->samples > plan->lights[i].samples && !light->settled))
+            light->samples = light->settled = 0;
+        free(light->key);
+        light->key = key;
+        light->key_count = count;
+    }
+    if (error || !pt_plan_lazy(scene, plan) || !pt_shadows_stale(frame, scene, plan))
+        return error;
+    for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
+        const struct pt_device_ops *ops = frame->device->ops;
+        if (shadows->fingerprints[i] && !shadows->marks[i].size)
+            error = ops->buffer_create(frame->device, (scene->instances[i].cloud->info.count + 3) / 4 * 4, NULL, 0,
+                                       &shadows->marks[i]);
+        if (!error && shadows->marks[i].size)
+            error = ops->buffer_fill(frame->device, &shadows->marks[i], 0, 4);
+    }
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+// ---- computing ---------------------------------------------------------------------------------------------------------
+
+struct update {
+    struct patina_frame *frame;
+    const struct patina_scene *scene;
+    struct pt_plan *plan;
+    struct pt_shadow_group *groups;
+    uint32_t group_count;
+    struct pt_instance *instances; // scratch: casters
+};
+
+// How many maps of a sample the instance is tested against.
+static uint32_t maps_of(const struct update *update, const struct pt_plan_light *planned, uint32_t instance)
+{
+    uint32_t count = 0;
+    for (uint32_t g = 0; g < update->group_count; g++)
+        count += (uint32_t)pt_group_receives(update->scene, &update->groups[g], instance);
+    return planned->cube ? 6 * count : count;
+}
+
+// Where a pass of a map finds its buffer. NULL: cannot be had, the message is at the frame.
+static struct pt_buffer *map_buffer(struct update *update, const struct pt_plan *map, struct pt_buffer *chunks,
+                                    const struct pt_ref *ref)
+{
+    struct patina_frame *frame = update->frame;
+    struct pt_resident *resident;
+    if (!ref->of_instance)
+        return pt_frame_ensure_plane(frame, frame->shadows.planes, map, ref->which, ref->index)
+                   ? NULL
+                   : &frame->shadows.planes[ref->which][ref->index];
+    if (ref->which == PT_CHUNKS)
+        return &chunks[ref->index];
+    if (pt_residency_take(&frame->residency, frame->device, map->instances[ref->index].instance->cloud, &resident)) {
+        pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY);
+        return NULL;
+    }
+    return &resident->buffers[ref->which];
+}
+
+static int run_map_pass(struct update *update, const struct pt_plan *map, struct pt_buffer *chunks, struct pt_buffer **bound,
+                        const struct pt_pass *pass)
+{
+    struct patina_frame *frame = update->frame;
+    for (uint32_t i = 0; i < pass->ref_count; i++)
+        if (!(bound[i] = map_buffer(update, map, chunks, &pass->refs[i])))
+            return PATINA_ERROR_MEMORY;
+    return frame->device->ops->run(frame->device, pass->kernel, pass->arguments, pass->argument_size, bound,
+                                   pass->ref_count, &frame->cancel);
+}
+
+// Draws a map into the planes of the shadows.
+static int draw_map(struct update *update, const struct pt_plan *map)
+{
+    struct patina_frame *frame = update->frame;
+    struct patina_device *device = frame->device;
+    uint32_t most = 16;
+    for (uint32_t i = 0; i < map->pass_count; i++)
+        most = map->passes[i].ref_count > most ? map->passes[i].ref_count : most;
+    struct pt_buffer *chunks = calloc(map->instance_count + 1, sizeof *chunks), **bound = calloc(most, sizeof *bound);
+    int error = chunks && bound ? pt_frame_ensure_plane(frame, frame->shadows.planes, map, PT_PLANE_KEYS, 0)
+                                : pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "a light's map: out of memory");
+    for (uint32_t i = 0; i < map->instance_count && !error; i++)
+        if (map->instances[i].chunk_count)
+            error = device->ops->buffer_create(device, map->instances[i].chunk_count * sizeof *map->instances[i].chunks,
+                                               map->instances[i].chunks, 1, &chunks[i]);
+    if (!error)
+        error = device->ops->buffer_fill(device, &frame->shadows.planes[PT_PLANE_KEYS][0],
+                                         (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+    for (uint32_t i = 0; i < map->pass_count && !error; i++)
+        error = run_map_pass(update, map, chunks, bound, &map->passes[i]);
+    if (!error)
+        error = device->ops->finish(device);
+    for (uint32_t i = 0; i < map->instance_count && chunks; i++)
+        device->ops->buffer_destroy(device, &chunks[i]);
+    free(chunks);
+    free(bound);
+    return error;
+}
+
+static void set_window(const struct pt_plan *map, const double window[4], float out[4])
+{
+    for (int k = 0; k < 4; k++) { // window units -> pixels of the padded picture
+        double first = k & 1 ? (double)map->view.ray_y0 : (double)map->view.ray_x0;
+        double step = k & 1 ? (double)map->view.ray_ys : (double)map->view.ray_xs;
+        out[k] = (float)((window[k] - first) / step);
+    }
+}
+
+// Tests the points of one instance against the map in the planes.
+static int test_instance(struct update *update, const struct patina_scene *view, struct pt_plan *map, uint32_t i,
+                         struct lit_args *args)
+{
+    struct patina_frame *frame = update->frame;
+    struct patina_device *device = frame->device;
+    const struct pt_instance *instance = &update->scene->instances[i];
+    struct pt_buffer(*planes)[PT_SLOTS] = frame->shadows.planes;
+    struct pt_buffer chunk_buffer = { 0 };
+    struct chunk_view *chunks;
+    struct pt_resident *resident;
+    uint32_t light = args->base;
+    int error = pt_plan_chunks(view, map, instance, &args->instance, &chunks);
+    if (!error)
+        error = pt_residency_take(&frame->residency, device, instance->cloud, &resident);
+    if (!error)
+        error = device->ops->buffer_create(device, instance->cloud->chunk_count * sizeof *chunks, chunks, 1, &chunk_buffer);
+    if (error)
+        return error;
+    struct pt_buffer *const bound[] = { &planes[PT_PLANE_KEYS][0], &planes[PT_PLANE_FROM][0], &planes[PT_PLANE_DEFF][0],
+                                        &chunk_buffer, &resident->buffers[PT_POSITIONS], &resident->buffers[PT_IDS],
+                                        &resident->buffers[PT_SURFACE], pt_shadows_buffer(frame, PT_MARKS, i),
+                                        pt_shadows_buffer(frame, PT_SHADOWS, i), &frame->shadows.differs };
+    args->base = light * (uint32_t)instance->cloud->info.count;
+    error = device->ops->run(device, PT_KERNEL_lit, args, sizeof *args, bound, sizeof bound / sizeof *bound, &frame->cancel);
+    args->base = light;
+    device->ops->buffer_destroy(device, &chunk_buffer);
+    return error ? error : device->ops->finish(device);
+}
+
+// One map of a sample: drawn, and everyone tested whom it concerns. args->base: the light's place.
+static int test_map(struct update *update, const struct pt_plan_light *planned, const struct pt_shadow_group *group,
+                    uint32_t sample, uint32_t face, struct lit_args *args)
+{
+    struct patina_frame *frame = update->frame;
+    struct patina_scene view = { 0 };
+    struct pt_plan map = { 0 };
+    double window[4], start = pt_milliseconds(), drawn;
+    if (!pt_light_scene(update->scene, planned, group, sample, face, update->instances, &view, window))
+        return PATINA_OK;
+    pt_handle_init(&view.handle);
+    int error = pt_plan_map(&view, &map);
+    if (!error && map.points_scattered)
+        error = draw_map(update, &map);
+    drawn = pt_milliseconds();
+    pt_frame_note_time(frame, "light map", drawn - start);
+    if (!error && map.points_scattered) {
+        frame->shadow_maps++;
+        frame->shadow_size[0] = map.crop[2] > frame->shadow_size[0] ? map.crop[2] : frame->shadow_size[0];
+        frame->shadow_size[1] = map.crop[3] > frame->shadow_size[1] ? map.crop[3] : frame->shadow_size[1];
+        args->view = map.view;
+        args->loss = group->loss;
+        set_window(&map, window, args->window);
+        for (uint32_t i = 0; i < update->scene->instance_count && !error; i++)
+            if (pt_group_receives(update->scene, group, i)) {
+                args->alone = maps_of(update, planned, i) == 1;
+                error = test_instance(update, &view, &map, i, args);
+            }
+        pt_frame_note_time(frame, "lit", pt_milliseconds() - drawn);
+    }
+    pt_plan_destroy(&map);
+    pt_handle_destroy(&view.handle);
+    return error;
+}
+
+// Instances of several maps a sample: what these took together goes into the sum.
+static int close_sample(struct update *update, const struct pt_plan_light *planned, struct lit_args *args)
+{
+    static const patina_camera anywhere = { .orthographic = 1,
+                                            .world_from_camera = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 },
+                                            .left = -1, .right = 1, .bottom = -1, .top = 1, .far_clip = 1 };
+    const struct patina_scene nothing = { .camera = anywhere, .settings = { .width = 1, .height = 1 } }; // lies in no window
+    double start = pt_milliseconds();
+    int error = PATINA_OK;
+    memset(args->window, 0, sizeof args->window);
+    args->alone = 0;
+    args->close = 1;
+    for (uint32_t i = 0; i < update->scene->instance_count && !error; i++) {
+        struct pt_plan scratch = { 0 };
+        if (pt_receives(&update->scene->instances[i]) && maps_of(update, planned, i) > 1)
+            error = test_instance(update, &nothing, &scratch, i, args);
+        pt_plan_destroy(&scratch);
+    }
+    pt_frame_note_time(update->frame, "lit", pt_milliseconds() - start);
+    return error;
+}
+
+static int take_sample(struct update *update, uint32_t index, uint32_t sample, int compare)
+{
+    const struct pt_plan_light *planned = &update->plan->lights[index];
+    uint32_t faces = planned->cube ? 6 : 1;
+    struct lit_args args = { .base = index, .samples = sample + 1, .compare = (uint32_t)compare };
+    args.marked = (uint32_t)pt_plan_lazy(update->scene, update->plan);
+    for (uint32_t g = 0; g < update->group_count; g++)
+        for (uint32_t face = 0; face < faces; face++) {
+            int error = test_map(update, planned, &update->groups[g], sample, face, &args);
+            if (error)
+                return error;
+        }
+    return close_sample(update, planned, &args);
+}
+
+// All zero: no sample yet. Other lights' words lie in the same buffers.
+static int clear_words(struct update *update, uint32_t index)
+{
+    struct patina_frame *frame = update->frame;
+    const struct pt_device_ops *ops = frame->device->ops;
+    if (update->plan->light_count == 1) {
+        for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
+            if (frame->shadows.words[i].size && ops->buffer_fill(frame->device, &frame->shadows.words[i], 0, 4))
+                return PATINA_ERROR_INTERNAL;
+        return PATINA_OK;
+    }
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < frame->shadows.instance_count && !error; i++) {
+        size_t size = (size_t)update->scene->instances[i].cloud->info.count * 4;
+        if (!frame->shadows.words[i].size)
+            continue;
+        void *zeros = calloc(size, 1);
+        error = zeros ? ops->buffer_write(frame->device, &frame->shadows.words[i], index * size, zeros, size)
+                      : pt_fail(&frame->device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+        free(zeros);
+    }
+    return error;
+}
+
+static int test_light(struct update *update, uint32_t index)
+{
+    struct patina_frame *frame = update->frame;
+    struct pt_shadow_light *light = &frame->shadows.lights[index];
+    uint32_t wanted = samples_wanted(update->scene, update->plan, index, light), done = light->samples;
+    int error = done || done == wanted ? PATINA_OK : clear_words(update, index);
+    for (uint32_t stop = FIRST_COMPARED; done < wanted && !error && !light->settled; done++) {
+        while (stop < done + 1)
+            stop *= 2;
+        uint32_t differs = 0;
+        int compare = stop == done + 1;
+        light->samples = 0; // half a sample is none
+        if (atomic_load(&frame->cancel))
+            return PATINA_ERROR_CANCELLED;
+        if (compare)
+            error = frame->device->ops->buffer_write(frame->device, &frame->shadows.differs, 0, &differs, sizeof differs);
+        if (!error)
+            error = take_sample(update, index, done, compare);
+        if (!error && compare)
+            error = frame->device->ops->buffer_read(frame->device, &frame->shadows.differs, 0, &differs, sizeof differs);
+        if (!error) {
+            light->samples = done + 1;
+            light->settled = compare && !differs;
+            light->partial = (uint32_t)pt_plan_lazy(update->scene, update->plan);
+        }
+    }
+    return error;
+}
+
+// Tells the shade passes how many samples the words hold.
+static void set_scales(const struct pt_shadows *shadows, struct pt_plan *plan)
+{
+    for (uint32_t p = 0; p < plan->pass_count; p++) {
+        if (plan->passes[p].kernel != PT_KERNEL_shade)
+            continue;
+        struct shade_args *args = (struct shade_args *)plan->passes[p].arguments; // the plan's own memory
+        for (uint32_t i = 0; i < args->light_count; i++)
+            if (args->lights[i].shadow)
+                args->lights[i].shadow_scale = 1.0f / (255.0f * (float)shadows->lights[args->lights[i].shadow - 1].samples);
+    }
+}
+
+int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan)
+{
+    struct update update = { .frame = frame, .scene = scene, .plan = plan };
+    const struct pt_device_ops *ops = frame->device->ops;
+    int error = PATINA_OK;
+    if (!plan->light_count)
+        return PATINA_OK;
+    pt_frame_note_time(frame, "lit", 0.0); // also where every texture is at hand
+    if (pt_shadows_stale(frame, scene, plan)) {
+        update.groups = calloc(2 * (size_t)scene->instance_count + 1, sizeof *update.groups);
+        update.instances = calloc((size_t)scene->instance_count + 1, sizeof *update.instances);
+        if (!update.groups || !update.instances)
+            error = pt_fail(&frame->device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+        else
+            update.group_count = pt_shadow_groups(scene, update.groups);
+        if (!error && !frame->shadows.differs.size)
+            error = ops->buffer_create(frame->device, sizeof(uint32_t), NULL, 0, &frame->shadows.differs);
+        for (uint32_t i = 0; i < plan->light_count && !error; i++)
+            error = test_light(&update, i);
+        free(update.groups);
+        free(update.instances);
+    }
+    if (!error)
+        set_scales(&frame->shadows, plan);
+    return error;
+}
+
+int pt_shadows_bake(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    struct patina_scene whole = *scene; // its handle is not touched
+    struct pt_plan plan = { 0 };
+    whole.settings.shadow_lazy = whole.settings.shadow_progressive = 0;
+    int error = pt_plan_lights(&whole, &plan);
+    frame->timing_count = 0;
+    frame->shadow_maps = 0;
+    if (!error && (!plan.light_count || !scene->instance_count))
+        error = pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "shadows: no light of the scene casts any, or there is no cloud");
+    if (!error)
+        error = pt_shadows_open(frame, &whole, &plan);
+    if (!error)
+        error = pt_shadows_update(frame, &whole, &plan);
+    pt_plan_destroy(&plan);
+    atomic_store(&frame->cancel, 0);
+    if (error == PATINA_ERROR_CANCELLED)
+        return pt_fail(&frame->handle, error, "baking shadows was cancelled");
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+int pt_shadows_read(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size)
+{
+    const struct pt_shadows *shadows = &frame->shadows;
+    if (instance >= shadows->instance_count || light >= shadows->light_count || !shadows->words[instance].size ||
+        !shadows->lights[light].samples)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: no texture of light %u on instance %u",
+                       light, instance);
+    size_t expected = shadows->words[instance].size / shadows->light_count;
+    if (size != expected)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_shadows: %zu points; got %zu bytes",
+                       expected / 4, size);
+    int error = frame->device->ops->buffer_read(frame->device, &shadows->words[instance], light * expected, values, expected);
+    float scale = 1.0f / (255.0f * (float)shadows->lights[light].samples);
+    for (size_t i = 0; i < expected / 4 && !error; i++) { // in place: a word and a float are 4 bytes each
+        uint32_t word;
+        memcpy(&word, values + i, sizeof word);
+        values[i] = 1.0f - (float)(word & PT_SHADOW_SUM) * scale;
+    }
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Shadow textures of a frame [D 6]: kept from render to render until something that they depend on changes.
+#ifndef PT_FRAME_SHADOW_H
+#define PT_FRAME_SHADOW_H
+
+#include "plan.h"
+
+struct patina_frame;
+
+// What is known of a light's texture.
+struct pt_shadow_light {
+    double *key; // pt_light_key
+    size_t key_count;
+    uint32_t samples; // in the words; 0: the words say nothing
+    uint32_t settled; // every point's samples agree: more would say the same
+    uint32_t partial; // lazy: only points that one picture showed; the next tests anew
+};
+
+struct pt_shadows {
+    struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS]; // of the maps
+    struct pt_buffer *words, *marks; // per instance of the scene; empty where it receives none
+    uint64_t *fingerprints;          // per instance: of whose points the words are; 0: none
+    uint32_t instance_count;
+    struct pt_shadow_light lights[PT_MAX_LIGHTS]; // in the plan's order
+    uint32_t light_count;
+    struct pt_buffer differs; // one word
+};
+
+// Compares what the plan asks for with what is at hand and makes room. Afterwards pt_shadows_stale says whether any light
+// is to be tested in this render.
+int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan);
+int pt_shadows_stale(const struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan);
+// Tests what is to be tested, and tells the plan's shade passes what the words mean. With shadow_lazy the marks are set.
+int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan);
+// All of the scene's textures, whole, without a picture.
+int pt_shadows_bake(struct patina_frame *frame, const struct patina_scene *scene);
+// What arrives of the light at each point of the instance.
+int pt_shadows_read(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size);
+// frame_shadow_file.c
+int pt_shadows_save(const struct patina_frame *frame, const char *path);
+int pt_shadows_load(struct patina_frame *frame, const struct patina_scene *scene, const char *path);
+// Of whose points words are; 0: the instance receives no shadows.
+uint64_t pt_shadows_identity(const struct pt_instance *instance);
+// Room for the words of these instances and lights, all forgotten.
+int pt_shadows_make_places(struct patina_frame *frame, const struct patina_scene *scene, uint32_t light_count);
+// An instance's marks or words; an empty buffer where there are none.
+struct pt_buffer *pt_shadows_buffer(struct patina_frame *frame, uint32_t which, uint32_t instance);
+void pt_shadows_release(struct patina_frame *frame);
+
+#endif

@@ -1,0 +1,516 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How lights see the scene [D 6], SPEC 4. A light's view is a scene of its own: the clouds that cast, a camera that looks
+// from the light, a picture as large as the clouds' spacing asks for. The passes are those of any picture, up to filling.
+//
+// Suns look in parallel. Other lights look in perspective at the box of the casters while it spans less than 120 degrees
+// (beyond that the texels in the middle shrink to a quarter of those at the edge), else through the six faces of a cube.
+#include "plan.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+// A texel is as wide as half of the surface is spaced, as the light sees it. With the spacing that 95% stay below the share of
+// wrong points in tests/scenes/test_shadow is 1.5 times as high; at half a texel more leaks show where filling fails.
+static const double widest = 1.7320508075688772; // tangent of 60 degrees
+enum { LEAST_TEXELS = 16, SURVEY_TEXELS = 1024 };
+
+// ---- casters and receivers ---------------------------------------------------------------------------------------------
+
+static int casts(const struct pt_instance *instance)
+{
+    return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && instance->cloud->info.drawn;
+}
+
+int pt_receives(const struct pt_instance *instance)
+{
+    return !(instance->style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && instance->style.lighting == PATINA_LIGHTING_LIT &&
+           instance->cloud->info.drawn;
+}
+
+int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    return scene->settings.shadow_lazy && plan->layers <= 1;
+}
+
+// What it takes of 255 parts of light.
+static uint32_t loss_of(const struct pt_instance *instance)
+{
+    return 255 - (uint32_t)(255.0f * instance->style.transparency + 0.5f);
+}
+
+static int spares_itself(const struct pt_instance *instance)
+{
+    return (instance->style.shadow_off & PATINA_SHADOW_NO_SELF) != 0;
+}
+
+static int opaque(const struct pt_instance *instance) { return casts(instance) && loss_of(instance) == 255; }
+
+uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups)
+{
+    uint32_t count = 0, casters = 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        casters += (uint32_t)opaque(&scene->instances[i]);
+    if (casters)
+        groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, PT_NO_INSTANCE, 255 };
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        const struct pt_instance *instance = &scene->instances[i];
+        if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
+            groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, i, 255 };
+        if (casts(instance) && loss_of(instance) && loss_of(instance) < 255)
+            groups[count++] = (struct pt_shadow_group){ i, PT_NO_INSTANCE, loss_of(instance) };
+    }
+    return count;
+}
+
+int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t i)
+{
+    if (group->only != PT_NO_INSTANCE)
+        return i == group->only;
+    return opaque(&scene->instances[i]) && i != group->without;
+}
+
+int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t i)
+{
+    const struct pt_instance *instance = &scene->instances[i];
+    if (!pt_receives(instance))
+        return 0;
+    if (group->only != PT_NO_INSTANCE)
+        return i != group->only || !spares_itself(instance);
+    if (group->without != PT_NO_INSTANCE)
+        return i == group->without;
+    return !(spares_itself(instance) && opaque(instance));
+}
+
+// ---- what there is to see ------------------------------------------------------------------------------------------------
+
+// Bounds of the casters' chunks in a frame (rows x, y, z) from `eye`; perspective: of x / -z and y / -z too.
+struct extent {
+    int some, behind; // behind: part of it is beside or behind the eye
+    double lower[3], upper[3];
+    double tangent[4]; // left, bottom, right, top
+};
+
+static void extend(struct extent *extent, const double p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        extent->lower[k] = extent->some ? fmin(extent->lower[k], p[k]) : p[k];
+        extent->upper[k] = extent->some ? fmax(extent->upper[k], p[k]) : p[k];
+    }
+    for (int k = 0; k < 2; k++) {
+        double tangent = -p[2] > 0.0 ? p[k] / -p[2] : 0.0;
+        extent->behind |= !(-p[2] > 0.0) || !(fabs(tangent) <= widest);
+        extent->tangent[k] = extent->some ? fmin(extent->tangent[k], tangent) : tangent;
+        extent->tangent[2 + k] = extent->some ? fmax(extent->tangent[2 + k], tangent) : tangent;
+    }
+    extent->some = 1;
+}
+
+static struct extent look(const struct patina_scene *scene, const struct pt_shadow_group *group, const double axes[9],
+                          const double eye[3])
+{
+    struct extent extent = { 0 };
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        const struct pt_instance *instance = &scene->instances[i];
+        double linear[9], translation[3], p[3], q[3];
+        if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
+            continue;
+        pt_split_matrix(instance->style.world_from_object, linear, translation);
+        for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
+            for (int corner = 0; corner < 8; corner++) {
+                const struct pt_chunk *chunk = &instance->cloud->chunks[c];
+                for (int k = 0; k < 3; k++)
+                    p[k] = chunk->origin[k] + (double)(corner >> k & 1 ? chunk->box_max[k] : chunk->box_min[k]);
+                pt_apply(linear, p, q);
+                for (int k = 0; k < 3; k++)
+                    q[k] = (q[k] + translation[k]) - eye[k];
+                pt_apply(axes, q, p);
+                extend(&extent, p);
+            }
+    }
+    return extent;
+}
+
+// ---- light frames ----------------------------------------------------------------------------------------------------------
+
+// Rows x, y, z with z against `direction` (unit) and x along `side` as far as it goes.
+static void frame_of(const double direction[3], const double side[3], double axes[9])
+{
+    double *x = axes, *y = axes + 3, *z = axes + 6, along, length;
+    const double poles[3][3] = { { side[0], side[1], side[2] }, { 0, 0, 1 }, { 1, 0, 0 } };
+    for (int k = 0; k < 3; k++)
+        z[k] = -direction[k];
+    for (int pole = 0; pole < 3; pole++) {
+        const double *p = poles[pole];
+        along = pt_dot(p, z);
+        for (int k = 0; k < 3; k++) // of the poles: across, so that y goes up
+            x[k] = pole ? p[(k + 1) % 3] * z[(k + 2) % 3] - p[(k + 2) % 3] * z[(k + 1) % 3] : p[k] - along * z[k];
+        length = sqrt(pt_dot(x, x));
+        if (length > 1e-3 * sqrt(pt_dot(p, p)) && isfinite(length))
+            break;
+    }
+    for (int k = 0; k < 3; k++)
+        x[k] /= length;
+    for (int k = 0; k < 3; k++)
+        y[k] = z[(k + 1) % 3] * x[(k + 2) % 3] - z[(k + 2) % 3] * x[(k + 1) % 3];
+}
+
+// The six faces of a cube: exact permutations, so that all agree about z to the bit.
+static void face_axes(uint32_t face, double axes[9])
+{
+    memset(axes, 0, 9 * sizeof *axes);
+    double sign = face & 1u ? -1.0 : 1.0;
+    uint32_t k = face >> 1;
+    axes[6 + k] = sign;                    // z
+    axes[3 + (k + 2) % 3] = 1.0;           // y
+    axes[(k + 1) % 3] = sign;              // x = y cross z
+}
+
+// Two numbers in [0, 1): the additive recurrence of the plastic number, even in every prefix; the first is the middle.
+static void point_of_sample(uint32_t sample, double p[2])
+{
+    static const double steps[2] = { 0.75487766624669276, 0.56984029099805327 };
+    for (int k = 0; k < 2; k++) {
+        double x = 0.5 + sample * steps[k];
+        p[k] = x - floor(x);
+    }
+}
+
+// The square onto the disc, areas kept, the middle onto the middle.
+static void disc_of_square(double p[2])
+{
+    double a = 2.0 * p[0] - 1.0, b = 2.0 * p[1] - 1.0;
+    double r = fabs(a) > fabs(b) ? a : b;
+    double turn = fabs(a) > fabs(b) ? PI / 4.0 * (b / a) : b != 0.0 ? PI / 2.0 - PI / 4.0 * (a / b) : 0.0;
+    p[0] = r * cos(turn);
+    p[1] = r * sin(turn);
+}
+
+static void area_point(const patina_light_desc *light, double p[2])
+{
+    if (light->shape == PATINA_AREA_ELLIPSE)
+        disc_of_square(p);
+    else
+        for (int k = 0; k < 2; k++)
+            p[k] = 2.0 * p[k] - 1.0;
+    for (int k = 0; k < 2; k++)
+        p[k] *= 0.5 * (double)light->size[k];
+}
+
+void pt_area_points(const patina_light_desc *light, double points[3 * PT_AREA_POINTS])
+{
+    double axes[9];
+    frame_of(light->direction, light->side, axes);
+    for (int i = 0; i < PT_AREA_POINTS; i++) { // the middles of 4 x 4 fields
+        double p[2] = { (i % 4 + 0.5) / 4.0, (i / 4 + 0.5) / 4.0 };
+        area_point(light, p);
+        for (int k = 0; k < 3; k++)
+            points[3 * i + k] = light->position[k] + p[0] * axes[k] + p[1] * axes[3 + k];
+    }
+}
+
+// Where the light is and looks in a sample. axes: of the light's maps, in and out: a sun turns them.
+static void place_sample(const struct pt_plan_light *planned, uint32_t sample, double axes[9], double position[3])
+{
+    const patina_light_desc *light = planned->light;
+    double p[2], frame[9], across[2];
+    point_of_sample(sample, p);
+    memcpy(axes, planned->axes, 9 * sizeof *axes);
+    memcpy(position, light->position, 3 * sizeof *position);
+    if (light->type == PATINA_LIGHT_AREA) {
+        area_point(light, p);
+        frame_of(light->direction, light->side, frame);
+        memcpy(across, p, sizeof across);
+    } else {
+        disc_of_square(p);
+        memcpy(frame, planned->axes, sizeof frame);
+        double radius = light->type == PATINA_LIGHT_SUN ? tan(0.5 * fmin((double)light->angle, 0.99 * PI)) : (double)light->radius;
+        across[0] = radius * p[0];
+        across[1] = radius * p[1];
+    }
+    if (light->type != PATINA_LIGHT_SUN) {
+        for (int k = 0; k < 3; k++)
+            position[k] += across[0] * frame[k] + across[1] * frame[3 + k];
+        return;
+    }
+    double direction[3], length;
+    for (int k = 0; k < 3; k++) {
+        position[k] = 0.0;
+        direction[k] = across[0] * frame[k] + across[1] * frame[3 + k] - frame[6 + k];
+    }
+    length = sqrt(pt_dot(direction, direction));
+    for (int k = 0; k < 3; k++)
+        direction[k] /= length;
+    frame_of(direction, frame, axes);
+}
+
+static int has_area(const patina_light_desc *light)
+{
+    return light->type == PATINA_LIGHT_SUN  ? light->angle > 0.0f
+           : light->type == PATINA_LIGHT_AREA ? 1
+                                              : light->radius > 0.0f;
+}
+
+// ---- cameras -----------------------------------------------------------------------------------------------------------
+
+// The camera of a view with axes and eye that holds `extent`. Parallel views start half a unit of depth before the first
+// caster, so that z > 0.
+static void set_camera(const double axes[9], const double eye[3], const struct extent *extent, int parallel, int face,
+                       patina_camera *camera)
+{
+    *camera = (patina_camera){ .struct_size = sizeof *camera, .orthographic = (uint32_t)parallel };
+    for (int r = 0; r < 3; r++) {
+        for (int c = 0; c < 3; c++)
+            camera->world_from_camera[4 * r + c] = axes[3 * c + r];
+        camera->world_from_camera[4 * r + 3] = eye[r];
+    }
+    camera->world_from_camera[15] = 1.0;
+    const double *window = extent->tangent;
+    double span[4] = { extent->lower[0], extent->lower[1], extent->upper[0], extent->upper[1] };
+    double cube[4] = { -1.0, -1.0, 1.0, 1.0 };
+    window = parallel ? span : face ? cube : window;
+    camera->left = window[0];
+    camera->bottom = window[1];
+    camera->right = window[2];
+    camera->top = window[3];
+    double first = -extent->upper[2], last = -extent->lower[2];
+    double size = fmax(last - first, fmax(span[2] - span[0], span[3] - span[1]));
+    size = size > 0.0 ? size : 1.0;
+    if (parallel) {
+        camera->near_clip = first - 0.01 * size;
+        camera->far_clip = last + 0.01 * size;
+    } else {
+        camera->far_clip = 1.01 * last;
+        camera->near_clip = fmax(0.99 * first, 1e-6 * camera->far_clip);
+    }
+}
+
+// Grows the window to whole texels around its middle; returns how many: at most `most`, or they get wider.
+static uint32_t fit(double *low, double *high, double texel, uint32_t most)
+{
+    most = most < LEAST_TEXELS ? LEAST_TEXELS : most;
+    texel = fmax(texel, (*high - *low) / (most - 3.0));
+    double count = ceil((*high - *low) / texel * (1.0 - 1e-9)) + 2.0;
+    count = !(count > LEAST_TEXELS) ? LEAST_TEXELS : count > most ? most : count;
+    double middle = 0.5 * (*low + *high);
+    *low = middle - 0.5 * count * texel;
+    *high = middle + 0.5 * count * texel;
+    return (uint32_t)count;
+}
+
+int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
+                   double window[4])
+{
+    double axes[9], position[3];
+    int parallel = light->light->type == PATINA_LIGHT_SUN;
+    place_sample(light, sample, axes, position);
+    if (light->cube)
+        face_axes(face, axes);
+    struct extent extent = look(scene, group, axes, position);
+    if (!extent.some || (!parallel && !(extent.lower[2] < 0.0)))
+        return 0;
+    out->instances = instances;
+    out->instance_count = 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (pt_group_casts(scene, group, i)) {
+            instances[out->instance_count] = scene->instances[i];
+            instances[out->instance_count].style.cull_back = 0;      // both sides cast
+            instances[out->instance_count++].style.transparency = 0; // its map has one layer
+        }
+    set_camera(axes, position, &extent, parallel, light->cube != 0, &out->camera);
+    out->has_camera = 1;
+    out->settings = (patina_settings){ .struct_size = sizeof out->settings,
+                                       .quality = scene->settings.quality,
+                                       .fill = scene->settings.fill };
+    patina_camera *camera = &out->camera;
+    uint32_t most = scene->settings.shadow_resolution;
+    out->settings.width = fit(&camera->left, &camera->right, light->texel, most);
+    out->settings.height = fit(&camera->bottom, &camera->top, light->texel, most);
+    out->settings.region[2] = out->settings.width;
+    out->settings.region[3] = out->settings.height;
+    const double cube[4] = { -1.0, -1.0, 1.0, 1.0 }, whole[4] = { camera->left, camera->bottom, camera->right, camera->top };
+    memcpy(window, light->cube ? cube : whole, sizeof whole);
+    return 1;
+}
+
+// ---- planning a light ----------------------------------------------------------------------------------------------------
+
+// Towards the middle of the casters; spots that see no further than 60 degrees look along their cone.
+static void aim(const struct patina_scene *scene, struct pt_plan_light *planned)
+{
+    static const double world[9] = { 1, 0, 0, 0, 1, 0, 0, 0, 1 }, none[3];
+    const patina_light_desc *light = planned->light;
+    if (light->type == PATINA_LIGHT_SUN) {
+        frame_of(light->direction, none, planned->axes);
+        return;
+    }
+    struct extent around = look(scene, NULL, world, light->position);
+    double middle[3], length;
+    for (int k = 0; k < 3; k++)
+        middle[k] = 0.5 * (around.lower[k] + around.upper[k]);
+    length = sqrt(pt_dot(middle, middle));
+    for (int k = 0; k < 3; k++)
+        middle[k] = length > 0.0 ? middle[k] / length : light->direction[k];
+    frame_of(middle, none, planned->axes);
+    planned->cube = 0;
+    for (uint32_t sample = 0; sample < (has_area(light) ? 16u : 1u); sample++) { // from all over its area
+        double axes[9], position[3];
+        place_sample(planned, sample, axes, position);
+        planned->cube |= (uint32_t)look(scene, NULL, axes, position).behind;
+    }
+}
+
+// How wide a texel is, from the casters' spacing as a survey with square texels sees it.
+static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *planned)
+{
+    double axes[9], position[3], spacing = 0.0, widest_window = 0.0;
+    int parallel = planned->light->type == PATINA_LIGHT_SUN;
+    place_sample(planned, 0, axes, position);
+    for (uint32_t face = 0; face < (planned->cube ? 6u : 1u); face++) {
+        struct patina_scene survey = { .instances = scene->instances,
+                                       .instance_count = scene->instance_count,
+                                       .has_camera = 1 };
+        struct pt_plan plan = { 0 };
+        if (planned->cube)
+            face_axes(face, axes);
+        struct extent extent = look(scene, NULL, axes, position);
+        if (!extent.some || (!parallel && !(extent.lower[2] < 0.0)))
+            continue;
+        set_camera(axes, position, &extent, parallel, planned->cube != 0, &survey.camera);
+        patina_camera *camera = &survey.camera;
+        double texel = fmax(camera->right - camera->left, camera->top - camera->bottom) / SURVEY_TEXELS;
+        texel = texel > 0.0 ? texel : 1e-6;
+        survey.settings = (patina_settings){ .struct_size = sizeof survey.settings };
+        survey.settings.width = fit(&camera->left, &camera->right, texel, SURVEY_TEXELS + 2);
+        survey.settings.height = fit(&camera->bottom, &camera->top, texel, SURVEY_TEXELS + 2);
+        survey.settings.region[2] = survey.settings.width;
+        survey.settings.region[3] = survey.settings.height;
+        pt_handle_init(&survey.handle);
+        int error = pt_plan_view(&survey, &plan);
+        pt_handle_destroy(&survey.handle);
+        double seen = plan.spacing_middle * texel;
+        if (!error && seen > 0.0)
+            spacing = spacing > 0.0 ? fmin(spacing, seen) : seen;
+        widest_window = fmax(widest_window, texel * SURVEY_TEXELS);
+        pt_plan_destroy(&plan);
+        if (error)
+            return error;
+    }
+    double size = widest_window > 0.0 ? widest_window : 1e-6; // spacing is not known of a handful of points
+    double wanted = spacing > 0.0 ? spacing : size / SURVEY_TEXELS;
+    double least = size / fmax(scene->settings.shadow_resolution - 3.0, LEAST_TEXELS);
+    planned->capped = wanted < least;
+    planned->texel = fmin(fmax(wanted, least), fmax(size / LEAST_TEXELS, least));
+    return PATINA_OK;
+}
+
+static int plan_light(const struct patina_scene *scene, struct pt_plan *plan, const patina_light_desc *light)
+{
+    static const char *const names[] = { "", "sun", "point light", "spot", "area light" };
+    struct pt_plan_light *planned = &plan->lights[plan->light_count];
+    *planned = (struct pt_plan_light){ .light = light };
+    planned->samples = has_area(light) ? scene->settings.shadow_samples : 1;
+    aim(scene, planned);
+    int error = choose_texel(scene, planned);
+    if (error)
+        return error;
+    struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (2 * scene->instance_count + 1) * sizeof *groups);
+    struct pt_instance *instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *instances);
+    if (!groups || !instances)
+        return PATINA_ERROR_MEMORY;
+    struct patina_scene view = { 0 };
+    double window[4];
+    uint32_t count = pt_shadow_groups(scene, groups);
+    for (uint32_t face = 0; face < (planned->cube ? 6u : 1u) && !planned->width && count; face++)
+        if (pt_light_scene(scene, planned, &groups[0], 0, face, instances, &view, window)) {
+            planned->width = view.settings.width;
+            planned->height = view.settings.height;
+        }
+    snprintf(planned->reason, sizeof planned->reason, "%s, %u sample%s, %s %u x %u texels, %s", names[light->type],
+             planned->samples, planned->samples > 1 ? "s" : "", planned->cube ? "six maps of" : "a map of",
+             planned->width, planned->height, planned->capped ? "as fine as is allowed" : "a point a texel");
+    plan->light_count++;
+    return PATINA_OK;
+}
+
+int pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan)
+{
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < scene->light_count && !error; i++)
+        if (scene->lights[i].shadows)
+            error = plan_light(scene, plan, &scene->lights[i]);
+    return error;
+}
+
+// ---- what a texture depends on -------------------------------------------------------------------------------------------
+
+struct key {
+    double *numbers;
+    size_t count, room;
+};
+
+static void put(struct key *key, double number)
+{
+    if (key->count < key->room)
+        key->numbers[key->count] = number;
+    key->count++;
+}
+
+static void put_word(struct key *key, uint64_t word)
+{
+    put(key, (double)(word >> 32)); // exact
+    put(key, (double)(word & 0xFFFFFFFFu));
+}
+
+// Its matrix as the light sees it: the same when light and cloud move together. A sun is everywhere: where the first cloud is.
+static void put_instance(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned, uint32_t i)
+{
+    const struct pt_instance *instance = &scene->instances[i];
+    const double *from = planned->light->position, *first = scene->instances[0].style.world_from_object;
+    double linear[9], translation[3], turned[9], moved[3], frame[9];
+    frame_of(planned->light->direction, planned->light->side, frame);
+    pt_split_matrix(instance->style.world_from_object, linear, translation);
+    for (int k = 0; k < 3; k++)
+        translation[k] -= planned->light->type == PATINA_LIGHT_SUN ? first[4 * k + 3] : from[k];
+    pt_multiply(frame, linear, turned);
+    pt_apply(frame, translation, moved);
+    put_word(key, instance->cloud->fingerprint);
+    put(key, (double)instance->style.shadow_off);
+    put(key, (double)loss_of(instance));
+    put(key, (double)instance->style.lighting);
+    put(key, (double)instance->style.d_min);
+    for (int k = 0; k < 9; k++)
+        put(key, turned[k]);
+    for (int k = 0; k < 3; k++)
+        put(key, moved[k]);
+}
+
+size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *planned, double *numbers, size_t room)
+{
+    const patina_light_desc *light = planned->light;
+    struct key key = { numbers, 0, room };
+    put(&key, (double)light->type);
+    put(&key, (double)light->shape);
+    put(&key, (double)light->angle);
+    put(&key, (double)light->radius);
+    put(&key, (double)light->size[0]);
+    put(&key, (double)light->size[1]);
+    put(&key, (double)scene->settings.shadow_resolution);
+    put(&key, (double)scene->settings.quality);
+    put(&key, (double)scene->settings.fill);
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        put_instance(&key, scene, planned, i);
+    return key.count;
+}
+
+int pt_same_key(const double *a, const double *b, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!(fabs(a[i] - b[i]) <= 1e-9 * fmax(1e-6, fmax(fabs(a[i]), fabs(b[i])))))
+            return 0;
+    return 1;
+}

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#ifndef PT_FINGERPRINT_H
+#define PT_FINGERPRINT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+// 64 bits of `size` bytes, alike on every little-endian machine; seed: what came before. Not against forgery.
+uint64_t pt_fingerprint(uint64_t seed, const void *data, size_t size);
+
+#endif

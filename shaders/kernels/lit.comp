@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// lit: points against the filled map of a light. [D 6], SPEC 4; twin of native/device_cpu/kernels/lit.c
+//
+// A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). A word belongs to one point, so invocations never meet.
+#version 430 core
+#include "lib/math.glsl"
+#include "lib/planes.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer arguments_block { lit_args args; };
+layout(std430, binding = 4) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = 5) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = 6) readonly buffer ids_block { uint ids[]; };
+layout(std430, binding = 7) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = 8) readonly buffer marks_block { uint marks[]; };
+layout(std430, binding = 9) buffer shadows_block { uint words[]; };
+layout(std430, binding = 10) buffer differs_block { uint differs[]; };
+
+layout(location = 0) uniform uint first_chunk; // of this dispatch
+layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
+
+bool on_map(view_args view, int x, int y) { return x >= 0 && y >= 0 && x < int(view.width) && y < int(view.height); }
+
+// The greatest depth of the 3 x 3 texels: a surface of unknown slope may be as far as its neighbours.
+float farthest(view_args view, int column, int row)
+{
+    float most = 0.0;
+    for (int y = row - 1; y <= row + 1; y++)
+        for (int x = column - 1; x <= column + 1; x++) {
+            float z = on_map(view, x, y) ? read_z(uint(y) * view.width + uint(x)) : pt_float(PT_KEY_EMPTY_Z);
+            most = z < pt_float(PT_KEY_EMPTY_Z) ? pt_max(most, z) : most;
+        }
+    return most;
+}
+
+// Whether enough of the texels around shadow the point, too.
+bool supported(view_args view, int column, int row, float d, float z)
+{
+    uint count = 0u;
+    for (int y = row - 1; y <= row + 1; y++)
+        for (int x = column - 1; x <= column + 1; x++) {
+            if ((x == column && y == row) || !on_map(view, x, y))
+                continue;
+            precise float until = read_z(uint(y) * view.width + uint(x)) + d;
+            count += until < z ? 1u : 0u;
+        }
+    return count >= PT_SHADOW_SUPPORT;
+}
+
+// 2. d_eff of the point in this view; ray: where it falls.
+float layer_distance(view_args view, vec2 ray, float z, uint id, out bool none)
+{
+    uint word = surface[id];
+    vec3 object = pt_decode_normal(word), n;
+    for (int k = 0; k < 3; k++)
+        n[k] = pt_dot(vec3(args.instance.normal_matrix[3 * k], args.instance.normal_matrix[3 * k + 1],
+                           args.instance.normal_matrix[3 * k + 2]), object);
+    float square = pt_dot(n, n);
+    none = args.instance.has_normals == 0u || (word & PT_NORMAL_BITS) == PT_NORMAL_NONE || !(1e-30 <= square);
+    precise vec3 unit = n * pt_rsqrt(square);
+    float inverse = pt_rcp(pt_max(pt_cosine(view, unit, ray), PT_COSINE_FLOOR));
+    return pt_layer_distance(view, args.instance.d_min, args.instance.spacing[word >> PT_SPACING_SHIFT], z,
+                             none ? 1.0 : inverse);
+}
+
+bool in_shadow(view_args view, chunk_view chunk, uint at, uint id)
+{
+    // 1. project
+    vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+    precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];
+    precise float x = (((chunk.lo[0] + chunk.row[0] * p.x) + chunk.row[1] * p.y) + chunk.row[2] * p.z) + chunk.hi[0];
+    precise float y = (((chunk.lo[1] + chunk.row[3] * p.x) + chunk.row[4] * p.y) + chunk.row[5] * p.z) + chunk.hi[1];
+    if (view.perspective != 0u) {
+        float r = pt_rcp(z);
+        x = x * r;
+        y = y * r;
+    }
+    if (!(args.window[0] <= x && x < args.window[2] && args.window[1] <= y && y < args.window[3] && view.z_near <= z))
+        return false;
+    int column = int(floor(x)) - view.origin_x, row = int(floor(y)) - view.origin_y;
+    uint pixel = uint(row) * view.width + uint(column);
+    float map = read_z(pixel);
+    if (!(map < z))
+        return false;
+    bool none;
+    precise vec2 ray = vec2(view.ray_x0 + view.ray_xs * x, view.ray_y0 + view.ray_ys * y);
+    precise float d = layer_distance(view, ray, z, id, none);
+    precise float until = map + d;
+    if (!(until < z))
+        return false;
+    if (none) {
+        d = pt_max(d, read_deff(read_from(pixel)));
+        until = farthest(view, column, row) + d;
+    }
+    return until < z && supported(view, column, row, d, z);
+}
+
+// 3. what the sample takes goes into the word. Returns whether the samples so far differ.
+bool note(uint at, bool shadowed)
+{
+    uint word = words[at], sum = word & PT_SHADOW_SUM, lost = word >> PT_SHADOW_SHIFT;
+    if (shadowed) { // of the light that is left; the division by 255 is exact
+        uint more = (255u - lost) * args.loss + 128u;
+        lost += (more + (more >> 8)) >> 8;
+    }
+    bool whole = args.alone != 0u || args.close != 0u;
+    words[at] = whole ? sum + lost : sum | lost << PT_SHADOW_SHIFT;
+    return whole && sum + lost != args.samples * lost;
+}
+
+void main()
+{
+    chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
+    view_args view = args.view;
+    precise float wider = view.footprint * PT_TEXEL_SLACK;
+    view.footprint = wider;
+    bool all = args.close != 0u || args.compare != 0u; // lit points have to be looked at too
+    uint base = chunk.first - first_slot;
+    uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
+    for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
+        uint id = ids[base + i];
+        if (args.marked != 0u && (marks[id >> 2] >> 8u * (id & 3u) & 255u) == 0u)
+            continue;
+        bool shadowed = in_shadow(view, chunk, 3u * base + i, id);
+        if ((all || shadowed) && note(args.base + id, shadowed) && args.compare != 0u)
+            differs[0] = 1u;
+    }
+}

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// mark: which points the picture shows (SPEC 4: shadows of no others are computed); twin of
+// native/device_cpu/kernels/mark.c
+#version 430 core
+#include "lib/math.glsl"
+#include "lib/planes.glsl"
+#include "lib/tiles.glsl"
+
+layout(std430, binding = 0) readonly buffer arguments_block { mark_args args; };
+layout(std430, binding = 2) buffer marks_block { uint marks[]; }; // four a word
+
+void main()
+{
+    view_args view = args.view;
+    uint id_base = args.id_base, id_count = args.id_count;
+    uvec2 column = pt_tile_column(view);
+    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
+        uvec2 key = read_key(y * view.width + column.x);
+        uint id = key.x - id_base;
+        if (id < id_count && key.y != PT_KEY_EMPTY_Z)
+            atomicOr(marks[id >> 2], 1u << 8u * (id & 3u));
+    }
+}
