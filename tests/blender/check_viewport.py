@@ -443,3 +443,24 @@ def figures_ten_million():
     print(f"  {count / 10:.1f} pictures/s in the window; the worker takes {np.median(seconds) * 1e3:.0f} ms a picture "
           f"(middle of {len(seconds)}), the upload {np.median(draws) * 1e3:.1f} ms; whole picture "
           f"{time.perf_counter() - stopped:.2f} s after the last motion, {found.shown.seconds * 1e3:.0f} ms of work")
+
+
+def test_rest_is_rest():
+    """When the whole picture is there, nothing is drawn or rendered any more."""
+    setup()
+    add_points(*sphere(5000, 1.0, (0, 0, 0)))
+    yield lambda: settled(5000)
+    found, calls, draw = shown(), [], viewport.Viewport.draw
+
+    def counted(self, *arguments):
+        calls.append(time.perf_counter())
+        return draw(self, *arguments)
+
+    start = time.perf_counter()
+    yield lambda: time.perf_counter() - start > 0.5  # draws that were under way
+    viewport.Viewport.draw, pictures = counted, found.pictures
+    start = time.perf_counter()
+    yield lambda: time.perf_counter() - start > 1.0
+    viewport.Viewport.draw = draw
+    check(len(calls) <= 1 and found.pictures == pictures, f"{len(calls)} draws, {found.pictures - pictures} pictures")
+    check(not bpy.app.timers.is_registered(viewport._tick), "the timer still runs")
