@@ -21,6 +21,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from . import native, pace, render, sync
+from .importers import Progress
 
 TICK = 0.008  # seconds between two looks at the workers
 REST = 0.12  # seconds without motion after which the whole picture is drawn
@@ -243,12 +244,12 @@ class Viewport:
 
     def _render(self, wish: Wish) -> Shown:
         start = time.monotonic()
-        with native.Progress() as progress:
-            self._build_cancel = progress.cancel
-            try:
-                clouds = [replace(item, cloud=item.cloud.resolve(progress)) for item in wish.scene.clouds]
-            finally:
-                self._build_cancel = None
+        progress = Progress()
+        self._build_cancel = progress.cancel
+        try:
+            clouds = [replace(item, cloud=item.cloud.resolve(progress)) for item in wish.scene.clouds]
+        finally:
+            self._build_cancel = None
         description = wish.description(clouds)
         try:
             return self._render_on(render.device_for(description.device), wish, description, start)

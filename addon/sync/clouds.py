@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Matrix
 
 from .. import jobs, native
+from ..importers import Progress
 from ..properties import enum_number
 from . import attributes, estimates, linked, meshes
 from .camera import row_major
@@ -79,10 +80,11 @@ class Pending:
     def built(self) -> native.Cloud | None:
         return self._cloud
 
-    def resolve(self, progress: native.Progress) -> native.Cloud:
+    def resolve(self, progress: Progress) -> native.Cloud:
         """The cloud; built at the first call. One thread at a time."""
         if self._cloud is None:
-            self._cloud = CACHE.obtain(self._identity, self._arrays, progress, recolor=True)
+            with progress.inner() as inner:
+                self._cloud = CACHE.obtain(self._identity, self._arrays, inner, recolor=True)
             self._arrays = None
         return self._cloud
 
@@ -94,7 +96,7 @@ class PendingLink(Pending):
         super().__init__(source.path.name, source.identity(), None)
         self._source = source
 
-    def resolve(self, progress: native.Progress) -> native.Cloud:
+    def resolve(self, progress: Progress) -> native.Cloud:
         if self._cloud is None:
             self._cloud = CACHE.obtain_linked(self._source, progress)
         return self._cloud
@@ -143,7 +145,7 @@ class CloudCache:
             self._entries[identity] = (fingerprint, cloud)
             return cloud
 
-    def obtain_linked(self, source: linked.Source, progress: native.Progress | None = None) -> native.Cloud:
+    def obtain_linked(self, source: linked.Source, progress: Progress) -> native.Cloud:
         """The cloud of a linked file as it is now."""
         with self._lock:
             known, cloud = self._entries.pop(source.identity(), ((b"", b""), None))
@@ -233,10 +235,15 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
         if arrays is None and link is None:
             return None
         name = obj.name
-        with native.Progress() as progress:
-            cloud = jobs.run(lambda: CACHE.obtain_linked(link, progress) if link else
-                             CACHE.obtain(identity, arrays, progress), progress.cancel,
-                             lambda: poll(f"Reading points of '{name}'", progress.value()))
+        progress = Progress()
+
+        def work() -> native.Cloud:
+            if link:
+                return CACHE.obtain_linked(link, progress)
+            with progress.inner() as inner:
+                return CACHE.obtain(identity, arrays, inner)
+
+        cloud = jobs.run(work, progress.cancel, lambda: poll(f"Reading points of '{name}'", progress.value()))
         if cloud.invalid_positions:
             notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
         return cloud

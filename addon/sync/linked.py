@@ -53,7 +53,7 @@ def source(path: Path) -> Source | None:
     return Source(path, Path(folder) / f"{place}-{state}.cloud")
 
 
-def load(source: Source, progress: native.Progress | None = None) -> Linked:
+def load(source: Source, progress: importers.Progress | None = None) -> Linked:
     """Maps the kept cloud, or builds and keeps it. Any thread. PatinaError when the file cannot be read."""
     notes = source.kept.with_suffix(".json")
     try:
@@ -61,9 +61,10 @@ def load(source: Source, progress: native.Progress | None = None) -> Linked:
         return _linked(native.Cloud.open(source.kept), origin)
     except (native.PatinaError, OSError, ValueError, KeyError):
         pass  # not there yet, of another version, or damaged: it is made anew
-    reading = importers.Progress()
-    points = importers.reader(source.path).read(source.path, importers.Filter(), reading)
-    cloud = native.Cloud(points.positions, points.normals, points.colors, progress)
+    progress = progress or importers.Progress()
+    points = importers.reader(source.path).read(source.path, importers.Filter(), progress)
+    with progress.inner() as inner:
+        cloud = native.Cloud(points.positions, points.normals, points.colors, inner)
     try:
         for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
             old.unlink()

@@ -83,3 +83,18 @@ def test_to_mesh_and_back():
     file = library.read(SCRATCH / "back.ply", patina.importers.Filter(), patina.importers.Progress())
     check_close(file.positions.astype(np.float64) + file.origin, before, 1e-4, "positions")
     check("intensity" in file.scalars and file.normals is not None and file.colors is not None, f"{list(file.scalars)}")
+
+
+def test_cancel_while_reading():
+    """A wish to stop reaches the reader of a linked file, which leaves nothing half behind."""
+    path = dense("slow.ply", 200000)
+    progress = patina.importers.Progress()
+    progress.cancel()
+    try:
+        linked.load(linked.source(path), progress)
+    except patina.importers.PatinaError as error:
+        check(error.code == -7, str(error))
+    else:
+        check(False, "a cancelled file was read")
+    check(not linked.source(path).kept.exists(), "half a cloud was kept")
+    check(linked.load(linked.source(path)).cloud.count == 200000, "the next time it is read")
