@@ -282,7 +282,8 @@ class Viewport:
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
         x0, y0, x1, y1 = settings.region
         pixel = (wish.view.camera.right - wish.view.camera.left) / settings.width
-        return Shown(wish, description.clouds, frame.read("COMBINED"), _cover(frame.read("DEPTH"), pixel, wish.view.camera.orthographic),
+        return Shown(wish, description.clouds, frame.read("COMBINED"),
+                     _cover(frame.read("DEPTH"), pixel, wish.view.camera.orthographic),
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.name, seconds)
 

@@ -19,8 +19,8 @@ from .lights import Light
 from .settings import DeviceChoice, Settings
 from .world import Mist
 
-__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Mist", "Pending", "SceneDescription",
-           "Settings", "Trusted", "View", "changed_owners", "describe", "describe_viewport", "final_view",
+__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Mist", "Pending",
+           "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_viewport", "final_view",
            "viewport_view"]
 
 

@@ -25,21 +25,24 @@ struct text {
     struct patina_file *file;
     locale_t c_locale;
     const uint8_t *at, *end;
-    uint64_t line;               // of `at`, from 1
-    uint32_t columns;            // words of a row
+    uint64_t line;    // of `at`, from 1
+    uint32_t columns; // words of a row
     char names[MOST_COLUMNS][NAME_SIZE];
     bool named, ptx, pts;
     enum role roles[MOST_COLUMNS];
-    bool float_colors;           // 0..1
-    double maximum;              // of integer colours: 255 or 65535
+    bool float_colors; // 0..1
+    double maximum;    // of integer colours: 255 or 65535
     double *staged;
-    float *scan;                 // of a PTX: each point's scan number, from 0
-    float **attributes;          // a column each, in the order of the columns
+    float *scan;        // of a PTX: each point's scan number, from 0
+    float **attributes; // a column each, in the order of the columns
 };
 
 // ---- lines -----------------------------------------------------------------------------------------------------------
 
-static bool parts(uint8_t c) { return pt_is_blank(c) || c == ',' || c == ';'; }
+static bool parts(uint8_t c)
+{
+    return pt_is_blank(c) || c == ',' || c == ';';
+}
 
 static bool is_comment(const uint8_t *at, const uint8_t *end)
 {
@@ -114,10 +117,9 @@ static const struct {
     const char *name;
     enum role role;
 } known_names[] = {
-    { "x", X }, { "y", Y }, { "z", Z }, { "easting", X }, { "northing", Y }, { "elevation", Z }, { "height", Z },
-    { "nx", NX }, { "ny", NY }, { "nz", NZ }, { "normal_x", NX }, { "normal_y", NY }, { "normal_z", NZ },
-    { "r", RED }, { "g", GREEN }, { "b", BLUE }, { "a", ALPHA },
-    { "red", RED }, { "green", GREEN }, { "blue", BLUE }, { "alpha", ALPHA },
+    {"x", X},     {"y", Y},    {"z", Z},     {"easting", X},   {"northing", Y},  {"elevation", Z}, {"height", Z},
+    {"nx", NX},   {"ny", NY},  {"nz", NZ},   {"normal_x", NX}, {"normal_y", NY}, {"normal_z", NZ}, {"r", RED},
+    {"g", GREEN}, {"b", BLUE}, {"a", ALPHA}, {"red", RED},     {"green", GREEN}, {"blue", BLUE},   {"alpha", ALPHA},
 };
 
 static bool has(const struct text *t, enum role first)
@@ -206,7 +208,7 @@ struct scan {
 // Reads "columns, rows, position, three axes, four rows of a matrix"; false when the lines are not that.
 static bool read_scan(struct text *t, struct scan *scan)
 {
-    double values[MOST_COLUMNS], size[2] = { 0 };
+    double values[MOST_COLUMNS], size[2] = {0};
     uint32_t strange;
     for (int i = 0; i < 10; i++) {
         uint32_t wanted = i < 2 ? 1 : i < 6 ? 3 : 4;
@@ -248,8 +250,9 @@ static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
             file->normal[3 * i + (role - NX)] = (float)v;
         } else if (t->float_colors) {
             double s = v > 0.0 ? v : 0.0; // text colours of 0..1 are sRGB too
-            ((float *)file->color)[4 * i + (role - RED)] =
-                (float)(role == ALPHA ? s : s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+            ((float *)file->color)[4 * i + (role - RED)] = (float)(role == ALPHA  ? s
+                                                                   : s <= 0.04045 ? s / 12.92
+                                                                                  : pow((s + 0.055) / 1.055, 2.4));
         } else {
             double clamped = v > 0.0 ? (v < t->maximum ? v + 0.5 : t->maximum) : 0.0;
             if (file->color_type == PATINA_UINT8)
@@ -263,11 +266,11 @@ static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
 // Goes over all rows; stores them, or only counts them and keeps the first ones.
 static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], uint64_t *count)
 {
-    struct scan scan = { 0 };
+    struct scan scan = {0};
     uint64_t i = 0, scans = 0, polled = 0;
     uint32_t strange;
     while (find_line(t)) {
-        double values[MOST_COLUMNS] = { 0 };
+        double values[MOST_COLUMNS] = {0};
         if (++polled % POLL_LINES == 0) {
             float half = 0.5f * (float)((double)(t->at - t->input->data) / (double)t->input->size);
             pt_progress_set(t->input->progress, storing ? 0.5f + half : half);
@@ -287,7 +290,8 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
             t->columns = words;
         if (strange || words < t->columns) {
             char what[96];
-            snprintf(what, sizeof what, strange ? "a word is no number" : "%u numbers; %u were expected", words, t->columns);
+            snprintf(what, sizeof what, strange ? "a word is no number" : "%u numbers; %u were expected", words,
+                     t->columns);
             return fail_at(t, what);
         }
         if (t->ptx) {
@@ -416,7 +420,7 @@ static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
 
 static int read_all(struct text *t)
 {
-    double (*sample)[MOST_COLUMNS] = calloc(SAMPLES, sizeof *sample);
+    double(*sample)[MOST_COLUMNS] = calloc(SAMPLES, sizeof *sample);
     const uint8_t *body = t->at;
     uint64_t line = 1, count;
     int code = sample ? look(t, &body, &line) : PATINA_ERROR_MEMORY;
@@ -439,7 +443,7 @@ static int read_all(struct text *t)
 
 int pt_text_read(struct patina_file *file, const struct pt_input *input)
 {
-    struct text t = { .input = input, .file = file, .at = input->data, .end = input->data + input->size, .line = 1 };
+    struct text t = {.input = input, .file = file, .at = input->data, .end = input->data + input->size, .line = 1};
     t.c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     if (!t.c_locale)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
@@ -466,7 +470,7 @@ int pt_text_read(struct patina_file *file, const struct pt_input *input)
 
 bool pt_text_is(const struct pt_input *input)
 {
-    struct text t = { .input = input, .at = input->data, .end = input->data + input->size, .line = 1 };
+    struct text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
     if (!input->size || !find_line(&t))

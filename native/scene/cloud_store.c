@@ -47,19 +47,22 @@ static uint64_t check_of(const struct header *header, const struct pt_chunk *chu
     return digest(hash, chunks, header->chunk_count * sizeof *chunks);
 }
 
-static uint64_t round_section(uint64_t size) { return (size + SECTION - 1) / SECTION * SECTION; }
+static uint64_t round_section(uint64_t size)
+{
+    return (size + SECTION - 1) / SECTION * SECTION;
+}
 
 static void list_sections(struct patina_cloud *cloud, struct section sections[SECTIONS])
 {
-    static const uint32_t color_bytes[] = { [PT_COLOR_NONE] = 0, [PT_COLOR_SRGB8] = 3, [PT_COLOR_FLOAT] = 12 };
+    static const uint32_t color_bytes[] = {[PT_COLOR_NONE] = 0, [PT_COLOR_SRGB8] = 3, [PT_COLOR_FLOAT] = 12};
     uint64_t count = cloud->info.count;
     const struct section list[SECTIONS] = {
-        { (void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks },
-        { (void **)&cloud->positions, cloud->slots * 12 },
-        { (void **)&cloud->ids, cloud->slots * 4 },
-        { (void **)&cloud->surface, count * 4 },
-        { &cloud->colors, cloud->color_format ? count * color_bytes[cloud->color_format] + 4 : 0 },
-        { (void **)&cloud->opacities, cloud->info.has_opacities ? count + 4 : 0 },
+        {(void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks},
+        {(void **)&cloud->positions, cloud->slots * 12},
+        {(void **)&cloud->ids, cloud->slots * 4},
+        {(void **)&cloud->surface, count * 4},
+        {&cloud->colors, cloud->color_format ? count * color_bytes[cloud->color_format] + 4 : 0},
+        {(void **)&cloud->opacities, cloud->info.has_opacities ? count + 4 : 0},
     };
     memcpy(sections, list, sizeof list);
 }
@@ -75,7 +78,8 @@ static uint64_t file_size(const struct section sections[SECTIONS])
 static int fail_with(const char *path, const char *what, int error)
 {
     char buffer[128];
-    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be %s: %s", path, what, strerror_r(error, buffer, sizeof buffer));
+    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be %s: %s", path, what,
+                   strerror_r(error, buffer, sizeof buffer));
 }
 
 // ---- save --------------------------------------------------------------------------------------------------------------
@@ -98,9 +102,13 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_save: bad arguments");
     struct patina_cloud copy = *cloud;
     struct section sections[SECTIONS];
-    struct header header = { .version = VERSION, .chunk_size = sizeof(struct pt_chunk), .color_format = cloud->color_format,
-                             .chunk_count = cloud->chunk_count, .slots = cloud->slots,
-                             .spacing_base = cloud->spacing_base, .info = cloud->info };
+    struct header header = {.version = VERSION,
+                            .chunk_size = sizeof(struct pt_chunk),
+                            .color_format = cloud->color_format,
+                            .chunk_count = cloud->chunk_count,
+                            .slots = cloud->slots,
+                            .spacing_base = cloud->spacing_base,
+                            .info = cloud->info};
     list_sections(&copy, sections);
     memcpy(header.magic, magic, sizeof magic);
     header.size = file_size(sections);
@@ -143,7 +151,8 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
         const struct pt_chunk *chunk = &cloud->chunks[c];
         double sum = (double)chunk->spacing;
         for (int k = 0; k < 3; k++)
-            sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] + (double)chunk->cone_axis[k];
+            sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] +
+                   (double)chunk->cone_axis[k];
         if (chunk->first != next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||
             chunk->padded > cloud->slots - next || !isfinite(sum) || !isfinite(chunk->cone_cosine))
             return refuse(path, "a chunk is damaged");
@@ -167,10 +176,12 @@ static int check_header(const char *path, const struct header *header, uint64_t 
         return refuse(path, "a saved cloud of another version");
     if (header->size != size)
         return refuse(path, "a saved cloud that was cut short");
-    if (header->color_format > PT_COLOR_FLOAT || header->info.count > 0x7FFFFFFF || header->info.chunks != header->chunk_count ||
-        header->slots > 2 * header->info.count + 16ull * header->chunk_count || header->chunk_count > header->info.count ||
-        header->info.drawn > header->info.count || header->info.has_colors != (header->color_format != PT_COLOR_NONE) ||
-        header->info.has_opacities > 1 || header->info.has_normals > 1 || !isfinite(header->spacing_base))
+    if (header->color_format > PT_COLOR_FLOAT || header->info.count > 0x7FFFFFFF ||
+        header->info.chunks != header->chunk_count ||
+        header->slots > 2 * header->info.count + 16ull * header->chunk_count ||
+        header->chunk_count > header->info.count || header->info.drawn > header->info.count ||
+        header->info.has_colors != (header->color_format != PT_COLOR_NONE) || header->info.has_opacities > 1 ||
+        header->info.has_normals > 1 || !isfinite(header->spacing_base))
         return refuse(path, "its header is damaged");
     return PATINA_OK;
 }

@@ -21,7 +21,7 @@ void pt_decode_normal(uint32_t word, double n[3])
 uint32_t pt_encode_normal(const double n[3])
 {
     double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-    double v[3] = { n[0] / largest, n[1] / largest, n[2] / largest };
+    double v[3] = {n[0] / largest, n[1] / largest, n[2] / largest};
     double sum = fabs(v[0]) + fabs(v[1]) + fabs(v[2]);
     double x = v[0] / sum, y = v[1] / sum;
     if (v[2] < 0.0) {
