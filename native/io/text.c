@@ -470,10 +470,12 @@ int pt_text_read(struct patina_file *file, const struct pt_input *input)
 
 bool pt_text_is(const struct pt_input *input)
 {
+    if (!input->size)
+        return false;
     struct text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
-    if (!input->size || !find_line(&t))
+    if (!find_line(&t))
         return false;
     if ((*t.at >= '0' && *t.at <= '9') || *t.at == '-' || *t.at == '+' || *t.at == '.')
         return true;
