@@ -104,9 +104,9 @@ static void ask_for_colors(const struct finish *finish, int32_t y)
             for (; bits; bits &= bits - 1) {
                 uint32_t point = ids[__builtin_ctz(bits)];
                 if (size)
-                    __builtin_prefetch(colors + size * point);
+                    __builtin_prefetch(colors + size * point, 0, 1); // into the second level
                 for (uint32_t l = 0; l < casting; l++)
-                    __builtin_prefetch(words[l] + point);
+                    __builtin_prefetch(words[l] + point, 0, 1);
             }
         }
     }
