@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
 GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
-          "peers", "hard")
+          "effects", "peers", "hard")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -61,6 +61,9 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
             found.append(case_of("headline", device=device, points=1_000_000, quality="paper", frames=n))
     main = options.device[0]
     found.append(case_of("headline", device=main, points=1_000_000, quality="unfilled", frames=n))
+    if not quick:
+        found += [case_of("effects", device=main, points=1_000_000, quality=quality, mode=mode, frames=n)
+                  for mode in peers.EFFECTS.values() for quality in ("refined", "paper")]
     counts = [100_000] if quick else [10_000, 100_000, 10_000_000] + [100_000_000] * full
     found += [case_of("points", device=main, points=count, frames=n, uploads=1) for count in counts]
     if not quick:

@@ -15,7 +15,8 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
-MODES = ("points 1 px", "points 3 px", "points 5 px", "points 3 px + EDL", "gaussian")
+MODES = ("points 1 px", "points 3 px", "points 5 px", "points 3 px + EDL", "gaussian", "points 3 px + 6 peels",
+         "points 3 px + shadow map")
 
 
 def cloud(data: dict[str, np.ndarray]) -> vtk.vtkPolyData:
@@ -90,6 +91,24 @@ def main() -> None:
         edl = vtk.vtkEDLShading()
         edl.SetDelegatePass(steps)
         renderer.SetPass(edl)
+    if mode.endswith("6 peels"):  # of half transparent points
+        renderer.GetActors().GetLastActor().GetProperty().SetOpacity(0.5)
+        renderer.SetUseDepthPeeling(1)
+        renderer.SetMaximumNumberOfPeels(6)
+        renderer.SetOcclusionRatio(0.0)
+    if mode.endswith("shadow map"):
+        light.SetPositional(True)  # VTK fits the map of a light to its cone
+        light.SetConeAngle(20.0)
+        baker, shadows, steps = vtk.vtkShadowMapBakerPass(), vtk.vtkShadowMapPass(), vtk.vtkSequencePass()
+        baker.SetResolution(1024)
+        shadows.SetShadowMapBakerPass(baker)
+        passes = vtk.vtkRenderPassCollection()
+        for one in (baker, shadows):
+            passes.AddItem(one)
+        steps.SetPasses(passes)
+        camera = vtk.vtkCameraPass()
+        camera.SetDelegatePass(steps)
+        renderer.SetPass(camera)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     times = []
     for index, matrix in enumerate(data["matrix"]):

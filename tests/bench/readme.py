@@ -66,6 +66,21 @@ def others(result: dict[str, Any]) -> str:
     return table(head, body)
 
 
+def effects(result: dict[str, Any]) -> str:
+    """Layers and shadows of the headline's cloud, and what VTK takes for the same."""
+    rows = joined(result, "effects")
+    peer = {row["mode"]: row for row in rows if row["device"].startswith("VTK")}
+    names = {"6 layers": "six layers of half transparent points", "shadows 1": "hard shadows of the sun"}
+    body = []
+    for row in rows:
+        if row["mode"] in peer and not row["device"].startswith("VTK"):
+            other = peer[row["mode"]]
+            body.append([names[row["mode"]], "as in the paper" if row["quality"] == "paper" else row["quality"],
+                         f"{row['ms_median']:.1f}", other["device"], f"{other['ms_median']:.0f}",
+                         f"{other['ms_median'] / row['ms_median']:.1f}×"])
+    return table(["what", "quality", "ms", "peer", "ms", "ratio"], body)
+
+
 def holes(program: Path) -> str:
     """The table that tests/scenes/test_holes prints."""
     said = subprocess.run([str(program), "--device", "cpu"], capture_output=True, text=True).stdout
@@ -110,6 +125,8 @@ def update(result: dict[str, Any], root: Path) -> str:
         parts |= {"aims": aims(result), "memory": memory(result)}
         if joined(result, "peers"):
             parts["others"] = others(result)
+        if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
+            parts["effects"] = effects(result)
     for quality in ("paper", "refined"):
         if papers.ratios(result, quality):
             parts[f"papers {quality}"] = papers.table(result, quality)
