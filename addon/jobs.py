@@ -1,16 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs a long native call off the thread that talks to Blender.
 
-The worker never touches Blender's API; the calling thread polls, shows progress and cancels.
+The worker never touches Blender's API; the calling thread polls, shows progress and cancels. Only for callers that
+Blender waits for, operators and final renders: beside a Blender that goes on, Python on another thread of ours makes it
+crash, for some of its code takes "Python runs somewhere" for "I hold Python's lock". There, work is made of steps: a
+generator that yields each native task and goes on when it is done.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import TypeVar
 
+from .native import Task
+
 T = TypeVar("T")
+
+# Work made of steps, which gives a T
+Steps = Generator[Task, None, T]
 
 # Seconds between two polls: a tenth of the 0.2 s within which a cancel shall show, and no load on a farm node.
 INTERVAL = 0.02
@@ -53,3 +61,12 @@ def run(work: Callable[[], T], cancel: Callable[[], None], poll: Callable[[], bo
         finally:
             failure.clear()  # else error, traceback and this list keep each other, and the caller's arrays, alive
     return outcome[0]
+
+
+def finish(steps: Steps[T]) -> T:
+    """Goes through all steps, waiting."""
+    try:
+        while True:
+            next(steps)  # which waits for the task of the step before
+    except StopIteration as end:
+        return end.value

@@ -3,7 +3,8 @@
 
 Structures and enumerations follow native/include/patina/patina.h field by field; every call that fails raises
 `PatinaError` with the library's own sentence. Calls release the GIL. A handle may be used from any thread, one
-call at a time; `Frame.cancel`, `Frame.progress`, `Progress.cancel` and `Progress.value` at any time.
+call at a time; `Frame.cancel`, `Frame.progress`, `Progress.cancel` and `Progress.value` at any time. What `start` in
+a name begins is a `Task`, which runs without Python.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import os
 import sys
 import threading
 import weakref
+from collections.abc import Callable
 from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_double, c_float, c_int
 from ctypes import c_size_t, c_uint32, c_uint64, c_void_p, sizeof
 from pathlib import Path
@@ -198,13 +200,21 @@ _CALLS = {
     "patina_frame_load_shadows": (c_void_p, c_void_p, c_char_p),
     "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
+    "patina_task_render": (c_void_p, c_void_p, _OUT),
+    "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
+    "patina_task_set_colors": (c_void_p, POINTER(_Array), _OUT),
+    "patina_task_fingerprint": (POINTER(_CloudDesc), POINTER(c_uint64), _OUT),
+    "patina_task_done": (c_void_p,),
+    "patina_task_wait": (c_void_p,),
+    "patina_task_take_cloud": (c_void_p, _OUT),
+    "patina_task_destroy": (c_void_p,),
 }
 _RESULTS = {
     "patina_version": c_char_p, "patina_message": c_size_t, "patina_log_next": c_size_t,
     "patina_progress_destroy": None, "patina_progress_cancel": None, "patina_progress_value": c_float,
     "patina_device_destroy": None, "patina_cloud_destroy": None, "patina_file_destroy": None,
     "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
-    "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t,
+    "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_task_destroy": None,
 }
 
 _loaded: ctypes.CDLL | None = None
@@ -282,17 +292,21 @@ def log_lines() -> list[tuple[int, str]]:
 # ---- handles -------------------------------------------------------------------------------------------------
 
 
+def _destroy(destroy: Callable[[c_void_p], None], handle: c_void_p, _keep: Any) -> None:
+    destroy(handle)
+
+
 class _Handle:
-    """Owns a native handle until close(), the end of a `with`, or the last reference."""
+    """Owns a native handle until close(), the end of a `with`, or the last reference. `keep` lives as long."""
 
     _kind = ""
 
-    def __init__(self, *arguments: Any, blame: tuple[c_void_p, ...] = (), create: str = "") -> None:
+    def __init__(self, *arguments: Any, blame: tuple[c_void_p, ...] = (), create: str = "", keep: Any = None) -> None:
         lib = library()
         handle = c_void_p()
         _check(getattr(lib, create or f"patina_{self._kind}_create")(*arguments, byref(handle)), *blame)
         self._handle = handle
-        self._finalizer = weakref.finalize(self, getattr(lib, f"patina_{self._kind}_destroy"), handle)
+        self._finalizer = weakref.finalize(self, _destroy, getattr(lib, f"patina_{self._kind}_destroy"), handle, keep)
 
     def close(self) -> None:
         self._finalizer()
@@ -321,6 +335,27 @@ class Progress(_Handle):
         return library().patina_progress_value(self._handle)
 
 
+class Task(_Handle):
+    """A call that runs on a native thread; what it uses stays alive until it ends. close() waits for it."""
+
+    _kind = "task"
+
+    def __init__(self, call: str, *arguments: Any, keep: tuple, finish: Callable[[Task], Any] = lambda task: None) -> None:
+        super().__init__(*arguments, create=f"patina_task_{call}", keep=keep)
+        self._finish = finish
+
+    def done(self) -> bool:
+        return bool(library().patina_task_done(self._handle))
+
+    def result(self) -> Any:
+        """Waits; raises what the call would have raised, else gives its result. Once: then the task is closed."""
+        try:
+            self._call("wait")
+            return self._finish(self)
+        finally:
+            self.close()
+
+
 def _handle_of(progress: Progress | None) -> c_void_p | None:
     return progress._handle if progress else None
 
@@ -345,6 +380,21 @@ def _view(array: np.ndarray | None, count: int) -> _Array:
     return _Array(data=array.ctypes.data, type=_TYPES[array.dtype.name], components=array.shape[1])
 
 
+def _describe(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
+              opacities: np.ndarray | None, threads: int = 0) -> _CloudDesc:
+    count = len(positions)
+    return _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
+                      color=_view(colors, count), opacity=_view(opacities, count), threads=threads)
+
+
+def start_fingerprint(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
+                      opacities: np.ndarray | None) -> Task:
+    """A task that gives two numbers: of places, normals and opacities, and of colours."""
+    values = (c_uint64 * 2)()
+    return Task("fingerprint", byref(_describe(positions, normals, colors, opacities)), values,
+                keep=(positions, normals, colors, opacities, values), finish=lambda task: tuple(values))
+
+
 class Cloud(_Handle):
     """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None;
     opacities (n, 1), floats 0 to 1, or None."""
@@ -353,11 +403,21 @@ class Cloud(_Handle):
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
                  progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None) -> None:
-        count = len(positions)
-        desc = _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
-                          color=_view(colors, count), opacity=_view(opacities, count), threads=threads)
-        super().__init__(byref(desc), _handle_of(progress))
+        super().__init__(byref(_describe(positions, normals, colors, opacities, threads)), _handle_of(progress))
         self._learn()
+
+    @classmethod
+    def start(cls, positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
+              opacities: np.ndarray | None, progress: Progress | None = None) -> Task:
+        """A task that gives the cloud."""
+        def take(task: Task) -> Cloud:
+            cloud = cls.__new__(cls)
+            _Handle.__init__(cloud, task._handle, blame=(task._handle,), create="patina_task_take_cloud")
+            cloud._learn()
+            return cloud
+
+        return Task("build", byref(_describe(positions, normals, colors, opacities)), _handle_of(progress),
+                    keep=(positions, normals, colors, opacities, progress), finish=take)
 
     @classmethod
     def open(cls, path: Path) -> Cloud:
@@ -379,10 +439,9 @@ class Cloud(_Handle):
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))
 
-    def set_colors(self, colors: np.ndarray | None) -> None:
-        """Other colours for the same points; waits for a picture that is being drawn."""
-        with _RENDERING:
-            self._call("set_colors", byref(_view(colors, self.count)))
+    def start_colors(self, colors: np.ndarray | None) -> Task:
+        """Other colours for the same points; no picture of them may be drawn meanwhile."""
+        return Task("set_colors", self._handle, byref(_view(colors, self.count)), keep=(self, colors))
 
 
 class File(_Handle):
@@ -451,10 +510,6 @@ class Scene(_Handle):
         self._call("set_settings", byref(_Settings(**settings)))
 
 
-# Held while a picture is drawn, so that no cloud changes under it. Frames of a device take turns anyway.
-_RENDERING = threading.Lock()
-
-
 class Frame(_Handle):
     """Renders scenes on a device and keeps the planes; closes before its device."""
 
@@ -467,9 +522,12 @@ class Frame(_Handle):
     def render(self, scene: Scene) -> None:
         if not self._finalizer.alive:
             raise PatinaError("this frame is closed")
-        with _RENDERING:
-            _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
-                   self._device._handle)
+        _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
+               self._device._handle)
+
+    def start(self, scene: Scene) -> Task:
+        """render() as a task."""
+        return Task("render", self._handle, scene._handle, keep=(self, self._device, scene))
 
     def bake_shadows(self, scene: Scene) -> None:
         """Whole shadow textures of the scene's casting lights, without a picture."""

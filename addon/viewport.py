@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The 3D viewport in Rendered mode.
 
-Blender's thread reads the scene where it changed, asks for pictures and draws the last finished one; a worker of each
-viewport renders. While the view moves, pictures are made in a time budget (pace.py); when it rests, the whole one follows,
-which is the picture that a final render would make. A timer tells Blender to draw again: the worker never calls Blender.
+Blender's thread reads the scene where it changed, asks for pictures and draws the last finished one. While the view moves,
+pictures are made in a time budget (pace.py); when it rests, the whole one follows, which is the picture that a final render
+would make. The long work is native tasks; a timer looks whether they are done and goes on. No Python runs on another
+thread (jobs.py says why).
 """
 
 from __future__ import annotations
 
-import threading
 import time
 import weakref
-from collections.abc import Callable
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,12 +21,12 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from . import native, pace, render, sync
-from .importers import Progress
+from .jobs import Steps
 
-TICK = 0.008  # seconds between two looks at the workers
+TICK = 0.008  # seconds between two looks at the tasks
+STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
 REST = 0.12  # seconds without motion after which the whole picture is drawn
 LARGEST = np.float32(65000.0)  # half floats end at 65504; what overflows turns the viewport black
-FAR = np.float32(1e30)  # depth of nothing
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,8 @@ class Shown:
     wish: Wish
     clouds: list[sync.CloudItem]  # built
     color: np.ndarray  # (height, width, 4), premultiplied, scene-linear
-    depth: np.ndarray  # (height, width, 1), linear z that hides overlays
+    depth: np.ndarray  # (height, width, 1), linear z
+    pixel: float  # its width, at distance 1 in perspective
     place: tuple[float, float, float, float]  # of the viewport that it covers, 0..1
     stats: dict[str, Any]
     passes: dict[str, Any]
@@ -64,10 +65,10 @@ class Shown:
 
 
 class Viewport:
-    """One 3D view region. Everything but _work runs on Blender's thread."""
+    """One 3D view region."""
 
     def __init__(self, engine: bpy.types.RenderEngine) -> None:
-        self.engine = weakref.ref(engine, lambda _: self.close())
+        self.engine = weakref.ref(engine, lambda _: _wake())  # anywhere in Python's work: the timer closes
         self.area = 0  # where it is, to find its statistics
         self.message = ""  # what went wrong last
         self.notices: list[str] = []
@@ -80,19 +81,17 @@ class Viewport:
         self._moved = 0.0  # when
         self._local = False  # in local view
         self._last: Wish | None = None  # that was asked for
-        self._lock = threading.Lock()  # of what follows
         self._wanted: Wish | None = None
         self._working: Wish | None = None
-        self._frame_cancel: Callable[[], None] | None = None  # while it renders
-        self._build_cancel: Callable[[], None] | None = None  # while it makes clouds
+        self._steps: Steps[Shown] | None = None  # of the work
+        self._task: native.Task | None = None  # the step under way
+        self._progress: native.Progress | None = None  # while clouds are made
+        self._rendering = False  # while the frame is drawn
         self._closed = False
         self._news = False
-        self._thread: threading.Thread | None = None
-        self._frame: tuple[native.Device, native.Frame] | None = None  # the worker's
+        self._frame: tuple[native.Device, native.Frame] | None = None
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture] | None = None
         _VIEWPORTS.add(self)
-
-    # ---- Blender's thread
 
     def update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """The scene changed."""
@@ -125,10 +124,10 @@ class Viewport:
         """Called by the timer. Whether it has to come again."""
         engine = self.engine()
         if engine is None:
+            self.close()
             return False
-        with self._lock:
-            news, self._news = self._news, False
-            idle = not self._working and not self._wanted
+        news, self._news = self._news, False
+        idle = not self._working and not self._wanted
         due = self._last is not None and self._last.level != pace.FULL
         if due and idle and time.monotonic() - self._moved > REST:
             self._ask(pace.FULL)
@@ -143,41 +142,39 @@ class Viewport:
         return not idle or due or news
 
     def close(self) -> None:
-        """Stops the worker soon and for good."""
-        with self._lock:
-            self._closed, self._wanted = True, None
-            stops, thread = (self._frame_cancel, self._build_cancel), self._thread
-        for stop in filter(None, stops):
-            stop()
-        if thread:
-            thread.join()
-        self._drawn = self._frame = None  # here, for textures go on Blender's thread
+        """Ends the work soon and for good."""
+        self._closed, self._wanted, self._working = True, None, None
+        if self._rendering:
+            self._frame[1].cancel()
+        if self._progress:
+            self._progress.cancel()
+        if self._task:
+            self._task.close()  # before what it uses
+        if self._steps:
+            self._steps.close()
+        self._drawn = self._frame = self._steps = self._task = None  # here, for textures go on Blender's thread
         _VIEWPORTS.discard(self)
+        if self in _TURNS:
+            _TURNS.remove(self)
 
     def _read_view(self, context: bpy.types.Context) -> sync.View:
         return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
 
     def _ask(self, level: pace.Level) -> None:
-        wish = self._last = Wish(self._scene, self._view, level)
-        with self._lock:
-            self._wanted = wish
-            # a quick picture of the moment before is worth its end, a whole one is not
-            stop = self._frame_cancel if self._working and self._working.level == pace.FULL else None
-            start = not self._thread and not self._closed
-            if start:
-                self._thread = threading.Thread(target=self._work, name="patina viewport", daemon=True)
-        if stop:
-            stop()
-        if start:
-            self._thread.start()
-        if not bpy.app.timers.is_registered(_tick):
-            bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
+        if self._closed:
+            return
+        self._wanted = self._last = Wish(self._scene, self._view, level)
+        # a quick picture of the moment before is worth its end, a whole one is not
+        if self._rendering and self._working.level == pace.FULL:
+            self._frame[1].cancel()
+        if self not in _TURNS:
+            _TURNS.append(self)
+        _wake()
 
     def _status(self) -> str:
         if self.message:
             return self.message
-        with self._lock:
-            working = self._working
+        working = self._working
         if working and any(isinstance(item.cloud, sync.Pending) and not item.cloud.built for item in
                            working.scene.clouds):
             return "Reading points"
@@ -188,7 +185,7 @@ class Viewport:
     def _draw_picture(self, context: bpy.types.Context) -> None:
         if self._drawn is None or self._drawn[0] is not self.shown:
             self._drawn = (self.shown, _texture(np.minimum(self.shown.color, LARGEST), 'RGBA16F'),
-                           _texture(np.minimum(self.shown.depth, FAR), 'R32F'))
+                           _texture(self.shown.depth, 'R32F'))
         shown, color, depth = self._drawn
         projection = context.region_data.window_matrix
         camera = shown.wish.view.camera
@@ -203,6 +200,7 @@ class Viewport:
         shader.uniform_sampler("depths", depth)
         shader.uniform_float("projection", (projection[2][2], projection[2][3], near, camera.orthographic))
         state.blend_set('ALPHA_PREMULT')
+        shader.uniform_float("cover", 4.0 * shown.pixel)
         # the colour over everything, the depth where nothing of Blender's is nearer, so that overlays are hidden rightly
         for share, test, mask in ((1.0, 'ALWAYS', False), (0.0, 'LESS_EQUAL', True)):
             state.depth_test_set(test)
@@ -213,82 +211,95 @@ class Viewport:
         state.depth_mask_set(False)
         state.blend_set('NONE')
 
-    # ---- the worker
+    # ---- the work
 
-    def _work(self) -> None:
-        while True:
-            with self._lock:
-                wish, self._wanted = self._wanted, None
-                self._working = wish
-                if wish is None or self._closed:
-                    self._working, self._thread = None, None
-                    return
-            shown, message = None, ""
-            cancelled = False
-            try:
-                shown = self._render(wish)
-            except native.PatinaCancelled:
-                message, cancelled = self.message, True
-            except Exception as error:  # shown in the viewport; the last good picture stays
-                message = str(error) or type(error).__name__
-            with self._lock:
-                self.message = message
-                self._news = True
-                if cancelled and not self._wanted and not self._closed:
-                    self._wanted = wish  # the cancel was meant for the picture before
-                if shown:
-                    self.shown = shown
-                    self.pictures += 1
-                    if shown.stats["shadow_pending"] and not self._wanted and not self._closed:
-                        self._wanted = wish  # more samples of soft shadows
-
-    def _render(self, wish: Wish) -> Shown:
-        start = time.monotonic()
-        progress = Progress()
-        self._build_cancel = progress.cancel
+    def advance(self, until: float) -> bool:
+        """Goes on with the wanted picture, waiting for short tasks until then. Whether it has come to its end."""
+        if self._task and not self._task.done():
+            return False
+        if self._steps is None:
+            self._working, self._wanted = self._wanted, None
+            self._steps = self._render(self._working)
+        wish, shown, message, cancelled = self._working, None, "", False
         try:
-            clouds = [replace(item, cloud=item.cloud.resolve(progress)) for item in wish.scene.clouds]
-        finally:
-            self._build_cancel = None
+            while True:
+                self._task = next(self._steps)
+                while not self._task.done():
+                    if time.monotonic() > until:
+                        return False
+                    time.sleep(0.0002)
+        except StopIteration as end:
+            shown = end.value
+        except native.PatinaCancelled:
+            message, cancelled = self.message, True
+        except Exception as error:  # shown in the viewport; the last good picture stays
+            message = str(error) or type(error).__name__
+        self._working = self._steps = self._task = None
+        self.message = message
+        self._news = True
+        if cancelled and not self._wanted:
+            self._wanted = wish  # the cancel was meant for the picture before
+        if shown:
+            self.shown = shown
+            self.pictures += 1
+            if shown.stats["shadow_pending"] and not self._wanted:
+                self._wanted = wish  # more samples of soft shadows
+        return True
+
+    def wants(self) -> bool:
+        return self._wanted is not None
+
+    def _render(self, wish: Wish) -> Steps[Shown]:
+        start = time.monotonic()
+        with native.Progress() as self._progress:
+            try:
+                clouds = []
+                for item in wish.scene.clouds:
+                    clouds.append(replace(item, cloud=(yield from item.cloud.resolve(self._progress))))
+            finally:
+                self._progress = None
+        if self._wanted and wish.level == pace.FULL:
+            raise native.PatinaCancelled("a newer picture is wanted", native.CANCELLED)
         description = wish.description(clouds)
         try:
-            return self._render_on(render.device_for(description.device), wish, description, start)
+            return (yield from self._render_on(render.device_for(description.device), wish, description, start))
         except native.PatinaCancelled:
             raise
         except native.PatinaError:
             if not self._frame or not self._frame[0].name.startswith("gl"):
                 raise
             self._frame = None
-        return self._render_on(render.device_for(replace(description.device, name="cpu")), wish, description, start)
+        device = render.device_for(replace(description.device, name="cpu"))
+        return (yield from self._render_on(device, wish, description, start))
 
-    def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription, start: float) -> Shown:
+    def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription,
+                   start: float) -> Steps[Shown]:
         if self._frame is None or self._frame[0] is not device:
             self._frame = (device, native.Frame(device))
         frame = self._frame[1]
         with native.Scene() as scene:
             render.describe(scene, description, ["DEPTH"])
-            with self._lock:
-                if self._closed or self._wanted and wish.level == pace.FULL:
-                    raise native.PatinaCancelled("a newer picture is wanted", native.CANCELLED)
-                self._frame_cancel = frame.cancel
+            task = frame.start(scene)
+            self._rendering = True
             try:
-                frame.render(scene)
+                yield task
+                task.result()
             finally:
-                with self._lock:
-                    self._frame_cancel = None
+                self._rendering = False
         settings, stats, passes = description.settings, frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
-        seconds = time.monotonic() - start
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
         x0, y0, x1, y1 = settings.region
-        pixel = (wish.view.camera.right - wish.view.camera.left) / settings.width
-        return Shown(wish, description.clouds, frame.read("COMBINED"),
-                     _cover(frame.read("DEPTH"), pixel, wish.view.camera.orthographic),
+        return Shown(wish, description.clouds, frame.read("COMBINED"), frame.read("DEPTH"),
+                     (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
-                     stats, passes, device.name, seconds)
+                     stats, passes, device.name, time.monotonic() - start)
 
 
 _VIEWPORTS: set[Viewport] = set()
+# Those with something to do; the first one works. One at a time: frames of a device take turns anyway, and clouds may only
+# get new colours while no picture of them is drawn.
+_TURNS: deque[Viewport] = deque()
 _compiled: list[gpu.types.GPUShader] = []  # none or one
 
 
@@ -311,10 +322,20 @@ def close_all() -> None:
 
 
 def _tick() -> float | None:
+    until = time.monotonic() + STAY
+    while _TURNS and time.monotonic() < until and _TURNS[0].advance(until):
+        viewport = _TURNS.popleft()
+        if viewport.wants():
+            _TURNS.append(viewport)
     again = False
     for viewport in list(_VIEWPORTS):
         again |= viewport.tick()
     return TICK if again else None
+
+
+def _wake() -> None:
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
 
 
 def _redraw_panels(area_pointer: int) -> None:
@@ -324,20 +345,6 @@ def _redraw_panels(area_pointer: int) -> None:
                 for region in area.regions:
                     if region.type == 'UI':
                         region.tag_redraw()
-
-
-def _cover(depth: np.ndarray, pixel: float, orthographic: int) -> np.ndarray:
-    """The depth behind which overlays hide: two pixels wider than the surface and four pixels' width nearer. Blender draws
-    the vertices of our points as dots over every engine's picture; these lie just behind it."""
-    for axis in (0, 1):
-        near = depth.copy()
-        for step in (1, 2):
-            for first, second in ((slice(step, None), slice(None, -step)), (slice(None, -step), slice(step, None))):
-                to, source = [slice(None)] * 3, [slice(None)] * 3
-                to[axis], source[axis] = first, second
-                np.minimum(near[tuple(to)], depth[tuple(source)], out=near[tuple(to)])
-        depth = near
-    return depth - np.float32(4.0 * pixel) * (np.float32(1.0) if orthographic else depth.clip(max=FAR))
 
 
 def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
@@ -354,15 +361,31 @@ void main()
 }
 """
 
-# z of the picture is linear; Blender's depth buffer is the projection's, projection.xy its third row.
+# z of the picture is linear; Blender's depth buffer is the projection's, projection.xy its third row. Overlays hide behind a
+# depth two pixels wider than the surface and four pixels' width (cover) nearer: Blender draws the vertices of our points as
+# dots over every engine's picture, and these lie just behind it.
 _FRAGMENT = """
+float covering(ivec2 texel, ivec2 last)
+{
+    float z = 1e30;
+    for (int y = -2; y <= 2; y++)
+        for (int x = -2; x <= 2; x++)
+            z = min(z, texelFetch(depths, clamp(texel + ivec2(x, y), ivec2(0), last), 0).r);
+    return z;
+}
+
 void main()
 {
-    ivec2 size = textureSize(depths, 0);
-    float z = texelFetch(depths, min(ivec2(place * vec2(size)), size - 1), 0).r;
-    float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z)
-                                   : projection.y / z - projection.x;
-    gl_FragDepth = z < 1e29 ? clamp(0.5 * ndc + 0.5, 0.0, 1.0) : 1.0;
+    gl_FragDepth = 1.0;
+    if (share < 0.5) {
+        ivec2 size = textureSize(depths, 0);
+        float far = covering(min(ivec2(place * vec2(size)), size - 1), size - 1);
+        float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
+        float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z)
+                                       : projection.y / z - projection.x;
+        if (far < 1e29)
+            gl_FragDepth = clamp(0.5 * ndc + 0.5, 0.0, 1.0);
+    }
     color = share * texture(picture, place);
 }
 """
@@ -375,6 +398,7 @@ def _shader() -> gpu.types.GPUShader:
         info = gpu.types.GPUShaderCreateInfo()
         info.push_constant('VEC4', "projection")
         info.push_constant('FLOAT', "share")
+        info.push_constant('FLOAT', "cover")
         info.sampler(0, 'FLOAT_2D', "picture")
         info.sampler(1, 'FLOAT_2D', "depths")
         info.vertex_in(0, 'VEC2', "pos")

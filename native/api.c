@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Devices, frames and progress as callers see them: check, delegate. The other exported functions stand with what they
-// concern: scene/cloud.c, scene/scene.c, io/file.c, error.c, log.c.
+// concern: scene/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
 #include "frame.h"
 #include "progress.h"
 

@@ -2,7 +2,7 @@
 """Blender's depsgraph → a description of the scene that needs Blender no more.
 
 What crosses is in dataclasses whose fields are those of the library's descriptors. Reading Blender happens on the
-calling thread; building clouds happens on a worker.
+calling thread; clouds are built by native threads.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, fl
 
 def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trusted,
                       space: bpy.types.SpaceView3D) -> SceneDescription:
-    """Reads the scene for a viewport: only points that changed; clouds are left to a worker."""
+    """Reads the scene for a viewport: only points that changed; clouds are left to be built."""
     notices: list[str] = []
 
     def visible(instance: bpy.types.DepsgraphObjectInstance) -> bool:  # local view, local collections

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from mathutils import Matrix
 
 from .. import jobs, native
 from ..importers import Progress
+from ..jobs import Steps
 from ..properties import enum_number
 from . import attributes, estimates, linked, meshes
 from .camera import row_major
@@ -35,19 +35,12 @@ class PointArrays:
     colors: np.ndarray | None  # (n, 4) uint8 sRGB, or (n, 3|4) float32 linear
     opacities: np.ndarray | None  # (n, 1) float32
 
-    def fingerprint(self) -> tuple[bytes, bytes]:
+    def fingerprint(self) -> Steps[tuple[int, int]]:
         """Of the places, normals and opacities, and of the colours: what Blender's update tags miss (undo, geometry
-        nodes, scripts) still shows. 1 GB/s."""
-        return _digest(self.positions, self.normals, self.opacities), _digest(self.colors)
-
-
-def _digest(*arrays: np.ndarray | None) -> bytes:
-    digest = hashlib.blake2b(digest_size=16)
-    for array in arrays:
-        digest.update(b"-" if array is None else f"{array.dtype}{array.shape}".encode())
-        if array is not None:
-            digest.update(array)
-    return digest.digest()
+        nodes, scripts) still shows."""
+        task = native.start_fingerprint(self.positions, self.normals, self.colors, self.opacities)
+        yield task
+        return task.result()
 
 
 @dataclass(frozen=True)
@@ -68,7 +61,7 @@ class CloudStyle:
 
 
 class Pending:
-    """Points that were read and wait for a worker to make a cloud of them. Shared by descriptions of one viewport."""
+    """Points that were read and wait to be made a cloud of. Shared by descriptions of one viewport."""
 
     def __init__(self, name: str, identity: tuple, arrays: PointArrays | None) -> None:
         self.name = name
@@ -80,25 +73,25 @@ class Pending:
     def built(self) -> native.Cloud | None:
         return self._cloud
 
-    def resolve(self, progress: Progress) -> native.Cloud:
-        """The cloud; built at the first call. One thread at a time."""
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
+        """The cloud; built at the first call. No viewport may draw meanwhile."""
         if self._cloud is None:
-            with progress.inner() as inner:
-                self._cloud = CACHE.obtain(self._identity, self._arrays, inner, recolor=True)
+            self._cloud = yield from CACHE.obtain(self._identity, self._arrays, progress, recolor=True)
             self._arrays = None
         return self._cloud
 
 
 class PendingLink(Pending):
-    """A linked cloud that waits for a worker to open it."""
+    """A linked cloud that waits to be opened."""
 
     def __init__(self, source: linked.Source) -> None:
         super().__init__(source.path.name, source.identity(), None)
         self._source = source
 
-    def resolve(self, progress: Progress) -> native.Cloud:
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
+        yield from ()  # no steps: a kept cloud opens at once, and reading a file that has changed is Python's work
         if self._cloud is None:
-            self._cloud = CACHE.obtain_linked(self._source, progress)
+            self._cloud = CACHE.obtain_linked(self._source, Progress())
         return self._cloud
 
 
@@ -111,11 +104,11 @@ class CloudItem:
 
 class CloudCache:
     """Clouds by the identity of the data they were built from. A scene that uses a cloud keeps it alive itself.
-    For any thread; calls take turns."""
+    For any thread; none waits for another one's building."""
 
     def __init__(self) -> None:
-        self._entries: dict[tuple, tuple[tuple[bytes, bytes], native.Cloud]] = {}  # least recently used first
-        self._lock = threading.RLock()
+        self._entries: dict[tuple, tuple[tuple[int, ...], native.Cloud]] = {}  # least recently used first
+        self._lock = threading.Lock()
         self._finals = 0
 
     @contextlib.contextmanager
@@ -130,29 +123,39 @@ class CloudCache:
                 self._finals -= 1
 
     def obtain(self, identity: tuple, arrays: PointArrays, progress: native.Progress | None = None,
-               recolor: bool = False) -> native.Cloud:
+               recolor: bool = False) -> Steps[native.Cloud]:
         """The cloud of these points: the one that is there, that one with new colours (recolor), or a new one."""
-        fingerprint = arrays.fingerprint()
+        fingerprint = yield from arrays.fingerprint()
         with self._lock:
-            known, cloud = self._entries.pop(identity, ((b"", b""), None))
-            if fingerprint != known:
-                if recolor and not self._finals and known[0] == fingerprint[0]:
-                    cloud.set_colors(arrays.colors)
-                else:
-                    cloud = None  # frees the old one before the new one is built
-                    cloud = native.Cloud(arrays.positions, arrays.normals, arrays.colors, progress,
-                                         opacities=arrays.opacities)
-            self._entries[identity] = (fingerprint, cloud)
-            return cloud
+            known, cloud = self._entries.pop(identity, ((), None))
+            if fingerprint == known:
+                self._entries[identity] = (known, cloud)
+                return cloud
+            recolor = recolor and not self._finals and known[:1] == fingerprint[:1]
+        if recolor:  # out of the cache: nobody takes it meanwhile
+            task = cloud.start_colors(arrays.colors)
+        else:
+            cloud = None  # frees the old one before the new one is built
+            task = native.Cloud.start(arrays.positions, arrays.normals, arrays.colors, arrays.opacities, progress)
+        yield task
+        cloud = task.result() or cloud
+        self._keep(identity, fingerprint, cloud)
+        return cloud
 
     def obtain_linked(self, source: linked.Source, progress: Progress) -> native.Cloud:
         """The cloud of a linked file as it is now."""
         with self._lock:
-            known, cloud = self._entries.pop(source.identity(), ((b"", b""), None))
-            if cloud is None:
-                cloud = linked.load(source, progress).cloud
-            self._entries[source.identity()] = (known, cloud)
-            return cloud
+            known, cloud = self._entries.pop(source.identity(), ((), None))
+            if cloud:
+                self._entries[source.identity()] = (known, cloud)
+                return cloud
+        cloud = linked.load(source, progress).cloud
+        self._keep(source.identity(), (), cloud)
+        return cloud
+
+    def _keep(self, identity: tuple, fingerprint: tuple, cloud: native.Cloud) -> None:
+        with self._lock:
+            self._entries[identity] = (fingerprint, cloud)
 
     def trim(self, used: set[tuple]) -> None:
         with self._lock:
@@ -241,7 +244,7 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
             if link:
                 return CACHE.obtain_linked(link, progress)
             with progress.inner() as inner:
-                return CACHE.obtain(identity, arrays, inner)
+                return jobs.finish(CACHE.obtain(identity, arrays, inner))
 
         cloud = jobs.run(work, progress.cancel, lambda: poll(f"Reading points of '{name}'", progress.value()))
         if cloud.invalid_positions:

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a cloud is, in 64 bits: shadow textures belong to points (SPEC 4), and files of them must know theirs again.
+// What a caller's arrays hold, so that a host can tell whether its points changed.
 #include "cloud.h"
+#include "error.h"
 #include "fingerprint.h"
 
 #include <string.h>
@@ -42,4 +44,26 @@ uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud)
             hash = mix(hash, cloud->surface[cloud->ids[chunk->first + i]]);
     }
     return hash;
+}
+
+// The bytes of an array and what they mean; `hash` is what came before.
+static uint64_t add_array(uint64_t hash, const patina_array *array, uint64_t count)
+{
+    static const uint64_t bytes[] = { 0, 4, 8, 1, 2, 4, 1, 2, 4 }; // by patina_type
+    hash = mix(mix(mix(hash, array->data != NULL), array->type), array->components);
+    return array->data ? pt_fingerprint(hash, array->data, count * array->components * bytes[array->type]) : hash;
+}
+
+int pt_desc_fingerprint(const patina_cloud_desc *desc, uint64_t values[2])
+{
+    const patina_array *arrays[] = { &desc->position, &desc->normal, &desc->opacity, &desc->color };
+    for (int i = 0; i < 4; i++)
+        if (arrays[i]->data && (arrays[i]->type > PATINA_INT32 || arrays[i]->stride))
+            return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: array %d is not tightly packed, or of an "
+                           "unknown type", i);
+    values[0] = mix(0, desc->count);
+    for (int i = 0; i < 3; i++)
+        values[0] = add_array(values[0], arrays[i], desc->count);
+    values[1] = add_array(mix(1, desc->count), arrays[3], desc->count);
+    return PATINA_OK;
 }

@@ -2,6 +2,7 @@
 """The 3D viewport in Rendered mode, in a real window. See test_window.py for what a yield means."""
 
 import os
+import threading
 import time
 
 import bpy
@@ -178,7 +179,7 @@ def test_navigation_and_rest():
         seconds.append(found.shown.seconds)
     moving = found.pictures - before
     kinds = ", ".join(f"{level.strata}/6 at 1/{level.shrink}" for level in sorted(levels, key=pace.Level.loss))
-    print(f"  {moving / 2.0:.1f} pictures/s in the window, {np.median(seconds) * 1e3:.0f} ms each for the worker "
+    print(f"  {moving / 2.0:.1f} pictures/s in the window, {np.median(seconds) * 1e3:.0f} ms each "
           f"({kinds}); longest {longest:.2f} s between two steps of Blender")
     check(moving >= 4, f"{moving} pictures in 2 s")
     stopped = time.perf_counter()
@@ -269,7 +270,7 @@ def test_orthographic_view():
 
 
 def test_toggling_lets_go():
-    """Leaving Rendered mode ends the engine and its worker."""
+    """Leaving Rendered mode ends the engine and its work."""
     setup()
     add_points(*sphere(5000, 1.0, (0, 0, 0)))
     yield lambda: shown() is not None
@@ -278,23 +279,66 @@ def test_toggling_lets_go():
     yield lambda: not viewport._VIEWPORTS
 
 
+def test_leaving_midway():
+    """Leaving Rendered mode while points are made a cloud of, or while they are drawn, ends both."""
+    rng = np.random.default_rng(2)
+    for step in ("_progress", "_rendering"):
+        setup()
+        add_points(rng.normal(size=(2_000_000, 3)).astype(np.float32), None, None)
+
+        def under_way():
+            return any(found._task and getattr(found, step) for found in viewport._VIEWPORTS)
+
+        yield under_way
+        area().spaces[0].shading.type = 'SOLID'
+        area().tag_redraw()
+        yield lambda: not viewport._VIEWPORTS and not viewport._TURNS
+
+
+def test_no_python_elsewhere():
+    """Points come, are painted and looked at without any thread of Python's beside Blender's."""
+    setup()
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    started, start = [], threading.Thread.start
+
+    def counted(self):
+        started.append(self.name)
+        start(self)
+
+    threading.Thread.start = counted
+    try:
+        obj = add_points(positions, colors, normals)
+        yield lambda: settled(20000)
+        found, before = shown(), shown().pictures
+        obj.data.attributes["Col"].data.foreach_set("color_srgb", np.tile(np.float32([1, 0, 0, 1]), len(positions)))
+        obj.data.update()
+        yield newer(before)
+        before = found.pictures
+        view().view_rotation = Quaternion((0, 1, 0), 0.6)
+        yield newer(before)
+    finally:
+        threading.Thread.start = start
+    check(not started, f"threads {started}")
+    check(threading.enumerate() == [threading.main_thread()], f"threads {threading.enumerate()}")
+
+
 def test_failure_is_said():
     """A failing picture leaves the last one and says why."""
     setup()
     add_points(*sphere(5000, 1.0, (0, 0, 0)))
     yield lambda: shown() is not None
-    found, honest = shown(), viewport.native.Frame.render
+    found, honest = shown(), viewport.native.Frame.start
     picture = found.shown
 
     def failing(self, scene):
         raise viewport.native.PatinaError("no memory left", -2)
 
-    viewport.native.Frame.render = failing
+    viewport.native.Frame.start = failing
     view().view_rotation = Quaternion((0, 1, 0), 0.5)
     try:
         yield lambda: "no memory left" in found.message
     finally:
-        viewport.native.Frame.render = honest
+        viewport.native.Frame.start = honest
     check(found.shown is picture, "the last good picture went")
     before = found.pictures
     view().view_rotation = Quaternion((0, 1, 0), 0.6)
@@ -440,7 +484,7 @@ def figures_ten_million():
     viewport.Viewport._draw_picture = draw
     stopped = time.perf_counter()
     yield lambda: settled(10_000_000)
-    print(f"  {count / 10:.1f} pictures/s in the window; the worker takes {np.median(seconds) * 1e3:.0f} ms a picture "
+    print(f"  {count / 10:.1f} pictures/s in the window; {np.median(seconds) * 1e3:.0f} ms a picture "
           f"(middle of {len(seconds)}), the upload {np.median(draws) * 1e3:.1f} ms; whole picture "
           f"{time.perf_counter() - stopped:.2f} s after the last motion, {found.shown.seconds * 1e3:.0f} ms of work")
 

@@ -28,7 +28,8 @@
 //
 // Threads: any handle may be used from any thread, one call at a time per handle; the exceptions, which may be
 // called at any time from any thread, are patina_frame_cancel, patina_frame_progress, patina_progress_cancel,
-// patina_progress_value, patina_message and patina_log_next. Different handles are independent. A cloud may be
+// patina_progress_value, patina_task_done, patina_message and patina_log_next. A task counts as a call of the handles
+// that it was given, from its start until it is done. Different handles are independent. A cloud may be
 // in many scenes and frames at once: it is immutable after creation.
 #ifndef PATINA_H
 #define PATINA_H
@@ -76,6 +77,7 @@ typedef struct patina_scene patina_scene;
 typedef struct patina_frame patina_frame;
 typedef struct patina_file patina_file;
 typedef struct patina_progress patina_progress;
+typedef struct patina_task patina_task;
 
 // ---- errors, log, version -------------------------------------------------------------------------------------
 
@@ -420,6 +422,26 @@ PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffe
 PATINA_API size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size);
 // Writes every plane of the last render as raw little-endian files with a .txt line of their shape into a folder.
 PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
+
+// ---- tasks: long calls that return at once and run on a thread of their own ------------------------------------------
+
+// Each starts one call. Handles and arrays that it is given must stay until the task is done; descriptors are copied. Stop
+// it with patina_frame_cancel or patina_progress_cancel.
+PATINA_API int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_task **out); // patina_frame_render
+PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress,
+                                 patina_task **out); // patina_cloud_create
+PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
+                                      patina_task **out); // patina_cloud_set_colors
+// Two numbers that tell whether points changed: of count, positions, normals and opacities; of count and colours. Not
+// against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
+// written once the task is done. About as fast as memory is read.
+PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);
+PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
+// Waits for the end and returns what the call returned; its message is at the task.
+PATINA_API int patina_task_wait(patina_task *task);
+// Waits, and gives ownership of the cloud that patina_task_build made; PATINA_ERROR_EMPTY the second time or without one.
+PATINA_API int patina_task_take_cloud(patina_task *task, patina_cloud **out);
+PATINA_API void patina_task_destroy(patina_task *task); // waits; a cloud that was not taken goes too
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Long calls on threads of their own, for hosts whose thread must go on and may not be joined by others of the host's kind.
+#include "error.h"
+#include "scene/fingerprint.h"
+
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+struct patina_task {
+    struct pt_handle handle;
+    pthread_t thread;
+    int joined;
+    atomic_int done;
+    int error; // of the work, once it is done
+    int (*work)(struct patina_task *task);
+    patina_frame *frame;
+    const patina_scene *scene;
+    patina_cloud_desc desc;
+    patina_array color;
+    patina_progress *progress;
+    uint64_t *fingerprint;
+    patina_cloud *painted; // the caller's
+    patina_cloud *cloud;   // built, until it is taken
+};
+
+static void *thread_main(void *argument)
+{
+    struct patina_task *task = argument;
+    task->error = task->work(task);
+    if (task->error)
+        pt_fail_again(&task->handle, task->error);
+    atomic_store(&task->done, 1);
+    return NULL;
+}
+
+// Starts a copy of the task. Its thread takes no signals: they belong to the host program.
+static int start(const struct patina_task *task, patina_task **out)
+{
+    sigset_t all, before;
+    if (!out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "a task: out is NULL");
+    *out = malloc(sizeof **out);
+    if (!*out)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "a task: out of memory");
+    **out = *task;
+    pt_handle_init(&(*out)->handle);
+    atomic_init(&(*out)->done, 0);
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    int failed = pthread_create(&(*out)->thread, NULL, thread_main, *out);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (!failed)
+        return PATINA_OK;
+    pt_handle_destroy(&(*out)->handle);
+    free(*out);
+    *out = NULL;
+    return pt_fail(NULL, PATINA_ERROR_MEMORY, "a task: the system gives no thread");
+}
+
+static int render(struct patina_task *task) { return patina_frame_render(task->frame, task->scene); }
+
+static int build(struct patina_task *task) { return patina_cloud_create(&task->desc, task->progress, &task->cloud); }
+
+static int paint(struct patina_task *task) { return patina_cloud_set_colors(task->painted, &task->color); }
+
+static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }
+
+int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_task **out)
+{
+    return start(&(struct patina_task){ .work = render, .frame = frame, .scene = scene }, out);
+}
+
+int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress, patina_task **out)
+{
+    if (!desc || desc->struct_size != sizeof *desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_build: desc->struct_size is not %zu", sizeof *desc);
+    return start(&(struct patina_task){ .work = build, .desc = *desc, .progress = progress }, out);
+}
+
+int patina_task_set_colors(patina_cloud *cloud, const patina_array *color, patina_task **out)
+{
+    if (!color)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_set_colors: color is NULL");
+    return start(&(struct patina_task){ .work = paint, .painted = cloud, .color = *color }, out);
+}
+
+int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out)
+{
+    if (!desc || desc->struct_size != sizeof *desc || !values)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: bad arguments");
+    return start(&(struct patina_task){ .work = fingerprint, .desc = *desc, .fingerprint = values }, out);
+}
+
+int patina_task_done(const patina_task *task) { return !task || atomic_load(&task->done); }
+
+int patina_task_wait(patina_task *task)
+{
+    if (!task)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_wait: task is NULL");
+    if (!task->joined)
+        pthread_join(task->thread, NULL);
+    task->joined = 1;
+    return task->error;
+}
+
+int patina_task_take_cloud(patina_task *task, patina_cloud **out)
+{
+    if (!task || !out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_take_cloud: task or out is NULL");
+    int error = patina_task_wait(task);
+    *out = task->cloud;
+    task->cloud = NULL;
+    if (error || *out)
+        return error;
+    return pt_fail(&task->handle, PATINA_ERROR_EMPTY, "patina_task_take_cloud: the task made no cloud, or it was taken");
+}
+
+void patina_task_destroy(patina_task *task)
+{
+    if (!task)
+        return;
+    patina_task_wait(task);
+    patina_cloud_destroy(task->cloud);
+    pt_handle_destroy(&task->handle);
+    free(task);
+}

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tasks: the work of a call on a thread of its own, with its code and message; waiting, cancelling, letting go meanwhile.
+#include <patina/patina.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { POINTS = 400000, SIDE = 64 };
+
+static float points[POINTS][3];
+static uint8_t colors[POINTS][3];
+
+static patina_cloud_desc describe(uint64_t count)
+{
+    for (int i = 0; i < POINTS; i++)
+        for (int k = 0; k < 3; k++) {
+            points[i][k] = (float)((i * (7 + 6 * k)) % 9973) / 9973.0f;
+            colors[i][k] = (uint8_t)(i + k);
+        }
+    return (patina_cloud_desc){ .struct_size = sizeof(patina_cloud_desc),
+                                .count = count,
+                                .position = { points, PATINA_FLOAT32, 3, 0 },
+                                .color = { colors, PATINA_UINT8, 3, 0 } };
+}
+
+static const char *message(const void *handle)
+{
+    static char text[512];
+    patina_message(handle, text, sizeof text);
+    return text;
+}
+
+static void wait_until_done(const patina_task *task)
+{
+    for (int i = 0; i < 30000 && !patina_task_done(task); i++)
+        usleep(1000);
+    assert_true(patina_task_done(task));
+}
+
+static void test_builds_and_renders(void **state)
+{
+    (void)state;
+    patina_cloud_desc desc = describe(POINTS);
+    patina_cloud *built = NULL, *again = NULL, *direct = NULL;
+    patina_task *task = NULL;
+    assert_int_equal(patina_task_build(&desc, NULL, &task), PATINA_OK);
+    memset(&desc, 0, sizeof desc); // descriptors are copied
+    wait_until_done(task);
+    assert_int_equal(patina_task_wait(task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_OK);
+    assert_int_equal(patina_task_take_cloud(task, &built), PATINA_OK);
+    assert_int_equal(patina_task_take_cloud(task, &again), PATINA_ERROR_EMPTY);
+    assert_null(again);
+    patina_task_destroy(task);
+    desc = describe(POINTS);
+    assert_int_equal(patina_cloud_create(&desc, NULL, &direct), PATINA_OK);
+
+    static float pixels[2][SIDE * SIDE * 4];
+    patina_cloud *clouds[2] = { built, direct };
+    patina_device *device;
+    patina_device_desc cpu = { .struct_size = sizeof cpu, .name = "cpu" };
+    assert_int_equal(patina_device_create(&cpu, &device), PATINA_OK);
+    for (int i = 0; i < 2; i++) {
+        patina_scene *scene;
+        patina_frame *frame;
+        patina_camera camera = { .struct_size = sizeof camera };
+        patina_settings settings = { .struct_size = sizeof settings, .width = SIDE, .height = SIDE };
+        assert_int_equal(patina_scene_create(&scene), PATINA_OK);
+        assert_int_equal(patina_scene_add_cloud(scene, clouds[i], NULL), PATINA_OK);
+        assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+        assert_int_equal(patina_scene_frame_camera(scene, 30, 40, 0, &camera), PATINA_OK);
+        assert_int_equal(patina_scene_set_camera(scene, &camera), PATINA_OK);
+        assert_int_equal(patina_frame_create(device, &frame), PATINA_OK);
+        if (i == 0) {
+            assert_int_equal(patina_task_render(frame, scene, &task), PATINA_OK);
+            assert_int_equal(patina_task_wait(task), PATINA_OK);
+            patina_task_destroy(task);
+        } else {
+            assert_int_equal(patina_frame_render(frame, scene), PATINA_OK);
+        }
+        assert_int_equal(patina_frame_read(frame, PATINA_PASS_COMBINED, pixels[i], sizeof pixels[i]), PATINA_OK);
+        patina_frame_destroy(frame);
+        patina_scene_destroy(scene);
+        patina_cloud_destroy(clouds[i]);
+    }
+    patina_device_destroy(device);
+    double sum = 0;
+    for (int i = 0; i < SIDE * SIDE * 4; i++)
+        sum += (double)pixels[0][i];
+    assert_true(sum > 100);
+    assert_memory_equal(pixels[0], pixels[1], sizeof pixels[0]);
+}
+
+static void test_errors_come_through(void **state)
+{
+    (void)state;
+    patina_cloud_desc desc = describe(10);
+    desc.color.components = 7;
+    patina_task *task = NULL;
+    patina_cloud *cloud = NULL;
+    assert_int_equal(patina_task_build(&desc, NULL, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_ARGUMENT);
+    assert_non_null(strstr(message(task), "color: 7 components"));
+    assert_int_equal(patina_task_take_cloud(task, &cloud), PATINA_ERROR_ARGUMENT);
+    assert_null(cloud);
+    patina_task_destroy(task);
+    assert_int_equal(patina_task_render(NULL, NULL, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_ARGUMENT);
+    assert_non_null(strstr(message(task), "patina_frame_render"));
+    patina_task_destroy(task);
+    assert_int_equal(patina_task_build(NULL, NULL, &task), PATINA_ERROR_ARGUMENT);
+    assert_non_null(strstr(message(NULL), "patina_task_build"));
+    assert_int_equal(patina_task_wait(NULL), PATINA_ERROR_ARGUMENT);
+    patina_task_destroy(NULL);
+}
+
+static void test_cancel(void **state)
+{
+    (void)state;
+    patina_cloud_desc desc = describe(POINTS);
+    patina_progress *progress;
+    patina_task *task;
+    assert_int_equal(patina_progress_create(&progress), PATINA_OK);
+    patina_progress_cancel(progress);
+    assert_int_equal(patina_task_build(&desc, progress, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_CANCELLED);
+    assert_non_null(strstr(message(task), "cancelled"));
+    patina_task_destroy(task);
+    patina_progress_destroy(progress);
+}
+
+static void test_destroy_waits(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        patina_cloud_desc desc = describe(POINTS);
+        patina_progress *progress;
+        patina_task *task;
+        assert_int_equal(patina_progress_create(&progress), PATINA_OK);
+        assert_int_equal(patina_task_build(&desc, progress, &task), PATINA_OK);
+        if (i & 1)
+            patina_progress_cancel(progress);
+        patina_task_destroy(task);
+        float reached = patina_progress_value(progress); // nobody writes it any more
+        usleep(5000);
+        assert_true(patina_progress_value(progress) == reached);
+        if (!(i & 1))
+            assert_true(reached == 1.0f);
+        patina_progress_destroy(progress);
+    }
+}
+
+static void run_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], int wanted)
+{
+    patina_task *task;
+    assert_int_equal(patina_task_fingerprint(desc, values, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), wanted);
+    patina_task_destroy(task);
+}
+
+static void test_fingerprints(void **state)
+{
+    (void)state;
+    patina_cloud_desc desc = describe(1001);
+    uint64_t first[2], second[2];
+    run_fingerprint(&desc, first, PATINA_OK);
+    run_fingerprint(&desc, second, PATINA_OK);
+    assert_memory_equal(first, second, sizeof first);
+    colors[1000][2] ^= 1;
+    run_fingerprint(&desc, second, PATINA_OK);
+    assert_true(first[0] == second[0] && first[1] != second[1]);
+    colors[1000][2] ^= 1;
+    points[500][1] += 1.0f;
+    run_fingerprint(&desc, second, PATINA_OK);
+    assert_true(first[0] != second[0] && first[1] == second[1]);
+    points[500][1] -= 1.0f;
+    desc.normal = (patina_array){ points, PATINA_FLOAT32, 3, 0 };
+    run_fingerprint(&desc, second, PATINA_OK);
+    assert_true(first[0] != second[0] && first[1] == second[1]);
+    desc.normal.stride = 16;
+    run_fingerprint(&desc, second, PATINA_ERROR_ARGUMENT);
+}
+
+static void test_colors(void **state)
+{
+    (void)state;
+    patina_cloud_desc desc = describe(1000);
+    patina_cloud *cloud;
+    patina_task *task;
+    patina_cloud_info info = { .struct_size = sizeof info };
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    assert_int_equal(patina_task_set_colors(cloud, &(patina_array){ 0 }, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_OK);
+    patina_task_destroy(task);
+    assert_int_equal(patina_cloud_get_info(cloud, &info), PATINA_OK);
+    assert_int_equal(info.has_colors, 0);
+    patina_cloud_destroy(cloud);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_builds_and_renders), cmocka_unit_test(test_errors_come_through),
+        cmocka_unit_test(test_cancel),             cmocka_unit_test(test_destroy_waits),
+        cmocka_unit_test(test_fingerprints),       cmocka_unit_test(test_colors),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
