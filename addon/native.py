@@ -201,6 +201,7 @@ _CALLS = {
     "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, _OUT),
+    "patina_task_read": (c_void_p, c_uint32, c_void_p, c_size_t, _OUT),
     "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_task_set_colors": (c_void_p, POINTER(_Array), _OUT),
     "patina_task_fingerprint": (POINTER(_CloudDesc), POINTER(c_uint64), _OUT),
@@ -558,6 +559,14 @@ class Frame(_Handle):
         else:
             self._call("read", number, pixels.ctypes.data, pixels.nbytes)
         return pixels
+
+    def start_read(self, plane: str) -> Task:
+        """read() of a plane of the picture as a task."""
+        number, channels = PLANES[plane]
+        stats = self.stats()
+        pixels = np.empty((stats["height"], stats["width"], channels), np.float32)
+        return Task("read", self._handle, number, pixels.ctypes.data, pixels.nbytes, keep=(self, self._device, pixels),
+                    finish=lambda task: pixels)
 
     def read_keys(self) -> np.ndarray:
         """What each pixel shows, (height, width, 1) uint64: float bits of z << 32 | id."""

@@ -184,7 +184,8 @@ class Viewport:
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
         if self._drawn is None or self._drawn[0] is not self.shown:
-            self._drawn = (self.shown, _texture(np.minimum(self.shown.color, LARGEST), 'RGBA16F'),
+            np.minimum(self.shown.color, LARGEST, out=self.shown.color)
+            self._drawn = (self.shown, _texture(self.shown.color, 'RGBA16F'),
                            _texture(self.shown.depth, 'R32F'))
         shown, color, depth = self._drawn
         projection = context.region_data.window_matrix
@@ -286,11 +287,16 @@ class Viewport:
                 task.result()
             finally:
                 self._rendering = False
+        planes = []
+        for plane in ("COMBINED", "DEPTH"):
+            task = frame.start_read(plane)
+            yield task
+            planes.append(task.result())
         settings, stats, passes = description.settings, frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
         x0, y0, x1, y1 = settings.region
-        return Shown(wish, description.clouds, frame.read("COMBINED"), frame.read("DEPTH"),
+        return Shown(wish, description.clouds, *planes,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.name, time.monotonic() - start)

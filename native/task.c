@@ -20,6 +20,9 @@ struct patina_task {
     patina_array color;
     patina_progress *progress;
     uint64_t *fingerprint;
+    uint32_t pass;
+    float *pixels;
+    size_t size; // of them
     patina_cloud *painted; // the caller's
     patina_cloud *cloud;   // built, until it is taken
 };
@@ -60,6 +63,11 @@ static int start(const struct patina_task *task, patina_task **out)
 
 static int render(struct patina_task *task) { return patina_frame_render(task->frame, task->scene); }
 
+static int read_pass(struct patina_task *task)
+{
+    return patina_frame_read(task->frame, task->pass, task->pixels, task->size);
+}
+
 static int build(struct patina_task *task) { return patina_cloud_create(&task->desc, task->progress, &task->cloud); }
 
 static int paint(struct patina_task *task) { return patina_cloud_set_colors(task->painted, &task->color); }
@@ -69,6 +77,13 @@ static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&t
 int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_task **out)
 {
     return start(&(struct patina_task){ .work = render, .frame = frame, .scene = scene }, out);
+}
+
+int patina_task_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size, patina_task **out)
+{
+    patina_frame *reading = (patina_frame *)frame; // which changes nothing of it
+    return start(&(struct patina_task){ .work = read_pass, .frame = reading, .pass = pass, .pixels = pixels, .size = size },
+                 out);
 }
 
 int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress, patina_task **out)

@@ -428,6 +428,8 @@ PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *f
 // Each starts one call. Handles and arrays that it is given must stay until the task is done; descriptors are copied. Stop
 // it with patina_frame_cancel or patina_progress_cancel.
 PATINA_API int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_task **out); // patina_frame_render
+PATINA_API int patina_task_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size,
+                                patina_task **out); // patina_frame_read
 PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress,
                                  patina_task **out); // patina_cloud_create
 PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
