@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs a long native call off the thread that talks to Blender.
 
-The worker never touches Blender's API; the calling thread polls, shows progress and cancels. Only for callers that
-Blender waits for, operators and final renders: beside a Blender that goes on, Python on another thread of ours makes it
-crash, for some of its code takes "Python runs somewhere" for "I hold Python's lock". There, work is made of steps: a
-generator that yields each native task and goes on when it is done.
+The worker never touches Blender's API; the calling thread polls, shows progress and cancels. Only for operators, which
+Blender waits for, and final renders, which Blender itself runs on a thread with Python. Beside a Blender that goes on,
+Python on a thread of ours makes it crash: some of its code takes "Python runs somewhere" for "I hold Python's lock".
+There, work is made of steps: a generator that yields each native task and goes on when it is done.
 """
 
 from __future__ import annotations
