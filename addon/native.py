@@ -341,7 +341,8 @@ class Task(_Handle):
 
     _kind = "task"
 
-    def __init__(self, call: str, *arguments: Any, keep: tuple, finish: Callable[[Task], Any] = lambda task: None) -> None:
+    def __init__(self, call: str, *arguments: Any, keep: tuple,
+                 finish: Callable[[Task], Any] = lambda task: None) -> None:
         super().__init__(*arguments, create=f"patina_task_{call}", keep=keep)
         self._finish = finish
 

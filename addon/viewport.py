@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The 3D viewport in Rendered mode.
 
-Blender's thread reads the scene where it changed, asks for pictures and draws the last finished one. While the view moves,
-pictures are made in a time budget (pace.py); when it rests, the whole one follows, which is the picture that a final render
-would make. The long work is native tasks; a timer looks whether they are done and goes on. No Python runs on another
-thread (jobs.py says why).
+Blender's thread reads the scene where it changed, asks for pictures and draws the last finished one. While the view
+moves, pictures are made in a time budget (pace.py); when it rests, the whole one follows, which is the picture that a
+final render would make. The long work is native tasks; a timer looks whether they are done and goes on. No Python runs
+on another thread (jobs.py says why).
 """
 
 from __future__ import annotations
@@ -303,8 +303,8 @@ class Viewport:
 
 
 _VIEWPORTS: set[Viewport] = set()
-# Those with something to do; the first one works. One at a time: frames of a device take turns anyway, and clouds may only
-# get new colours while no picture of them is drawn.
+# Those with something to do; the first one works. One at a time: frames of a device take turns anyway, and clouds may
+# only get new colours while no picture of them is drawn.
 _TURNS: deque[Viewport] = deque()
 _compiled: list[gpu.types.GPUShader] = []  # none or one
 
@@ -367,9 +367,9 @@ void main()
 }
 """
 
-# z of the picture is linear; Blender's depth buffer is the projection's, projection.xy its third row. Overlays hide behind a
-# depth two pixels wider than the surface and four pixels' width (cover) nearer: Blender draws the vertices of our points as
-# dots over every engine's picture, and these lie just behind it.
+# z of the picture is linear; Blender's depth buffer is the projection's, projection.xy its third row. Overlays hide
+# behind a depth two pixels wider than the surface and four pixels' width (cover) nearer: Blender draws the vertices of
+# our points as dots over every engine's picture, and these lie just behind it.
 _FRAGMENT = """
 float covering(ivec2 texel, ivec2 last)
 {

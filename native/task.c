@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Long calls on threads of their own, for hosts whose thread must go on and may not be joined by others of the host's kind.
+// Long calls on threads of their own, for hosts that must go on meanwhile and start no threads themselves.
 #include "error.h"
 #include "scene/fingerprint.h"
 
@@ -82,8 +82,8 @@ int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_ta
 int patina_task_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size, patina_task **out)
 {
     patina_frame *reading = (patina_frame *)frame; // which changes nothing of it
-    return start(&(struct patina_task){ .work = read_pass, .frame = reading, .pass = pass, .pixels = pixels, .size = size },
-                 out);
+    const struct patina_task task = { .work = read_pass, .frame = reading, .pass = pass, .pixels = pixels, .size = size };
+    return start(&task, out);
 }
 
 int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress, patina_task **out)
@@ -128,7 +128,7 @@ int patina_task_take_cloud(patina_task *task, patina_cloud **out)
     task->cloud = NULL;
     if (error || *out)
         return error;
-    return pt_fail(&task->handle, PATINA_ERROR_EMPTY, "patina_task_take_cloud: the task made no cloud, or it was taken");
+    return pt_fail(&task->handle, PATINA_ERROR_EMPTY, "patina_task_take_cloud: no cloud, or it was taken");
 }
 
 void patina_task_destroy(patina_task *task)
