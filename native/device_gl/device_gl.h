@@ -9,7 +9,7 @@
 #include "glad/gl.h"
 
 enum {
-    PT_GL_VARIANTS = 12,      // programs of one kernel: its passes and special cases
+    PT_GL_VARIANTS = 24,      // programs of one kernel: its passes and special cases
     PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
     PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
     PT_GL_TEXTURES = 5,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl

@@ -3,6 +3,8 @@
 // (llvmpipe runs all lanes of a vector when one of them needs it.)
 #include "device_gl.h"
 
+#include <stdio.h>
+
 enum { TILE_PIXELS = 64, GROUP = 64 };
 
 // Room for as many pixels as the tiles hold; counts from nothing. Both bound.
@@ -44,22 +46,25 @@ static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 
 enum { NORMALS = 0, BLEND = 1, BLEND_WIDE = 2, COLORS = 3 };
 
-static int shade_programs(struct pt_gl_device *d, uint32_t normals, uint32_t colors)
+// What a light kernel must know: llvmpipe runs every branch that any lane may take.
+static int plain_lights(const struct shade_args *args)
 {
-    static const char *const definitions[] = {"#define STEP 0\n",
-                                              "#define STEP 0\n#define BLEND 1\n",
-                                              "#define STEP 0\n#define WIDE 1\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 0\n#define LIT 0\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 0\n#define LIT 1\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 0\n#define LIT 2\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 1\n#define LIT 0\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 1\n#define LIT 1\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 1\n#define LIT 2\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 2\n#define LIT 0\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 2\n#define LIT 1\n",
-                                              "#define STEP 1\n#define COLOR_FORMAT 2\n#define LIT 2\n"};
-    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, normals, definitions[normals]);
-    return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors, definitions[colors]) : result;
+    for (uint32_t i = 0; i < args->light_count; i++)
+        if (args->lights[i].type > PATINA_LIGHT_POINT || args->lights[i].shadow)
+            return 0;
+    return 1;
+}
+
+static int shade_programs(struct pt_gl_device *d, const struct shade_args *args, uint32_t normals, uint32_t colors)
+{
+    static const char *const steps[] = {"#define STEP 0\n", "#define STEP 0\n#define BLEND 1\n",
+                                        "#define STEP 0\n#define WIDE 1\n"};
+    char definitions[96];
+    uint32_t lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1;
+    snprintf(definitions, sizeof definitions, "#define STEP 1\n#define COLOR_FORMAT %u\n#define LIT %u\n#define PLAIN %d\n",
+             args->instance.color_format % 3, lit, plain_lights(args));
+    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, normals, steps[normals]);
+    return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors, definitions) : result;
 }
 
 // In a uniform array: read once for all lanes, where a block would be read once a lane.
@@ -84,11 +89,11 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 {
     uint32_t lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1;
-    uint32_t colors = COLORS + 3 * (args->instance.color_format % 3) + lit;
+    uint32_t colors = COLORS + 6 * (args->instance.color_format % 3) + 2 * lit + (uint32_t)plain_lights(args);
     uint32_t normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE;
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
-    int result = shade_programs(d, normals, colors);
+    int result = shade_programs(d, args, normals, colors);
     if (result == PATINA_OK)
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, normals, PT_GL_TILES_POINTS);
     if (result == PATINA_OK && args->instance.lit)

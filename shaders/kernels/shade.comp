@@ -3,7 +3,7 @@
 // native/device_cpu/kernels/shade.c
 //
 // STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any
-// window); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights)
+// window); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -169,6 +169,9 @@ vec3 towards(uint light, uint type, vec3 from, vec3 point, inout float falloff)
     l = l * scale;
     precise float less = falloff * (scale * scale);
     falloff = less;
+#if PLAIN
+    return l;
+#else
     if (type == 2u) // PATINA_LIGHT_POINT
         return l;
     vec3 axis = vec3(args.lights[light].axis[0], args.lights[light].axis[1], args.lights[light].axis[2]);
@@ -181,6 +184,7 @@ vec3 towards(uint light, uint type, vec3 from, vec3 point, inout float falloff)
     float edge = pt_min(pt_max((cosine - cone.x) * cone.y, 0.0), 1.0);
     falloff = falloff * ((edge * edge) * (3.0 - 2.0 * edge));
     return l;
+#endif
 }
 
 void add_light(uint light, uint type, vec3 from, float share, uint shininess, vec3 n, vec3 point, vec3 to_eye,
@@ -222,8 +226,11 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
     uint casting = 0u;
     for (uint i = 0u; i < light_count; i++) {
         uint type = uint(lights[3u * i].w);
-        vec4 extra = lights[3u * i + 2u];
         precise float share = 1.0;
+#if PLAIN
+        add_light(i, type, lights[3u * i + 1u].xyz, share, shininess, n, point, to_eye, diffuse, specular);
+#else
+        vec4 extra = lights[3u * i + 2u];
         if (extra.z != 0.0) {
             uint lost = shadows[(uint(extra.z) - 1u) * id_count + id] & PT_SHADOW_SUM;
             share = 1.0 - float(lost) * extra.w;
@@ -236,6 +243,7 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
             add_light(i, type, vec3(args.lights[i].points[3u * j], args.lights[i].points[3u * j + 1u],
                                     args.lights[i].points[3u * j + 2u]),
                       share, shininess, n, point, to_eye, diffuse, specular);
+#endif
     }
     precise float mean = sum / float(casting);
     shadow = casting != 0u ? mean : 1.0;
