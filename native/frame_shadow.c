@@ -57,7 +57,7 @@ struct pt_buffer *pt_shadows_buffer(struct patina_frame *frame, uint32_t which, 
 
 uint64_t pt_shadows_identity(const struct pt_instance *instance)
 {
-    return pt_receives(instance) ? instance->cloud->fingerprint | 1u : 0; // never 0 of a receiver
+    return pt_receives(instance) ? pt_cloud_fingerprint(instance->cloud) : 0;
 }
 
 // The words are for these instances and so many lights.

@@ -478,7 +478,7 @@ static void put_instance(struct key *key, const struct patina_scene *scene, cons
         translation[k] -= planned->light->type == PATINA_LIGHT_SUN ? first[4 * k + 3] : from[k];
     pt_multiply(frame, linear, turned);
     pt_apply(frame, translation, moved);
-    put_word(key, instance->cloud->fingerprint);
+    put_word(key, pt_cloud_fingerprint(instance->cloud));
     put(key, (double)instance->style.shadow_off);
     put(key, (double)loss_of(instance));
     put(key, (double)instance->style.lighting);

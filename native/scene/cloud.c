@@ -689,8 +689,6 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
         cloud->color_format = color_format(&desc->color);
         build.cloud = cloud;
         error = build_cloud(&build);
-        if (!error)
-            cloud->fingerprint = pt_cloud_fingerprint(cloud);
     }
     pt_pages_free(build.words, (size_t)build.drawn * sizeof *build.words);
     pt_pages_free(build.scratch, (size_t)build.drawn * sizeof *build.scratch);

@@ -25,6 +25,7 @@ struct pt_chunk {
 struct pt_alive {
     atomic_int references, alive;
     atomic_uint colors; // counts how often they were set
+    _Atomic uint64_t fingerprint; // 0: nobody has asked for it yet
 };
 
 enum pt_color_format { PT_COLOR_NONE = 0, PT_COLOR_SRGB8 = 1, PT_COLOR_FLOAT = 2 };
@@ -42,7 +43,6 @@ struct patina_cloud {
     void *colors;      // count x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // count, or NULL where every point is opaque
     enum pt_color_format color_format;
-    uint64_t fingerprint; // of positions, ids, normals and spacings
     double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 
@@ -59,6 +59,7 @@ void pt_decode_normal(uint32_t word, double n[3]);
 // Local spacing by sampled nearest neighbours among the `count` points x, y, z.
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);
 
+// Of positions, ids, normals and spacings; never 0. Made at the first call, which reads them all: only shadows ask. Any thread.
 uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);
 
 void pt_alive_release(struct pt_alive *alive);

@@ -3,6 +3,7 @@
 // that opening it maps them and reads nothing but chunks and ids. A cache for this machine's kind: another byte order,
 // version or struct is another file, and the caller builds it anew.
 #include "cloud.h"
+#include "fingerprint.h"
 #include "memory.h"
 #include "progress.h"
 
@@ -16,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTION = 1 << 16, VERSION = 1, SECTIONS = 6 };
+enum { SECTION = 1 << 16, VERSION = 2, SECTIONS = 6 };
 static const char magic[8] = "patina\n\x1a";
 
 struct header {
@@ -33,18 +34,10 @@ struct section {
     uint64_t size;
 };
 
-// FNV-1a.
-static uint64_t digest(uint64_t hash, const void *data, size_t size)
-{
-    for (size_t i = 0; i < size; i++)
-        hash = (hash ^ ((const uint8_t *)data)[i]) * 0x100000001B3u;
-    return hash;
-}
-
 static uint64_t check_of(const struct header *header, const struct pt_chunk *chunks)
 {
-    uint64_t hash = digest(0xCBF29CE484222325u, header, offsetof(struct header, check));
-    return digest(hash, chunks, header->chunk_count * sizeof *chunks);
+    uint64_t hash = pt_fingerprint(VERSION, header, offsetof(struct header, check));
+    return pt_fingerprint(hash, chunks, header->chunk_count * sizeof *chunks);
 }
 
 static uint64_t round_section(uint64_t size)

@@ -33,7 +33,7 @@ uint64_t pt_fingerprint(uint64_t seed, const void *data, size_t size)
     return hash;
 }
 
-uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud)
+static uint64_t fingerprint_of(const struct patina_cloud *cloud)
 {
     uint64_t hash = pt_fingerprint(cloud->info.count, cloud->positions, cloud->slots * 12);
     hash = pt_fingerprint(hash, cloud->ids, cloud->slots * 4);
@@ -44,6 +44,16 @@ uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud)
             hash = mix(hash, cloud->surface[cloud->ids[chunk->first + i]]);
     }
     return hash;
+}
+
+uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud)
+{
+    uint64_t known = atomic_load(&cloud->alive->fingerprint);
+    if (!known) { // threads that meet here find the same
+        known = fingerprint_of(cloud) | 1u;
+        atomic_store(&cloud->alive->fingerprint, known);
+    }
+    return known;
 }
 
 // The bytes of an array and what they mean; `hash` is what came before.

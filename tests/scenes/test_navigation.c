@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the viewport needs: quick pictures of a few strata that still close, and colours that change alone.
 #include "clouds.h"
+#include "scene/cloud.h"
 #include "support.h"
 
 #include <stdio.h>
@@ -165,6 +166,12 @@ static void test_saved(void **state)
         patina_cloud_info info = {.struct_size = sizeof info};
         assert_int_equal(patina_cloud_get_info(opened, &info), PATINA_OK);
         assert_true(info.count == 50000 && info.bytes < 50000);
+        assert_true(pt_cloud_fingerprint(opened) == pt_cloud_fingerprint(cloud)); // shadow textures know it again
+        struct points strange = points_torus(50000, 1.0, 0.4, columns ? POINTS_ALL : 0, 4);
+        patina_cloud *foreign = points_upload(&strange);
+        assert_true(pt_cloud_fingerprint(foreign) != pt_cloud_fingerprint(opened));
+        patina_cloud_destroy(foreign);
+        points_free(&strange);
         for (uint32_t d = 0; d < support_device_count(); d++) {
             patina_device *device = support_device_open(support_device_name(d), 0, 0);
             if (!device)
