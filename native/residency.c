@@ -27,12 +27,11 @@ static void forget_dead(struct pt_residency *residency, struct patina_device *de
 // The colours as they are now, in place of what the buffer holds.
 static int upload_colors(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
-    static const uint32_t color_bytes[] = { 0, 3, 12 };
     device->ops->buffer_destroy(device, &resident->buffers[PT_COLORS]);
     resident->colors = atomic_load(&cloud->alive->colors);
     if (!cloud->colors)
         return PATINA_OK;
-    return device->ops->buffer_create(device, cloud->info.count * color_bytes[cloud->color_format], cloud->colors, 1,
+    return device->ops->buffer_create(device, cloud->info.count * pt_color_size(cloud->color_format), cloud->colors, 1,
                                       &resident->buffers[PT_COLORS]);
 }
 

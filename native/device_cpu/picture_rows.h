@@ -30,12 +30,6 @@ static inline vi pt_source(const struct pt_planes *planes, size_t at)
     return vi_and(vi_load(planes->from + at), vi_set(~PT_FROM_MIXED));
 }
 
-// Those of `some` that show the surface of another pixel.
-static inline vm pt_filled(vi source, size_t at, vm some)
-{
-    return vm_and(some, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
-}
-
 static inline void pt_empty_row(float *z, uint32_t width)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));

@@ -55,6 +55,12 @@ static inline vm pt_of_instance(const uint64_t *keys, const struct instance_args
                                           vm_not(vi_eq(vi_load_z(keys), vi_set(PT_KEY_EMPTY_Z)))));
 }
 
+// Those of `some` among PT_LANES pixels from `at` on that show the surface of another pixel.
+static inline vm pt_filled(vi source, size_t at, vm some)
+{
+    return vm_and(some, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
+}
+
 // d_eff at this view's level of those of PT_LANES pixels from `at` on that `lanes` names; at level 0 most are measured.
 static inline vf pt_own_distance(const struct view_args *view, const float *deff, const float *normals, const uint32_t *from,
                                  size_t at, vf z, vm lanes)
@@ -62,7 +68,7 @@ static inline vf pt_own_distance(const struct view_args *view, const float *deff
     vi source = vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED));
     if (view->level)
         return vf_level_distance(view, deff, normals, source, z, lanes);
-    vm other = vm_and(lanes, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
+    vm other = pt_filled(source, at, lanes);
     vf own = vf_load(deff + at);
     if (!vm_bits(other))
         return own;

@@ -592,6 +592,24 @@ static inline void vf_decode_normal(vi word, vf n[3])
     n[2] = z;
 }
 
+// Row 0, 1 or 2 of points as the view sees their chunk: see struct chunk_view.
+static inline vf vf_transform(const struct chunk_view *chunk, int row, vf x, vf y, vf z)
+{
+    const float *r = chunk->row + 3 * row;
+    return (((vf_set(chunk->lo[row]) + vf_set(r[0]) * x) + vf_set(r[1]) * y) + vf_set(r[2]) * z) +
+           vf_set(chunk->hi[row]);
+}
+
+// Normals of surface words in view space, not yet unit. Words without one give anything.
+static inline void vf_view_normal(const struct instance_args *instance, vi word, vf n[3])
+{
+    const float *m = instance->normal_matrix;
+    vf object[3];
+    vf_decode_normal(word, object);
+    for (int k = 0; k < 3; k++)
+        n[k] = (vf_set(m[3 * k]) * object[0] + vf_set(m[3 * k + 1]) * object[1]) + vf_set(m[3 * k + 2]) * object[2];
+}
+
 // Rays of the pixels (x, y) of this view's level: see struct view_args.
 static inline void vf_ray_of(const struct view_args *view, vi x, vi y, vf ray[2])
 {

@@ -55,16 +55,21 @@ static int plain_lights(const struct shade_args *args)
     return 1;
 }
 
-static int shade_programs(struct pt_gl_device *d, const struct shade_args *args, uint32_t normals, uint32_t colors)
+struct shade_choice {
+    uint32_t normals, format, lit, plain;
+};
+
+static uint32_t colors_of(const struct shade_choice *c) { return COLORS + 6 * c->format + 2 * c->lit + c->plain; }
+
+static int shade_programs(struct pt_gl_device *d, const struct shade_choice *c)
 {
     static const char *const steps[] = {"#define STEP 0\n", "#define STEP 0\n#define BLEND 1\n",
                                         "#define STEP 0\n#define WIDE 1\n"};
     char definitions[96];
-    uint32_t lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1;
-    snprintf(definitions, sizeof definitions, "#define STEP 1\n#define COLOR_FORMAT %u\n#define LIT %u\n#define PLAIN %d\n",
-             args->instance.color_format % 3, lit, plain_lights(args));
-    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, normals, steps[normals]);
-    return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors, definitions) : result;
+    snprintf(definitions, sizeof definitions, "#define STEP 1\n#define COLOR_FORMAT %u\n#define LIT %u\n#define PLAIN %u\n",
+             c->format, c->lit, c->plain);
+    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, c->normals, steps[c->normals]);
+    return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors_of(c), definitions) : result;
 }
 
 // In a uniform array: read once for all lanes, where a block would be read once a lane.
@@ -88,14 +93,16 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
 
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 {
-    uint32_t lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1;
-    uint32_t colors = COLORS + 6 * (args->instance.color_format % 3) + 2 * lit + (uint32_t)plain_lights(args);
-    uint32_t normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE;
+    const struct shade_choice choice = { .normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE,
+                                         .format = args->instance.color_format % 3,
+                                         .lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1,
+                                         .plain = (uint32_t)plain_lights(args)};
+    const uint32_t colors = colors_of(&choice);
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
-    int result = shade_programs(d, args, normals, colors);
+    int result = shade_programs(d, &choice);
     if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, normals, PT_GL_TILES_POINTS);
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, choice.normals, PT_GL_TILES_POINTS);
     if (result == PATINA_OK && args->instance.lit)
         set_lights(d, args, colors);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, colors, PT_GL_TILES_POINTS) : result;

@@ -482,8 +482,7 @@ static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32
 
 static size_t color_bytes(const struct patina_cloud *cloud)
 {
-    static const uint32_t bytes[] = { [PT_COLOR_NONE] = 0, [PT_COLOR_SRGB8] = 3, [PT_COLOR_FLOAT] = 12 };
-    return cloud->info.count * bytes[cloud->color_format] + 4; // kernels read bytes as words
+    return cloud->info.count * pt_color_size(cloud->color_format) + 4; // kernels read bytes as words
 }
 
 static int add_chunk(struct build *build, uint32_t begin, uint32_t count)

@@ -30,6 +30,11 @@ struct pt_alive {
 
 enum pt_color_format { PT_COLOR_NONE = 0, PT_COLOR_SRGB8 = 1, PT_COLOR_FLOAT = 2 };
 
+static inline size_t pt_color_size(enum pt_color_format format) // bytes a point
+{
+    return format == PT_COLOR_SRGB8 ? 3 : format == PT_COLOR_FLOAT ? 12 : 0;
+}
+
 struct patina_cloud {
     struct pt_handle handle;
     patina_cloud_info info;

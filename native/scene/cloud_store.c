@@ -47,14 +47,13 @@ static uint64_t round_section(uint64_t size)
 
 static void list_sections(struct patina_cloud *cloud, struct section sections[SECTIONS])
 {
-    static const uint32_t color_bytes[] = {[PT_COLOR_NONE] = 0, [PT_COLOR_SRGB8] = 3, [PT_COLOR_FLOAT] = 12};
     uint64_t count = cloud->info.count;
     const struct section list[SECTIONS] = {
         {(void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks},
         {(void **)&cloud->positions, cloud->slots * 12},
         {(void **)&cloud->ids, cloud->slots * 4},
         {(void **)&cloud->surface, count * 4},
-        {&cloud->colors, cloud->color_format ? count * color_bytes[cloud->color_format] + 4 : 0},
+        {&cloud->colors, cloud->color_format ? count * pt_color_size(cloud->color_format) + 4 : 0},
         {(void **)&cloud->opacities, cloud->info.has_opacities ? count + 4 : 0},
     };
     memcpy(sections, list, sizeof list);

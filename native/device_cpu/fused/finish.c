@@ -48,14 +48,16 @@ struct walk {
     struct pt_tile_sum *tiles;      // of the row of tiles at hand
 };
 
+static uint32_t seen_slot(const struct finish *finish, int32_t y) { return (uint32_t)(y + 4 * SEEN_MOST) % finish->ring; }
+
 static struct pt_seen_row *seen_row(const struct finish *finish, struct walk *walk, int32_t y)
 {
-    return &walk->seen[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring];
+    return &walk->seen[seen_slot(finish, y)];
 }
 
 static int anything(const struct finish *finish, const struct walk *walk, int32_t y)
 {
-    return walk->any[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring];
+    return walk->any[seen_slot(finish, y)];
 }
 
 static uint32_t slot(int32_t y) { return (uint32_t)(y + RING) % RING; }
@@ -80,12 +82,11 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
 // later.
 static void ask_for_colors(const struct finish *finish, int32_t y)
 {
-    static const uint32_t color_bytes[] = { 0, 3, 12 };
     const struct view_args *view = finish->planes.view;
     for (uint32_t i = 0; i < finish->shade_count; i++) {
         const struct shade_args *args = finish->shades[i].call.arguments;
         const char *colors = pt_cpu_data(&finish->shades[i].call, 4);
-        const size_t size = color_bytes[args->instance.color_format];
+        const size_t size = pt_color_bytes[args->instance.color_format];
         const uint32_t *words[PT_MAX_LIGHTS];
         uint32_t casting = 0;
         for (uint32_t l = 0; l < args->light_count; l++)
@@ -114,9 +115,8 @@ static void ask_for_colors(const struct finish *finish, int32_t y)
 
 static void see(const struct finish *finish, struct walk *walk, int32_t y)
 {
-    walk->any[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring] =
-        pt_see_row(&finish->planes, y, finish->reach ? PT_BLEND_FILLED : 1.0f, finish->with_normals,
-                   seen_row(finish, walk, y));
+    walk->any[seen_slot(finish, y)] = pt_see_row(&finish->planes, y, finish->reach ? PT_BLEND_FILLED : 1.0f,
+                                                 finish->with_normals, seen_row(finish, walk, y));
     if (anything(finish, walk, y))
         ask_for_colors(finish, y);
 }

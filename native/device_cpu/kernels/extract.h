@@ -23,7 +23,7 @@ static inline void pt_place_of(vi index, uint32_t width, vi *x, vi *y)
 static inline vf pt_source_value(uint32_t width, vi source, vm mixed, vm some, uint32_t x, uint32_t y)
 {
     const vf one = vf_set(1.0f);
-    vm filled = vm_and(some, vm_not(vi_eq(source, vi_add(vi_set(y * width + x), vi_lanes()))));
+    vm filled = pt_filled(source, (size_t)y * width + x, some);
     vf value = one;
     if (vm_bits(filled)) {
         vi sx, sy;

@@ -10,22 +10,15 @@ struct lit {
     struct lit_args args; // with the wider texel
 };
 
-static inline vf transform(const struct chunk_view *chunk, int row, vf x, vf y, vf z)
-{
-    const float *r = chunk->row + 3 * row;
-    return (((vf_set(chunk->lo[row]) + vf_set(r[0]) * x) + vf_set(r[1]) * y) + vf_set(r[2]) * z) +
-           vf_set(chunk->hi[row]);
-}
-
 // 1. project: pixel and z; which lanes the map says something about.
 static vm project(const struct view_args *view, const float window[4], const struct chunk_view *chunk,
                   const float *positions, uint32_t i, vf at[2], vf *z)
 {
     vf px = vf_load(positions + i), py = vf_load(positions + chunk->padded + i);
     vf pz = vf_load(positions + 2 * (size_t)chunk->padded + i);
-    *z = transform(chunk, 2, px, py, pz);
-    at[0] = transform(chunk, 0, px, py, pz);
-    at[1] = transform(chunk, 1, px, py, pz);
+    *z = vf_transform(chunk, 2, px, py, pz);
+    at[0] = vf_transform(chunk, 0, px, py, pz);
+    at[1] = vf_transform(chunk, 1, px, py, pz);
     if (view->perspective) {
         vf r = vf_rcp(*z);
         at[0] = at[0] * r;
@@ -78,14 +71,11 @@ static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm 
     const struct view_args *view = &lit->args.view;
     const struct instance_args *instance = &lit->args.instance;
     vi word = vi_gather(pt_cpu_data(lit->call, 6), id, lanes);
-    vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), lanes), object[3], n[3];
+    vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), lanes), n[3];
     *none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
     if (!instance->has_normals)
         *none = lanes;
-    const float *m = instance->normal_matrix;
-    vf_decode_normal(word, object);
-    for (int k = 0; k < 3; k++)
-        n[k] = (vf_set(m[3 * k]) * object[0] + vf_set(m[3 * k + 1]) * object[1]) + vf_set(m[3 * k + 2]) * object[2];
+    vf_view_normal(instance, word, n);
     vf square = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
     *none = vm_and(lanes, vm_or(*none, vm_not(vf_le(vf_set(1e-30f), square))));
     vf scale = vf_rsqrt(square), ray[2];

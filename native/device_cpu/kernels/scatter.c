@@ -68,13 +68,6 @@ static void drain(const struct chunk_view *chunk, const float *positions, const 
     queue->count = 0;
 }
 
-static inline vf transform(const struct chunk_view *chunk, int row, vf x, vf y, vf z)
-{
-    const float *r = chunk->row + 3 * row;
-    return (((vf_set(chunk->lo[row]) + vf_set(r[0]) * x) + vf_set(r[1]) * y) + vf_set(r[2]) * z) +
-           vf_set(chunk->hi[row]);
-}
-
 static void scatter_chunk(const struct view_args *view, const struct chunk_view *chunk, const float *all_positions,
                           const uint32_t *all_ids, const uint32_t *surface, struct target target)
 {
@@ -91,8 +84,8 @@ static void scatter_chunk(const struct view_args *view, const struct chunk_view 
         // 1. project
         vf px = vf_load(positions + i), py = vf_load(positions + chunk->padded + i);
         vf pz = vf_load(positions + 2 * (size_t)chunk->padded + i);
-        vf z = transform(chunk, 2, px, py, pz);
-        vf x = transform(chunk, 0, px, py, pz), y = transform(chunk, 1, px, py, pz);
+        vf z = vf_transform(chunk, 2, px, py, pz);
+        vf x = vf_transform(chunk, 0, px, py, pz), y = vf_transform(chunk, 1, px, py, pz);
         if (view->perspective) {
             vf r = vf_rcp(z);
             x = x * r;

@@ -8,6 +8,8 @@
 
 enum { PT_BLEND_MOST = 8 };
 
+static const uint32_t pt_color_bytes[] = { 0, 3, 12 }; // of a point, by color_format
+
 // Weights of the blend by squared distance.
 static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1])
 {

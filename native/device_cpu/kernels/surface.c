@@ -22,11 +22,7 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     // 2. its normal, in view space: the cloud's, or the estimate that the normal plane holds
     vm none = vm_not(ours);
     if (instance->has_normals) {
-        vf object[3];
-        const float *m = instance->normal_matrix;
-        vf_decode_normal(word, object);
-        for (int k = 0; k < 3; k++)
-            n[k] = (vf_set(m[3 * k]) * object[0] + vf_set(m[3 * k + 1]) * object[1]) + vf_set(m[3 * k + 2]) * object[2];
+        vf_view_normal(instance, word, n);
         none = vm_or(none, vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE)));
     } else {
         vf_load4(normals + 4 * at, n);
