@@ -72,18 +72,24 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         if not points:
             return {'CANCELLED'}
         bpy.ops.object.select_all(action='DESELECT') if bpy.ops.object.select_all.poll() else None
-        shared = origin.shared(context.scene, [item.origin for item in points]) if self.origin == 'SHARED' else None
+        shared = self._shared_origin(context, [item.origin for item in points])
         for item in points:
-            obj = bpy.data.objects.new(item.name, importers.to_mesh(item))
-            warning = origin.place(obj, item.origin, shared)
-            if warning:
-                self.report({'WARNING'}, warning)
-            context.collection.objects.link(obj)
-            obj.select_set(True)
-            context.view_layer.objects.active = obj
+            self._add(context, bpy.data.objects.new(item.name, importers.to_mesh(item)), item.origin, shared)
         count = sum(len(item.positions) for item in points)
         self.report({'INFO'}, f"Imported {count:,} points from {len(points)} file{'s' * (len(points) > 1)}")
         return {'FINISHED'}
+
+    def _shared_origin(self, context: Context, origins: list) -> origin.Origin | None:
+        return origin.shared(context.scene, origins) if self.origin == 'SHARED' else None
+
+    def _add(self, context: Context, obj: bpy.types.Object, own: origin.Origin, shared: origin.Origin | None) -> None:
+        """Places the object, selected, in the scene."""
+        warning = origin.place(obj, own, shared)
+        if warning:
+            self.report({'WARNING'}, warning)
+        context.collection.objects.link(obj)
+        obj.select_set(True)
+        context.view_layer.objects.active = obj
 
     def _link(self, context: Context) -> set[str]:
         found = []
@@ -96,16 +102,11 @@ class PATINA_OT_import_points(Operator, ImportHelper):
                 found.append((path, jobs.run(lambda source=source: linked.load(source), lambda: None, lambda: False)))
             except native.PatinaError as error:
                 self.report({'ERROR'}, f"Patina: {path.name}: {error}")
-        shared = origin.shared(context.scene, [item.origin for _, item in found]) if self.origin == 'SHARED' else None
+        shared = self._shared_origin(context, [item.origin for _, item in found])
         for path, item in found:
             obj = bpy.data.objects.new(path.stem, linked.box_mesh(path.stem, item.box))
             obj.patina.linked_file = str(path)
-            warning = origin.place(obj, item.origin, shared)
-            if warning:
-                self.report({'WARNING'}, warning)
-            context.collection.objects.link(obj)
-            obj.select_set(True)
-            context.view_layer.objects.active = obj
+            self._add(context, obj, item.origin, shared)
         self.report({'INFO'}, f"Linked {sum(item.cloud.count for _, item in found):,} points")
         return {'FINISHED'} if found else {'CANCELLED'}
 

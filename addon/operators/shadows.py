@@ -70,12 +70,4 @@ class PATINA_OT_load_shadows(_ShadowOperator, Operator, ImportHelper):
 
 _CLASSES = (PATINA_OT_bake_shadows, PATINA_OT_load_shadows)
 
-
-def register() -> None:
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

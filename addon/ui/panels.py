@@ -247,12 +247,4 @@ class PATINA_PT_light(_PatinaPanel, Panel):
 _CLASSES = (PATINA_PT_surface, PATINA_PT_transparency, PATINA_PT_shadows, PATINA_PT_film, PATINA_PT_performance,
             PATINA_PT_passes, PATINA_PT_points, PATINA_PT_shading, PATINA_PT_point_shadows, PATINA_PT_light)
 
-
-def register() -> None:
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

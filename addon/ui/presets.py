@@ -35,12 +35,4 @@ class PATINA_PT_presets(PresetPanel, Panel):
 
 _CLASSES = (PATINA_OT_preset_add, PATINA_PT_presets)
 
-
-def register() -> None:
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

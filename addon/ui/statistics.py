@@ -84,12 +84,4 @@ def _lines(layout: UILayout, text: str, icon: str, width: int = 38) -> None:
 
 _CLASSES = (PATINA_PT_statistics, PATINA_PT_statistics_passes)
 
-
-def register() -> None:
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)
