@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // THE file: scene + settings -> passes, each with its reason, and why each other pass is left out.
-#include "plan.h"
+#include "plan_passes.h"
 
 #include "expected.h"
 
@@ -15,227 +15,120 @@ enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16, BLEND_MOST = 8 };
 static const struct {
     uint32_t bytes, levels;
 } plane_table[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) { bytes, levels },
+#define PT_X(name, bytes, levels) {bytes, levels},
     PT_PLANES(PT_X)
 #undef PT_X
 };
 
-struct builder {
-    const struct patina_scene *scene;
-    struct pt_plan *plan;
-    uint32_t room;
-    uint32_t layer; // that passes are added for; 0: the whole picture
-    uint32_t finish; // first shading pass of the last layer planned
-    int failed;
-};
-
-// ---- adding passes -------------------------------------------------------------------------------------------------
-
-static struct pt_ref plane(enum pt_plane which, uint32_t level) { return (struct pt_ref){ 0, which, level }; }
-// Of the layer at hand: the first has its own.
-static struct pt_ref keys_of(const struct builder *builder, uint32_t level)
-{
-    return plane(builder->layer > 1 && !level ? PT_PLANE_KEYS_BEHIND : PT_PLANE_KEYS, level);
-}
-static struct pt_ref from_of(const struct builder *builder, uint32_t level)
-{
-    return plane(builder->layer > 1 && !level ? PT_PLANE_FROM_BEHIND : PT_PLANE_FROM, level);
-}
-static struct pt_ref shading_of(const struct builder *builder)
-{
-    return plane(builder->layer > 1 ? PT_PLANE_SHADING_BEHIND : PT_PLANE_SHADING, 0);
-}
-static struct pt_ref buffer(enum pt_instance_buffer which, uint32_t instance)
-{
-    return (struct pt_ref){ 1, which, instance };
-}
-
-static void *copy(struct builder *builder, const void *source, size_t size)
-{
-    void *memory = pt_arena_take(&builder->plan->arena, size);
-    if (memory)
-        memcpy(memory, source, size);
-    else
-        builder->failed = 1;
-    return memory;
-}
-
-static struct pt_pass *add(struct builder *builder, enum pt_kernel kernel, const char *name, const void *arguments,
-                           size_t argument_size, const struct pt_ref *refs, uint32_t ref_count)
-{
-    struct pt_plan *plan = builder->plan;
-    static struct pt_pass nowhere; // written to when memory lacks; the plan then fails as a whole
-    if (plan->pass_count == builder->room) {
-        uint32_t room = builder->room ? 2 * builder->room : 32;
-        struct pt_pass *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
-        if (!grown) {
-            builder->failed = 1;
-            return &nowhere;
-        }
-        if (plan->pass_count)
-            memcpy(grown, plan->passes, plan->pass_count * sizeof *grown);
-        plan->passes = grown;
-        builder->room = room;
-    }
-    struct pt_pass *pass = &plan->passes[plan->pass_count++];
-    *pass = (struct pt_pass){ .kernel = kernel,
-                              .layer = builder->layer,
-                              .name = name,
-                              .arguments = copy(builder, arguments, argument_size),
-                              .argument_size = argument_size,
-                              .refs = copy(builder, refs, ref_count * sizeof *refs),
-                              .ref_count = ref_count };
-    return pass;
-}
-
-#define ADD(builder, kernel, args, ...)                                                         \
-    add(builder, PT_KERNEL_##kernel, #kernel, &(args), sizeof(args), (struct pt_ref[])__VA_ARGS__, \
-        sizeof((struct pt_ref[])__VA_ARGS__) / sizeof(struct pt_ref))
-#define REASON(pass, ...) snprintf((pass)->reason, sizeof(pass)->reason, __VA_ARGS__)
-
-// Says so once, with the first layer.
-static void skip(struct builder *builder, const char *name, const char *reason)
-{
-    if (builder->layer > 1)
-        return;
-    struct pt_skipped *skipped = &builder->plan->skipped[builder->plan->skipped_count++];
-    skipped->name = name;
-    snprintf(skipped->reason, sizeof skipped->reason, "%s", reason);
-}
-
-// ---- views -----------------------------------------------------------------------------------------------------------
-
-static struct view_args view_at(const struct pt_plan *plan, uint32_t level)
-{
-    struct view_args view = plan->view;
-    uint32_t cell = 1u << level;
-    view.level = level;
-    view.width = (view.width + cell - 1) >> level;
-    view.height = (view.height + cell - 1) >> level;
-    for (int k = 0; k < 2; k++) {
-        view.rect[k] >>= level;
-        view.rect[2 + k] = (view.rect[2 + k] + cell - 1) >> level;
-    }
-    return view;
-}
-
-// The instance's rectangle, wider by what filling may carry its points.
-static struct view_args view_of(const struct pt_plan *plan, const struct pt_plan_instance *instance, uint32_t margin)
-{
-    struct view_args view = plan->view;
-    const uint32_t *rect = instance->rect;
-    for (int k = 0; k < 2; k++) {
-        view.rect[k] = rect[k] > margin ? rect[k] - margin : 0;
-        view.rect[2 + k] = rect[2 + k] + margin;
-    }
-    view.rect[2] = view.rect[2] < view.width ? view.rect[2] : view.width;
-    view.rect[3] = view.rect[3] < view.height ? view.rect[3] : view.height;
-    return view;
-}
-
 // ---- the passes --------------------------------------------------------------------------------------------------------
 
-static void plan_scatter(struct builder *builder)
+static void plan_scatter(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    struct scatter_args args = { .view = plan->view, .behind = builder->layer > 1 };
+    struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1};
     struct pt_ref *refs = pt_arena_take(&plan->arena, (2 + 4 * (size_t)plan->instance_count) * sizeof *refs);
     uint32_t count = 0;
     if (!refs) {
         builder->failed = 1;
         return;
     }
-    refs[count++] = keys_of(builder, 0);
+    refs[count++] = pt_keys_of(builder, 0);
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         if (!plan->instances[i].chunk_count)
             continue;
-        refs[count++] = buffer(PT_CHUNKS, i);
-        refs[count++] = buffer(PT_POSITIONS, i);
-        refs[count++] = buffer(PT_IDS, i);
-        refs[count++] = buffer(PT_SURFACE, i);
+        refs[count++] = pt_buffer_of(PT_CHUNKS, i);
+        refs[count++] = pt_buffer_of(PT_POSITIONS, i);
+        refs[count++] = pt_buffer_of(PT_IDS, i);
+        refs[count++] = pt_buffer_of(PT_SURFACE, i);
         args.instances++;
     }
     if (args.behind)
-        refs[count++] = plane(PT_PLANE_LIMIT, 0);
-    struct pt_pass *pass = add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
+        refs[count++] = pt_plane_at(PT_PLANE_LIMIT, 0);
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
     if (args.behind)
-        REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
+        PT_REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
     else
-        REASON(pass, "%llu points in %llu chunks of %u instances are in view", (unsigned long long)plan->points_scattered,
-           (unsigned long long)(plan->chunks - plan->chunks_culled), args.instances);
+        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view",
+                  (unsigned long long)plan->points_scattered, (unsigned long long)(plan->chunks - plan->chunks_culled),
+                  args.instances);
 }
 
-static void plan_surface(struct builder *builder, uint32_t i)
+static void plan_surface(struct pt_builder *builder, uint32_t i)
 {
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     if (!instance->args.has_normals) {
         double wanted = ceil(2.0 * plan->spacing_px);
-        struct normals_args args = { .view = view_of(plan, instance, 0), .instance = instance->args };
-        args.radius = wanted < ESTIMATE_LEAST ? ESTIMATE_LEAST : wanted > ESTIMATE_MOST ? ESTIMATE_MOST : (uint32_t)wanted;
-        REASON(ADD(builder, normals, args,
-                   { keys_of(builder, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0) }),
-               "instance %u has no normals: estimated from the depth of %u x %u pixels", i, 2 * args.radius + 1,
-               2 * args.radius + 1);
+        struct normals_args args = {.view = pt_view_of(plan, instance, 0), .instance = instance->args};
+        args.radius = wanted < ESTIMATE_LEAST  ? ESTIMATE_LEAST
+                      : wanted > ESTIMATE_MOST ? ESTIMATE_MOST
+                                               : (uint32_t)wanted;
+        PT_REASON(PT_ADD(builder, normals, args,
+                         {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0)}),
+                  "instance %u has no normals: estimated from the depth of %u x %u pixels", i, 2 * args.radius + 1,
+                  2 * args.radius + 1);
     }
-    struct surface_args args = { .view = view_of(plan, instance, 0), .instance = instance->args };
-    REASON(ADD(builder, surface, args,
-               { keys_of(builder, 0), buffer(PT_SURFACE, i), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
-                 from_of(builder, 0) }),
-           "layer distance and normal of instance %u's pixels", i);
+    struct surface_args args = {.view = pt_view_of(plan, instance, 0), .instance = instance->args};
+    PT_REASON(PT_ADD(builder, surface, args,
+                     {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0),
+                      pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0)}),
+              "layer distance and normal of instance %u's pixels", i);
 }
 
-static void plan_fill_level(struct builder *builder, uint32_t level)
+static void plan_fill_level(struct pt_builder *builder, uint32_t level)
 {
     struct pt_plan *plan = builder->plan;
-    struct fill_args args = { .view = view_at(plan, level),
-                              .iterations = plan->iterations,
-                              .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
-                              .refined = plan->quality == PATINA_QUALITY_REFINED };
+    struct fill_args args = {.view = pt_view_at(plan, level),
+                             .iterations = plan->iterations,
+                             .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
+                             .refined = plan->quality == PATINA_QUALITY_REFINED};
     for (args.occluded = 0; args.occluded < 2; args.occluded++)
-        REASON(ADD(builder, fill, args,
-                   { keys_of(builder, level), from_of(builder, level), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
-               "%s pixels at level %u, %u fills, at most %u un-fills (spacing %.2f pixels)",
-               args.occluded ? "occluded" : "background", level, args.iterations, args.unfills, plan->spacing_px);
+        PT_REASON(PT_ADD(builder, fill, args,
+                         {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
+                          pt_plane_at(PT_PLANE_DEFF, 0)}),
+                  "%s pixels at level %u, %u fills, at most %u un-fills (spacing %.2f pixels)",
+                  args.occluded ? "occluded" : "background", level, args.iterations, args.unfills, plan->spacing_px);
 }
 
-static void plan_pyramid(struct builder *builder)
+static void plan_pyramid(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     for (uint32_t level = 1; level <= plan->levels; level++) {
-        struct view_args fine = view_at(plan, level - 1);
-        struct pull_args args = { .view = view_at(plan, level), .fine_width = fine.width, .fine_height = fine.height };
+        struct view_args fine = pt_view_at(plan, level - 1);
+        struct pull_args args = {.view = pt_view_at(plan, level), .fine_width = fine.width, .fine_height = fine.height};
         // the whole plane: filters may look one pixel past the rectangle
         args.view.rect[0] = args.view.rect[1] = 0;
         args.view.rect[2] = args.view.width;
         args.view.rect[3] = args.view.height;
-        REASON(ADD(builder, pull, args,
-                   { keys_of(builder, level - 1), from_of(builder, level - 1), keys_of(builder, level),
-                     from_of(builder, level) }),
-               "spacing %.2f pixels: holes are closed at coarser levels first", plan->spacing_px);
+        PT_REASON(PT_ADD(builder, pull, args,
+                         {pt_keys_of(builder, level - 1), pt_from_of(builder, level - 1), pt_keys_of(builder, level),
+                          pt_from_of(builder, level)}),
+                  "spacing %.2f pixels: holes are closed at coarser levels first", plan->spacing_px);
     }
     for (uint32_t level = plan->levels; level > 0; level--) {
         plan_fill_level(builder, level);
-        struct view_args coarse = view_at(plan, level);
-        struct push_args args = { .view = view_at(plan, level - 1),
-                                  .coarse_width = coarse.width,
-                                  .coarse_height = coarse.height,
-                                  .refined = plan->quality == PATINA_QUALITY_REFINED };
-        REASON(ADD(builder, push, args,
-                   { keys_of(builder, level), from_of(builder, level), keys_of(builder, level - 1),
-                     from_of(builder, level - 1), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0) }),
-               "level %u to level %u", level, level - 1);
+        struct view_args coarse = pt_view_at(plan, level);
+        struct push_args args = {.view = pt_view_at(plan, level - 1),
+                                 .coarse_width = coarse.width,
+                                 .coarse_height = coarse.height,
+                                 .refined = plan->quality == PATINA_QUALITY_REFINED};
+        PT_REASON(
+            PT_ADD(builder, push, args,
+                   {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),
+                    pt_from_of(builder, level - 1), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0)}),
+            "level %u to level %u", level, level - 1);
     }
 }
 
-static void plan_filling(struct builder *builder)
+static void plan_filling(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     if (!plan->iterations) {
-        skip(builder, "fill", builder->scene->settings.error_target > 0.0f ? "the error target is met without"
-                                                                           : "switched off in the settings");
-        skip(builder, "pull", "no filling");
-        skip(builder, "push", "no filling");
+        pt_skip(builder, "fill",
+                builder->scene->settings.error_target > 0.0f ? "the error target is met without"
+                                                             : "switched off in the settings");
+        pt_skip(builder, "pull", "no filling");
+        pt_skip(builder, "push", "no filling");
         return;
     }
     if (plan->levels) {
@@ -244,10 +137,10 @@ static void plan_filling(struct builder *builder)
         char reason[96];
         snprintf(reason, sizeof reason,
                  plan->fill == PATINA_FILL_PAPER ? "filling as in the paper has one level"
-                                                                    : "spacing %.2f pixels needs no coarser level",
+                                                 : "spacing %.2f pixels needs no coarser level",
                  plan->spacing_px);
-        skip(builder, "pull", reason);
-        skip(builder, "push", reason);
+        pt_skip(builder, "pull", reason);
+        pt_skip(builder, "push", reason);
     }
     plan_fill_level(builder, 0);
 }
@@ -270,7 +163,7 @@ static void set_light(const struct patina_scene *scene, const patina_light_desc 
     set_vector(axes, vector, out->vector);
     set_vector(axes, light->direction, out->axis);
     if (light->type == PATINA_LIGHT_POINT || light->type == PATINA_LIGHT_SPOT)
-        strength /= 4.0 * pi; // radiant power -> intensity
+        strength /= 4.0 * pi;               // radiant power -> intensity
     if (light->type == PATINA_LIGHT_AREA) { // radiance times area, over its points
         strength /= pi * PT_AREA_POINTS;
         pt_area_points(light, points);
@@ -289,7 +182,8 @@ static void set_light(const struct patina_scene *scene, const patina_light_desc 
 }
 
 // receives: whether the instance's shadow words are there to be read.
-static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, int receives, struct shade_args *args)
+static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, int receives,
+                       struct shade_args *args)
 {
     uint32_t casting = 0;
     for (uint32_t i = 0; i < scene->light_count; i++) { // patina_scene_add_light keeps them to PT_MAX_LIGHTS
@@ -300,12 +194,12 @@ static void set_lights(const struct pt_plan *plan, const struct patina_scene *sc
     }
 }
 
-static void plan_shade(struct builder *builder, uint32_t i)
+static void plan_shade(struct pt_builder *builder, uint32_t i)
 {
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     uint32_t margin = (plan->iterations + 2) << plan->levels;
-    struct shade_args args = { .view = view_of(plan, instance, margin), .instance = instance->args };
+    struct shade_args args = {.view = pt_view_of(plan, instance, margin), .instance = instance->args};
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
     uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u);
@@ -316,84 +210,84 @@ static void plan_shade(struct builder *builder, uint32_t i)
     args.arrived = builder->layer <= 1 && (builder->scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
     if (instance->args.lit)
         set_lights(plan, builder->scene, pt_receives(instance->instance), &args);
-    REASON(ADD(builder, shade, args,
-               { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_NORMAL, 0), plane(PT_PLANE_DEFF, 0),
-                 buffer(PT_COLORS, i), shading_of(builder), plane(PT_PLANE_COLOR_A, 0), buffer(PT_OPACITIES, i),
-                 buffer(PT_SHADOWS, i), plane(PT_PLANE_ARRIVED, 0) }),
-           "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
-           instance->args.lit ? "lit" : "unlit", args.light_count, args.blend);
+    PT_REASON(PT_ADD(builder, shade, args,
+                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
+                      pt_plane_at(PT_PLANE_DEFF, 0), pt_buffer_of(PT_COLORS, i), pt_shading_of(builder),
+                      pt_plane_at(PT_PLANE_COLOR_A, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, i),
+                      pt_plane_at(PT_PLANE_ARRIVED, 0)}),
+              "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
+              instance->args.lit ? "lit" : "unlit", args.light_count, args.blend);
 }
 
 // Returns the plane that holds the finished colour.
-static enum pt_plane plan_image_filters(struct builder *builder)
+static enum pt_plane plan_image_filters(struct pt_builder *builder)
 {
-    static const float weights[3][3] = { { 16.0f, 2.0f, 1.0f }, { 4.0f, 2.0f, 1.0f }, { 1.0f, 1.0f, 1.0f } };
-    static const char *const names[3] = { "alleviated Gaussian", "Gaussian", "box" };
+    static const float weights[3][3] = {{16.0f, 2.0f, 1.0f}, {4.0f, 2.0f, 1.0f}, {1.0f, 1.0f, 1.0f}};
+    static const char *const names[3] = {"alleviated Gaussian", "Gaussian", "box"};
     struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
     enum pt_plane color = PT_PLANE_COLOR_A;
     if (settings->smooth != PATINA_SMOOTH_OFF) {
         const float *w = weights[settings->smooth];
-        struct smooth_args args = { .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2],
-                                    .translucent = plan->transparent != 0 };
-        REASON(ADD(builder, smooth, args,
-                   { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
-                     plane(PT_PLANE_COLOR_B, 0) }),
-               "%s, 3 x 3", names[settings->smooth]);
+        struct smooth_args args = {
+            .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2], .translucent = plan->transparent != 0};
+        PT_REASON(PT_ADD(builder, smooth, args,
+                         {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                          pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COLOR_B, 0)}),
+                  "%s, 3 x 3", names[settings->smooth]);
         color = PT_PLANE_COLOR_B;
     } else {
-        skip(builder, "smooth", "switched off in the settings");
+        pt_skip(builder, "smooth", "switched off in the settings");
     }
     if (settings->antialias == PATINA_ANTIALIAS_OFF) {
-        skip(builder, "antialias", "switched off in the settings");
+        pt_skip(builder, "antialias", "switched off in the settings");
         return color;
     }
-    struct antialias_args args = { .view = plan->view,
-                                   .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS,
-                                   .behind = builder->layer > 1 };
-    const struct pt_ref refs[] = { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_DEFF, 0), plane(color, 0),
-                                   plane(PT_PLANE_THROUGH, 0) };
-    REASON(add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.behind ? 5 : 4),
-           args.layers ? "edges of background and layers" : "edges of background");
+    struct antialias_args args = {
+        .view = plan->view, .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS, .behind = builder->layer > 1};
+    const struct pt_ref refs[] = {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                                  pt_plane_at(color, 0), pt_plane_at(PT_PLANE_THROUGH, 0)};
+    PT_REASON(pt_add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.behind ? 5 : 4),
+              args.layers ? "edges of background and layers" : "edges of background");
     return color;
 }
 
 // ---- layers ------------------------------------------------------------------------------------------------------------
 
-static void plan_peel(struct builder *builder, enum pt_plane color)
+static void plan_peel(struct pt_builder *builder, enum pt_plane color)
 {
     const struct pt_plan *plan = builder->plan;
-    struct peel_args args = { .view = plan->view,
-                              .first = builder->layer == 1,
-                              .stop = !builder->scene->settings.layer_passes };
-    REASON(ADD(builder, peel, args,
-               { keys_of(builder, 0), from_of(builder, 0), plane(PT_PLANE_DEFF, 0), shading_of(builder), plane(color, 0),
-                 plane(PT_PLANE_LIMIT, 0), plane(PT_PLANE_THROUGH, 0), plane(PT_PLANE_OVER, 0),
-                 plane(PT_PLANE_TILES, PT_TILE_LEVEL) }),
-           "layer %u of at most %u is blended, what may lie behind it is marked", builder->layer, plan->layers);
+    struct peel_args args = {
+        .view = plan->view, .first = builder->layer == 1, .stop = !builder->scene->settings.layer_passes};
+    PT_REASON(
+        PT_ADD(builder, peel, args,
+               {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_shading_of(builder),
+                pt_plane_at(color, 0), pt_plane_at(PT_PLANE_LIMIT, 0), pt_plane_at(PT_PLANE_THROUGH, 0),
+                pt_plane_at(PT_PLANE_OVER, 0), pt_plane_at(PT_PLANE_TILES, PT_TILE_LEVEL)}),
+        "layer %u of at most %u is blended, what may lie behind it is marked", builder->layer, plan->layers);
 }
 
 static struct compose_args compose_args(const struct pt_plan *plan)
 {
-    return (struct compose_args){ .view = plan->view,
-                                  .crop_x = plan->crop[0],
-                                  .crop_y = plan->crop[1],
-                                  .crop_width = plan->crop[2],
-                                  .crop_height = plan->crop[3] };
-}
-
-static struct extract_args extract_args(const struct builder *builder, uint32_t passes)
-{
-    const struct pt_plan *plan = builder->plan;
-    struct extract_args args = { .view = plan->view,
+    return (struct compose_args){.view = plan->view,
                                  .crop_x = plan->crop[0],
                                  .crop_y = plan->crop[1],
                                  .crop_width = plan->crop[2],
-                                 .crop_height = plan->crop[3],
-                                 .depth = passes >> PATINA_PASS_DEPTH & 1u,
-                                 .normal = passes >> PATINA_PASS_NORMAL & 1u,
-                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
-                                 .shadow = passes >> PATINA_PASS_SHADOW & 1u };
+                                 .crop_height = plan->crop[3]};
+}
+
+static struct extract_args extract_args(const struct pt_builder *builder, uint32_t passes)
+{
+    const struct pt_plan *plan = builder->plan;
+    struct extract_args args = {.view = plan->view,
+                                .crop_x = plan->crop[0],
+                                .crop_y = plan->crop[1],
+                                .crop_width = plan->crop[2],
+                                .crop_height = plan->crop[3],
+                                .depth = passes >> PATINA_PASS_DEPTH & 1u,
+                                .normal = passes >> PATINA_PASS_NORMAL & 1u,
+                                .source = passes >> PATINA_PASS_SOURCE & 1u,
+                                .shadow = passes >> PATINA_PASS_SHADOW & 1u};
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
@@ -402,7 +296,7 @@ static struct extract_args extract_args(const struct builder *builder, uint32_t 
     return args;
 }
 
-static void plan_layer_passes(struct builder *builder, enum pt_plane color)
+static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
 {
     const uint32_t passes = builder->scene->settings.layer_passes, layer = builder->layer, slot = layer - 1;
     struct compose_args compose = compose_args(builder->plan);
@@ -411,39 +305,42 @@ static void plan_layer_passes(struct builder *builder, enum pt_plane color)
     enum pt_plane depth = extract.depth ? PT_PLANE_LAYER_DEPTH : PT_PLANE_LAYER_NORMALS;
     enum pt_plane normal = extract.normal ? PT_PLANE_LAYER_NORMALS : PT_PLANE_LAYER_DEPTH;
     if (passes >> PATINA_PASS_COMBINED & 1u)
-        REASON(ADD(builder, compose, compose, { keys_of(builder, 0), plane(color, 0), plane(PT_PLANE_LAYER_COMBINED, slot) }),
-               "colour of layer %u is asked for", layer);
+        PT_REASON(PT_ADD(builder, compose, compose,
+                         {pt_keys_of(builder, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_LAYER_COMBINED, slot)}),
+                  "colour of layer %u is asked for", layer);
     if (extract.depth || extract.normal)
-        REASON(ADD(builder, extract, extract,
-                   { keys_of(builder, 0), from_of(builder, 0), shading_of(builder), plane(depth, slot), plane(normal, slot),
-                     plane(depth, slot), plane(depth, slot), plane(depth, slot) }),
-               "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "", extract.normal ? " normal" : "");
+        PT_REASON(PT_ADD(builder, extract, extract,
+                         {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_shading_of(builder),
+                          pt_plane_at(depth, slot), pt_plane_at(normal, slot), pt_plane_at(depth, slot),
+                          pt_plane_at(depth, slot), pt_plane_at(depth, slot)}),
+                  "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "",
+                  extract.normal ? " normal" : "");
 }
 
 // ---- the picture -------------------------------------------------------------------------------------------------------
 
-static void plan_output(struct builder *builder, enum pt_plane color)
+static void plan_output(struct pt_builder *builder, enum pt_plane color)
 {
     const patina_settings *settings = &builder->scene->settings;
     struct compose_args compose = compose_args(builder->plan);
     for (int k = 0; k < 3 && !settings->film_transparent; k++)
         compose.background[k] = settings->world_color[k];
     compose.background[3] = settings->film_transparent ? 0.0f : 1.0f;
-    REASON(ADD(builder, compose, compose,
-               { plane(PT_PLANE_KEYS, 0), plane(color, 0), plane(PT_PLANE_COMBINED, 0) }),
-           settings->film_transparent ? "transparent film" : "over the world colour");
+    PT_REASON(PT_ADD(builder, compose, compose,
+                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
+              settings->film_transparent ? "transparent film" : "over the world colour");
 
     struct extract_args extract = extract_args(builder, settings->passes);
     if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {
-        skip(builder, "extract", "no pass beside the combined one is asked for");
+        pt_skip(builder, "extract", "no pass beside the combined one is asked for");
         return;
     }
-    REASON(ADD(builder, extract, extract,
-               { plane(PT_PLANE_KEYS, 0), plane(PT_PLANE_FROM, 0), plane(PT_PLANE_SHADING, 0),
-                 plane(PT_PLANE_DEPTH, 0), plane(PT_PLANE_NORMALS, 0), plane(PT_PLANE_SOURCE, 0),
-                 plane(PT_PLANE_ARRIVED, 0), plane(PT_PLANE_SHADOW, 0) }),
-           "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
-           extract.source ? " source" : "", extract.shadow ? " shadow" : "");
+    PT_REASON(PT_ADD(builder, extract, extract,
+                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_SHADING, 0),
+                      pt_plane_at(PT_PLANE_DEPTH, 0), pt_plane_at(PT_PLANE_NORMALS, 0), pt_plane_at(PT_PLANE_SOURCE, 0),
+                      pt_plane_at(PT_PLANE_ARRIVED, 0), pt_plane_at(PT_PLANE_SHADOW, 0)}),
+              "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
+              extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
 
 // Why no light casts a shadow, or NULL.
@@ -462,30 +359,33 @@ static const char *no_shadows(const struct patina_scene *scene)
                         : NULL;
 }
 
-static void plan_marks(struct builder *builder)
+static void plan_marks(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     const char *none = no_shadows(builder->scene);
     int lazy = pt_plan_lazy(builder->scene, plan);
     if (none || !lazy)
-        skip(builder, "mark", none ? none : plan->layers > 1 ? "what later layers show is not known yet" : "whole shadow textures, to be kept");
+        pt_skip(builder, "mark",
+                none               ? none
+                : plan->layers > 1 ? "what later layers show is not known yet"
+                                   : "whole shadow textures, to be kept");
     if (none)
-        skip(builder, "lit", none);
+        pt_skip(builder, "lit", none);
     for (uint32_t i = 0; i < plan->instance_count && !none && lazy; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count || !pt_receives(instance->instance))
             continue;
         uint32_t margin = (plan->iterations + 2) << plan->levels;
-        struct mark_args args = { .view = view_of(plan, instance, margin),
-                                  .id_base = instance->args.id_base,
-                                  .id_count = instance->args.id_count };
-        REASON(ADD(builder, mark, args, { keys_of(builder, 0), buffer(PT_MARKS, i) }),
-               "only points of instance %u that the picture shows need shadows", i);
+        struct mark_args args = {.view = pt_view_of(plan, instance, margin),
+                                 .id_base = instance->args.id_base,
+                                 .id_count = instance->args.id_count};
+        PT_REASON(PT_ADD(builder, mark, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_MARKS, i)}),
+                  "only points of instance %u that the picture shows need shadows", i);
     }
 }
 
 // Scatter, surfaces, filling: what pictures and light maps have in common.
-static void plan_surfaces(struct builder *builder)
+static void plan_surfaces(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     int estimate = 0;
@@ -496,12 +396,12 @@ static void plan_surfaces(struct builder *builder)
             estimate |= !plan->instances[i].args.has_normals;
         }
     if (!estimate)
-        skip(builder, "normals", "every cloud in view has normals");
+        pt_skip(builder, "normals", "every cloud in view has normals");
     plan_filling(builder);
 }
 
 // Returns the plane that holds the layer's colour.
-static enum pt_plane plan_layer(struct builder *builder)
+static enum pt_plane plan_layer(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     plan_surfaces(builder);
@@ -519,18 +419,19 @@ static enum pt_plane plan_layer(struct builder *builder)
 }
 
 // From shading on, passes may run as one where nobody asks for what lies between them.
-static void put_together(const struct builder *builder)
+static void put_together(const struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
-    const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE | 1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
+    const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE |
+                              1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
     if (settings->layer_passes || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
         return;
     plan->passes[builder->finish].together = plan->pass_count - builder->finish;
 }
 
-static void plan_points(struct builder *builder)
+static void plan_points(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     enum pt_plane color = PT_PLANE_COLOR_A;
@@ -542,27 +443,28 @@ static void plan_points(struct builder *builder)
     }
     builder->layer = 0;
     if (plan->layers == 1)
-        skip(builder, "peel", plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");
+        pt_skip(builder, "peel",
+                plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
     if (plan->layers == 1)
         put_together(builder);
 }
 
-static void plan_nothing(struct builder *builder, const char *reason)
+static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    static const char *const names[] = { "scatter", "normals", "surface", "pull", "fill", "push", "mark", "lit", "shade",
-                                         "smooth", "antialias", "peel" };
+    static const char *const names[] = {"scatter", "normals", "surface", "pull",   "fill",      "push",
+                                        "mark",    "lit",     "shade",   "smooth", "antialias", "peel"};
     builder->plan->light_count = 0;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        skip(builder, names[i], reason);
+        pt_skip(builder, names[i], reason);
     plan_output(builder, PT_PLANE_COLOR_A);
     put_together(builder);
 }
 
 int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan)
 {
-    struct builder builder = { .scene = scene, .plan = plan };
-    *plan = (struct pt_plan){ 0 };
+    struct pt_builder builder = {.scene = scene, .plan = plan};
+    *plan = (struct pt_plan){0};
     int error = pt_plan_view(scene, plan);
     if (!error && plan->points_scattered) {
         plan_surfaces(&builder);
@@ -575,8 +477,8 @@ int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan)
 
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
 {
-    struct builder builder = { .scene = scene, .plan = plan };
-    *plan = (struct pt_plan){ 0 };
+    struct pt_builder builder = {.scene = scene, .plan = plan};
+    *plan = (struct pt_plan){0};
     if (!scene->has_camera)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);
@@ -586,9 +488,9 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
         if (plan->points_scattered)
             plan_points(&builder);
         else
-            plan_nothing(&builder, !scene->instance_count  ? "the scene has no cloud"
-                                   : !plan->chunks       ? "the clouds have no points"
-                                                         : "no cloud is in view");
+            plan_nothing(&builder, !scene->instance_count ? "the scene has no cloud"
+                                   : !plan->chunks        ? "the clouds have no points"
+                                                          : "no cloud is in view");
         error = builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
     }
     if (error == PATINA_ERROR_MEMORY)
@@ -601,7 +503,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
 void pt_plan_destroy(struct pt_plan *plan)
 {
     pt_arena_free(plan->arena);
-    *plan = (struct pt_plan){ 0 };
+    *plan = (struct pt_plan){0};
 }
 
 void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_t level, uint32_t size[2])
@@ -611,7 +513,7 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
         size[1] = plan->crop[3];
         return;
     }
-    struct view_args view = view_at(plan, plane_table[which].levels ? level : 0);
+    struct view_args view = pt_view_at(plan, plane_table[which].levels ? level : 0);
     size[0] = view.width;
     size[1] = view.height;
 }
@@ -619,11 +521,11 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
 size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
 {
     size_t length = 0;
-#define LINE(...)                                                                                      \
-    length += (size_t)snprintf(buffer_out && length < size ? buffer_out + length : NULL,              \
+#define LINE(...)                                                                                                      \
+    length += (size_t)snprintf(buffer_out && length < size ? buffer_out + length : NULL,                               \
                                buffer_out && length < size ? size - length : 0, __VA_ARGS__)
-    LINE("planes %u x %u, crop %u x %u at %u, %u, %u coarse levels\n", plan->view.width, plan->view.height, plan->crop[2],
-         plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
+    LINE("planes %u x %u, crop %u x %u at %u, %u, %u coarse levels\n", plan->view.width, plan->view.height,
+         plan->crop[2], plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
     LINE("expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)\n",
          (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
          (double)plan->expected.normal, pt_means_name(pt_means_of(plan->quality, plan->fill)));

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "plan_passes.h"
+
+#include <string.h>
+
+static void *copy(struct pt_builder *builder, const void *source, size_t size)
+{
+    void *memory = pt_arena_take(&builder->plan->arena, size);
+    if (memory)
+        memcpy(memory, source, size);
+    else
+        builder->failed = 1;
+    return memory;
+}
+
+struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const char *name, const void *arguments,
+                       size_t argument_size, const struct pt_ref *refs, uint32_t ref_count)
+{
+    struct pt_plan *plan = builder->plan;
+    static struct pt_pass nowhere; // written to when memory lacks; the plan then fails as a whole
+    if (plan->pass_count == builder->room) {
+        uint32_t room = builder->room ? 2 * builder->room : 32;
+        struct pt_pass *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
+        if (!grown) {
+            builder->failed = 1;
+            return &nowhere;
+        }
+        if (plan->pass_count)
+            memcpy(grown, plan->passes, plan->pass_count * sizeof *grown);
+        plan->passes = grown;
+        builder->room = room;
+    }
+    struct pt_pass *pass = &plan->passes[plan->pass_count++];
+    *pass = (struct pt_pass){.kernel = kernel,
+                             .layer = builder->layer,
+                             .name = name,
+                             .arguments = copy(builder, arguments, argument_size),
+                             .argument_size = argument_size,
+                             .refs = copy(builder, refs, ref_count * sizeof *refs),
+                             .ref_count = ref_count};
+    return pass;
+}
+
+void pt_skip(struct pt_builder *builder, const char *name, const char *reason)
+{
+    if (builder->layer > 1)
+        return;
+    struct pt_skipped *skipped = &builder->plan->skipped[builder->plan->skipped_count++];
+    skipped->name = name;
+    snprintf(skipped->reason, sizeof skipped->reason, "%s", reason);
+}
+
+struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level)
+{
+    struct view_args view = plan->view;
+    uint32_t cell = 1u << level;
+    view.level = level;
+    view.width = (view.width + cell - 1) >> level;
+    view.height = (view.height + cell - 1) >> level;
+    for (int k = 0; k < 2; k++) {
+        view.rect[k] >>= level;
+        view.rect[2 + k] = (view.rect[2 + k] + cell - 1) >> level;
+    }
+    return view;
+}
+
+struct view_args pt_view_of(const struct pt_plan *plan, const struct pt_plan_instance *instance, uint32_t margin)
+{
+    struct view_args view = plan->view;
+    const uint32_t *rect = instance->rect;
+    for (int k = 0; k < 2; k++) {
+        view.rect[k] = rect[k] > margin ? rect[k] - margin : 0;
+        view.rect[2 + k] = rect[2 + k] + margin;
+    }
+    view.rect[2] = view.rect[2] < view.width ? view.rect[2] : view.width;
+    view.rect[3] = view.rect[3] < view.height ? view.rect[3] : view.height;
+    return view;
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Adding passes to a plan: what plan.c and the files that plan one room each (plan_*.c) share.
+#ifndef PT_PLAN_PASSES_H
+#define PT_PLAN_PASSES_H
+
+#include "plan.h"
+
+#include <stdio.h>
+
+struct pt_builder {
+    const struct patina_scene *scene;
+    struct pt_plan *plan;
+    uint32_t room;
+    uint32_t layer;  // that passes are added for; 0: the whole picture
+    uint32_t finish; // first shading pass of the last layer planned
+    int failed;      // memory lacked: the plan fails as a whole
+};
+
+// ---- what a pass binds -----------------------------------------------------------------------------------------------
+
+static inline struct pt_ref pt_plane_at(enum pt_plane which, uint32_t level)
+{
+    return (struct pt_ref){0, which, level};
+}
+// Of the layer at hand: the first has its own.
+static inline struct pt_ref pt_keys_of(const struct pt_builder *builder, uint32_t level)
+{
+    return pt_plane_at(builder->layer > 1 && !level ? PT_PLANE_KEYS_BEHIND : PT_PLANE_KEYS, level);
+}
+static inline struct pt_ref pt_from_of(const struct pt_builder *builder, uint32_t level)
+{
+    return pt_plane_at(builder->layer > 1 && !level ? PT_PLANE_FROM_BEHIND : PT_PLANE_FROM, level);
+}
+static inline struct pt_ref pt_shading_of(const struct pt_builder *builder)
+{
+    return pt_plane_at(builder->layer > 1 ? PT_PLANE_SHADING_BEHIND : PT_PLANE_SHADING, 0);
+}
+static inline struct pt_ref pt_buffer_of(enum pt_instance_buffer which, uint32_t instance)
+{
+    return (struct pt_ref){1, which, instance};
+}
+
+// ---- passes ------------------------------------------------------------------------------------------------------------
+
+// Adds a pass for the layer at hand; arguments and refs are copied into the plan. Never NULL.
+struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const char *name, const void *arguments,
+                       size_t argument_size, const struct pt_ref *refs, uint32_t ref_count);
+
+#define PT_ADD(builder, kernel, args, ...)                                                                             \
+    pt_add(builder, PT_KERNEL_##kernel, #kernel, &(args), sizeof(args), (struct pt_ref[])__VA_ARGS__,                  \
+           sizeof((struct pt_ref[])__VA_ARGS__) / sizeof(struct pt_ref))
+#define PT_REASON(pass, ...) snprintf((pass)->reason, sizeof(pass)->reason, __VA_ARGS__)
+
+// Says why a pass is left out; once, with the first layer.
+void pt_skip(struct pt_builder *builder, const char *name, const char *reason);
+
+// ---- views -------------------------------------------------------------------------------------------------------------
+
+struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level);
+// The instance's rectangle, wider by what filling may carry its points.
+struct view_args pt_view_of(const struct pt_plan *plan, const struct pt_plan_instance *instance, uint32_t margin);
+
+#endif
