@@ -134,6 +134,16 @@ static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
     _mm512_mask_storeu_epi64(keys, (__mmask8)lanes, words[0]);
     _mm512_mask_storeu_epi64(keys + 8, (__mmask8)(lanes >> 8), words[1]);
 }
+static inline vf vf_look_up(const float table[256], vi i) // 0..255; a third of a gather's time
+{
+    vf parts[8];
+    for (int k = 0; k < 8; k++)
+        parts[k] = _mm512_permutex2var_ps(vf_load(table + 32 * k), i, vf_load(table + 32 * k + 16));
+    for (int bit = 5, count = 4; count; bit++, count /= 2)
+        for (int k = 0; k < count; k++)
+            parts[k] = _mm512_mask_blend_ps(_mm512_test_epi32_mask(i, vi_set(1u << bit)), parts[2 * k], parts[2 * k + 1]);
+    return parts[0];
+}
 #define PT_VECTOR(name) _mm512_##name
 
 #elif defined(PT_ISA_AVX2)
@@ -533,6 +543,9 @@ static inline vi vi_gather_id(const uint64_t *keys, vi i, vm m) // lower words o
 }
 static inline vi vi_select(vm m, vi a, vi b) { return vf_bits(vf_select(m, vi_float(a), vi_float(b))); }
 static inline vf vf_gather(const float *base, vi i, vm m) { return vi_float(vi_gather(base, i, m)); }
+#if !defined(PT_ISA_AVX512)
+static inline vf vf_look_up(const float table[256], vi i) { return vf_gather(table, i, vm_first(PT_LANES)); }
+#endif
 static inline vf vf_abs(vf a) { return vi_float(vi_and(vf_bits(a), vi_set(0x7FFFFFFFu))); }
 static inline vf vf_zero(void) { return vf_set(0.0f); }
 
