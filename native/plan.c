@@ -227,6 +227,7 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
     struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
     enum pt_plane color = PT_PLANE_COLOR_A;
+    pt_plan_shaded_effects(builder, color);
     if (settings->smooth != PATINA_SMOOTH_OFF) {
         const float *w = weights[settings->smooth];
         struct smooth_args args = {
@@ -418,6 +419,12 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     return color;
 }
 
+static int runs_with_others(enum pt_kernel kernel)
+{
+    return kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
+           kernel == PT_KERNEL_peel || kernel == PT_KERNEL_compose || kernel == PT_KERNEL_extract;
+}
+
 // From shading on, passes may run as one where nobody asks for what lies between them.
 static void put_together(const struct pt_builder *builder)
 {
@@ -428,6 +435,9 @@ static void put_together(const struct pt_builder *builder)
     if (settings->layer_passes || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
         return;
+    for (uint32_t i = builder->finish; i < plan->pass_count; i++)
+        if (!runs_with_others(plan->passes[i].kernel))
+            return;
     plan->passes[builder->finish].together = plan->pass_count - builder->finish;
 }
 
@@ -453,7 +463,7 @@ static void plan_points(struct pt_builder *builder)
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
     static const char *const names[] = {"scatter", "normals", "surface", "pull",   "fill",      "push",
-                                        "mark",    "lit",     "shade",   "smooth", "antialias", "peel"};
+                                        "mark",    "lit",     "shade",   "edl",    "smooth",    "antialias", "peel"};
     builder->plan->light_count = 0;
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         pt_skip(builder, names[i], reason);

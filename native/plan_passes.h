@@ -54,6 +54,10 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
 // Says why a pass is left out; once, with the first layer.
 void pt_skip(struct pt_builder *builder, const char *name, const char *reason);
 
+// ---- effects: plan_effects.c --------------------------------------------------------------------------------------------
+
+// On what shading gave, in place: before smoothing.
+void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color);
 // ---- views -------------------------------------------------------------------------------------------------------------
 
 struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level);

@@ -419,7 +419,7 @@ static void choose_window(const struct patina_scene *scene, struct pt_plan *plan
 {
     const uint32_t *region = scene->settings.region, cell = 1u << plan->levels;
     const uint32_t full[2] = { scene->settings.width + 2 * guard, scene->settings.height + 2 * guard };
-    uint32_t reach = reach_of(plan), origin[2], size[2];
+    uint32_t reach = reach_of(plan) + pt_effects_reach(scene), origin[2], size[2];
     for (int k = 0; k < 2; k++) {
         uint32_t first = region[k] + guard, last = region[2 + k] + guard;
         int whole = region[k] == 0 && last + guard == full[k];
@@ -582,7 +582,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     choose_filling(&scene->settings, plan);
     choose_layers(&scene->settings, plan);
     uint32_t cell = 1u << plan->levels;
-    uint32_t guard = round_up(8 + 4 * cell, cell > 16 ? cell : 16);
+    uint32_t effects = pt_effects_reach(scene), margin = 8 + 4 * cell;
+    uint32_t guard = round_up(margin > effects ? margin : effects, cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
     survey.camera = bare;

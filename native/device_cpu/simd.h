@@ -573,6 +573,36 @@ static inline vf vf_rsqrt(vf x)
     return r * (c - (h * r) * r);
 }
 
+// log2(x) for normal x > 0, within 2e-7 and a rounding: the exponent, and a polynomial in the mantissa less 1, which lies
+// between sqrt(1/2) and sqrt(2).
+static inline vf vf_log2(vf x)
+{
+    const vi least = vi_set(0x3F3504F3u); // sqrt(1/2)
+    vi word = vi_add(vf_bits(x), vi_sub(vi_set(0x3F800000u), least));
+    vf whole = vi_convert(vi_sub(vi_shr(word, 23), vi_set(127)));
+    vf t = vi_float(vi_add(vi_and(word, vi_set(0x007FFFFFu)), least)) - vf_set(1.0f);
+    vf p = t * vf_set(-0.14973319f) + vf_set(0.23570961f);
+    p = p * t + vf_set(-0.24832283f);
+    p = p * t + vf_set(0.28686887f);
+    p = p * t + vf_set(-0.36026347f);
+    p = p * t + vf_set(0.48093116f);
+    p = p * t + vf_set(-0.72135246f);
+    p = p * t + vf_set(1.4426949f);
+    return whole + p * t;
+}
+
+// 2^x for x within +-126, within 4e-7 of it.
+static inline vf vf_exp2(vf x)
+{
+    vf whole = vf_floor(x + vf_set(0.5f)), t = x - whole;
+    vf p = t * vf_set(0.0013410005f) + vf_set(0.009676036f);
+    p = p * t + vf_set(0.055502973f);
+    p = p * t + vf_set(0.24022107f);
+    p = p * t + vf_set(0.69314724f);
+    p = p * t + vf_set(1.0000001f);
+    return p * vi_float(vi_mul(vi_add(vf_int(whole), vi_set(127)), vi_set(1u << 23)));
+}
+
 // 4 ulp(z) for z >= 0 (0 at 0): the exponent alone, times 2^-21.
 static inline vf vf_ulp4(vf z) { return vi_float(vi_and(vf_bits(z), vi_set(0x7F800000u))) * vf_set(0x1p-21f); }
 

@@ -69,7 +69,7 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3, 6},
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
     [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},   [PT_KERNEL_mark] = {1},
-    [PT_KERNEL_lit] = {1, 2, 3},
+    [PT_KERNEL_lit] = {1, 2, 3},        [PT_KERNEL_edl] = {1},
 };
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
@@ -92,7 +92,7 @@ static int tiled(enum pt_kernel kernel)
 {
     return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_fill ||
            kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
-           kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark;
+           kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark || kernel == PT_KERNEL_edl;
 }
 
 static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
@@ -163,6 +163,7 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     case PT_KERNEL_surface:
     case PT_KERNEL_smooth:
     case PT_KERNEL_mark:
+    case PT_KERNEL_edl:
         return run_tiles(d, kernel);
     case PT_KERNEL_compose: {
         const struct compose_args *args = arguments;

@@ -29,6 +29,7 @@ static const char usage[] =
     "  --opacity X[,X...]                 0 to 1, of each FILE; the last counts for those behind it\n"
     "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
     "  --background R,G,B                 linear; also the ambient light\n"
+    "  --edl STRENGTH[,RADIUS]            eye-dome lighting (1 = well seen), neighbours RADIUS pixels away (1.4)\n"
     "  --shadows                          the brighter light casts shadows\n"
     "  --sun AZIMUTH,HEIGHT[,DIAMETER]    where from and how wide, degrees (default: over the left shoulder, sharp)\n"
     "  --samples N                        of a sun with a diameter, 1 to 4096 (16)\n"

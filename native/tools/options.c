@@ -10,8 +10,7 @@
 
 enum { MAX_SIZE = 65536, MAX_REPEAT = 100000 };
 
-// Reads between `least` and `most` numbers separated by commas. Returns how many, or -1.
-static int parse_numbers(const char *text, double *numbers, int least, int most)
+int parse_numbers(const char *text, double *numbers, int least, int most)
 {
     int count = 0;
     for (const char *at = text;; at++) {
@@ -238,8 +237,11 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     } else if (!strcmp(name, "--stats")) {
         bad = strcmp(value, "json");
         o->json = 1;
-    } else
-        return UNKNOWN;
+    } else {
+        bad = tool_parse_effect(name, value, &o->effects);
+        if (bad > 0)
+            return UNKNOWN;
+    }
     return bad ? BAD_VALUE : GOOD;
 }
 
@@ -247,6 +249,7 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
 {
     *options = (struct tool_options){
         .files = arguments,
+        .effects = {.struct_size = sizeof options->effects},
         .azimuth = 30, // three-quarter view
         .elevation = 40,
         .settings = {.struct_size = sizeof options->settings,

@@ -107,6 +107,8 @@ static int set_scene(struct job *job)
     patina_camera camera;
     int code = patina_scene_set_settings(job->scene, &job->options.settings);
     if (!code)
+        code = patina_scene_set_effects(job->scene, &job->options.effects);
+    if (!code)
         code = set_view(job, 0, &camera);
     if (!code)
         code = tool_lights(job->scene, &job->options, &camera);

@@ -53,7 +53,13 @@ struct tool_options {
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
     int repeat; // measured frames; 0 = just the picture
     patina_settings settings;
+    patina_effects effects;
 };
+
+// Reads between `least` and `most` numbers separated by commas. Returns how many, or -1.
+int parse_numbers(const char *text, double *numbers, int least, int most);
+// Options of effects (effects.c): 0 good, -1 a bad value, 1 no such option.
+int tool_parse_effect(const char *name, const char *value, patina_effects *effects);
 
 // Fills options from the arguments of `render`; files point into the vector, which is reordered. Returns a tool_exit.
 int tool_parse_render(int count, char **arguments, struct tool_options *options);

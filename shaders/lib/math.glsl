@@ -37,6 +37,38 @@ float pt_rsqrt(float x)
     return r;
 }
 
+// log2(x) for normal x > 0, within 2e-7 and a rounding: the exponent, and a polynomial in the mantissa less 1, which lies
+// between sqrt(1/2) and sqrt(2).
+float pt_log2(float x)
+{
+    uint word = pt_bits(x) + (0x3F800000u - 0x3F3504F3u);
+    precise float whole = float(int(word >> 23) - 127);
+    precise float t = pt_float((word & 0x007FFFFFu) + 0x3F3504F3u) - 1.0;
+    precise float p = t * -0.14973319 + 0.23570961;
+    p = p * t + -0.24832283;
+    p = p * t + 0.28686887;
+    p = p * t + -0.36026347;
+    p = p * t + 0.48093116;
+    p = p * t + -0.72135246;
+    p = p * t + 1.4426949;
+    precise float sum = whole + p * t;
+    return sum;
+}
+
+// 2^x for x within +-126, within 4e-7 of it.
+float pt_exp2(float x)
+{
+    precise float whole = floor(x + 0.5);
+    precise float t = x - whole;
+    precise float p = t * 0.0013410005 + 0.009676036;
+    p = p * t + 0.055502973;
+    p = p * t + 0.24022107;
+    p = p * t + 0.69314724;
+    p = p * t + 1.0000001;
+    precise float scaled = p * pt_float(uint(int(whole) + 127) << 23);
+    return scaled;
+}
+
 // 4 ulp(z) for z >= 0 (0 at 0): the exponent alone, times 2^-21.
 float pt_ulp4(float z)
 {

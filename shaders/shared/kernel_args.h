@@ -219,6 +219,26 @@ struct compose_args {
     float background[4]; // premultiplied
 };
 
+// ---- effects: on the colour of a layer, premultiplied, where it has something --------------------------------------------
+
+#define PT_EDL_NEIGHBOURS 8
+#define PT_EDL_MOST 16    // largest radius, pixels
+// A neighbour's step counts up to this: beyond, an edge is an edge. So much darkens to 1/20 where half of the neighbours have
+// it, at strength 1.
+#define PT_EDL_STEP 6.0f
+#define PT_EDL_EMPTY -3e38f // what empty neighbours have for a depth: nearer than all
+#define PT_EDL_BEYOND 3e38f // beyond the plane: farther, so that it says nothing
+
+// edl: eye-dome lighting. A pixel is darker the farther it lies behind its neighbours: with f(z) = log2 z in perspective, z in
+// orthographic views, colour times 2^(-gain sum min(max(scale (f(z) - f(z_q)), 0), PT_EDL_STEP)). Empty neighbours count
+// as nearer: a silhouette darkens within.
+struct edl_args {
+    struct view_args view;
+    int32_t offsets[2 * PT_EDL_NEIGHBOURS]; // x, y in pixels
+    uint32_t reach;                         // the largest of them
+    float scale, gain;
+};
+
 // extract: depth, world-space normal, source, shadow. Any may be left out.
 struct extract_args {
     struct view_args view;

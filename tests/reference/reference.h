@@ -101,6 +101,7 @@ struct ref_planes {
     const uint8_t *opacities; // by id - id_base
     const float *through;    // light that earlier layers let through
     const float *arrived;
+    const float *albedo; // colours without light
     const uint32_t *shadows; // words, by light and id - id_base
 };
 
@@ -180,6 +181,9 @@ struct ref_peel ref_peel(const struct peel_args *args, const struct ref_planes *
                          const float *through, const float *over, int x, int y);
 // x, y: in the crop.
 struct ref_color ref_compose(const struct compose_args *args, const struct ref_planes *planes, int x, int y);
+
+// Effects: of pixels that are not empty. errors of 0: to the bit.
+struct ref_color ref_edl(const struct edl_args *args, const struct ref_planes *planes, int x, int y);
 
 struct ref_extract {
     double depth; // +inf: nothing

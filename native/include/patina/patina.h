@@ -321,6 +321,15 @@ typedef struct patina_settings {
 
 #define PATINA_MAX_LAYERS 16
 
+// Effects in image space, on the colours of every layer. A zero strength leaves an effect out. Lengths in pixels are those of the
+// picture, lengths along the view are those from the camera.
+typedef struct patina_effects {
+    size_t struct_size;
+    // Eye-dome lighting: what lies behind its neighbours on screen is darker, so that shape shows without light or normals.
+    float edl_strength; // 0..10, 1 = well seen; 0 = none
+    float edl_radius;   // pixels to the neighbours, 1..16; 0 = 1.4
+} patina_effects;
+
 PATINA_API int patina_scene_create(patina_scene **out);
 PATINA_API void patina_scene_destroy(patina_scene *scene); // clouds stay
 PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds and lights
@@ -331,6 +340,8 @@ PATINA_API int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *c
 PATINA_API int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light);
 PATINA_API int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera);
 PATINA_API int patina_scene_set_settings(patina_scene *scene, const patina_settings *settings);
+// NULL: no effects, as at first.
+PATINA_API int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects);
 // A camera that frames the scene's clouds, seen from `azimuth` degrees around z (0 = from -y) and `elevation`
 // degrees above the horizon, vertical field of view fov_degrees (0 = 45.8).
 PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation,

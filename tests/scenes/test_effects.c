@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Effects on whole pictures: regions and tiles equal crops, threads and batches change nothing, devices agree within the
+// table; depth, normals, source and keys stay as they are without effects; off is as it was.
+#include "staging.h"
+#include "tolerances.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const struct {
+    const char *name;
+    patina_effects effects;
+    float noise; // largest difference of colours between devices; 0: TOL_COLOR of the brightest
+} shows[] = {
+    {"eye-dome lighting", {.edl_strength = 1.0f}, 0.0f},
+    {"eye-dome lighting, wide", {.edl_strength = 0.7f, .edl_radius = 16.0f}, 0.0f},
+};
+enum { SHOWS = sizeof shows / sizeof shows[0] };
+
+// A few of each kind: perspective, orthographic, lit, unlit, many clouds, glass, layers as passes.
+static const uint32_t chosen[] = {1, 2, 4, 5, 8, 10, 11, 17, 19, 20, 21};
+enum { CHOSEN = sizeof chosen / sizeof chosen[0] };
+
+static struct stage build(uint32_t stage, uint32_t show)
+{
+    struct stage built = stage_build(&stagings[chosen[stage]]);
+    patina_effects effects = shows[show].effects;
+    effects.struct_size = sizeof effects;
+    CHECK(patina_scene_set_effects(built.scene, &effects), built.scene);
+    return built;
+}
+
+static void compare_region(patina_device *device, const struct stage *stage, const struct picture *whole,
+                           const uint32_t region[4], const char *name)
+{
+    char what[160];
+    patina_settings settings = stage->settings;
+    memcpy(settings.region, region, sizeof settings.region);
+    struct picture part = picture_render(device, stage->scene, &stage->camera, &settings);
+    snprintf(what, sizeof what, "%s, region %u %u %u %u", name, region[0], region[1], region[2], region[3]);
+    picture_assert_identical(&part, whole, region[0], region[1], what);
+    picture_free(&part);
+}
+
+static void test_regions(void **state)
+{
+    (void)state;
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        const char *device_name = support_device_name(k);
+        if (!strncmp(device_name, "cpu-", 4))
+            continue; // levels differ in kernels only
+        patina_device *device = support_device_open(device_name, 0, 0);
+        for (uint32_t s = 0; s < CHOSEN * SHOWS && device; s++) {
+            const uint32_t show = s % SHOWS, at = s / SHOWS;
+            if (support_is_gl(device_name) && at % 4)
+                continue;
+            struct stage stage = build(at, show);
+            uint32_t w = stage.settings.width, h = stage.settings.height;
+            struct picture whole = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+            const uint32_t regions[][4] = {{0, 0, w / 2, h / 2}, {w / 2, h / 3, w, h}, {w / 3, h / 3, w / 3 + 1, h / 3 + 1},
+                                           {1, h / 2, w - 1, h / 2 + 1}, {w / 2 - 9, 3, w / 2 + 8, h - 2}};
+            for (uint32_t r = 0; r < sizeof regions / sizeof regions[0]; r++)
+                compare_region(device, &stage, &whole, regions[r], shows[show].name);
+            picture_free(&whole);
+            stage_free(&stage);
+        }
+        patina_device_destroy(device);
+    }
+}
+
+static void test_threads(void **state)
+{
+    (void)state;
+    static const uint32_t ways[][2] = {{1, 0}, {2, 0}, {3, 1}, {7, 2}, {5, 64}};
+    for (uint32_t s = 0; s < CHOSEN * SHOWS; s++) {
+        struct stage stage = build(s / SHOWS, s % SHOWS);
+        struct picture truth = {0};
+        for (uint32_t k = 0; k < sizeof ways / sizeof ways[0]; k++) {
+            patina_device *device = support_device_open("cpu", ways[k][0], ways[k][1]);
+            struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+            if (k) {
+                picture_assert_identical(&picture, &truth, 0, 0, shows[s % SHOWS].name);
+                picture_free(&picture);
+            } else {
+                truth = picture;
+            }
+            patina_device_destroy(device);
+        }
+        picture_free(&truth);
+        stage_free(&stage);
+    }
+}
+
+static double worst(const float *a, const float *b, uint64_t count)
+{
+    double most = 0.0;
+    for (uint64_t i = 0; i < count; i++)
+        most = fmax(most, a[i] == b[i] ? 0.0 : fabs((double)a[i] - (double)b[i]));
+    return most;
+}
+
+static double brightest(const struct picture *picture)
+{
+    double most = 1.0;
+    for (uint64_t i = 0; i < 4 * (uint64_t)picture->width * picture->height; i++)
+        most = fmax(most, fabs((double)picture->combined[i]));
+    return most;
+}
+
+static void test_devices(void **state)
+{
+    (void)state;
+    for (uint32_t s = 0; s < CHOSEN * SHOWS; s++) {
+        const uint32_t show = s % SHOWS;
+        struct stage stage = build(s / SHOWS, show);
+        struct picture truth = {0};
+        for (uint32_t k = 0; k < support_device_count(); k++) {
+            const char *name = support_device_name(k);
+            if (support_is_gl(name) && s / SHOWS % 4)
+                continue;
+            patina_device *device = support_device_open(name, 0, 0);
+            if (!device)
+                continue;
+            struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+            patina_device_destroy(device);
+            if (!truth.keys) {
+                truth = picture;
+                continue;
+            }
+            uint64_t pixels = (uint64_t)truth.width * truth.height;
+            double limit = shows[show].noise > 0.0f ? (double)shows[show].noise : TOL_COLOR * brightest(&truth);
+            double off = worst(picture.combined, truth.combined, 4 * pixels);
+            if (!(off <= limit) || memcmp(picture.keys, truth.keys, 8 * pixels) != 0)
+                support_die("%s, %s, %s: colours %.3g off, at most %.3g allowed", name, stagings[chosen[s / SHOWS]].name,
+                            shows[show].name, off, limit);
+            picture_free(&picture);
+        }
+        picture_free(&truth);
+        stage_free(&stage);
+    }
+}
+
+// What is not colour is as it was, the picture is another one, and without effects all is as it was.
+static void test_nothing_else_changes(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    for (uint32_t s = 0; s < CHOSEN * SHOWS; s++) {
+        struct stage stage = build(s / SHOWS, s % SHOWS);
+        struct picture with = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        CHECK(patina_scene_set_effects(stage.scene, NULL), stage.scene);
+        struct picture without = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        struct stage bare = stage_build(&stagings[chosen[s / SHOWS]]);
+        struct picture never = picture_render(device, bare.scene, &bare.camera, &bare.settings);
+        picture_assert_identical(&without, &never, 0, 0, "effects taken away");
+        uint64_t pixels = (uint64_t)with.width * with.height;
+        assert_memory_equal(with.keys, without.keys, 8 * pixels);
+        assert_true(worst(with.depth, without.depth, pixels) == 0.0 && worst(with.normal, without.normal, 3 * pixels) == 0.0);
+        assert_true(worst(with.source, without.source, pixels) == 0.0);
+        if (!(worst(with.combined, without.combined, 4 * pixels) > 0.01))
+            support_die("%s, %s: nothing to be seen", stagings[chosen[s / SHOWS]].name, shows[s % SHOWS].name);
+        for (uint64_t i = 0; i < 4 * pixels; i++)
+            assert_true(isfinite(with.combined[i]));
+        picture_free(&with);
+        picture_free(&without);
+        picture_free(&never);
+        stage_free(&stage);
+        stage_free(&bare);
+    }
+    patina_device_destroy(device);
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    const patina_effects wrong[] = {
+        {.edl_strength = -1.0f}, {.edl_strength = NAN}, {.edl_strength = 11.0f}, {.edl_radius = 17.0f}, {.edl_radius = 0.5f},
+    };
+    patina_scene *scene = NULL;
+    CHECK(patina_scene_create(&scene), NULL);
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        patina_effects effects = wrong[i];
+        assert_int_equal(patina_scene_set_effects(scene, &effects), PATINA_ERROR_ARGUMENT); // no struct_size
+        effects.struct_size = sizeof effects;
+        if (patina_scene_set_effects(scene, &effects) != PATINA_ERROR_ARGUMENT || !support_message(scene)[0])
+            support_die("wrong effects %u were taken", (unsigned)i);
+    }
+    patina_scene_destroy(scene);
+}
+
+int main(int argc, char **argv)
+{
+    support_arguments(argc, argv);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_regions),
+        cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_devices),
+        cmocka_unit_test(test_nothing_else_changes),
+        cmocka_unit_test(test_refusals),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
