@@ -135,7 +135,8 @@ class _Settings(_Descriptor):
                 ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
                 ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
                 ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
-                ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32)]
+                ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("own_background", c_uint32),
+                ("background", c_float * 3)]
 
 
 class _ExpectedError(Structure):

@@ -325,11 +325,12 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
     const patina_settings *settings = &builder->scene->settings;
     struct compose_args compose = compose_args(builder->plan);
     for (int k = 0; k < 3 && !settings->film_transparent; k++)
-        compose.background[k] = settings->world_color[k];
+        compose.background[k] = (settings->own_background ? settings->background : settings->world_color)[k];
     compose.background[3] = settings->film_transparent ? 0.0f : 1.0f;
     PT_REASON(PT_ADD(builder, compose, compose,
                      {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
-              settings->film_transparent ? "transparent film" : "over the world colour");
+              "%s", settings->film_transparent ? "transparent film"
+                    : settings->own_background ? "over its own background" : "over the world colour");
 
     struct extract_args extract = extract_args(builder, settings->passes);
     if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {

@@ -221,6 +221,8 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u strata; the most is %d", s.strata, PT_STRATA);
     if (!isfinite(s.world_color[0] + s.world_color[1] + s.world_color[2]))
         return fail(scene, "settings: world_color is not finite");
+    if (s.own_background > 1 || !isfinite(s.background[0] + s.background[1] + s.background[2]))
+        return fail(scene, "settings: own_background is 0 or 1, background is finite");
     if (s.layers > PATINA_MAX_LAYERS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u layers; the most is %d", s.layers,
                        PATINA_MAX_LAYERS);

@@ -30,6 +30,8 @@ static const char usage[] =
     "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
     "  --background R,G,B                 linear; also the ambient light\n"
     "  --edl STRENGTH[,RADIUS]            eye-dome lighting (1 = well seen), neighbours RADIUS pixels away (1.4)\n"
+    "  --background R,G,B                 linear; also the ambient light, unless told\n"
+    "  --ambient R,G,B                    linear; the ambient light\n"
     "  --shadows                          the brighter light casts shadows\n"
     "  --sun AZIMUTH,HEIGHT[,DIAMETER]    where from and how wide, degrees (default: over the left shoulder, sharp)\n"
     "  --samples N                        of a sun with a diameter, 1 to 4096 (16)\n"

@@ -231,7 +231,10 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_count(value, 0, PATINA_MAX_LAYERS, &s->layers);
     else if (!strcmp(name, "--background"))
         bad = parse_color(value, s->world_color);
-    else if (!strcmp(name, "--repeat")) {
+    else if (!strcmp(name, "--ambient")) {
+        bad = parse_color(value, o->ambient);
+        s->own_background = 1;
+    } else if (!strcmp(name, "--repeat")) {
         bad = parse_count(value, 1, MAX_REPEAT, &number);
         o->repeat = (int)number;
     } else if (!strcmp(name, "--stats")) {
@@ -281,6 +284,10 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         i++;
     }
     options->settings.film_transparent = options->transparent ? 1 : 0;
+    if (options->settings.own_background) {
+        memcpy(options->settings.background, options->settings.world_color, sizeof options->ambient);
+        memcpy(options->settings.world_color, options->ambient, sizeof options->ambient);
+    }
     if (!options->settings.shadow_samples)
         options->settings.shadow_samples = 16;
     options->settings.shadow_lazy = 1; // a picture has no use for whole textures, and measured frames are to compute theirs

@@ -50,6 +50,7 @@ struct tool_options {
     double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
     int opacity_count;              // 0: all opaque
     int cull, transparent, shadows, sun, json, dump_plan, verbose;
+    float ambient[3];
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
     int repeat; // measured frames; 0 = just the picture
     patina_settings settings;

@@ -239,6 +239,12 @@ def test_background():
     ball("background.ply", 500)
     run("render", "background.ply", "-o", "background.png", "--size", "32x32", "--background", "1,0.2140411,0")
     assert read_png("background.png")[3][0][0] == (255, 127, 0)
+    lit = [read_png("background.png")[3][16][16]]
+    run("render", "background.ply", "-o", "background.png", "--size", "32x32", "--background", "1,0.2140411,0", "--ambient",
+        "0,0,0.5", "--lit")
+    assert read_png("background.png")[3][0][0] == (255, 127, 0)
+    lit.append(read_png("background.png")[3][16][16])
+    assert lit[1][2] > lit[0][2] + 50, lit  # blue light in front of an orange background
 
 
 def test_ortho_width():

@@ -317,6 +317,8 @@ typedef struct patina_settings {
                                  // final pictures. 0 = whole textures, kept until something that they depend on changes
     uint32_t shadow_progressive; // 1 = one sample after a change, and every further render of the frame doubles them up to
                                  // shadow_samples (stats: shadow_pending); not with shadow_lazy
+    uint32_t own_background;   // 1 = background lies behind the points, and world_color only lights them
+    float background[3];       // linear, with own_background; not where the film is transparent
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
