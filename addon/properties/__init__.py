@@ -11,7 +11,10 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy.props import PointerProperty, StringProperty
 from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
 
+from .. import styles
 from ..native import MOST_LAYERS
+from .studio import PatinaStudioProperties
+from .style import PatinaStyleProperties
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 
@@ -22,6 +25,8 @@ def enum_number(group: PropertyGroup, name: str) -> int:
 
 
 class PatinaSceneProperties(PropertyGroup):
+    style: PointerProperty(type=PatinaStyleProperties)
+    studio: PointerProperty(type=PatinaStudioProperties, override=_OVERRIDE)
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
@@ -184,7 +189,7 @@ class PatinaViewLayerProperties(PropertyGroup):
                     "layers behind opaque surfaces too")
 
 
-_CLASSES = (PatinaSceneProperties, PatinaObjectProperties, PatinaViewLayerProperties)
+_CLASSES = (PatinaStyleProperties, PatinaStudioProperties, PatinaSceneProperties, PatinaObjectProperties, PatinaViewLayerProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties))
 
 
@@ -196,6 +201,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    styles.forget_icons()
     for owner, _ in _OWNERS:
         del owner.patina
     for cls in reversed(_CLASSES):

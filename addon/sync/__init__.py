@@ -14,14 +14,14 @@ import bpy
 
 from . import clouds, lights, settings, world
 from .camera import Camera, CameraError, View, final_view, viewport_view
-from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners
+from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
 from .lights import Light
 from .settings import DeviceChoice, Settings
 from .world import Mist
 
 __all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Mist", "Pending",
-           "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_viewport", "final_view",
-           "viewport_view"]
+           "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
+           "describe_viewport", "final_view", "style_of", "viewport_view"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, fl
     """Reads the scene of a final render. poll(what, progress of it) is called during long steps and returns True to
     cancel."""
     notices: list[str] = []
-    return _describe(depsgraph, view, notices, clouds.collect(depsgraph, clouds.taking_now(poll, notices), notices))
+    return describe_items(depsgraph, view, notices, clouds.collect(depsgraph, clouds.taking_now(poll, notices), notices))
 
 
 def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trusted,
@@ -53,12 +53,13 @@ def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trust
         obj = instance.parent if instance.is_instance else instance.object
         return obj.visible_in_viewport_get(space)
 
-    return _describe(depsgraph, view, notices,
+    return describe_items(depsgraph, view, notices,
                      clouds.collect(depsgraph, trusted.take(notices), notices, visible))
 
 
-def _describe(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str],
-              items: list[CloudItem]) -> SceneDescription:
+def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str],
+                   items: list[CloudItem]) -> SceneDescription:
+    """Lights, world and settings of a scene around clouds that the caller has."""
     scene = depsgraph.scene_eval
     background = world.background(scene.world, notices)
     return SceneDescription(

@@ -212,7 +212,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
         if cloud:
-            style = _style(obj, instance.matrix_world)
+            style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
             items.append(CloudItem(cloud, style, obj.pass_index))
@@ -348,7 +348,7 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int) -> PointA
     return PointArrays(positions, normals, colors, opacities)
 
 
-def _style(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
+def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
     patina = obj.patina
     dark = not (patina.ambient or patina.diffuse or patina.specular)
     return CloudStyle(

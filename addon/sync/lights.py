@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 import bpy
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 TYPES = {'SUN': 1, 'POINT': 2, 'SPOT': 3, 'AREA': 4}  # patina_light_type
 MOST = 32  # lights of a scene in the library
@@ -36,6 +36,8 @@ class Light:
 
 
 def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Light]:
+    if depsgraph.scene_eval.patina.studio.use_light:
+        return _studio(depsgraph.scene_eval)
     lights = []
     use_shadows = depsgraph.scene_eval.patina.use_shadows
     for instance in depsgraph.object_instances:
@@ -49,6 +51,27 @@ def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Light]:
     if len(lights) > MOST:
         notices.append(f"only the {MOST} strongest of {len(lights)} lights shine")
         lights = sorted(lights, key=lambda light: -light.power * max(light.color))[:MOST]
+    return lights
+
+
+def _studio(scene: bpy.types.Scene) -> list[Light]:
+    """The studio's light and the one that fills its shadows, as suns."""
+    studio, lights = scene.patina.studio, []
+    heading = 0.0
+    if studio.follow_camera and scene.camera:
+        right = scene.camera.matrix_world.col[0]  # level for most cameras, also for one that looks straight down
+        heading = math.atan2(right.y, right.x)
+    for azimuth, height, strength, shadows in (
+            (studio.azimuth, studio.height, studio.strength, scene.patina.use_shadows),
+            (studio.azimuth + math.radians(120), abs(studio.height) / 3, studio.strength * studio.fill, False)):
+        if strength <= 0.0 or max(studio.color) <= 0.0:
+            continue
+        around = heading + azimuth
+        toward = Vector((math.sin(around) * math.cos(height), -math.cos(around) * math.cos(height), math.sin(height)))
+        lights.append(Light(
+            type=TYPES['SUN'], color=tuple(studio.color), power=strength, position=(0.0, 0.0, 0.0),
+            direction=tuple(-toward), side=(0.0, 0.0, 0.0), angle=studio.angle, radius=0.0, size=(0.0, 0.0), shape=0,
+            cone=0.0, blend=0.0, shadows=int(shadows)))
     return lights
 
 

@@ -42,10 +42,12 @@ class Settings:
     error_target: float = 0.0
     strata: int = 0  # of 6 that are drawn; 0: all
     shadow_progressive: int = 0
+    own_background: int = 0
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:
-    patina = scene.patina
+    patina, studio = scene.patina, scene.patina.studio
     forced = options.read()
     quality = forced.get("quality")
     return Settings(
@@ -56,7 +58,9 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         smooth=enum_number(patina, "smooth"),
         antialias=enum_number(patina, "antialias"),
         film_transparent=int(scene.render.film_transparent),
-        world_color=world_color,
+        world_color=tuple(studio.ambient) if studio.use_light else world_color,
+        own_background=int(studio.use_light or studio.use_background),
+        background=tuple(studio.background) if studio.use_background else world_color,
         layers=patina.layers,
         error_target=0.0 if quality else 0.01 * patina.error_target,
         shadow_samples=patina.shadow_samples,

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from . import panels, presets, standard, statistics
+from . import panels, presets, standard, statistics, styles
 
-_MODULES = (presets, panels, statistics, standard)
+_MODULES = (presets, styles, panels, statistics, standard)
 
 
 def register() -> None:

@@ -20,7 +20,7 @@ def _length(scene: Scene, meters: float) -> str:
     return bpy.utils.units.to_string(units.system, 'LENGTH', meters * units.scale_length, precision=4)
 
 
-class _PatinaPanel:
+class PatinaPanel:
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     COMPAT_ENGINES = {PatinaRenderEngine.bl_idname}
@@ -30,7 +30,7 @@ class _PatinaPanel:
         return context.engine in cls.COMPAT_ENGINES
 
 
-class _PatinaObjectPanel(_PatinaPanel):
+class _PatinaObjectPanel(PatinaPanel):
     bl_context = "data"
 
     @classmethod
@@ -38,7 +38,7 @@ class _PatinaObjectPanel(_PatinaPanel):
         return super().poll(context) and context.object and context.object.type in {'MESH', 'POINTCLOUD'}
 
 
-class PATINA_PT_surface(_PatinaPanel, Panel):
+class PATINA_PT_surface(PatinaPanel, Panel):
     bl_label = "Surface"
     bl_context = "render"
 
@@ -68,7 +68,7 @@ class PATINA_PT_surface(_PatinaPanel, Panel):
             layout.prop(patina, "mesh_points")
 
 
-class PATINA_PT_transparency(_PatinaPanel, Panel):
+class PATINA_PT_transparency(PatinaPanel, Panel):
     bl_label = "Transparency"
     bl_context = "render"
     bl_options = {'DEFAULT_CLOSED'}
@@ -79,7 +79,7 @@ class PATINA_PT_transparency(_PatinaPanel, Panel):
         self.layout.prop(context.scene.patina, "layers")
 
 
-class PATINA_PT_shadows(_PatinaPanel, Panel):
+class PATINA_PT_shadows(PatinaPanel, Panel):
     bl_label = "Shadows"
     bl_context = "render"
 
@@ -100,7 +100,7 @@ class PATINA_PT_shadows(_PatinaPanel, Panel):
         row.operator("patina.load_shadows")
 
 
-class PATINA_PT_film(_PatinaPanel, Panel):
+class PATINA_PT_film(PatinaPanel, Panel):
     bl_label = "Film"
     bl_context = "render"
     bl_options = {'DEFAULT_CLOSED'}
@@ -108,13 +108,20 @@ class PATINA_PT_film(_PatinaPanel, Panel):
     def draw(self, context: Context) -> None:
         self.layout.use_property_split = True
         self.layout.prop(context.scene.render, "film_transparent", text="Transparent")
+        studio = context.scene.patina.studio
+        row = self.layout.row(heading="Background", align=True)
+        row.active = not context.scene.render.film_transparent
+        row.prop(studio, "use_background", text="")
+        inner = row.row(align=True)
+        inner.active = studio.use_background
+        inner.prop(studio, "background", text="")
         if view_transform.changes_colors(context.scene):
             column = self.layout.column()
             column.label(text=f"{context.scene.view_settings.view_transform} changes the colors of scans", icon='INFO')
             column.operator(view_transform.PATINA_OT_true_colors.bl_idname)
 
 
-class PATINA_PT_performance(_PatinaPanel, Panel):
+class PATINA_PT_performance(PatinaPanel, Panel):
     bl_label = "Performance"
     bl_context = "render"
     bl_options = {'DEFAULT_CLOSED'}
@@ -129,7 +136,7 @@ class PATINA_PT_performance(_PatinaPanel, Panel):
         layout.prop(context.scene.patina, "navigation_ms", text="Viewport, ms")
 
 
-class PATINA_PT_passes(_PatinaPanel, Panel):
+class PATINA_PT_passes(PatinaPanel, Panel):
     bl_label = "Passes"
     bl_context = "view_layer"
 
@@ -214,7 +221,7 @@ class PATINA_PT_point_shadows(_PatinaObjectPanel, Panel):
         row.prop(patina, "self_shadows")
 
 
-class PATINA_PT_light(_PatinaPanel, Panel):
+class PATINA_PT_light(PatinaPanel, Panel):
     bl_label = "Light"
     bl_context = "data"
 

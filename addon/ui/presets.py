@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Presets of the render settings: the artist's own, saved by the button at the panel's head."""
+"""Presets of how well surfaces are drawn: the artist's own, saved by the button at the panel's head. How they look is a
+style's (styles.py); the two share no property."""
 
 from __future__ import annotations
 
@@ -20,8 +21,8 @@ class PATINA_OT_preset_add(AddPresetBase, Operator):
     bl_label = "Patina Preset"
     preset_menu = "PATINA_PT_presets"
     preset_defines = ["patina = bpy.context.scene.patina"]
-    preset_values = [f"patina.{name}" for name in ("error_target", "quality", "fill", "fill_iterations", "smooth",
-                                                  "antialias", "samples")]
+    preset_values = [f"patina.{name}" for name in ("error_target", "quality", "fill", "fill_iterations", "antialias",
+                                                  "samples")]
     preset_subdir = FOLDER
 
 

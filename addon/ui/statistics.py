@@ -10,7 +10,7 @@ from .. import pace, viewport
 from ..engine import PatinaRenderEngine
 
 
-class _SidebarPanel:
+class SidebarPanel:
     bl_space_type = 'VIEW_3D'
     bl_region_type = 'UI'
     bl_category = "Patina"
@@ -20,14 +20,14 @@ class _SidebarPanel:
         return context.engine == PatinaRenderEngine.bl_idname
 
 
-class PATINA_PT_statistics(_SidebarPanel, Panel):
+class PATINA_PT_statistics(SidebarPanel, Panel):
     bl_label = "Statistics"
 
     def draw(self, context: Context) -> None:
         layout = self.layout
         found = viewport.of_area(context.area)
         if found and found.message:
-            _lines(layout, found.message, 'ERROR')
+            sentence(layout, found.message, 'ERROR')
         if not found or not found.shown:
             layout.label(text="Switch to Rendered shading to see figures")
             return
@@ -44,10 +44,10 @@ class PATINA_PT_statistics(_SidebarPanel, Panel):
             rows.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
         _table(layout, rows)
         for notice in found.notices:
-            _lines(layout, notice, 'INFO')
+            sentence(layout, notice, 'INFO')
 
 
-class PATINA_PT_statistics_passes(_SidebarPanel, Panel):
+class PATINA_PT_statistics_passes(SidebarPanel, Panel):
     bl_label = "Passes"
     bl_parent_id = "PATINA_PT_statistics"
     bl_options = {'DEFAULT_CLOSED'}
@@ -59,7 +59,7 @@ class PATINA_PT_statistics_passes(_SidebarPanel, Panel):
         passes = found.shown.passes
         _table(self.layout, [(name, f"{ms:.2f} ms") for name, ms in passes["passes"].items()])
         for name, reason in passes["skipped"].items():
-            _lines(self.layout, f"no {name}: {reason}", 'NONE')
+            sentence(self.layout, f"no {name}: {reason}", 'NONE')
 
 
 def _table(layout: UILayout, rows: list[tuple[str, str]]) -> None:
@@ -70,7 +70,7 @@ def _table(layout: UILayout, rows: list[tuple[str, str]]) -> None:
         split.label(text=value)
 
 
-def _lines(layout: UILayout, text: str, icon: str, width: int = 38) -> None:
+def sentence(layout: UILayout, text: str, icon: str, width: int = 38) -> None:
     """A sentence on as many lines as a sidebar needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8

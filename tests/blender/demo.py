@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders the demo picture: imports a PLY through the operator, lights it, looks at it, saves a PNG.
+"""Renders the demo picture: imports points through the operator, lights them, looks at them, saves a PNG; for a folder,
+one in every style that is shipped, STYLE.png.
 
-    blender -b --factory-startup --python-exit-code 1 --python tests/blender/demo.py -- FILE.ply OUT.png
-    python tests/blender/demo.py FILE.ply OUT.png
+    blender -b --factory-startup --python-exit-code 1 --python tests/blender/demo.py -- FILE.ply OUT.png|FOLDER
+    python tests/blender/demo.py FILE.ply OUT.png|FOLDER
 
 PATINA_DEMO_PLY and PATINA_DEMO_PNG stand for missing arguments; PATINA_LIBRARY names the library;
-PATINA_DEMO_LIT=1 lights points that have colours too; PATINA_DEMO_VIEW=32,14 looks from azimuth 32 and 14 degrees up.
+PATINA_DEMO_LIT=1 lights points that have colours too; PATINA_DEMO_VIEW=32,14 looks from azimuth 32 and 14 degrees up;
+PATINA_DEMO_SIZE=1024,1024 is the picture's; PATINA_DEMO_KEEP=0.6 keeps that middle part of the points' extent in view.
 """
 
 import os
@@ -20,7 +22,8 @@ import bpy
 import numpy as np
 from mathutils import Euler
 
-WIDTH, HEIGHT = 1280, 960
+WIDTH, HEIGHT = (int(side) for side in os.environ.get("PATINA_DEMO_SIZE", "1280,960").split(","))
+KEEP = float(os.environ.get("PATINA_DEMO_KEEP", "1"))
 AZIMUTH, ELEVATION = (float(angle) for angle in os.environ.get("PATINA_DEMO_VIEW", "25,40").split(","))
 # degrees around z from -y, and above the horizon
 MARGIN = 1.05
@@ -68,14 +71,17 @@ def add_camera(scene, obj):
     axes = np.array(camera.rotation_euler.to_matrix(), np.float64)  # columns: right, up, back
     x, y, z = (finite_points(obj) @ axes).T
     place, away = [], []
-    for across, half in ((x, tan(data.angle / 2)), (y, tan(data.angle / 2) * HEIGHT / WIDTH)):
+    wide = 1 if WIDTH > HEIGHT else WIDTH / HEIGHT  # the angle is the larger side's
+    for across, half in ((x, tan(data.angle / 2) * wide), (y, tan(data.angle / 2) * wide * HEIGHT / WIDTH)):
         half /= MARGIN
         high, low = (across + half * z).max(), (half * z - across).max()
         place.append((high - low) / 2)
         away.append((high + low) / 2 / half)
     back = max(away)
+    middle = (z.max() + z.min()) / 2
+    back = middle + (back - middle) * KEEP
     camera.location = axes @ (*place, back)
-    data.clip_start, data.clip_end = (back - z.max()) * 0.9, (back - z.min()) * 1.1
+    data.clip_start, data.clip_end = max(back - z.max(), back - middle) * 0.05, (back - z.min()) * 1.1
     scene.collection.objects.link(camera)
     scene.camera = camera
 
@@ -99,6 +105,25 @@ def add_light_and_world(scene, obj):
         obj.patina.lighting = 'LIT'
 
 
+def save(target):
+    bpy.context.scene.render.filepath = str(target)
+    target.unlink(missing_ok=True)
+    bpy.ops.render.render(write_still=True)
+    if not target.is_file():
+        raise RuntimeError(f"Blender saved no picture at {target}")
+
+
+def render_styles(scene, folder):
+    from patina import styles
+    for entry in styles.entries():
+        if entry.own:
+            continue
+        bpy.ops.patina.apply_style(style=entry.key)
+        if scene.patina.style.notice:
+            raise RuntimeError(scene.patina.style.notice)
+        save(folder / f"{entry.key}.png")
+
+
 def main(folder):
     source, target = arguments()
     load_addon(folder)
@@ -112,12 +137,11 @@ def main(folder):
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = WIDTH, HEIGHT, 100
     scene.view_settings.view_transform = 'Standard'  # shows a scan's colours as they were taken
     scene.render.image_settings.file_format = 'PNG'
-    scene.render.filepath = str(target)
-    target.unlink(missing_ok=True)
-    bpy.ops.render.render(write_still=True)
+    if target.suffix:
+        save(target)
+    else:
+        render_styles(scene, target)
     rendered = time.perf_counter()
-    if not target.is_file():
-        raise RuntimeError(f"Blender saved no picture at {target}")
     print(f"Blender {bpy.app.version_string}: {len(obj.data.vertices):,} points imported in "
           f"{imported - start:.2f} s, rendered and saved in {rendered - imported:.2f} s: {target}", flush=True)
 

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A light and a background of the picture's own, in place of the scene's: what styles need to look the same anywhere."""
+
+from __future__ import annotations
+
+from math import radians
+
+from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty
+from bpy.types import PropertyGroup
+
+_OVERRIDE = {'LIBRARY_OVERRIDABLE'}
+
+
+class PatinaStudioProperties(PropertyGroup):
+    use_light: BoolProperty(
+        name="Studio Light", override=_OVERRIDE, default=False,
+        description="One large light and an even one light the points, in place of the scene's lights and the world")
+    azimuth: FloatProperty(
+        name="Azimuth", override=_OVERRIDE, default=radians(-45), min=radians(-180), max=radians(180), subtype='ANGLE',
+        description="Where the light stands, around the vertical: 0 behind the camera, negative to its left")
+    height: FloatProperty(
+        name="Height", override=_OVERRIDE, default=radians(45), min=radians(-90), max=radians(90), subtype='ANGLE',
+        description="How high the light stands above the horizon")
+    follow_camera: BoolProperty(
+        name="Follow Camera", override=_OVERRIDE, default=True,
+        description="The light turns with the scene's camera; else azimuth 0 is the direction -Y")
+    color: FloatVectorProperty(
+        name="Color", override=_OVERRIDE, default=(1.0, 1.0, 1.0), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
+        description="Colour of the light")
+    strength: FloatProperty(
+        name="Strength", override=_OVERRIDE, default=3.0, min=0.0, soft_max=10.0,
+        description="Watts a square metre, as of Blender's suns: at 3.14 a surface that faces the light shows its own colour")
+    angle: FloatProperty(
+        name="Size", override=_OVERRIDE, default=radians(20), min=0.0, max=radians(90), subtype='ANGLE',
+        description="Angle that the light spans: the larger, the softer its shadows")
+    fill: FloatProperty(
+        name="Fill", override=_OVERRIDE, default=0.25, min=0.0, max=1.0, subtype='FACTOR',
+        description="Strength of a second light from the other side, without shadows, as a share of the first")
+    ambient: FloatVectorProperty(
+        name="Ambient", override=_OVERRIDE, default=(0.1, 0.1, 0.1), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
+        description="Light from everywhere")
+    use_background: BoolProperty(
+        name="Background", override=_OVERRIDE, default=False,
+        description="A colour of its own lies behind the points, in place of the world's")
+    background: FloatVectorProperty(
+        name="Background Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
+        description="Colour behind the points")

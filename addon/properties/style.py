@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The style that an artist picks. Choosing one applies it: one step of undo, as any other property."""
+
+from __future__ import annotations
+
+from bpy.props import EnumProperty, StringProperty
+from bpy.types import Context, PropertyGroup
+
+from .. import styles
+
+_items: list[tuple[str, str, str, int, int]] = []  # Blender does not keep the strings that a callback gives it
+
+
+def _list(_group: PropertyGroup | None, _context: Context | None) -> list[tuple[str, str, str, int, int]]:
+    fresh = [(entry.key, entry.label, entry.about, styles.icon(entry), number)
+             for number, entry in enumerate(styles.entries())]
+    if fresh != _items:
+        _items[:] = fresh
+    return _items
+
+
+def _chosen(group: PatinaStyleProperties) -> int:
+    keys = [item[0] for item in _list(None, None)]
+    known = group.applied if group.applied in keys else styles.PLAIN
+    return keys.index(known)
+
+
+def _choose(group: PatinaStyleProperties, number: int) -> None:
+    group.applied = _list(None, None)[number][0]
+
+
+def _apply(group: PatinaStyleProperties, _context: Context) -> None:
+    """What went wrong cannot be raised here: panels show the notice."""
+    try:
+        group.notice = "; ".join(styles.apply_to_scene(group.id_data, group.applied))
+    except styles.StyleError as error:
+        group.notice = str(error)
+
+
+class PatinaStyleProperties(PropertyGroup):
+    chosen: EnumProperty(
+        name="Style", items=_list, get=_chosen, set=_choose, update=_apply, options=set(),
+        description="How the points look: lines, light, colours and background at once")
+    objects: EnumProperty(
+        name="Apply To", default='ALL', options=set(),
+        description="Which objects a chosen style changes, beside the scene",
+        items=(
+            ('ALL', "All Points", "Every object of the scene that Patina draws", 0),
+            ('SELECTED', "Selected Points", "Selected objects only: others keep their colours and lighting", 1)))
+    applied: StringProperty(options={'HIDDEN'})
+    notice: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders the thumbnails of the shipped styles into addon/presets/styles: build/styles --thumbnails."""
+
+import os
+import sys
+
+import bpy
+
+sys.path.insert(0, os.path.dirname(__file__))
+
+from check_styles import shipped, stage  # noqa: E402
+from patina import styles, thumbnails  # noqa: E402
+
+for key in shipped():
+    _, obj = stage()
+    bpy.ops.patina.apply_style(style=key)
+    pixels = thumbnails.of_sample(bpy.context.evaluated_depsgraph_get(), obj)
+    thumbnails.save(pixels, styles.SHIPPED.resolve() / f"{key}.png")
+    print(f"{key}.png", flush=True)
