@@ -79,6 +79,38 @@ def screenshot(name):
     return pixels.reshape(height, width, 4)[region.y:region.y + region.height, region.x:region.x + region.width]
 
 
+def test_styles_at_once_and_one_step_of_undo():
+    """The view shows a picked style without being touched; one undo takes all of it back, one redo gives it again."""
+    scene = setup()
+    scene.render.film_transparent = False
+    obj = add_points(*sphere(60000, 1.5, (0, 0, 0)))
+    name, scene_name = obj.name, scene.name
+    yield lambda: settled(60000)
+    pictures = shown().pictures
+    scene.patina.style.chosen = 'museum'
+    yield newer(pictures)
+    corner = shown().shown.color[0, 0, :3]
+    check_close(corner, scene.patina.studio.background, 1e-6, "the view's background")
+    scene.patina.style.chosen = 'scan'
+    window = bpy.context.window_manager.windows[0]
+
+    def look():
+        scene, obj = bpy.data.scenes[scene_name], bpy.data.objects[name]
+        return scene.patina.style.chosen, scene.patina.studio.use_light, obj.patina.lighting
+
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        bpy.ops.ed.undo_push(message="before")
+        bpy.ops.patina.apply_style('EXEC_DEFAULT', True, style="museum")
+        check(look() == ("museum", True, 'LIT'), f"applied: {look()}")
+        bpy.ops.ed.undo()
+        check(look() == ("scan", False, 'AUTO'), f"undone: {look()}")
+        bpy.ops.ed.redo()
+        check(look() == ("museum", True, 'LIT'), f"redone: {look()}")
+    picture = screenshot("styles")
+    check(picture.shape[0] > 100, "drawn")
+    yield lambda: settled(60000)
+
+
 def test_draws_points():
     """Screen colours of a sphere are its bytes; the background is the world's."""
     setup()
