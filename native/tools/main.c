@@ -28,7 +28,6 @@ static const char usage[] =
     "  --error E                          picks quality and fill: colour error at most E of white, if it can be had\n"
     "  --opacity X[,X...]                 0 to 1, of each FILE; the last counts for those behind it\n"
     "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
-    "  --background R,G,B                 linear; also the ambient light\n"
     "  --edl STRENGTH[,RADIUS]            eye-dome lighting (1 = well seen), neighbours RADIUS pixels away (1.4)\n"
     "  --background R,G,B                 linear; also the ambient light, unless told\n"
     "  --ambient R,G,B                    linear; the ambient light\n"
