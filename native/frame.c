@@ -86,7 +86,7 @@ static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan
     int error = PATINA_OK;
     for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED && !error; p++) {
         size_t bytes = size_of(plan, (enum pt_plane)p, 0);
-        if (frame->planes[p][0].size == bytes)
+        if (frame->planes[p][0].size == bytes || (p == PT_PLANE_SHADOW && !plan->light_count))
             continue;
         total += bytes - frame->planes[p][0].size;
         error = check_cap(frame, plan, total);
@@ -381,6 +381,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
     frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
+    frame->all_lit = !plan->light_count;
     memcpy(frame->crop, plan->crop, sizeof frame->crop);
     frame->plane_width = plan->view.width;
     frame->keys_valid = 1;
@@ -450,6 +451,10 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
                        pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, expected,
                        size);
+    for (size_t i = 0; pass == PATINA_PASS_SHADOW && frame->all_lit && i < size / sizeof *pixels; i++)
+        pixels[i] = 1.0f;
+    if (pass == PATINA_PASS_SHADOW && frame->all_lit)
+        return PATINA_OK;
     int error = frame->device->ops->buffer_read(frame->device, &frame->planes[pass_table[pass].plane][0], 0, pixels, size);
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }

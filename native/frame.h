@@ -44,6 +44,7 @@ struct patina_frame {
     uint32_t layer_passes;    // bits of what was kept of each
     uint32_t crop[4], plane_width;
     int keys_valid, picture_valid;
+    int all_lit; // no light cast a shadow: there is no plane that says so
 };
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene);

@@ -207,7 +207,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     memcpy(args.world, builder->scene->settings.world_color, sizeof args.world);
     args.eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f;
-    args.arrived = builder->layer <= 1 && (builder->scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
+    args.arrived = builder->layer <= 1 && plan->light_count && (builder->scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
     if (instance->args.lit)
         set_lights(plan, builder->scene, pt_receives(instance->instance), &args);
     PT_REASON(PT_ADD(builder, shade, args,
@@ -288,7 +288,7 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .depth = passes >> PATINA_PASS_DEPTH & 1u,
                                 .normal = passes >> PATINA_PASS_NORMAL & 1u,
                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
-                                .shadow = passes >> PATINA_PASS_SHADOW & 1u};
+                                .shadow = plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u)};
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
