@@ -43,16 +43,20 @@ def preview(path: Path) -> list[str]:
 
 
 def to_mesh(points: PointFile) -> bpy.types.Mesh:
-    """A mesh of vertices alone. Byte colours stay bytes, everything else is float."""
+    """A mesh of vertices alone. Byte colours stay bytes, everything else is float. Takes the arrays out of `points` one by
+    one: a large cloud needs little more memory than the mesh."""
     mesh = bpy.data.meshes.new(points.name)
     mesh.vertices.add(len(points.positions))
     mesh.vertices.foreach_set("co", points.positions.reshape(-1))
+    points.positions = points.positions[:0].copy()
     if points.colors is not None:
         _add_colors(mesh, points.colors)
+        points.colors = None
     if points.normals is not None:
         _add(mesh, NORMAL_NAME, 'FLOAT_VECTOR').data.foreach_set("vector", points.normals.reshape(-1))
-    for name, values in points.scalars.items():
-        _add(mesh, name, 'FLOAT').data.foreach_set("value", values)
+        points.normals = None
+    for name in list(points.scalars):
+        _add(mesh, name, 'FLOAT').data.foreach_set("value", points.scalars.pop(name))
     for name, value in points.notes.items():
         mesh[f"patina_{name}"] = value
     mesh.update()

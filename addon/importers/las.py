@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import native
-from .reading import Filter, PointFile, Progress, colors_of, origin_of
-
-PIECE = 1 << 20  # points read at once
+from .reading import PIECE, Filter, PointFile, Progress, colors_of, origin_of
 
 _OLD = [("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bit_fields", "u1"),
         ("raw_classification", "u1"), ("scan_angle_rank", "i1"), ("user_data", "u1"), ("point_source_id", "<u2")]
@@ -124,14 +122,49 @@ def _pieces(path: Path, header: Header) -> Iterator[np.ndarray]:
         yield np.fromfile(path, kind, min(PIECE, header.points - first), offset=header.data_offset + first * kind.itemsize)
 
 
+class _Columns:
+    """Arrays filled piece by piece, in memory that is taken once: pieces put together at the end would need twice as much.
+    A column begins with its first number that is not zero: many fields the scanner never filled."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most  # points
+        self._arrays: dict[str, np.ndarray] = {}
+        self.count = 0  # of points so far
+
+    def add(self, found: dict[str, np.ndarray]) -> None:
+        end = self.count + len(found["positions"])
+        for name, values in found.items():
+            if name not in self._arrays:
+                if name != "positions" and not values.any():
+                    continue
+                self._arrays[name] = np.zeros((self._most, *values.shape[1:]), values.dtype)  # zeros are no memory yet
+            self._arrays[name][self.count:end] = values
+        self.count = end
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(list(self._arrays))
+
+    def take(self, name: str) -> np.ndarray | None:
+        """The column, which is gone here then; None for one of zeros."""
+        values = self._arrays.pop(name, None)
+        return None if values is None else values[:self.count]
+
+
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     """Reads and filters piece by piece. PatinaError when it cannot be read."""
     try:
         header = read_header(path)
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
+    try:
+        return _read(path, header, wanted, progress)
+    except (MemoryError, OverflowError):
+        raise native.PatinaError(f"{path.name}: memory is short for its {header.points:,} points", -2) from None
+
+
+def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> PointFile:
     origin = origin_of(header.lower, header.upper, float(header.scale.min()))
-    columns: dict[str, list[np.ndarray]] = {}
+    columns = _Columns(header.points)
     done = 0
     for piece in _pieces(path, header):
         progress.step(done / max(header.points, 1))
@@ -153,33 +186,26 @@ def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
             found["gps_time"] = piece["gps_time"][keep]
         if "red" in names:
             found["rgb"] = np.stack([piece[name][keep] for name in ("red", "green", "blue")], 1)
-        for name, values in found.items():
-            columns.setdefault(name, []).append(values)
+        columns.add(found)
     return _assemble(path, header, origin, columns)
 
 
-def _assemble(path: Path, header: Header, origin: tuple[float, float, float],
-              columns: dict[str, list[np.ndarray]]) -> PointFile:
-    def whole(name: str) -> np.ndarray:
-        return np.concatenate(columns.pop(name))
-
-    if not columns:
+def _assemble(path: Path, header: Header, origin: tuple[float, float, float], columns: _Columns) -> PointFile:
+    positions = columns.take("positions")
+    if positions is None:
         return PointFile(path.stem, np.empty((0, 3), np.float32), None, None, {}, origin, 0)
     notes: dict[str, str | float] = {"crs": header.crs} if header.crs else {}
-    positions = whole("positions")
-    colors = None
-    if "rgb" in columns:
-        rgb = whole("rgb")
-        colors = colors_of(rgb) if rgb.any() else None
+    rgb = columns.take("rgb")
+    colors = None if rgb is None else colors_of(rgb)
+    del rgb  # before more is made
     scalars = {}
-    if "gps_time" in columns:
-        times = whole("gps_time")
+    times = columns.take("gps_time")
+    if times is not None:  # float32 holds no GPS second: kept from the first one on
         start = float(np.nanmin(times)) if np.isfinite(times).any() else 0.0
-        if times.any():  # float32 holds no GPS second: kept from the first one on
-            scalars["gps_time"] = (times - start).astype(np.float32)
-            notes["gps_time_start"] = start
-    for name in list(columns):
-        values = whole(name)
-        if values.any():  # fields that the scanner never filled
-            scalars[name] = values.astype(np.float32)
+        times -= start
+        scalars["gps_time"] = times.astype(np.float32)
+        notes["gps_time_start"] = start
+    del times
+    for name in columns:
+        scalars[name] = columns.take(name).astype(np.float32)
     return PointFile(path.stem, positions, None, colors, scalars, origin, 0, notes)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +12,8 @@ import numpy as np
 from .. import native
 
 ZERO = (0.0, 0.0, 0.0)
+
+PIECE = 1 << 20  # points that are worked on at once where a whole column would cost memory
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Filter:
         return keep
 
 
-@dataclass(frozen=True)
+@dataclass
 class PointFile:
     name: str
     positions: np.ndarray  # (n, 3) float32, relative to origin
@@ -94,21 +96,24 @@ class Progress:
 
 def colors_of(rgb: np.ndarray) -> np.ndarray:
     """(n, 3) uint16 sRGB → (n, 4): bytes where no detail is lost (8 bits in the low or in the high byte), else linear
-    floats."""
-    most = int(rgb.max()) if rgb.size else 0
-    if most <= 255:
-        return _opaque(rgb.astype(np.uint8), 255)
-    high = rgb >> 8
-    if not ((rgb & 255) != 0).any() or (rgb == high * 257).all():
-        return _opaque(high.astype(np.uint8), 255)
+    floats. Piece by piece, for the steps between need several times the memory."""
+    pieces = [slice(first, first + PIECE) for first in range(0, len(rgb), PIECE)]
+    if all(rgb[piece].max() <= 255 for piece in pieces):
+        return _opaque(rgb, pieces, np.uint8, 255, lambda part: part)
+    if (not any((rgb[piece] & 255).any() for piece in pieces)
+            or all((rgb[piece] == (rgb[piece] >> 8) * 257).all() for piece in pieces)):
+        return _opaque(rgb, pieces, np.uint8, 255, lambda part: part >> 8)
     s = (np.arange(65536) / 65535.0)
     linear = np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4).astype(np.float32)
-    return _opaque(linear[rgb], 1.0)
+    return _opaque(rgb, pieces, np.float32, 1.0, lambda part: linear[part])
 
 
-def _opaque(rgb: np.ndarray, one: float) -> np.ndarray:
-    rgba = np.full((len(rgb), 4), one, rgb.dtype)
-    rgba[:, :3] = rgb
+def _opaque(rgb: np.ndarray, pieces: list[slice], kind: type, one: float,
+            convert: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    rgba = np.empty((len(rgb), 4), kind)
+    rgba[:, 3] = one
+    for piece in pieces:
+        rgba[piece, :3] = convert(rgb[piece])
     return rgba
 
 

@@ -68,15 +68,16 @@ class PATINA_OT_import_points(Operator, ImportHelper):
     def execute(self, context: Context) -> set[str]:
         if self.link:
             return self._link(context)
-        points = [read for path in self._paths() if (read := self._read(context, path))]
-        if not points:
+        found = [(importers.to_mesh(points), points.origin) for path in self._paths()
+                 if (points := self._read(context, path))]
+        if not found:
             return {'CANCELLED'}
         bpy.ops.object.select_all(action='DESELECT') if bpy.ops.object.select_all.poll() else None
-        shared = self._shared_origin(context, [item.origin for item in points])
-        for item in points:
-            self._add(context, bpy.data.objects.new(item.name, importers.to_mesh(item)), item.origin, shared)
-        count = sum(len(item.positions) for item in points)
-        self.report({'INFO'}, f"Imported {count:,} points from {len(points)} file{'s' * (len(points) > 1)}")
+        shared = self._shared_origin(context, [own for _, own in found])
+        for mesh, own in found:
+            self._add(context, bpy.data.objects.new(mesh.name, mesh), own, shared)
+        count = sum(len(mesh.vertices) for mesh, _ in found)
+        self.report({'INFO'}, f"Imported {count:,} points from {len(found)} file{'s' * (len(found) > 1)}")
         return {'FINISHED'}
 
     def _shared_origin(self, context: Context, origins: list) -> origin.Origin | None:

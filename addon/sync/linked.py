@@ -63,6 +63,7 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
         pass  # not there yet, of another version, or damaged: it is made anew
     progress = progress or importers.Progress()
     points = importers.reader(source.path).read(source.path, importers.Filter(), progress)
+    points.scalars.clear()  # clouds have no use for them
     with progress.inner() as inner:
         cloud = native.Cloud(points.positions, points.normals, points.colors, inner)
     try:

@@ -11,6 +11,8 @@ of them, in the same order; "absent" what could not be measured, and why.
 
     --quick   one size and density of each scene: within two minutes
     --full    scenes x devices x qualities x sizes x densities, and 10^8 points where memory allows: hours
+
+--only import: a LAZ of 30 million points into Blender, 1 million with --quick; else only --full does it.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import case as cases
+import imports
 import machine
 import page
 import papers
@@ -38,7 +41,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
 GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
-          "effects", "peers", "hard")
+          "effects", "peers", "hard", "import")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -127,7 +130,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "frames": options.frames,
         "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
         "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
-        "rows": [], "details": [], "absent": [], "hard": "",
+        "rows": [], "details": [], "absent": [], "hard": "", "import": "",
     }
     for case in chosen(options):
         reason = too_large(case)
@@ -142,6 +145,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             split(result, row)
     if not options.only or "hard" in options.only:
         result["hard"] = hard_cases(options)
+    if "import" in options.only or options.full:
+        result["import"] = imports.measure(1_000_000 if options.quick else 30_000_000, options.library)
     return result
 
 
@@ -180,6 +185,7 @@ def main() -> int:
                         help="measure nothing: tables of that run")
     options = parser.parse_args()
     options.library = options.library.resolve()
+    options.only = options.only or []
     options.device = options.device or ["cpu", "gl-egl"] + ["gl-osmesa"] * (not options.quick)
     if not options.library.is_file() and not options.source:
         parser.error(f"there is no {options.library}: run build/compile first")

@@ -110,6 +110,8 @@ def markdown(result: dict[str, Any]) -> str:
         text += [papers.markdown(result), ""]
     if result.get("hard"):
         text += ["## Hard cases", "", result["hard"], ""]
+    if result.get("import"):
+        text += ["## Large imports", "", result["import"], ""]
     skipped = {name: reason for row in joined(result) for name, reason in (row.get("skipped") or {}).items()}
     if skipped:
         text += ["Left out: " + "; ".join(f"*{name}*: {reason}" for name, reason in sorted(skipped.items())) + ".", ""]

@@ -2,6 +2,7 @@
 """Point files of many kinds in, PLY and LAS out: what is kept, what is refused and how."""
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -11,7 +12,7 @@ from check_import import attribute_of, positions_of
 from harness import REPOSITORY, SCRATCH, Skip, check, check_close, drawn, new_scene, render
 
 from patina import importers
-from patina.importers import e57, las
+from patina.importers import e57, las, reading
 
 DATA = REPOSITORY.parent / "shared/data"
 
@@ -84,7 +85,9 @@ def test_las_round_trip():
         {"intensity": rng.integers(0, 60000, 2000).astype(np.float32), "class": np.full(2000, 6, np.float32),
          "gps_time": np.arange(2000, dtype=np.float32)}, (431000.0, 4581000.0, 2000.0), 0,
         {"crs": "PROJCS[\"somewhere\"]", "gps_time_start": 3e8})
-    obj = bpy.data.objects.new("scan", importers.to_mesh(points))
+    given = replace(points, scalars=dict(points.scalars))
+    obj = bpy.data.objects.new("scan", importers.to_mesh(given))
+    check(not len(given.positions) and given.colors is None and not given.scalars, "the mesh takes the arrays over")
     importers.origin.place(obj, points.origin, importers.origin.shared(bpy.context.scene, [points.origin]))
     bpy.context.scene.collection.objects.link(obj)
     obj.select_set(True)
@@ -128,6 +131,30 @@ def test_real_las():
     places = np.array(obj["patina_origin"]) + positions_of(obj) - np.array(obj.matrix_world.translation)
     check_close(places.min(axis=0), header.lower, 0.01, "lower corner")
     check_close(places.max(axis=0), header.upper, 0.01, "upper corner")
+
+
+def test_colors_of_sixteen_bits():
+    """Bytes where 8 bits were stored as 16, in each of the three ways; else linear floats. Longer than a piece too."""
+    low = np.random.default_rng(2).integers(0, 256, (reading.PIECE + 5, 3)).astype(np.uint16)
+    for rgb in (low, low << 8, low * 257):
+        check(np.array_equal(reading.colors_of(rgb)[:, :3], low), f"bytes of {rgb[0]}")
+    odd = low * 257
+    odd[-1] = (256, 30000, 65535)
+    colors = reading.colors_of(odd)
+    check(colors.dtype == np.float32 and (colors[:, 3] == 1).all(), f"{colors.dtype}")
+    check_close(colors[-1, :3], ((256 / 65535) / 12.92, ((30000 / 65535 + 0.055) / 1.055) ** 2.4, 1), 1e-6, "linear")
+    check(reading.colors_of(low[:0]).shape == (0, 4), "no points")
+
+
+def test_las_that_is_larger_than_memory():
+    """A packed file may claim any number of points: a message, not a dead Blender."""
+    with_laspy()
+    new_scene()
+    head = bytearray(shared("lidar/autzen_trim.laz").read_bytes())
+    struct.pack_into("<I", head, 107, 0xFFFFFFFF)
+    path = SCRATCH / "huge.laz"
+    path.write_bytes(bytes(head))
+    fails(path, "huge.laz:")
 
 
 def test_laz_is_las():
