@@ -169,6 +169,7 @@ class Viewport:
             self._frame[1].cancel()
         if self not in _TURNS:
             _TURNS.append(self)
+        _work(0.0)  # so that it goes on while Blender draws
         _wake()
 
     def _status(self) -> str:
@@ -184,9 +185,7 @@ class Viewport:
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
         if self._drawn is None or self._drawn[0] is not self.shown:
-            np.minimum(self.shown.color, LARGEST, out=self.shown.color)
-            self._drawn = (self.shown, _texture(self.shown.color, 'RGBA16F'),
-                           _texture(self.shown.depth, 'R32F'))
+            self._drawn = (self.shown, *_upload(self.shown))
         shown, color, depth = self._drawn
         projection = context.region_data.window_matrix
         camera = shown.wish.view.camera
@@ -200,14 +199,18 @@ class Viewport:
         shader.uniform_sampler("picture", color)
         shader.uniform_sampler("depths", depth)
         shader.uniform_float("projection", (projection[2][2], projection[2][3], near, camera.orthographic))
-        state.blend_set('ALPHA_PREMULT')
         shader.uniform_float("cover", 4.0 * shown.pixel)
         # the colour over everything, the depth where nothing of Blender's is nearer, so that overlays are hidden rightly
-        for share, test, mask in ((1.0, 'ALWAYS', False), (0.0, 'LESS_EQUAL', True)):
+        for colors, test in ((True, 'ALWAYS'), (False, 'LESS_EQUAL')):
+            if not colors and not context.space_data.overlay.show_overlays:
+                break
+            state.blend_set('ALPHA_PREMULT' if colors else 'NONE')
+            state.color_mask_set(colors, colors, colors, colors)
             state.depth_test_set(test)
-            state.depth_mask_set(mask)
-            shader.uniform_float("share", share)
+            state.depth_mask_set(not colors)
+            shader.uniform_float("share", float(colors))
             batch.draw(shader)
+        state.color_mask_set(True, True, True, True)
         state.depth_test_set('NONE')
         state.depth_mask_set(False)
         state.blend_set('NONE')
@@ -327,12 +330,18 @@ def close_all() -> None:
     _compiled.clear()
 
 
-def _tick() -> float | None:
-    until = time.monotonic() + STAY
-    while _TURNS and time.monotonic() < until and _TURNS[0].advance(until):
+def _work(until: float) -> None:
+    """Goes on with the pictures whose turn it is, and waits for short tasks until then."""
+    while _TURNS and _TURNS[0].advance(until):
         viewport = _TURNS.popleft()
         if viewport.wants():
             _TURNS.append(viewport)
+        if time.monotonic() >= until:
+            break
+
+
+def _tick() -> float | None:
+    _work(time.monotonic() + STAY)
     again = False
     for viewport in list(_VIEWPORTS):
         again |= viewport.tick()
@@ -353,10 +362,30 @@ def _redraw_panels(area_pointer: int) -> None:
                         region.tag_redraw()
 
 
+def _upload(shown: Shown) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
+    """Colour, and the depth that overlays hide behind."""
+    np.minimum(shown.color, LARGEST, out=shown.color)
+    return _texture(shown.color, 'RGBA16F'), _texture(_covering(shown.depth), 'R32F')
+
+
 def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
     height, width = pixels.shape[:2]
     flat = np.ascontiguousarray(pixels, np.float32).reshape(-1)
     return gpu.types.GPUTexture((width, height), format=kind, data=gpu.types.Buffer('FLOAT', flat.size, flat))
+
+
+def _covering(depth: np.ndarray) -> np.ndarray:
+    """The nearest of 5 x 5 pixels, for all pixels. Here and not in the shader: a GPU in software takes ten times as long."""
+    height, width = depth.shape[:2]
+    wide = np.pad(depth[..., 0], 2, mode='edge')
+    for axis, size in ((0, height), (1, width)):
+        def shifted(values: np.ndarray, by: int, length: int, axis: int = axis) -> np.ndarray:
+            return values[by:by + length] if axis == 0 else values[:, by:by + length]
+
+        two = np.minimum(shifted(wide, 0, size + 3), shifted(wide, 1, size + 3))
+        four = np.minimum(shifted(two, 0, size + 1), shifted(two, 2, size + 1))
+        wide = np.minimum(shifted(four, 0, size), shifted(four, 1, size))
+    return wide[..., None]
 
 
 _VERTEX = """
@@ -371,21 +400,12 @@ void main()
 # behind a depth two pixels wider than the surface and four pixels' width (cover) nearer: Blender draws the vertices of
 # our points as dots over every engine's picture, and these lie just behind it.
 _FRAGMENT = """
-float covering(ivec2 texel, ivec2 last)
-{
-    float z = 1e30;
-    for (int y = -2; y <= 2; y++)
-        for (int x = -2; x <= 2; x++)
-            z = min(z, texelFetch(depths, clamp(texel + ivec2(x, y), ivec2(0), last), 0).r);
-    return z;
-}
-
 void main()
 {
     gl_FragDepth = 1.0;
     if (share < 0.5) {
         ivec2 size = textureSize(depths, 0);
-        float far = covering(min(ivec2(place * vec2(size)), size - 1), size - 1);
+        float far = texelFetch(depths, min(ivec2(place * vec2(size)), size - 1), 0).r;
         float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
         float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z)
                                        : projection.y / z - projection.x;
