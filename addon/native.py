@@ -384,10 +384,10 @@ def _view(array: np.ndarray | None, count: int) -> _Array:
 
 
 def _describe(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
-              opacities: np.ndarray | None, threads: int = 0) -> _CloudDesc:
+              opacities: np.ndarray | None, threads: int = 0, origin: tuple[float, ...] = (0.0,) * 3) -> _CloudDesc:
     count = len(positions)
     return _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
-                      color=_view(colors, count), opacity=_view(opacities, count), threads=threads)
+                      color=_view(colors, count), opacity=_view(opacities, count), threads=threads, origin=origin)
 
 
 def start_fingerprint(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
@@ -400,13 +400,14 @@ def start_fingerprint(positions: np.ndarray, normals: np.ndarray | None, colors:
 
 class Cloud(_Handle):
     """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None;
-    opacities (n, 1), floats 0 to 1, or None."""
+    opacities (n, 1), floats 0 to 1, or None; origin is added to the positions, in float64."""
 
     _kind = "cloud"
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
-                 progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None) -> None:
-        super().__init__(byref(_describe(positions, normals, colors, opacities, threads)), _handle_of(progress))
+                 progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None,
+                 origin: tuple[float, ...] = (0.0,) * 3) -> None:
+        super().__init__(byref(_describe(positions, normals, colors, opacities, threads, origin)), _handle_of(progress))
         self._learn()
 
     @classmethod
@@ -437,6 +438,7 @@ class Cloud(_Handle):
         info = _CloudInfo()
         self._call("get_info", byref(info))
         self.count, self.drawn, self.bytes = info.count, info.drawn, info.bytes
+        self.footprint = max(info.bytes, 23 * info.count)  # with what of a mapped file may be in memory
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units

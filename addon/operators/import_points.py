@@ -12,7 +12,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native
 from ..importers import PointFile, origin
-from ..sync import linked
+from ..sync import linked, sequence
 
 _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked at last
 
@@ -37,6 +37,10 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         name="Link", default=False,
         description="Keep the points out of Blender: the object is a box, Patina reads the file itself. For scans too large "
                     "for a mesh; the filters below do not apply")
+    sequence: BoolProperty(
+        name="Sequence", default=False,
+        description="Files in the same folder whose names differ by a number become one object, which shows one of them a "
+                    "frame")
     every: IntProperty(
         name="Keep Every", default=1, min=1, soft_max=100,
         description="Keep each so-manieth point: 1 keeps all, 10 a tenth")
@@ -52,6 +56,9 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         layout.use_property_decorate = False
         layout.prop(self, "origin")
         layout.prop(self, "link")
+        row = layout.row()
+        row.active = self.link
+        row.prop(self, "sequence")
         column = layout.column()
         column.active = not self.link
         column.prop(self, "every")
@@ -93,23 +100,34 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         context.view_layer.objects.active = obj
 
     def _link(self, context: Context) -> set[str]:
-        found = []
+        found: dict[Path, linked.Linked] = {}  # by the path or pattern that objects shall name
         for path in self._paths():
+            name, first = self._named(path)
+            if name in found:
+                continue
             try:
-                source = linked.source(path)
+                source = linked.source(first)
                 if source is None:
                     raise native.PatinaError("there is no such file")
-                importers.reader(path)
-                found.append((path, jobs.run(lambda source=source: linked.load(source), lambda: None, lambda: False)))
+                importers.reader(first)
+                found[name] = jobs.run(lambda source=source: linked.load(source), lambda: None, lambda: False)
             except native.PatinaError as error:
-                self.report({'ERROR'}, f"Patina: {path.name}: {error}")
-        shared = self._shared_origin(context, [item.origin for _, item in found])
-        for path, item in found:
-            obj = bpy.data.objects.new(path.stem, linked.box_mesh(path.stem, item.box))
+                self.report({'ERROR'}, f"Patina: {first.name}: {error}")
+        shared = self._shared_origin(context, [item.origin for item in found.values()])
+        for path, item in found.items():
+            name = path.stem.replace("#", "").rstrip("_-. ") or path.stem if self.sequence else path.stem
+            obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
             obj.patina.linked_file = str(path)
+            obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, shared)
-        self.report({'INFO'}, f"Linked {sum(item.cloud.count for _, item in found):,} points")
+        self.report({'INFO'}, f"Linked {sum(item.cloud.count for item in found.values()):,} points")
         return {'FINISHED'} if found else {'CANCELLED'}
+
+    def _named(self, path: Path) -> tuple[Path, Path]:
+        """What an object names, and the file to read now: of a sequence its pattern and its first file."""
+        pattern = sequence.pattern_of(path) if self.sequence else None
+        files = sequence.files_of(pattern) if pattern else {}
+        return (pattern, files[min(files)]) if files else (path, path)
 
     def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
         if self.directory and any(item.name for item in self.files):  # dropped

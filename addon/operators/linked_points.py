@@ -29,11 +29,15 @@ class PATINA_OT_linked_to_mesh(Operator):
         return context.object is not None and bool(context.object.patina.linked_file)
 
     def execute(self, context: Context) -> set[str]:
-        obj = context.object
-        path = Path(bpy.path.abspath(obj.patina.linked_file, library=obj.library))
+        obj, notices = context.object, []
+        source = linked.source_of(obj, context.scene.frame_current, notices)
+        for notice in notices:
+            self.report({'WARNING' if source else 'ERROR'}, f"Patina: {notice}")
+        if source is None:
+            return {'CANCELLED'}
         try:
-            module = importers.reader(path)
-            points = jobs.run(lambda: module.read(path, importers.Filter(), importers.Progress()), lambda: None,
+            module = importers.reader(source.path)
+            points = jobs.run(lambda: module.read(source.path, importers.Filter(), importers.Progress()), lambda: None,
                               lambda: False)
         except native.PatinaError as error:
             self.report({'ERROR'}, f"Patina: {error}")

@@ -13,6 +13,7 @@ from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
 
 from .. import styles
 from ..native import MOST_LAYERS
+from .sequence import PatinaSequenceProperties
 from .studio import PatinaStudioProperties
 from .style import PatinaStyleProperties
 
@@ -144,7 +145,9 @@ class PatinaObjectProperties(PropertyGroup):
         description="Colour of points that have none")
     linked_file: StringProperty(
         name="Linked File", override=_OVERRIDE, subtype='FILE_PATH',
-        description="Point file that is drawn in place of the object's own vertices; its points never become Blender's")
+        description="Point file that is drawn in place of the object's own vertices; its points never become Blender's. "
+                    "Number signs in its name stand for digits: scan_####.ply shows a file a frame")
+    sequence: PointerProperty(type=PatinaSequenceProperties, override=_OVERRIDE)
     cast_shadows: BoolProperty(
         name="Cast", override=_OVERRIDE, default=True, description="These points throw shadows")
     receive_shadows: BoolProperty(
@@ -189,7 +192,8 @@ class PatinaViewLayerProperties(PropertyGroup):
                     "layers behind opaque surfaces too")
 
 
-_CLASSES = (PatinaStyleProperties, PatinaStudioProperties, PatinaSceneProperties, PatinaObjectProperties, PatinaViewLayerProperties)
+_CLASSES = (PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaSceneProperties,
+            PatinaObjectProperties, PatinaViewLayerProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties))
 
 

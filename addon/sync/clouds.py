@@ -159,11 +159,13 @@ class CloudCache:
 
     def trim(self, used: set[tuple]) -> None:
         with self._lock:
-            idle = sum(cloud.bytes for identity, (_, cloud) in self._entries.items() if identity not in used)
-            for identity in [identity for identity in self._entries if identity not in used]:
-                if idle <= IDLE_BYTES:
+            idle = {identity: cloud.footprint for identity, (_, cloud) in self._entries.items() if identity not in used}
+            total = sum(idle.values())
+            for identity, size in idle.items():
+                if total <= IDLE_BYTES:
                     break
-                idle -= self._entries.pop(identity)[1].bytes
+                del self._entries[identity]
+                total -= size
 
     def clear(self) -> None:
         with self._lock:
@@ -200,9 +202,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             continue
         link = None
         if obj.patina.linked_file:
-            link = linked.source_of(obj)
+            link = linked.source_of(obj, depsgraph.scene_eval.frame_current, notices)
             if link is None:
-                notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
                 continue
         count = depsgraph.scene_eval.patina.mesh_points if solid else 0
         place = link.identity() if link else (obj.data.as_pointer(), count, *_attribute_names(obj))

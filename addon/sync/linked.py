@@ -8,14 +8,19 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
 from .. import importers, native
+from ..importers.origin import PROPERTY
+from . import sequence
 
 Corner = tuple[float, float, float]
+
+KEPT_BYTES = 32 << 30  # of clouds on the disk, 23 a point: a sequence has many
 
 
 @dataclass(frozen=True)
@@ -24,6 +29,7 @@ class Source:
 
     path: Path
     kept: Path
+    origin: Corner | None = None  # float64, that the cloud shall be relative to; None: the file's own
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.kept.name)
@@ -36,21 +42,35 @@ class Linked:
     box: tuple[Corner, Corner]
 
 
-def source_of(obj: bpy.types.Object) -> Source | None:
-    """Of an evaluated object with a linked file; None and no more where the file is missing."""
-    owner = obj.original
-    return source(Path(bpy.path.abspath(obj.patina.linked_file, library=owner.library)))
+def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
+    """Of an object with a linked file, evaluated or not; None where there is nothing to show. The files of a sequence are
+    all relative to the object's origin, so that they lie to one another as they were scanned."""
+    path = Path(bpy.path.abspath(obj.patina.linked_file, library=obj.original.library))
+    origin = None
+    if sequence.is_pattern(path):
+        settings = obj.patina.sequence
+        path, notice = sequence.file_at(path, frame, settings.start, settings.step, settings.outside)
+        if notice:
+            notices.append(f"'{obj.name}': {notice}")
+        if path is None:
+            return None
+        origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
+    found = source(path, origin)
+    if found is None:
+        notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
+    return found
 
 
-def source(path: Path) -> Source | None:
+def source(path: Path, origin: Corner | None = None) -> Source | None:
     try:
         status = path.stat()
     except OSError:
         return None
-    place = hashlib.blake2b(str(path.resolve()).encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
+    name = f"{path.resolve()}{origin or ''}"
+    place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
     state = hashlib.blake2b(f"{status.st_size} {status.st_mtime_ns}".encode(), digest_size=6).hexdigest()
     folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    return Source(path, Path(folder) / f"{place}-{state}.cloud")
+    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin)
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
@@ -58,23 +78,39 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
     notes = source.kept.with_suffix(".json")
     try:
         origin = tuple(json.loads(notes.read_text("utf-8"))["origin"])
-        return _linked(native.Cloud.open(source.kept), origin)
+        found = _linked(native.Cloud.open(source.kept), origin)
+        os.utime(source.kept)  # used just now
+        return found
     except (native.PatinaError, OSError, ValueError, KeyError):
         pass  # not there yet, of another version, or damaged: it is made anew
     progress = progress or importers.Progress()
     points = importers.reader(source.path).read(source.path, importers.Filter(), progress)
     points.scalars.clear()  # clouds have no use for them
+    origin = source.origin or points.origin
+    offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     with progress.inner() as inner:
-        cloud = native.Cloud(points.positions, points.normals, points.colors, inner)
+        cloud = native.Cloud(points.positions, points.normals, points.colors, inner, origin=offset)
     try:
         for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
             old.unlink()
         cloud.save(source.kept)
-        notes.write_text(json.dumps({"origin": points.origin}), "utf-8")
+        notes.write_text(json.dumps({"origin": origin}), "utf-8")
+        _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
-    return _linked(cloud, points.origin)
+    return _linked(cloud, origin)
+
+
+def _tidy(newest: Path) -> None:
+    """Lets the clouds go that were not used for longest, where all together are too large."""
+    clouds = sorted((-path.stat().st_mtime_ns, path.stat().st_size, path) for path in newest.parent.glob("*.cloud"))
+    total = 0
+    for _, size, path in clouds:
+        total += size
+        if total > KEPT_BYTES and path != newest:
+            path.unlink()
+            path.with_suffix(".json").unlink(missing_ok=True)
 
 
 def _linked(cloud: native.Cloud, origin: Corner) -> Linked:
