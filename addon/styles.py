@@ -39,7 +39,7 @@ import numpy as np
 
 VERSION = 1
 PLAIN = "scan"  # the style of defaults
-SHIPPED = Path(__file__).parent / "presets/styles"
+SHIPPED = Path(__file__).resolve().parent / "presets/styles"
 LARGEST = 1 << 20  # bytes of a file
 
 # What makes up a look; a group stands for all its properties.

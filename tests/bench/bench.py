@@ -41,7 +41,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
 GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
-          "effects", "peers", "hard", "import")
+          "effects", "styles", "peers", "hard", "import")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -139,8 +139,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             row["floor_ms"] = (12 * row["points"] + row["plane_bytes"]) / result["bandwidth"] / 1e6
         say(row)
         split(result, row)
-    if not options.only or "peers" in options.only:
-        for row in peers.measure(options.quick, options.library):
+    for group, others in (("styles", peers.measure_styles), ("peers", peers.measure)):
+        for row in others(options.quick, options.library) if not options.only or group in options.only else ():
             say(row)
             split(result, row)
     if not options.only or "hard" in options.only:

@@ -2,10 +2,11 @@
 """Blender draws a cloud: blender -b --factory-startup --python peer_blender.py -- MODE IN.npz OUT.npz ADDON. Run by
 peers.py.
 
-MODE: cycles (native points, 1 sample), eevee (oriented quads: it draws no points), workbench (native points), patina.
+MODE: cycles (native points, 1 sample), eevee (oriented quads: it draws no points), workbench (native points), patina,
+styles.
 IN as for peer_vtk.py. OUT: rgba, depth of the first camera. Prints as JSON the times of whole renders (F12), each from
 a new camera, and with `persistent` data where the engine can keep it. No shadows; ambient light is emission: nothing is
-left to chance."""
+left to chance. styles: times of the library alone, of the scene that each style makes; OUT: KEY rgba, KEY depth."""
 
 import json
 import resource
@@ -20,7 +21,8 @@ from mathutils import Matrix
 
 MODE, SOURCE, TARGET, ADDON = sys.argv[sys.argv.index("--") + 1:]
 DATA = dict(np.load(SOURCE))
-ENGINES = {"cycles": 'CYCLES', "eevee": 'BLENDER_EEVEE', "workbench": 'BLENDER_WORKBENCH', "patina": 'PATINA'}
+ENGINES = {"cycles": 'CYCLES', "eevee": 'BLENDER_EEVEE', "workbench": 'BLENDER_WORKBENCH', "patina": 'PATINA',
+           "styles": 'PATINA'}
 
 
 def material() -> bpy.types.Material:
@@ -100,7 +102,7 @@ def stage() -> bpy.types.Scene:
         obj = quads(material())
     else:
         obj = points()
-        if MODE == "patina":
+        if ENGINES[MODE] == 'PATINA':
             obj.patina.lighting = 'LIT'
             obj.patina.cull_back = True
         else:
@@ -127,7 +129,7 @@ def stage() -> bpy.types.Scene:
     scene.camera = camera
     world = bpy.data.worlds.new("world")
     world.use_nodes = False
-    ambient = float(DATA["world"]) if MODE == "patina" else 0.0
+    ambient = float(DATA["world"]) if ENGINES[MODE] == 'PATINA' else 0.0
     world.color = (ambient, ambient, ambient)
     scene.world = world
     render = scene.render
@@ -185,8 +187,34 @@ def planes(scene: bpy.types.Scene, folder: str) -> dict:
     return found
 
 
+def in_styles(scene: bpy.types.Scene) -> dict:
+    """By style: label, device, milliseconds of each frame but the first, of each pass in the last."""
+    from patina import native, render, styles, sync
+    result, pictures = {}, {}
+    for entry in styles.entries():
+        if entry.own:
+            continue
+        bpy.ops.patina.apply_style(style=entry.key)
+        times = []
+        with native.Frame(render.device_for(sync.DeviceChoice("cpu", 0))) as frame:
+            for matrix in reversed(DATA["matrix"]):  # the first camera's picture is the last, and kept
+                scene.camera.matrix_world = Matrix(matrix)
+                depsgraph = bpy.context.evaluated_depsgraph_get()
+                view = sync.final_view(scene.camera.evaluated_get(depsgraph), depsgraph)
+                description = sync.describe(depsgraph, view, lambda what, progress: False)
+                with native.Scene() as described:
+                    render.describe(described, description, ["DEPTH"])
+                    frame.render(described)
+                times.append(frame.stats()["ms"])
+            result[entry.key] = {"label": entry.label, "times": times[1:], "passes": frame.pass_stats()["passes"],
+                                 "device": render.device_for(sync.DeviceChoice("cpu", 0)).name}
+            pictures |= {f"{entry.key} rgba": frame.read("COMBINED"), f"{entry.key} depth": frame.read("DEPTH")[..., 0]}
+    np.savez(TARGET, **pictures)
+    return result
+
+
 def main() -> None:
-    if MODE == "patina":
+    if ENGINES[MODE] == 'PATINA':
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "patina").symlink_to(ADDON, target_is_directory=True)
             sys.path.insert(0, folder)
@@ -194,6 +222,9 @@ def main() -> None:
             import patina
             patina.register()
     scene = stage()
+    if MODE == "styles":
+        print(json.dumps(in_styles(scene)), flush=True)
+        return
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     full = [timed(scene, matrix) for matrix in DATA["matrix"][:4]]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before

@@ -81,6 +81,15 @@ def effects(result: dict[str, Any]) -> str:
     return table(["what", "quality", "ms", "peer", "ms", "ratio"], body)
 
 
+def styles(result: dict[str, Any]) -> str:
+    """Every style's time on the headline's cloud, and as a multiple of the plain one's."""
+    rows = joined(result, "styles")
+    plain = next(row for row in rows if row["quality"] == "As Scanned")["ms_median"]
+    body = [[row["quality"], f"{row['ms_median']:.1f}", f"{row['ms_median'] / plain:.1f}×",
+             f"{100.0 * (1.0 - row['error']['coverage_iou']):.2f}", f"{row['error']['depth_rms_spacings']:.2f}"] for row in rows]
+    return table(["style", "ms", "against As Scanned", "coverage wrong, %", "depth rms, spacings"], body)
+
+
 def holes(program: Path) -> str:
     """The table that tests/scenes/test_holes prints."""
     said = subprocess.run([str(program), "--device", "cpu"], capture_output=True, text=True).stdout
@@ -127,6 +136,8 @@ def update(result: dict[str, Any], root: Path) -> str:
             parts["others"] = others(result)
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
             parts["effects"] = effects(result)
+    if joined(result, "styles"):
+        parts["styles"] = styles(result)
     for quality in ("paper", "refined"):
         if papers.ratios(result, quality):
             parts[f"papers {quality}"] = papers.table(result, quality)

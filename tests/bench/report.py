@@ -100,7 +100,9 @@ def markdown(result: dict[str, Any]) -> str:
     if joined(result, "peers"):
         text += ["## Other programs, the same points, camera and truth", "", errors_table(against), "",
                  *notes(joined(result, "peers")), ""]
-    for group, title in (("effects", "Layers and shadows of the torus"), ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
+    for group, title in (("effects", "Layers and shadows of the torus"),
+                         ("styles", "Styles, one row each"),
+                         ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
                          ("shadows", "A ball's shadow on a plane"), ("patterns", "Patterns and noise"),
                          ("steady", "Steadiness under a slow turn")):
         rows = joined(result, group)

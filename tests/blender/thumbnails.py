@@ -15,5 +15,5 @@ for key in shipped():
     _, obj = stage()
     bpy.ops.patina.apply_style(style=key)
     pixels = thumbnails.of_sample(bpy.context.evaluated_depsgraph_get(), obj)
-    thumbnails.save(pixels, styles.SHIPPED.resolve() / f"{key}.png")
+    thumbnails.save(pixels, styles.SHIPPED / f"{key}.png")
     print(f"{key}.png", flush=True)
