@@ -315,6 +315,15 @@ def apply(style: Style, scene: bpy.types.Scene, objects: Iterable[bpy.types.Obje
     return notices
 
 
+def dress(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    """Gives a new object the look of the style that was chosen last, if there is one that can be read."""
+    try:
+        style = read(entry(scene.patina.style.applied).path)
+    except StyleError:
+        return
+    _set(obj, POINTS, style.points, [])
+
+
 def _set(owner: bpy.types.ID, names: Iterable[str], values: dict[str, Any], kept: list[str]) -> None:
     animated, changed = _animated(owner), False
     for path, kind in _properties(owner.patina.bl_rna, names):

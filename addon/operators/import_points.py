@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatVecto
 from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
-from .. import importers, jobs, native
+from .. import importers, jobs, native, styles
 from ..importers import PointFile, origin
 from ..sync import linked, sequence
 
@@ -96,6 +96,7 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         if warning:
             self.report({'WARNING'}, warning)
         context.collection.objects.link(obj)
+        styles.dress(context.scene, obj)
         obj.select_set(True)
         context.view_layer.objects.active = obj
 

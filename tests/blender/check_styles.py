@@ -268,6 +268,18 @@ def test_selected_points_only():
     check(other.patina.lighting == 'LIT', "all")
 
 
+def test_imported_points_wear_the_style():
+    scene, _ = stage()
+    apply("museum")
+    path = SCRATCH / "points.xyz"
+    path.write_text("0 0 0\n1 0 0\n0 1 0\n")
+    bpy.ops.import_scene.patina_points(filepath=str(path))
+    check(bpy.context.view_layer.objects.active.patina.lighting == 'LIT', "points that come later")
+    scene.patina.style.applied = "gone"
+    bpy.ops.import_scene.patina_points(filepath=str(path))
+    check(bpy.context.view_layer.objects.active.patina.lighting == 'AUTO', "a style that is gone")
+
+
 def test_studio_light():
     """A sphere: bright where the light stands, by its strength; it turns with the camera unless told."""
     scene = new_scene(64, 64)
