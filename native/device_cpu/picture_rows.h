@@ -77,9 +77,11 @@ static inline int pt_see_row(const struct pt_planes *planes, int32_t y, float sh
             vf_load4(planes->normals + 4 * at, n);
         if (vm_bits(filled)) {
             limit = vf_select(filled, vf_gather(planes->deff, source, filled), limit);
-            vi word = vi_mul(source, vi_set(4));
+            vf of_source[4];
+            if (with_normals)
+                vf_gather4(planes->normals, source, filled, of_source);
             for (uint32_t k = 0; k < 3 && with_normals; k++)
-                n[k] = vf_select(filled, vf_gather(planes->normals + k, word, filled) * vf_set(share), n[k]);
+                n[k] = vf_select(filled, of_source[k] * vf_set(share), n[k]);
         }
         vf_store(row->limit + x, limit, vm_first(PT_LANES));
         for (uint32_t k = 0; k < 3 && with_normals; k++)

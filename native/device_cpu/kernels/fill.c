@@ -172,9 +172,8 @@ static void choose(const struct fill *fill, size_t at, uint32_t count)
     vi source = vi_gather(fill->from, vi_add(vi_mul(qy, vi_set(view->width)), qx), lanes);
     vf z = vi_float(best_z);
     if (fill->args->refined) {
-        vf n[3], ray_p[2], ray_q[2];
-        for (uint32_t k = 0; k < 3; k++)
-            n[k] = vf_gather(fill->normals, vi_add(vi_mul(source, vi_set(4)), vi_set(k)), lanes);
+        vf n[4], ray_p[2], ray_q[2];
+        vf_gather4(fill->normals, source, lanes, n);
         vf_ray_of(view, x, y, ray_p);
         vf_ray_of(view, qx, qy, ray_q);
         z = vf_plane_depth(view, n, ray_q, z, ray_p, vf_level_distance(view, fill->deff, fill->normals, source, z, lanes));

@@ -71,7 +71,7 @@ static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm 
     const struct view_args *view = &lit->args.view;
     const struct instance_args *instance = &lit->args.instance;
     vi word = vi_gather(pt_cpu_data(lit->call, 6), id, lanes);
-    vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), lanes), n[3];
+    vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT)), n[3];
     *none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
     if (!instance->has_normals)
         *none = lanes;

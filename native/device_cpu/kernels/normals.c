@@ -95,7 +95,7 @@ static void normal_pixels(const struct normals_args *args, const struct pt_cpu_c
     center.z = vf_select(center.ours, center.z, vf_set(1.0f));
     center.w = linear_depth(view, center.z);
     vi word = vi_gather(pt_cpu_data(call, 1), vi_load(ids), center.ours);
-    vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), center.ours);
+    vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
     center.distance = vf_layer_distance(view, instance->d_min, spacing, center.z, vf_set(1.0f));
     center.slope = vf_set(4.0f) * vf_footprint(view, center.z); // 76 degrees
 

@@ -116,14 +116,15 @@ static void load_parents(const struct push *push, uint32_t x, uint32_t y, struct
     p->id = vi_load_id(keys);
     p->source = vi_load((const uint32_t *)pt_cpu_data(push->call, 1) + at);
     vm some = vm_and(vm_first(pt_lanes_left(x, push->args->coarse_width)), vf_lt(p->z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
-    vi word = vi_mul(p->source, vi_set(4));
-    vf inverse = vf_gather(normals + 3, word, some);
+    vf normal[4];
+    vf_gather4(normals, p->source, some, normal);
+    vf inverse = normal[3];
     vf distance = vf_gather(pt_cpu_data(push->call, 5), p->source, some); // at level 0
     p->give = vm_bits(vm_and(some, vm_not(vf_lt(distance, (vf_set(PT_DENSE) * vf_footprint(view, p->z)) * inverse))));
     if (!p->give || !push->args->refined)
         return;
     for (uint32_t k = 0; k < 3; k++)
-        p->n[k] = vf_gather(normals + k, word, some);
+        p->n[k] = normal[k];
     vf_ray(&push->coarse, x, y, p->ray);
     p->limit = vf_max(distance, vf_footprint(&push->coarse, p->z) * inverse);
 }

@@ -50,7 +50,7 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
     if (instance->color_format == 1 && instance->id_count < 1u << 29) { // byte offsets fit a signed index
         vi rgb = vi_gather_bytes(colors, vi_add(id, vi_add(id, id)), ours);
         for (int k = 0; k < 3; k++)
-            albedo[k] = vf_look_up(pt_srgb_table, vi_and(vi_shr(rgb, 8 * k), vi_set(255)));
+            albedo[k] = vf_look_up(pt_srgb_table, 256, vi_and(vi_shr(rgb, 8 * k), vi_set(255)));
         return;
     }
     if (!instance->color_format)

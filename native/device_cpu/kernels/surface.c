@@ -18,7 +18,7 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     // 1. the point
     vf z = vi_float(vi_load_z(keys + at)), ray[2], n[4];
     vf_ray(view, x, y, ray);
-    vf spacing = vf_gather(instance->spacing, vi_shr(word, PT_SPACING_SHIFT), ours);
+    vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
     // 2. its normal, in view space: the cloud's, or the estimate that the normal plane holds
     vm none = vm_not(ours);
     if (instance->has_normals) {
