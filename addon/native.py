@@ -145,7 +145,7 @@ class _ExpectedError(Structure):
 
 class _FrameStats(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("points", c_uint64),
-                ("points_scattered", c_uint64), ("chunks", c_uint64), ("chunks_culled", c_uint64),
+                ("points_scattered", c_uint64), ("triangles", c_uint64), ("chunks", c_uint64), ("chunks_culled", c_uint64),
                 ("ms", c_double), ("plane_bytes", c_uint64), ("layers", c_uint32), ("spacing_px", c_float),
                 ("expected", _ExpectedError), ("shadow_bytes", c_uint64), ("shadow_maps", c_uint32),
                 ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32)]

@@ -117,6 +117,7 @@ struct render {
     const struct patina_scene *scene;
     struct pt_plan *plan;
     struct pt_resident **clouds; // per instance
+    struct pt_resident **meshes; // per mesh
     struct pt_buffer *chunks;    // per instance, of the layer at hand
     struct pt_buffer **bound;    // scratch for one pass
     struct chunk_view **behind;  // per instance: those of the layer at hand, behind the first
@@ -132,10 +133,11 @@ static int upload(struct render *render)
     for (uint32_t i = 0; i < plan->pass_count; i++)
         most = plan->passes[i].ref_count > most ? plan->passes[i].ref_count : most;
     render->clouds = calloc(plan->instance_count + 1, sizeof *render->clouds);
+    render->meshes = calloc(plan->mesh_count + 1, sizeof *render->meshes);
     render->chunks = calloc(plan->instance_count + 1, sizeof *render->chunks);
     render->bound = calloc(most, sizeof *render->bound);
     render->behind = calloc(plan->instance_count + 1, sizeof *render->behind);
-    if (!render->clouds || !render->chunks || !render->bound || !render->behind)
+    if (!render->clouds || !render->meshes || !render->chunks || !render->bound || !render->behind)
         return pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
@@ -148,24 +150,41 @@ static int upload(struct render *render)
         if (error)
             return pt_fail_again(&render->frame->handle, error);
     }
+    for (uint32_t i = 0; i < plan->mesh_count && plan->triangles; i++)
+        if (pt_residency_take_mesh(&render->frame->residency, device, plan->meshes[i].instance->mesh, &render->meshes[i]))
+            return pt_fail_again(&render->frame->handle, PATINA_ERROR_MEMORY);
     return PATINA_OK;
 }
 
 static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *ref)
 {
-    if (!ref->of_instance)
+    if (ref->of == PT_OF_FRAME)
         return &render->frame->planes[ref->which][ref->index];
+    if (ref->of == PT_OF_MESH)
+        return &render->meshes[ref->index]->buffers[ref->which];
     if (ref->which == PT_MARKS || ref->which == PT_SHADOWS)
         return pt_shadows_buffer(render->frame, ref->which, ref->index);
     return ref->which == PT_CHUNKS ? &render->chunks[ref->index] : &render->clouds[ref->index]->buffers[ref->which];
 }
 
+int pt_frame_clear_keys(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
+                        enum pt_plane which)
+{
+    int error = pt_frame_ensure_plane(frame, planes, plan, which, 0);
+    return error ? error
+                 : frame->device->ops->buffer_fill(frame->device, &planes[which][0],
+                                                   (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+}
+
+// Before a layer: `which` are its keys.
 static int clear_keys(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which)
 {
-    int error = pt_frame_ensure_plane(frame, frame->planes, plan, which, 0);
-    return error ? error
-                 : frame->device->ops->buffer_fill(frame->device, &frame->planes[which][0],
-                                                   (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+    int error = pt_frame_clear_keys(frame, frame->planes, plan, which);
+    if (!error && plan->triangles)
+        error = pt_frame_clear_keys(frame, frame->planes, plan, PT_PLANE_MESH_KEYS);
+    if (!error && plan->triangles)
+        error = pt_frame_clear_keys(frame, frame->planes, plan, PT_PLANE_MESH_SHOWN);
+    return error;
 }
 
 // ---- layers --------------------------------------------------------------------------------------------------------------
@@ -214,7 +233,7 @@ static int begin_layer(struct render *render, uint32_t layer, int *some)
         device->ops->buffer_destroy(device, &render->chunks[i]);
         error = device->ops->buffer_create(device, count * sizeof **render->behind, render->behind[i], 1, &render->chunks[i]);
     }
-    *some = out->points > 0;
+    *some = out->points > 0 || plan->triangles;
     return error || !*some ? error : clear_keys(render->frame, plan, PT_PLANE_KEYS_BEHIND);
 }
 
@@ -256,7 +275,7 @@ static int run_pass(struct render *render, const struct pt_pass *pass)
     struct patina_frame *frame = render->frame;
     for (uint32_t i = 0; i < pass->ref_count; i++) {
         const struct pt_ref *ref = &pass->refs[i];
-        if (!ref->of_instance) {
+        if (ref->of == PT_OF_FRAME) {
             int error = pt_frame_ensure_plane(frame, frame->planes, render->plan, ref->which, ref->index);
             if (error)
                 return error;
@@ -287,7 +306,7 @@ static int run_together(struct render *render, const struct pt_pass *passes)
         bound[i] = (struct pt_bound_pass){ passes[i].kernel, passes[i].arguments, next, passes[i].ref_count };
         for (uint32_t k = 0; k < passes[i].ref_count && !error; k++) {
             const struct pt_ref *ref = &passes[i].refs[k];
-            if (!ref->of_instance && peeled(ref->which))
+            if (ref->of == PT_OF_FRAME && peeled(ref->which))
                 error = pt_frame_ensure_plane(render->frame, render->frame->planes, render->plan, ref->which, ref->index);
             *next++ = buffer_of(render, ref);
         }
@@ -359,6 +378,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .height = plan->crop[3],
                                          .points = plan->points,
                                          .points_scattered = plan->points_scattered,
+                                         .triangles = plan->triangles,
                                          .chunks = plan->chunks,
                                          .chunks_culled = plan->chunks_culled,
                                          .ms = ms };
@@ -412,6 +432,7 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     for (uint32_t i = 0; i < plan.instance_count && render.chunks; i++)
         frame->device->ops->buffer_destroy(frame->device, &render.chunks[i]);
     free(render.clouds);
+    free(render.meshes);
     free(render.chunks);
     free(render.bound);
     for (uint32_t i = 0; i < plan.instance_count && render.behind; i++)

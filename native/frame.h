@@ -56,6 +56,9 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder);
 // For its parts (frame_shadow.c).
 int pt_frame_ensure_plane(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
                           enum pt_plane which, uint32_t level);
+// An empty key everywhere in a plane of keys.
+int pt_frame_clear_keys(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
+                        enum pt_plane which);
 void pt_frame_note_time(struct patina_frame *frame, const char *name, double ms);
 double pt_milliseconds(void);
 void pt_frame_release(struct patina_frame *frame); // planes and resident clouds

@@ -168,6 +168,7 @@ struct update {
     struct pt_shadow_group *groups;
     uint32_t group_count;
     struct pt_instance *instances; // scratch: casters
+    struct pt_mesh_instance *meshes; // likewise
 };
 
 // How many maps of a sample the instance is tested against.
@@ -185,10 +186,17 @@ static struct pt_buffer *map_buffer(struct update *update, const struct pt_plan 
 {
     struct patina_frame *frame = update->frame;
     struct pt_resident *resident;
-    if (!ref->of_instance)
+    if (ref->of == PT_OF_FRAME)
         return pt_frame_ensure_plane(frame, frame->shadows.planes, map, ref->which, ref->index)
                    ? NULL
                    : &frame->shadows.planes[ref->which][ref->index];
+    if (ref->of == PT_OF_MESH) {
+        if (pt_residency_take_mesh(&frame->residency, frame->device, map->meshes[ref->index].instance->mesh, &resident)) {
+            pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY);
+            return NULL;
+        }
+        return &resident->buffers[ref->which];
+    }
     if (ref->which == PT_CHUNKS)
         return &chunks[ref->index];
     if (pt_residency_take(&frame->residency, frame->device, map->instances[ref->index].instance->cloud, &resident)) {
@@ -218,15 +226,16 @@ static int draw_map(struct update *update, const struct pt_plan *map)
     for (uint32_t i = 0; i < map->pass_count; i++)
         most = map->passes[i].ref_count > most ? map->passes[i].ref_count : most;
     struct pt_buffer *chunks = calloc(map->instance_count + 1, sizeof *chunks), **bound = calloc(most, sizeof *bound);
-    int error = chunks && bound ? pt_frame_ensure_plane(frame, frame->shadows.planes, map, PT_PLANE_KEYS, 0)
+    int error = chunks && bound ? PATINA_OK
                                 : pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "a light's map: out of memory");
     for (uint32_t i = 0; i < map->instance_count && !error; i++)
         if (map->instances[i].chunk_count)
             error = device->ops->buffer_create(device, map->instances[i].chunk_count * sizeof *map->instances[i].chunks,
                                                map->instances[i].chunks, 1, &chunks[i]);
     if (!error)
-        error = device->ops->buffer_fill(device, &frame->shadows.planes[PT_PLANE_KEYS][0],
-                                         (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+        error = pt_frame_clear_keys(frame, frame->shadows.planes, map, PT_PLANE_KEYS);
+    if (!error && map->triangles)
+        error = pt_frame_clear_keys(frame, frame->shadows.planes, map, PT_PLANE_MESH_KEYS);
     for (uint32_t i = 0; i < map->pass_count && !error; i++)
         error = run_map_pass(update, map, chunks, bound, &map->passes[i]);
     if (!error)
@@ -285,15 +294,15 @@ static int test_map(struct update *update, const struct pt_plan_light *planned, 
     struct patina_scene view = { 0 };
     struct pt_plan map = { 0 };
     double window[4], start = pt_milliseconds(), drawn;
-    if (!pt_light_scene(update->scene, planned, group, sample, face, update->instances, &view, window))
+    if (!pt_light_scene(update->scene, planned, group, sample, face, update->instances, update->meshes, &view, window))
         return PATINA_OK;
     pt_handle_init(&view.handle);
     int error = pt_plan_map(&view, &map);
-    if (!error && map.points_scattered)
+    if (!error && pt_plan_shows(&map))
         error = draw_map(update, &map);
     drawn = pt_milliseconds();
     pt_frame_note_time(frame, "light map", drawn - start);
-    if (!error && map.points_scattered) {
+    if (!error && pt_plan_shows(&map)) {
         frame->shadow_maps++;
         frame->shadow_size[0] = map.crop[2] > frame->shadow_size[0] ? map.crop[2] : frame->shadow_size[0];
         frame->shadow_size[1] = map.crop[3] > frame->shadow_size[1] ? map.crop[3] : frame->shadow_size[1];
@@ -426,7 +435,8 @@ int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *sce
     if (pt_shadows_stale(frame, scene, plan)) {
         update.groups = calloc(2 * (size_t)scene->instance_count + 1, sizeof *update.groups);
         update.instances = calloc((size_t)scene->instance_count + 1, sizeof *update.instances);
-        if (!update.groups || !update.instances)
+        update.meshes = calloc((size_t)scene->mesh_count + 1, sizeof *update.meshes);
+        if (!update.groups || !update.instances || !update.meshes)
             error = pt_fail(&frame->device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
         else
             update.group_count = pt_shadow_groups(scene, update.groups);
@@ -436,6 +446,7 @@ int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *sce
             error = test_light(&update, i);
         free(update.groups);
         free(update.instances);
+        free(update.meshes);
     }
     if (!error)
         set_scales(&frame->shadows, plan);

@@ -194,22 +194,32 @@ static void set_lights(const struct pt_plan *plan, const struct patina_scene *sc
     }
 }
 
+void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args)
+{
+    const struct patina_scene *scene = builder->scene;
+    *args = (struct shade_args){.view = builder->plan->view};
+    memcpy(args->world, scene->settings.world_color, sizeof args->world);
+    args->eye_z = scene->camera.orthographic ? (float)scene->camera.near_clip : 0.0f;
+    args->arrived =
+        builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
+    set_lights(builder->plan, scene, receives, args);
+}
+
 static void plan_shade(struct pt_builder *builder, uint32_t i)
 {
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     uint32_t margin = (plan->iterations + 2) << plan->levels;
-    struct shade_args args = {.view = pt_view_of(plan, instance, margin), .instance = instance->args};
+    struct shade_args args;
+    pt_shade_lights(builder, pt_receives(instance->instance), &args);
+    args.view = pt_view_of(plan, instance, margin);
+    args.instance = instance->args;
+    args.light_count = instance->args.lit ? args.light_count : 0;
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
     uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u);
     if (plan->quality == PATINA_QUALITY_REFINED && wants_normals)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
-    memcpy(args.world, builder->scene->settings.world_color, sizeof args.world);
-    args.eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f;
-    args.arrived = builder->layer <= 1 && plan->light_count && (builder->scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
-    if (instance->args.lit)
-        set_lights(plan, builder->scene, pt_receives(instance->instance), &args);
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_buffer_of(PT_COLORS, i), pt_shading_of(builder),
@@ -355,9 +365,11 @@ static const char *no_shadows(const struct patina_scene *scene)
         receiving += (uint32_t)pt_receives(&scene->instances[i]);
         objects += !(scene->instances[i].style.shadow_off & PATINA_SHADOW_NO_CAST);
     }
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        objects += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
     return !casting     ? "no light casts shadows"
            : !receiving ? "no lit cloud receives shadows"
-           : !objects   ? "no cloud casts shadows"
+           : !objects   ? "nothing casts shadows"
                         : NULL;
 }
 
@@ -386,11 +398,23 @@ static void plan_marks(struct pt_builder *builder)
     }
 }
 
+static const char *const of_points[] = {"scatter", "normals", "surface", "pull", "fill", "push"};
+
+static void skip_all(struct pt_builder *builder, const char *reason, const char *const *names, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        pt_skip(builder, names[i], reason);
+}
+
 // Scatter, surfaces, filling: what pictures and light maps have in common.
 static void plan_surfaces(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     int estimate = 0;
+    if (!plan->points_scattered) {
+        skip_all(builder, "no cloud is in view", of_points, sizeof of_points / sizeof *of_points);
+        return;
+    }
     plan_scatter(builder);
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count) {
@@ -407,12 +431,14 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     plan_surfaces(builder);
+    pt_plan_meshes(builder, 1);
     if (builder->layer == 1)
         plan_marks(builder);
     uint32_t finish = plan->pass_count;
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count)
             plan_shade(builder, i);
+    pt_plan_mesh_shade(builder);
     enum pt_plane color = plan_image_filters(builder);
     if (plan->layers > 1)
         plan_peel(builder, color);
@@ -433,7 +459,7 @@ static void put_together(const struct pt_builder *builder)
     const patina_settings *settings = &builder->scene->settings;
     const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE |
                               1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
-    if (settings->layer_passes || (plan->layers == 1 && plan->transparent) ||
+    if (settings->layer_passes || plan->triangles || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
         return;
     for (uint32_t i = builder->finish; i < plan->pass_count; i++)
@@ -463,11 +489,10 @@ static void plan_points(struct pt_builder *builder)
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    static const char *const names[] = {"scatter", "normals", "surface", "pull",   "fill",      "push",
-                                        "mark",    "lit",     "shade",   "edl",    "smooth",    "antialias", "peel"};
+    static const char *const others[] = {"raster", "cover", "mark", "lit", "shade", "edl", "smooth", "antialias", "peel"};
     builder->plan->light_count = 0;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        pt_skip(builder, names[i], reason);
+    skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
+    skip_all(builder, reason, others, sizeof others / sizeof *others);
     plan_output(builder, PT_PLANE_COLOR_A);
     put_together(builder);
 }
@@ -477,8 +502,9 @@ int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan)
     struct pt_builder builder = {.scene = scene, .plan = plan};
     *plan = (struct pt_plan){0};
     int error = pt_plan_view(scene, plan);
-    if (!error && plan->points_scattered) {
+    if (!error && pt_plan_shows(plan)) {
         plan_surfaces(&builder);
+        pt_plan_meshes(&builder, 0);
         error = builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
     }
     if (error)
@@ -493,15 +519,16 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
     if (!scene->has_camera)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);
-    if (!error && plan->points_scattered && !no_shadows(scene))
+    if (!error && pt_plan_shows(plan) && !no_shadows(scene))
         error = pt_plan_lights(scene, plan);
     if (!error) {
-        if (plan->points_scattered)
+        if (pt_plan_shows(plan))
             plan_points(&builder);
         else
-            plan_nothing(&builder, !scene->instance_count ? "the scene has no cloud"
-                                   : !plan->chunks        ? "the clouds have no points"
-                                                          : "no cloud is in view");
+            plan_nothing(&builder, scene->mesh_count       ? "nothing is in view"
+                                   : !scene->instance_count ? "the scene has no cloud"
+                                   : !plan->chunks          ? "the clouds have no points"
+                                                            : "no cloud is in view");
         error = builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
     }
     if (error == PATINA_ERROR_MEMORY)

@@ -28,6 +28,10 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(THROUGH, 4, 0)        \
     X(OVER, 16, 0)          \
     X(TILES, 8, 1)          \
+    X(MESH_KEYS, 8, 0)      \
+    X(MESH_SHOWN, 8, 0)     \
+    X(MESH_NORMAL, 16, 0)   \
+    X(MESH_ALBEDO, 12, 0)   \
     X(COMBINED, 16, 0)      \
     X(DEPTH, 4, 0)          \
     X(NORMALS, 12, 0)       \
@@ -55,11 +59,14 @@ enum pt_instance_buffer {
     PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS
 };
 
-// What a pass binds: a plane at a level, or a buffer of an instance.
+enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_BUFFERS };
+
+// What a pass binds: a plane at a level, or a buffer of an instance or a mesh.
+enum pt_ref_of { PT_OF_FRAME, PT_OF_INSTANCE, PT_OF_MESH };
 struct pt_ref {
-    uint32_t of_instance;
-    uint32_t which; // pt_plane or pt_instance_buffer
-    uint32_t index; // level, layer from 0 on, or instance
+    uint32_t of;    // pt_ref_of
+    uint32_t which; // pt_plane, pt_instance_buffer or pt_mesh_buffer
+    uint32_t index; // level, layer from 0 on, instance or mesh
 };
 
 struct pt_pass {
@@ -106,14 +113,23 @@ struct pt_plan_instance {
     uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
 };
 
+struct pt_plan_mesh {
+    const struct pt_mesh_instance *instance;
+    struct mesh_args args;
+    uint32_t rect[4]; // in the planes; empty where it is out of view: x0 >= x1
+};
+
 struct pt_plan {
-    struct view_args view;  // level 0; rect: union over instances
+    struct view_args view;  // level 0; rect: union over instances and meshes
     uint32_t levels;        // coarse levels
     uint32_t crop[4];       // x, y, width, height of the picture in the planes
     uint32_t pixel_offset[2]; // of the crop in the full picture
     uint32_t guard;           // pixels by which the padded picture is wider on each side
     struct pt_plan_instance *instances;
     uint32_t instance_count;
+    struct pt_plan_mesh *meshes;
+    uint32_t mesh_count;
+    uint64_t triangles; // of meshes in view; 0: none is
     struct pt_pass *passes;
     uint32_t pass_count;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
@@ -130,6 +146,9 @@ struct pt_plan {
     int transparent;        // something in view lets light through
     struct pt_arena *arena;
 };
+
+// Is there anything in view?
+static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->triangles; }
 
 // Every pointer inside belongs to the plan; the clouds must outlive it. Message on the scene when it fails.
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan);
@@ -157,6 +176,7 @@ int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan);
 // Lists plan->lights, with what their maps are like.
 int pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
 int pt_receives(const struct pt_instance *instance); // shadows, at all
+int pt_mesh_casts(const struct pt_mesh_instance *instance);
 // Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late.
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
 
@@ -171,11 +191,11 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
 int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 
-// A scene of the group's casters as a sample of the light sees them, for pt_plan_map. instances: room for the scene's. The
+// A scene of the group's casters as a sample of the light sees them, for pt_plan_map. instances, meshes: room for the scene's. The
 // window is what of the map counts, in window units: left, bottom, right, top. 0: there is nothing to see.
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
-                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
-                   double window[4]);
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct pt_mesh_instance *meshes,
+                   struct patina_scene *out, double window[4]);
 
 // Where shading gathers an area light's light: PT_AREA_POINTS positions, world.
 void pt_area_points(const patina_light_desc *light, double points[3 * PT_AREA_POINTS]);

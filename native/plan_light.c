@@ -25,6 +25,14 @@ static int casts(const struct pt_instance *instance)
     return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && instance->cloud->info.drawn;
 }
 
+int pt_mesh_casts(const struct pt_mesh_instance *instance)
+{
+    return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && pt_mesh_drawn(instance->mesh);
+}
+
+// Meshes are opaque, and among the opaque casters of everyone.
+static int meshes_cast(const struct pt_shadow_group *group) { return !group || group->only == PT_NO_INSTANCE; }
+
 int pt_receives(const struct pt_instance *instance)
 {
     return !(instance->style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && instance->style.lighting == PATINA_LIGHTING_LIT &&
@@ -54,6 +62,8 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
     uint32_t count = 0, casters = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         casters += (uint32_t)opaque(&scene->instances[i]);
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        casters += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
     if (casters)
         groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, PT_NO_INSTANCE, 255 };
     for (uint32_t i = 0; i < scene->instance_count; i++) {
@@ -109,28 +119,36 @@ static void extend(struct extent *extent, const double p[3])
     extent->some = 1;
 }
 
+static void extend_by_box(struct extent *extent, const struct pt_chunk *box, const double matrix[16], const double axes[9],
+                          const double eye[3])
+{
+    double linear[9], translation[3], p[3], q[3];
+    pt_split_matrix(matrix, linear, translation);
+    for (int corner = 0; corner < 8; corner++) {
+        for (int k = 0; k < 3; k++)
+            p[k] = box->origin[k] + (double)(corner >> k & 1 ? box->box_max[k] : box->box_min[k]);
+        pt_apply(linear, p, q);
+        for (int k = 0; k < 3; k++)
+            q[k] = (q[k] + translation[k]) - eye[k];
+        pt_apply(axes, q, p);
+        extend(extent, p);
+    }
+}
+
 static struct extent look(const struct patina_scene *scene, const struct pt_shadow_group *group, const double axes[9],
                           const double eye[3])
 {
     struct extent extent = { 0 };
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
-        double linear[9], translation[3], p[3], q[3];
         if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
             continue;
-        pt_split_matrix(instance->style.world_from_object, linear, translation);
         for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-            for (int corner = 0; corner < 8; corner++) {
-                const struct pt_chunk *chunk = &instance->cloud->chunks[c];
-                for (int k = 0; k < 3; k++)
-                    p[k] = chunk->origin[k] + (double)(corner >> k & 1 ? chunk->box_max[k] : chunk->box_min[k]);
-                pt_apply(linear, p, q);
-                for (int k = 0; k < 3; k++)
-                    q[k] = (q[k] + translation[k]) - eye[k];
-                pt_apply(axes, q, p);
-                extend(&extent, p);
-            }
+            extend_by_box(&extent, &instance->cloud->chunks[c], instance->style.world_from_object, axes, eye);
     }
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        if (meshes_cast(group) && pt_mesh_casts(&scene->meshes[i]))
+            extend_by_box(&extent, &scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, axes, eye);
     return extent;
 }
 
@@ -302,8 +320,8 @@ static uint32_t fit(double *low, double *high, double texel, uint32_t most)
 }
 
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
-                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct patina_scene *out,
-                   double window[4])
+                   uint32_t sample, uint32_t face, struct pt_instance *instances, struct pt_mesh_instance *meshes,
+                   struct patina_scene *out, double window[4])
 {
     double axes[9], position[3];
     int parallel = light->light->type == PATINA_LIGHT_SUN;
@@ -321,6 +339,12 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
             instances[out->instance_count].style.cull_back = 0;      // both sides cast
             instances[out->instance_count++].style.transparency = 0; // its map has one layer
         }
+    out->meshes = meshes;
+    out->mesh_count = 0;
+    out->points = scene->points; // their triangles' ids follow
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        if (meshes_cast(group) && pt_mesh_casts(&scene->meshes[i]))
+            meshes[out->mesh_count++] = scene->meshes[i];
     set_camera(axes, position, &extent, parallel, light->cube != 0, &out->camera);
     out->has_camera = 1;
     out->settings = (patina_settings){ .struct_size = sizeof out->settings,
@@ -420,13 +444,14 @@ static int plan_light(const struct patina_scene *scene, struct pt_plan *plan, co
         return error;
     struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (2 * scene->instance_count + 1) * sizeof *groups);
     struct pt_instance *instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *instances);
-    if (!groups || !instances)
+    struct pt_mesh_instance *meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *meshes);
+    if (!groups || !instances || !meshes)
         return PATINA_ERROR_MEMORY;
     struct patina_scene view = { 0 };
     double window[4];
     uint32_t count = pt_shadow_groups(scene, groups);
     for (uint32_t face = 0; face < (planned->cube ? 6u : 1u) && !planned->width && count; face++)
-        if (pt_light_scene(scene, planned, &groups[0], 0, face, instances, &view, window)) {
+        if (pt_light_scene(scene, planned, &groups[0], 0, face, instances, meshes, &view, window)) {
             planned->width = view.settings.width;
             planned->height = view.settings.height;
         }
@@ -467,26 +492,32 @@ static void put_word(struct key *key, uint64_t word)
 }
 
 // Its matrix as the light sees it: the same when light and cloud move together. A sun is everywhere: where the first cloud is.
-static void put_instance(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned, uint32_t i)
+static void put_matrix(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned,
+                       const double matrix[16])
 {
-    const struct pt_instance *instance = &scene->instances[i];
     const double *from = planned->light->position, *first = scene->instances[0].style.world_from_object;
     double linear[9], translation[3], turned[9], moved[3], frame[9];
     frame_of(planned->light->direction, planned->light->side, frame);
-    pt_split_matrix(instance->style.world_from_object, linear, translation);
+    pt_split_matrix(matrix, linear, translation);
     for (int k = 0; k < 3; k++)
         translation[k] -= planned->light->type == PATINA_LIGHT_SUN ? first[4 * k + 3] : from[k];
     pt_multiply(frame, linear, turned);
     pt_apply(frame, translation, moved);
+    for (int k = 0; k < 9; k++)
+        put(key, turned[k]);
+    for (int k = 0; k < 3; k++)
+        put(key, moved[k]);
+}
+
+static void put_instance(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned, uint32_t i)
+{
+    const struct pt_instance *instance = &scene->instances[i];
     put_word(key, pt_cloud_fingerprint(instance->cloud));
     put(key, (double)instance->style.shadow_off);
     put(key, (double)loss_of(instance));
     put(key, (double)instance->style.lighting);
     put(key, (double)instance->style.d_min);
-    for (int k = 0; k < 9; k++)
-        put(key, turned[k]);
-    for (int k = 0; k < 3; k++)
-        put(key, moved[k]);
+    put_matrix(key, scene, planned, instance->style.world_from_object);
 }
 
 size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *planned, double *numbers, size_t room)
@@ -504,6 +535,11 @@ size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light
     put(&key, (double)scene->settings.fill);
     for (uint32_t i = 0; i < scene->instance_count; i++)
         put_instance(&key, scene, planned, i);
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        if (pt_mesh_casts(&scene->meshes[i])) {
+            put_word(&key, atomic_load(&scene->meshes[i].mesh->alive->fingerprint));
+            put_matrix(&key, scene, planned, scene->meshes[i].style.world_from_object);
+        }
     return key.count;
 }
 

@@ -20,7 +20,7 @@ struct pt_builder {
 
 static inline struct pt_ref pt_plane_at(enum pt_plane which, uint32_t level)
 {
-    return (struct pt_ref){0, which, level};
+    return (struct pt_ref){PT_OF_FRAME, which, level};
 }
 // Of the layer at hand: the first has its own.
 static inline struct pt_ref pt_keys_of(const struct pt_builder *builder, uint32_t level)
@@ -37,7 +37,11 @@ static inline struct pt_ref pt_shading_of(const struct pt_builder *builder)
 }
 static inline struct pt_ref pt_buffer_of(enum pt_instance_buffer which, uint32_t instance)
 {
-    return (struct pt_ref){1, which, instance};
+    return (struct pt_ref){PT_OF_INSTANCE, which, instance};
+}
+static inline struct pt_ref pt_mesh_buffer_of(enum pt_mesh_buffer which, uint32_t mesh)
+{
+    return (struct pt_ref){PT_OF_MESH, which, mesh};
 }
 
 // ---- passes ------------------------------------------------------------------------------------------------------------
@@ -58,6 +62,16 @@ void pt_skip(struct pt_builder *builder, const char *name, const char *reason);
 
 // On what shading gave, in place: before smoothing.
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color);
+
+// ---- meshes: plan_mesh.c -----------------------------------------------------------------------------------------------
+
+// Draws the meshes in view over the layer's filled points; shown: they are shaded, too.
+void pt_plan_meshes(struct pt_builder *builder, int shown);
+// Lights and colours what they show.
+void pt_plan_mesh_shade(struct pt_builder *builder);
+// plan.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
+void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
+
 // ---- views -------------------------------------------------------------------------------------------------------------
 
 struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level);

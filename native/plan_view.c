@@ -68,9 +68,9 @@ static void pad_camera(struct camera *camera, uint32_t guard)
     camera->height += 2.0 * guard;
 }
 
-static void set_object(const struct camera *camera, const struct pt_instance *instance, struct object *object)
+static void set_object(const struct camera *camera, const double world_from_object[16], struct object *object)
 {
-    pt_split_matrix(instance->style.world_from_object, object->linear, object->translation);
+    pt_split_matrix(world_from_object, object->linear, object->translation);
     pt_multiply(camera->axes, object->linear, object->view);
     double cofactors[9], size = 0.0;
     pt_cofactors(object->linear, cofactors);
@@ -286,7 +286,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     const struct camera *camera = &survey->camera;
     struct object *object = &survey->objects[i];
     int transparent = is_transparent(instance), layered = transparent || scene->settings.layer_passes;
-    set_object(camera, instance, object);
+    set_object(camera, instance->style.world_from_object, object);
     int cull = instance->style.cull_back && cloud->info.has_normals && !object->singular && !transparent;
     struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
     if (!list)
@@ -450,17 +450,22 @@ static void set_view(const struct camera *camera, struct view_args *view)
 
 // ---- what kernels get ----------------------------------------------------------------------------------------------------
 
+static void set_product(const double rows[9], const double translation[3], float row[9], float hi[3], float lo[3])
+{
+    for (int k = 0; k < 9; k++)
+        row[k] = (float)rows[k];
+    for (int k = 0; k < 3; k++) {
+        hi[k] = (float)translation[k];
+        lo[k] = (float)(translation[k] - (double)hi[k]);
+    }
+}
+
 static void set_chunk(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
                       const struct pt_chunk *chunk, uint32_t count, uint32_t cull, struct chunk_view *out)
 {
     double rows[9], translation[3], eye[4] = { 0 };
     chunk_product(camera, object, chunk, rows, translation);
-    for (int k = 0; k < 9; k++)
-        out->row[k] = (float)rows[k];
-    for (int k = 0; k < 3; k++) {
-        out->hi[k] = (float)translation[k];
-        out->lo[k] = (float)(translation[k] - (double)out->hi[k]);
-    }
+    set_product(rows, translation, out->row, out->hi, out->lo);
     if (cull)
         chunk_eye(camera, object, chunk, eye);
     for (int k = 0; k < 4; k++)
@@ -559,6 +564,31 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     return PATINA_OK;
 }
 
+static void place_mesh(struct pt_plan *plan, const struct camera *camera, const struct pt_mesh_instance *instance,
+                       uint32_t id_base, struct pt_plan_mesh *out)
+{
+    const struct patina_mesh *mesh = instance->mesh;
+    struct object object;
+    double rows[9], translation[3], bounds[4], z, beyond;
+    *out = (struct pt_plan_mesh){ .instance = instance };
+    set_object(camera, instance->style.world_from_object, &object);
+    chunk_product(camera, &object, &mesh->box, rows, translation);
+    if (!pt_mesh_drawn(mesh) || !chunk_bounds(camera, &mesh->box, rows, translation, bounds, &z, &beyond) ||
+        !rect_in_window(&plan->view, bounds, out->rect))
+        return;
+    struct mesh_args *args = &out->args;
+    set_product(rows, translation, args->row, args->hi, args->lo);
+    normal_matrix(camera, &object, args->normal_matrix);
+    args->id_base = id_base;
+    args->id_count = (uint32_t)mesh->info.triangle_count;
+    args->stride = mesh->stride;
+    args->has_normals = mesh->has_normals;
+    args->has_colors = mesh->has_colors;
+    memcpy(args->color, instance->style.color, sizeof args->color);
+    join_rect(plan->view.rect, out->rect);
+    plan->triangles += mesh->info.triangle_count;
+}
+
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = { 0 };
@@ -567,7 +597,9 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     survey.objects = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.objects);
     survey.seen = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.seen);
     survey.seen_count = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.seen_count);
-    if (!plan->instances || !survey.objects || !survey.seen || !survey.seen_count)
+    plan->mesh_count = scene->mesh_count;
+    plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
+    if (!plan->instances || !plan->meshes || !survey.objects || !survey.seen || !survey.seen_count)
         return PATINA_ERROR_MEMORY;
     int error = set_camera(scene, &survey.camera);
     if (error)
@@ -595,6 +627,11 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
                        plan->view.width, plan->view.height);
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
+    uint64_t id_base = scene->points;
+    for (uint32_t i = 0; i < scene->mesh_count && !error; i++) {
+        place_mesh(plan, &survey.camera, &scene->meshes[i], (uint32_t)id_base, &plan->meshes[i]);
+        id_base += scene->meshes[i].mesh->info.triangle_count;
+    }
     return error;
 }
 
@@ -608,7 +645,7 @@ int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const
     if (error || !*chunks)
         return error ? error : PATINA_ERROR_MEMORY;
     pad_camera(&camera, plan->guard);
-    set_object(&camera, instance, &object);
+    set_object(&camera, instance->style.world_from_object, &object);
     set_instance(&camera, &object, instance, 1.0, args);
     for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
         set_chunk(&camera, &object, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0, &(*chunks)[c]);

@@ -57,30 +57,65 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
     return upload_colors(device, cloud, resident);
 }
 
-int pt_residency_take(struct pt_residency *residency, struct patina_device *device, const struct patina_cloud *cloud,
-                      struct pt_resident **out)
+// What is there already, or NULL; forgets the dead on the way.
+static struct pt_resident *find(struct pt_residency *residency, struct patina_device *device, const struct pt_alive *alive)
 {
+    struct pt_resident *resident;
     forget_dead(residency, device);
-    for (struct pt_resident *resident = residency->first; resident; resident = resident->next)
-        if (resident->alive == cloud->alive) {
-            *out = resident;
-            return resident->colors == atomic_load(&cloud->alive->colors) ? PATINA_OK
-                                                                          : upload_colors(device, cloud, resident);
-        }
+    for (resident = residency->first; resident && resident->alive != alive; resident = resident->next)
+        ;
+    return resident;
+}
+
+static struct pt_resident *begin(struct patina_device *device, struct pt_alive *alive)
+{
     struct pt_resident *resident = calloc(1, sizeof *resident);
-    if (!resident)
-        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "a cloud's place on the device: out of memory");
-    resident->alive = cloud->alive;
-    atomic_fetch_add(&cloud->alive->references, 1);
-    int error = upload(device, cloud, resident);
+    if (!resident) {
+        pt_fail(&device->handle, PATINA_ERROR_MEMORY, "a cloud's or mesh's place on the device: out of memory");
+        return NULL;
+    }
+    resident->alive = alive;
+    atomic_fetch_add(&alive->references, 1);
+    return resident;
+}
+
+// Takes it in, or destroys it where uploading failed.
+static int end(struct pt_residency *residency, struct patina_device *device, struct pt_resident *resident, int error,
+               struct pt_resident **out)
+{
     if (error) {
         destroy(resident, device);
         return error;
     }
     resident->next = residency->first;
-    residency->first = resident;
-    *out = resident;
+    *out = residency->first = resident;
     return PATINA_OK;
+}
+
+int pt_residency_take(struct pt_residency *residency, struct patina_device *device, const struct patina_cloud *cloud,
+                      struct pt_resident **out)
+{
+    struct pt_resident *resident = *out = find(residency, device, cloud->alive);
+    if (resident)
+        return resident->colors == atomic_load(&cloud->alive->colors) ? PATINA_OK : upload_colors(device, cloud, resident);
+    resident = begin(device, cloud->alive);
+    return resident ? end(residency, device, resident, upload(device, cloud, resident), out) : PATINA_ERROR_MEMORY;
+}
+
+int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
+                           struct pt_resident **out)
+{
+    struct pt_resident *resident = *out = find(residency, device, mesh->alive);
+    if (resident)
+        return PATINA_OK;
+    if (!(resident = begin(device, mesh->alive)))
+        return PATINA_ERROR_MEMORY;
+    int error = device->ops->buffer_create(device, mesh->info.vertex_count * mesh->stride * sizeof *mesh->vertices,
+                                           mesh->vertices, 1, &resident->buffers[PT_MESH_VERTICES]);
+    if (!error)
+        error = device->ops->buffer_create(device, 3 * mesh->info.triangle_count * sizeof *mesh->indices, mesh->indices, 1,
+                                           &resident->buffers[PT_MESH_INDICES]);
+    return end(residency, device, resident, error, out);
 }
 
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which clouds lie on a device. A CPU device borrows the cloud's memory, a GL device holds a copy until the cloud dies.
+// Which clouds and meshes lie on a device. A CPU device borrows the cloud's memory, a GL device holds a copy until the cloud dies.
 #ifndef PT_RESIDENCY_H
 #define PT_RESIDENCY_H
 
@@ -9,12 +9,15 @@ struct pt_resident {
     struct pt_resident *next;
     struct pt_alive *alive;
     uint32_t colors; // the state of alive->colors that the buffers hold
-    struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer; PT_CHUNKS is unused
+    struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh by pt_mesh_buffer; PT_CHUNKS is unused
 };
 
 // The cloud's buffers on the device, uploaded at the first call; forgets dead clouds on the way.
 int pt_residency_take(struct pt_residency *residency, struct patina_device *device, const struct patina_cloud *cloud,
                       struct pt_resident **out);
+// Likewise of a mesh.
+int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
+                           struct pt_resident **out);
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device);
 
 #endif

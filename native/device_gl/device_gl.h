@@ -115,7 +115,9 @@ int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t 
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 
-// scatter.c, fill.c, pixels.c: kernels of several dispatches. The filters find their buffers bound and tiles listed.
+// raster.c, scatter.c, fill.c, pixels.c: kernels of several dispatches. The filters find their buffers bound and tiles listed.
+int pt_gl_raster(struct pt_gl_device *d, const struct raster_args *args, size_t argument_size,
+                 struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel);
 int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
                   uint32_t count, const atomic_int *cancel);
 int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,

@@ -176,7 +176,7 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
         return run_over(d, kernel, 0, "", view->rect[2] - (view->rect[0] >> PT_TILE_LEVEL << PT_TILE_LEVEL),
                         view->rect[3] - (view->rect[1] >> PT_TILE_LEVEL << PT_TILE_LEVEL));
     default:
-        pt_gl_tiles_forget(d); // pull writes keys
+        pt_gl_tiles_forget(d); // pull and cover write keys
         return run_over(d, kernel, 0, "", view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);
     }
 }
@@ -193,6 +193,8 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
         pt_gl_tiles_forget(d);
         return pt_gl_scatter(d, arguments, buffers, count, cancel);
     }
+    if (kernel == PT_KERNEL_raster)
+        return pt_gl_raster(d, arguments, argument_size, buffers, count, cancel);
     if (kernel == PT_KERNEL_lit)
         return pt_gl_lit(d, argument_size, buffers, count, cancel);
     int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_extract;

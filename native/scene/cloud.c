@@ -11,12 +11,12 @@
 
 // ---- reading the caller's arrays ---------------------------------------------------------------------------------
 
-static const uint8_t *element(const patina_array *array, uint64_t index) // stride was made explicit by check_array
+static const uint8_t *element(const patina_array *array, uint64_t index) // stride was made explicit by pt_check_array
 {
     return (const uint8_t *)array->data + index * array->stride;
 }
 
-static void read_vector(const patina_array *array, uint64_t index, double v[3])
+void pt_read_vector(const patina_array *array, uint64_t index, double v[3])
 {
     if (array->type == PATINA_FLOAT64) {
         memcpy(v, element(array, index), 3 * sizeof *v);
@@ -33,7 +33,7 @@ static int finite3(const double v[3]) { return isfinite(v[0]) && isfinite(v[1]) 
 // A point's normal; 0 when it has none (zero or not finite).
 static int read_normal(const patina_array *array, uint64_t index, double n[3])
 {
-    read_vector(array, index, n);
+    pt_read_vector(array, index, n);
     return finite3(n) && (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0);
 }
 
@@ -89,7 +89,7 @@ enum { BLOCK_POINTS = 1 << 16, LEAST_POINTS = 16 };
 
 static void position(const struct build *build, uint64_t index, double p[3])
 {
-    read_vector(&build->desc.position, index, p);
+    pt_read_vector(&build->desc.position, index, p);
     for (int i = 0; i < 3; i++)
         p[i] += build->desc.origin[i];
 }
@@ -619,8 +619,8 @@ static size_t type_bytes(uint32_t type)
     return 0;
 }
 
-static int check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components,
-                       uint32_t most_components)
+int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components,
+                   uint32_t most_components)
 {
     if (!array->data)
         return PATINA_OK;
@@ -645,11 +645,11 @@ static int check_desc(patina_cloud_desc *desc)
                        (unsigned long long)desc->count);
     if (!finite3(desc->origin))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "origin: not finite");
-    if ((error = check_array(&desc->position, "position", floats, 3, 3)) ||
-        (error = check_array(&desc->normal, "normal", floats, 3, 3)) ||
-        (error = check_array(&desc->opacity, "opacity", floats | 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1)))
+    if ((error = pt_check_array(&desc->position, "position", floats, 3, 3)) ||
+        (error = pt_check_array(&desc->normal, "normal", floats, 3, 3)) ||
+        (error = pt_check_array(&desc->opacity, "opacity", floats | 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1)))
         return error;
-    return check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 3, 4);
+    return pt_check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 3, 4);
 }
 
 static enum pt_color_format color_format(const patina_array *color)
@@ -746,7 +746,7 @@ int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_colors: bad arguments");
     struct build build = { .cloud = cloud, .desc = { .count = cloud->info.count, .color = *color } };
     const uint32_t types = 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32;
-    int error = check_array(&build.desc.color, "color", types, 3, 4);
+    int error = pt_check_array(&build.desc.color, "color", types, 3, 4);
     if (error)
         return pt_fail_again(&cloud->handle, error);
     error = replace_colors(&build);

@@ -69,6 +69,11 @@ uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);
 
 void pt_alive_release(struct pt_alive *alive);
 
+// Caller's arrays. Checks type (types: bits) and components, and makes the stride explicit; no data is fine.
+int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components, uint32_t most_components);
+// Three components of FLOAT32 or FLOAT64.
+void pt_read_vector(const patina_array *array, uint64_t index, double v[3]);
+
 // Sorts (code << 32 | id) words by their upper 30 bits; scratch has room for as many. The result is in words.
 int pt_morton_sort(struct pt_pool *pool, uint64_t *words, uint64_t *scratch, uint32_t count);
 // 30-bit Morton code of integer coordinates 0..1023.

@@ -41,6 +41,7 @@ void patina_scene_destroy(patina_scene *scene)
         return;
     free(scene->instances);
     free(scene->lights);
+    free(scene->meshes);
     pt_handle_destroy(&scene->handle);
     free(scene);
 }
@@ -49,8 +50,8 @@ int patina_scene_clear(patina_scene *scene)
 {
     if (!scene)
         return fail(NULL, "patina_scene_clear: scene is NULL");
-    scene->instance_count = scene->light_count = 0;
-    scene->points = 0;
+    scene->instance_count = scene->light_count = scene->mesh_count = 0;
+    scene->points = scene->triangles = 0;
     return PATINA_OK;
 }
 
@@ -66,13 +67,34 @@ static void *grow(void *array, uint32_t count, uint32_t *room, size_t size)
     return grown;
 }
 
-static int check_style(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
+// All zero becomes the identity.
+static int check_matrix(double matrix[16])
 {
     static const double zero[16];
+    if (!memcmp(matrix, zero, sizeof zero))
+        memcpy(matrix, identity, sizeof identity);
+    return all_finite(matrix, 16);
+}
+
+static void default_grey(float color[3])
+{
+    if (color[0] == 0.0f && color[1] == 0.0f && color[2] == 0.0f)
+        color[0] = color[1] = color[2] = 0.8f;
+}
+
+static int too_many(const patina_scene *scene, uint64_t more)
+{
+    if (scene->points + scene->triangles + more <= 0xFFFFFFFEull)
+        return PATINA_OK;
+    return pt_fail(&scene->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                   "the scene would hold %llu points and triangles with this instance; ids end at 4294967294",
+                   (unsigned long long)(scene->points + scene->triangles + more));
+}
+
+static int check_style(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
+{
     const float *c = style->color;
-    if (!memcmp(style->world_from_object, zero, sizeof zero))
-        memcpy(style->world_from_object, identity, sizeof identity);
-    if (!all_finite(style->world_from_object, 16))
+    if (!check_matrix(style->world_from_object))
         return fail(scene, "cloud style: world_from_object is not finite");
     if (!(style->d_min >= 0.0f) || !isfinite(style->d_min))
         return fail(scene, "cloud style: d_min must be 0 or more");
@@ -85,8 +107,7 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: colour and Phong factors must be finite");
     if (style->lighting == PATINA_LIGHTING_AUTO)
         style->lighting = cloud->info.has_colors ? PATINA_LIGHTING_UNLIT : PATINA_LIGHTING_LIT;
-    if (c[0] == 0.0f && c[1] == 0.0f && c[2] == 0.0f)
-        style->color[0] = style->color[1] = style->color[2] = 0.8f;
+    default_grey(style->color);
     if (style->ambient == 0.0f && style->diffuse == 0.0f && style->specular == 0.0f)
         style->ambient = style->diffuse = 1.0f;
     if (!(style->transparency >= 0.0f) || !(style->transparency <= 1.0f))
@@ -107,12 +128,8 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     if (style)
         checked = *style;
     int error = check_style(scene, &checked, cloud);
-    if (error)
+    if (error || (error = too_many(scene, cloud->info.count)))
         return error;
-    if (scene->points + cloud->info.count > 0xFFFFFFFEull)
-        return pt_fail(&scene->handle, PATINA_ERROR_TOO_MANY_POINTS,
-                       "the scene would hold %llu points with this instance; ids end at 4294967294",
-                       (unsigned long long)(scene->points + cloud->info.count));
     void *grown = grow(scene->instances, scene->instance_count, &scene->instance_room, sizeof *scene->instances);
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->instance_count);
@@ -120,6 +137,34 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     scene->instances[scene->instance_count++] =
         (struct pt_instance){ .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points };
     scene->points += cloud->info.count;
+    return PATINA_OK;
+}
+
+int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const patina_mesh_style *style)
+{
+    patina_mesh_style checked = { .struct_size = sizeof checked };
+    if (!scene || !mesh || mesh->handle.magic != PT_MAGIC)
+        return fail(scene, "patina_scene_add_mesh: scene or mesh is NULL or destroyed");
+    if (style && style->struct_size != sizeof *style)
+        return fail(scene, "patina_scene_add_mesh: style->struct_size is wrong");
+    if (style)
+        checked = *style;
+    if (!check_matrix(checked.world_from_object))
+        return fail(scene, "mesh style: world_from_object is not finite");
+    if (!isfinite(checked.color[0] + checked.color[1] + checked.color[2]))
+        return fail(scene, "mesh style: colour must be finite");
+    if (checked.shadow_off & ~(uint32_t)(PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE))
+        return fail(scene, "mesh style: shadow_off has unknown bits");
+    default_grey(checked.color);
+    int error = too_many(scene, mesh->info.triangle_count);
+    if (error)
+        return error;
+    void *grown = grow(scene->meshes, scene->mesh_count, &scene->mesh_room, sizeof *scene->meshes);
+    if (!grown)
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for mesh %u", scene->mesh_count);
+    scene->meshes = grown;
+    scene->meshes[scene->mesh_count++] = (struct pt_mesh_instance){ .mesh = mesh, .style = checked };
+    scene->triangles += mesh->info.triangle_count;
     return PATINA_OK;
 }
 
@@ -240,26 +285,34 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
 
 // ---- a camera that frames the scene -----------------------------------------------------------------------------------
 
-// Calls back with the eight world-space corners of every chunk's box: closer to the points than the cloud's own box.
+// Calls back with the eight world-space corners of every chunk's box, closer to the points than the cloud's own, and of every
+// mesh's box.
 typedef void corner_work(void *context, const double corner[3]);
+
+static void box_corners(const struct pt_chunk *box, const double matrix[16], corner_work *work, void *context)
+{
+    double linear[9], translation[3], p[3], q[3];
+    pt_split_matrix(matrix, linear, translation);
+    for (int corner = 0; corner < 8; corner++) {
+        for (int k = 0; k < 3; k++)
+            p[k] = box->origin[k] + (double)(corner >> k & 1 ? box->box_max[k] : box->box_min[k]);
+        pt_apply(linear, p, q);
+        for (int k = 0; k < 3; k++)
+            q[k] += translation[k];
+        work(context, q);
+    }
+}
 
 static void each_corner(const patina_scene *scene, corner_work *work, void *context)
 {
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const patina_cloud *cloud = scene->instances[i].cloud;
-        double linear[9], translation[3], p[3], q[3];
-        pt_split_matrix(scene->instances[i].style.world_from_object, linear, translation);
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
-            for (int corner = 0; corner < 8; corner++) {
-                const struct pt_chunk *chunk = &cloud->chunks[c];
-                for (int k = 0; k < 3; k++)
-                    p[k] = chunk->origin[k] + (double)(corner >> k & 1 ? chunk->box_max[k] : chunk->box_min[k]);
-                pt_apply(linear, p, q);
-                for (int k = 0; k < 3; k++)
-                    q[k] += translation[k];
-                work(context, q);
-            }
+            box_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
     }
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        if (pt_mesh_drawn(scene->meshes[i].mesh))
+            box_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
 }
 
 struct framing {

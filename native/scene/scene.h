@@ -4,11 +4,17 @@
 #define PT_SCENE_H
 
 #include "cloud.h"
+#include "mesh.h"
 
 struct pt_instance {
     const struct patina_cloud *cloud;
     patina_cloud_style style; // defaults made explicit
     uint32_t id_base;
+};
+
+struct pt_mesh_instance {
+    const struct patina_mesh *mesh;
+    patina_mesh_style style; // defaults made explicit
 };
 
 struct patina_scene {
@@ -17,6 +23,9 @@ struct patina_scene {
     uint32_t instance_count, instance_room;
     patina_light_desc *lights;
     uint32_t light_count, light_room;
+    struct pt_mesh_instance *meshes;
+    uint32_t mesh_count, mesh_room;
+    uint64_t triangles; // of all meshes
     uint64_t points; // of all instances
     patina_camera camera;
     int has_camera;

@@ -27,6 +27,7 @@ static const char usage[] =
     "  --cull                             leave out points that face away\n"
     "  --error E                          picks quality and fill: colour error at most E of white, if it can be had\n"
     "  --opacity X[,X...]                 0 to 1, of each FILE; the last counts for those behind it\n"
+    "  --mesh FILE.obj                    triangles among the points, in grey; may be repeated\n"
     "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
     "  --edl STRENGTH[,RADIUS]            eye-dome lighting (1 = well seen), neighbours RADIUS pixels away (1.4)\n"
     "  --background R,G,B                 linear; also the ambient light, unless told\n"

@@ -227,6 +227,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_error(value, &s->error_target);
     else if (!strcmp(name, "--opacity"))
         bad = parse_opacity(value, o);
+    else if (!strcmp(name, "--mesh"))
+        bad = !*value || o->mesh_count == TOOL_MESHES || !(o->meshes[o->mesh_count++] = value);
     else if (!strcmp(name, "--layers"))
         bad = parse_count(value, 0, PATINA_MAX_LAYERS, &s->layers);
     else if (!strcmp(name, "--background"))
@@ -293,7 +295,7 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     options->settings.shadow_lazy = 1; // a picture has no use for whole textures, and measured frames are to compute theirs
     if ((options->save_shadows || options->load_shadows) && !options->shadows)
         return tool_misuse("--save-shadows and --load-shadows need --shadows");
-    if (!options->file_count)
+    if (!options->file_count && !options->mesh_count)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)
         return tool_misuse("render: nothing to do; name the picture with -o OUT.png");

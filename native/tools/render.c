@@ -14,6 +14,7 @@ struct job {
     patina_device_info device_info;
     patina_progress *progress;
     patina_cloud **clouds; // options.file_count
+    patina_mesh *meshes[TOOL_MESHES];
     patina_scene *scene;
     patina_frame *frame;
     struct tool_box box;
@@ -35,6 +36,8 @@ static void destroy(struct job *job)
     patina_scene_destroy(job->scene);
     for (int i = 0; job->clouds && i < job->options.file_count; i++)
         patina_cloud_destroy(job->clouds[i]);
+    for (int i = 0; i < job->options.mesh_count; i++)
+        patina_mesh_destroy(job->meshes[i]);
     free(job->clouds);
     patina_progress_destroy(job->progress);
     patina_device_destroy(job->device);
@@ -55,21 +58,36 @@ static int open_device(struct job *job)
     return code ? tool_failed("device", job->device, code) : TOOL_OK;
 }
 
-static void grow_box(struct tool_box *box, const patina_cloud_info *info)
+// By a box of its contents; empty ones have min > max.
+static void grow_box(struct tool_box *box, const double low[3], const double high[3])
 {
-    if (!info->drawn)
-        return;
-    for (int i = 0; i < 3; i++) {
-        box->min[i] = fmin(box->min[i], info->box_min[i]);
-        box->max[i] = fmax(box->max[i], info->box_max[i]);
+    for (int i = 0; i < 3 && low[0] <= high[0]; i++) {
+        box->min[i] = fmin(box->min[i], low[i]);
+        box->max[i] = fmax(box->max[i], high[i]);
     }
+}
+
+static int load_meshes(struct job *job)
+{
+    for (int i = 0; i < job->options.mesh_count; i++) {
+        patina_mesh_info info = {.struct_size = sizeof info};
+        int code = tool_load_mesh(job->options.meshes[i], &job->meshes[i]);
+        if (!code)
+            code = patina_mesh_get_info(job->meshes[i], &info);
+        if (!code)
+            code = patina_scene_add_mesh(job->scene, job->meshes[i], NULL);
+        if (code)
+            return tool_failed(job->options.meshes[i], NULL, code);
+        grow_box(&job->box, info.box_min, info.box_max);
+    }
+    return TOOL_OK;
 }
 
 static int load_clouds(struct job *job)
 {
     const struct tool_options *options = &job->options;
     job->box = (struct tool_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    job->clouds = calloc((size_t)options->file_count, sizeof *job->clouds);
+    job->clouds = calloc((size_t)options->file_count + 1, sizeof *job->clouds);
     int code = job->clouds ? patina_progress_create(&job->progress) : PATINA_ERROR_MEMORY;
     if (!code)
         code = patina_scene_create(&job->scene);
@@ -86,14 +104,14 @@ static int load_clouds(struct job *job)
             code = patina_cloud_get_info(job->clouds[i], &info);
         if (code)
             return tool_failed(options->files[i], NULL, code);
-        grow_box(&job->box, &info);
+        grow_box(&job->box, info.box_min, info.box_max);
         if (options->opacity_count)
             style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);
         code = patina_scene_add_cloud(job->scene, job->clouds[i], &style);
         if (code)
             return tool_failed(options->files[i], job->scene, code);
     }
-    return TOOL_OK;
+    return load_meshes(job);
 }
 
 static int set_view(struct job *job, double turn, patina_camera *camera)

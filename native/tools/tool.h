@@ -34,7 +34,7 @@ int tool_cancelled(void);
 
 enum tool_view { VIEW_ANGLES, VIEW_LOOK };
 
-enum { TOOL_OPACITIES = 64 };
+enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64 };
 
 struct tool_options {
     char **files; // into the argument vector
@@ -49,6 +49,8 @@ struct tool_options {
     uint32_t lighting;              // patina_lighting
     double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
     int opacity_count;              // 0: all opaque
+    const char *meshes[TOOL_MESHES]; // OBJ files
+    int mesh_count;
     int cull, transparent, shadows, sun, json, dump_plan, verbose;
     float ambient[3];
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter

@@ -15,4 +15,7 @@ int tool_camera(const struct tool_options *options, const patina_scene *scene, c
 // A sun over the left shoulder of that camera and a weak one from the right. Returns a patina_error.
 int tool_lights(patina_scene *scene, const struct tool_options *options, const patina_camera *camera);
 
+// Positions and faces of an OBJ file. A PATINA_ERROR code; says where a line is wrong.
+int tool_load_mesh(const char *path, patina_mesh **out);
+
 #endif

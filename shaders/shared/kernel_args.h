@@ -34,6 +34,14 @@
 // again. Chunks of 4096 points are 30 to 70 pixels wide at a point a pixel.
 #define PT_TILE_LEVEL 4
 
+// Meshes: screen positions are rounded to 1 / 2^PT_MESH_BITS of a pixel, so that edges are decided in integers, exactly.
+// Triangles are cut off PT_MESH_REACH pixels from the picture's corner: positions then fit 32 bits.
+#define PT_MESH_BITS 8
+#define PT_MESH_UNIT 256.0f
+#define PT_MESH_REACH 1048576.0f
+#define PT_MESH_FARTHEST 1e18f // triangles with a greater coordinate, or none that is a number, are left out
+#define PT_MESH_CORNERS 8 // of a triangle that five planes cut
+
 #define PT_SPACINGS 64
 #define PT_MAX_LIGHTS 32
 #define PT_AREA_POINTS 16 // of an area light, where shading gathers its light
@@ -79,6 +87,34 @@ struct scatter_args {
     struct view_args view;
     uint32_t instances;
     uint32_t behind; // 1: the limit plane holds
+};
+
+// A mesh as this view sees it. Its vertices are projected as a chunk's points are.
+struct mesh_args {
+    float row[9], hi[3], lo[3]; // as in chunk_view
+    uint32_t id_base, id_count; // ids of its triangles: [id_base, id_base + id_count)
+    uint32_t stride;            // floats a vertex: position 3, normal 3 (with has_normals), colour 3 (with has_colors)
+    uint32_t has_normals, has_colors;
+    float color[3];             // without colours
+    float normal_matrix[9];     // object normal -> view space, not yet unit
+};
+
+// raster: triangles -> least key a pixel, of pixels whose centre they cover. A centre on an edge belongs to the triangle on one
+// side of it: the one whose edge goes down, or left where it is level. Depth: the triangle's plane, within its corners' depths.
+struct raster_args {
+    struct view_args view;
+    struct mesh_args mesh;
+    uint32_t behind; // 1: only what lies beyond the limit plane counts
+};
+
+// cover: pixels where the mesh lies before what the keys show, or where that is not beyond the limit, show the mesh. d_eff is a
+// pixel's footprint on the triangle. The normal plane keeps the normal of a point that was measured there: pixels may have been
+// filled from it.
+struct cover_args {
+    struct view_args view;
+    struct mesh_args mesh;
+    uint32_t behind; // 1: the limit plane holds
+    uint32_t shown;  // 1: the last three planes are written
 };
 
 // What the per-instance kernels (normals, surface, shade) know of an instance of a cloud.

@@ -89,6 +89,16 @@ struct ref_place {
 struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
                            uint32_t slot);
 
+// ---- raster.c -------------------------------------------------------------------------------------------------------
+
+// A triangle at the centre of the pixel (x, y).
+struct ref_hit {
+    int possible, definite; // definite: covers it, whatever the rounding
+    struct ref_range z;
+};
+struct ref_hit ref_raster(const struct view_args *view, const struct mesh_args *mesh, const float *vertices,
+                          const uint32_t *indices, uint32_t triangle, int x, int y);
+
 // ---- one pixel of a filter --------------------------------------------------------------------------------------------
 
 // Planes of the view's size; a filter reads those that kernels.def lists.
@@ -125,6 +135,17 @@ struct ref_surface {
     uint32_t from;
 };
 struct ref_surface ref_surface(const struct surface_args *args, const struct ref_planes *planes, int x, int y);
+
+// What a pixel shows of a triangle.
+struct ref_cover {
+    struct ref_vec n, smooth; // view space, unit: of its plane, and between its corners
+    double plane_error, smooth_error;
+    double inverse, inverse_error, deff, deff_error;
+    double albedo[3], albedo_error;
+    int front; // the mesh is shown
+};
+struct ref_cover ref_cover(const struct cover_args *args, const float *vertices, const uint32_t *indices, uint64_t key,
+                           uint64_t mesh_key, float limit, int x, int y);
 
 void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y,
               uint64_t *key, uint32_t *from);

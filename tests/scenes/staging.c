@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "staging.h"
 
+#include "meshes.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -52,6 +54,11 @@ const struct staging stagings[] = {
      {0.0f, 0, 4, LAYER_PASSES}},
     {"large, transparent", 1024, 768, 400000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0,
      {0.5f, 0, 6, 0}},
+    {"meshes", 203, 151, 20000, POINTS_ALL, STAGE_MESHES, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"meshes, orthographic, sparse points", 203, 151, 3000, POINTS_COLORS, STAGE_MESHES, 1, 0, LIT, REFINED, CLOSED, 0, 0, 1,
+     0, OPAQUE},
+    {"meshes and transparent points", 203, 151, 20000, POINTS_ALL, STAGE_MESHES, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0,
+     {0.5f, 0, 6, LAYER_PASSES}},
 };
 const uint32_t staging_count = sizeof stagings / sizeof stagings[0];
 
@@ -151,6 +158,13 @@ struct stage stage_build(const struct staging *staging)
         add(&stage, staging, point, 0.9f);
         add(&stage, staging, far_off, 0.5f);
     }
+    if (staging->objects == STAGE_MESHES) {
+        const double hub[3] = {0.1, 0.0, 0.1}, ball[3] = {0.9, 0.3, 0.1}, half[3] = {0.15, 1.3, 0.2};
+        stage.meshes[0] = mesh_box(hub, half);
+        stage.meshes[1] = mesh_sphere(ball, 0.45, 40, 1);
+        mesh_add(stage.scene, stage.meshes[0], 0.7f, 0.3f, 0.1f);
+        mesh_add(stage.scene, stage.meshes[1], 0.1f, 0.6f, 0.3f);
+    }
     add_lights(stage.scene);
 
     const double eye[3] = {0.3, -2.7, 2.3}, target[3] = {0.0, 0.0, 0.0};
@@ -175,5 +189,7 @@ void stage_free(struct stage *stage)
 {
     patina_scene_destroy(stage->scene);
     patina_cloud_destroy(stage->cloud);
+    for (int i = 0; i < 2; i++)
+        patina_mesh_destroy(stage->meshes[i]);
     *stage = (struct stage){0};
 }

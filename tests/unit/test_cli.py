@@ -235,6 +235,22 @@ def test_opacity_of_each_file():
     assert stats["layers"] == 2, stats
 
 
+def test_a_mesh_hides_and_is_hidden():
+    wall("behind.ply", lambda x, z: (0, 255, 0), y=1.0)
+    wall("before.ply", lambda x, z: (0, 0, 255), y=-1.0)
+    (FOLDER / "square.obj").write_text("v -0.5 0 -0.5\nv 0.5 0 -0.5\nv 0.5 0 0.5\nv -0.5 0 0.5\nvn 0 1 0\nf 1//1 2//1 3//1 -1//1\n")
+    view = ("--size", "64x64", "--ortho", "4", "--look", "0,-5,0,0,0,0")
+    for cloud, middle in (("behind.ply", "mesh"), ("before.ply", "points")):
+        run("render", cloud, "--mesh", "square.obj", "-o", "mesh.png", *view)
+        rows = read_png("mesh.png")[3]
+        r, g, b = rows[32][32]
+        assert (max(r, g, b) - min(r, g, b) <= 1 and r > 20) if middle == "mesh" else (r, g, b) == (0, 0, 255), (cloud, rows[32][32])
+        assert rows[32][20] == ((0, 255, 0) if middle == "mesh" else (0, 0, 255)), (cloud, rows[32][20])
+    run("render", "--mesh", "square.obj", "-o", "mesh.png", *view)  # no points at all
+    (FOLDER / "bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    assert "line 2" in run("render", "--mesh", "bad.obj", "-o", "mesh.png", code=1).stderr
+
+
 def test_background():
     ball("background.ply", 500)
     run("render", "background.ply", "-o", "background.png", "--size", "32x32", "--background", "1,0.2140411,0")

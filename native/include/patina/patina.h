@@ -73,6 +73,7 @@ enum patina_error {
 
 typedef struct patina_device patina_device;
 typedef struct patina_cloud patina_cloud;
+typedef struct patina_mesh patina_mesh;
 typedef struct patina_scene patina_scene;
 typedef struct patina_frame patina_frame;
 typedef struct patina_file patina_file;
@@ -190,6 +191,32 @@ PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
 
+// ---- mesh: triangles that stand among the points ----------------------------------------------------------------
+
+typedef struct patina_mesh_desc {
+    size_t struct_size;
+    uint64_t vertex_count;
+    patina_array position;   // 3 x FLOAT32 or FLOAT64, object units. A triangle with a NaN/Inf corner is not drawn
+    patina_array normal;     // 3 x FLOAT32/FLOAT64, any length, of every vertex, shared out over the triangle. Optional: without
+                             // it, and where it comes to zero, triangles are lit flat
+    patina_array color;      // 3 or 4 x FLOAT32, linear, of every vertex, shared out likewise. Optional; else the style's
+    uint64_t triangle_count;
+    const uint32_t *indices; // three a triangle, below vertex_count; NULL: vertices 0 1 2, 3 4 5, ...
+} patina_mesh_desc;
+
+typedef struct patina_mesh_info {
+    size_t struct_size;
+    uint64_t vertex_count, triangle_count;
+    uint64_t bytes;                // of memory held
+    double box_min[3], box_max[3]; // over the vertices that are finite; none: min > max
+} patina_mesh_info;
+
+// A mesh of at most 2^27 vertices and 2^29 triangles. Immutable; used in scenes as a cloud is. Vertices are kept as float32
+// around the middle of their box.
+PATINA_API int patina_mesh_create(const patina_mesh_desc *desc, patina_mesh **out);
+PATINA_API void patina_mesh_destroy(patina_mesh *mesh);
+PATINA_API int patina_mesh_get_info(const patina_mesh *mesh, patina_mesh_info *info);
+
 // ---- files -----------------------------------------------------------------------------------------------------
 
 typedef struct patina_file_info {
@@ -255,6 +282,13 @@ typedef struct patina_cloud_style {
                                   // is as much lighter, by this number alone
     uint32_t shadow_off;          // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
 } patina_cloud_style;
+
+typedef struct patina_mesh_style {
+    size_t struct_size;
+    double world_from_object[16]; // row-major; all zero = identity
+    float color[3];               // linear, of meshes without colours; all zero = 0.8 grey (for black use 1e-20)
+    uint32_t shadow_off;          // bits of patina_shadow_off: NO_CAST, NO_RECEIVE
+} patina_mesh_style;
 
 enum patina_light_type { PATINA_LIGHT_SUN = 1, PATINA_LIGHT_POINT = 2, PATINA_LIGHT_SPOT = 3, PATINA_LIGHT_AREA = 4 };
 enum patina_area_shape { PATINA_AREA_RECTANGLE = 0, PATINA_AREA_ELLIPSE = 1 };
@@ -334,10 +368,14 @@ typedef struct patina_effects {
 
 PATINA_API int patina_scene_create(patina_scene **out);
 PATINA_API void patina_scene_destroy(patina_scene *scene); // clouds stay
-PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds and lights
+PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds, meshes and lights
 // The cloud must outlive the scene or the next patina_scene_clear. Instances get ids in order of adding: the base
 // of instance i is the sum of the counts before it.
 PATINA_API int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style);
+// A mesh is opaque, seen from both sides, lit by all lights (ambient and diffuse), takes part in every pass, and hides and
+// shadows points, as points hide and shadow it. It is drawn exactly: neither filled nor grown. In keys, ids of triangles follow
+// those of all clouds' points, meshes in order of adding. The mesh must outlive the scene or the next patina_scene_clear.
+PATINA_API int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const patina_mesh_style *style);
 // At most 32 lights.
 PATINA_API int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light);
 PATINA_API int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera);
@@ -381,6 +419,7 @@ typedef struct patina_frame_stats {
     uint32_t width, height;     // of the passes (the region's)
     uint64_t points;            // in the scene
     uint64_t points_scattered;  // in chunks that were not culled
+    uint64_t triangles;         // of meshes in view
     uint64_t chunks, chunks_culled;
     double ms;                  // whole render call
     uint64_t plane_bytes;       // planes held by the frame, those of shadow maps too
