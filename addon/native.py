@@ -86,7 +86,8 @@ class _DeviceInfo(_Descriptor):
 
 class _CloudDesc(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", _Array), ("normal", _Array),
-                ("color", _Array), ("opacity", _Array), ("origin", c_double * 3), ("threads", c_uint32)]
+                ("color", _Array), ("opacity", _Array), ("origin", c_double * 3), ("threads", c_uint32),
+                ("radius", _Array)]
 
 
 class _CloudInfo(_Descriptor):
@@ -95,7 +96,7 @@ class _CloudInfo(_Descriptor):
                 ("spacing_min", c_double), ("spacing_max", c_double), ("invalid_positions", c_uint64),
                 ("invalid_normals", c_uint64), ("invalid_colors", c_uint64), ("has_normals", c_uint32),
                 ("has_colors", c_uint32), ("has_opacities", c_uint32), ("origin", c_double * 3),
-                ("layer_distance", c_double)]
+                ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float)]
 
 
 class _FileInfo(_Descriptor):
@@ -113,7 +114,7 @@ class _CloudStyle(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
                 ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float),
-                ("shadow_off", c_uint32)]
+                ("shadow_off", c_uint32), ("radius", c_float)]
 
 
 class _LightDesc(_Descriptor):
@@ -136,7 +137,7 @@ class _Settings(_Descriptor):
                 ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
                 ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
                 ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("own_background", c_uint32),
-                ("background", c_float * 3)]
+                ("background", c_float * 3), ("surface", c_uint32)]
 
 
 class _ExpectedError(Structure):
@@ -384,35 +385,39 @@ def _view(array: np.ndarray | None, count: int) -> _Array:
 
 
 def _describe(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
-              opacities: np.ndarray | None, threads: int = 0, origin: tuple[float, ...] = (0.0,) * 3) -> _CloudDesc:
+              opacities: np.ndarray | None, radii: np.ndarray | None, threads: int = 0,
+              origin: tuple[float, ...] = (0.0,) * 3) -> _CloudDesc:
     count = len(positions)
     return _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
-                      color=_view(colors, count), opacity=_view(opacities, count), threads=threads, origin=origin)
+                      color=_view(colors, count), opacity=_view(opacities, count), radius=_view(radii, count),
+                      threads=threads, origin=origin)
 
 
 def start_fingerprint(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
-                      opacities: np.ndarray | None) -> Task:
-    """A task that gives two numbers: of places, normals and opacities, and of colours."""
+                      opacities: np.ndarray | None, radii: np.ndarray | None = None) -> Task:
+    """A task that gives two numbers: of places, normals, opacities and radii, and of colours."""
     values = (c_uint64 * 2)()
-    return Task("fingerprint", byref(_describe(positions, normals, colors, opacities)), values,
-                keep=(positions, normals, colors, opacities, values), finish=lambda task: tuple(values))
+    return Task("fingerprint", byref(_describe(positions, normals, colors, opacities, radii)), values,
+                keep=(positions, normals, colors, opacities, radii, values), finish=lambda task: tuple(values))
 
 
 class Cloud(_Handle):
     """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None;
-    opacities (n, 1), floats 0 to 1, or None; origin is added to the positions, in float64."""
+    opacities (n, 1), floats 0 to 1, or None; origin is added to the positions, in float64; radii of discs (n, 1), floats,
+    or None."""
 
     _kind = "cloud"
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
                  progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None,
-                 origin: tuple[float, ...] = (0.0,) * 3) -> None:
-        super().__init__(byref(_describe(positions, normals, colors, opacities, threads, origin)), _handle_of(progress))
+                 origin: tuple[float, ...] = (0.0,) * 3, radii: np.ndarray | None = None) -> None:
+        super().__init__(byref(_describe(positions, normals, colors, opacities, radii, threads, origin)),
+                         _handle_of(progress))
         self._learn()
 
     @classmethod
     def start(cls, positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
-              opacities: np.ndarray | None, progress: Progress | None = None) -> Task:
+              opacities: np.ndarray | None, progress: Progress | None = None, radii: np.ndarray | None = None) -> Task:
         """A task that gives the cloud."""
         def take(task: Task) -> Cloud:
             cloud = cls.__new__(cls)
@@ -420,8 +425,8 @@ class Cloud(_Handle):
             cloud._learn()
             return cloud
 
-        return Task("build", byref(_describe(positions, normals, colors, opacities)), _handle_of(progress),
-                    keep=(positions, normals, colors, opacities, progress), finish=take)
+        return Task("build", byref(_describe(positions, normals, colors, opacities, radii)), _handle_of(progress),
+                    keep=(positions, normals, colors, opacities, radii, progress), finish=take)
 
     @classmethod
     def open(cls, path: Path) -> Cloud:

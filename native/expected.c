@@ -40,7 +40,7 @@ void pt_means_settings(enum pt_means means, uint32_t *quality, uint32_t *fill)
     *fill = table[means].fill;
 }
 
-const char *pt_means_name(enum pt_means means) { return table[means].name; }
+const char *pt_means_name(enum pt_means means) { return means == PT_MEANS_SPLATS ? "discs" : table[means].name; }
 
 static float between(float a, float b, double t) { return (float)((double)a + t * ((double)b - (double)a)); }
 

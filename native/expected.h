@@ -5,10 +5,10 @@
 
 #include "patina/patina.h"
 
-// How a surface is closed, cheapest first.
-enum pt_means { PT_MEANS_UNFILLED, PT_MEANS_PAPER, PT_MEANS_CLOSED, PT_MEANS_REFINED, PT_MEANS_COUNT };
+// How a surface is closed: the ways of filling, cheapest first, then discs.
+enum pt_means { PT_MEANS_UNFILLED, PT_MEANS_PAPER, PT_MEANS_CLOSED, PT_MEANS_REFINED, PT_MEANS_COUNT, PT_MEANS_SPLATS = PT_MEANS_COUNT };
 
-// What settings ask for, and the other way round.
+// What settings ask for of filling, and the other way round.
 enum pt_means pt_means_of(uint32_t quality, uint32_t fill);
 void pt_means_settings(enum pt_means means, uint32_t *quality, uint32_t *fill);
 const char *pt_means_name(enum pt_means means);

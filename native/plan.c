@@ -53,7 +53,7 @@ static void plan_scatter(struct pt_builder *builder)
                   args.instances);
 }
 
-static void plan_surface(struct pt_builder *builder, uint32_t i)
+void pt_plan_surface(struct pt_builder *builder, uint32_t i)
 {
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
@@ -218,11 +218,17 @@ static void plan_shade(struct pt_builder *builder, uint32_t i)
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
     uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u);
-    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals)
+    const int discs = plan->surface == PATINA_SURFACE_SPLATS; // blended already
+    if (discs) {
+        args.instance.color_format = PT_COLOR_OF_PLANE;
+        args.instance.has_opacities = plan->transparent != 0;
+    }
+    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && !discs)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0), pt_buffer_of(PT_COLORS, i), pt_shading_of(builder),
+                      pt_plane_at(PT_PLANE_DEFF, 0),
+                      discs ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(PT_COLORS, i), pt_shading_of(builder),
                       pt_plane_at(PT_PLANE_COLOR_A, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, i),
                       pt_plane_at(PT_PLANE_ARRIVED, 0)}),
               "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
@@ -298,7 +304,8 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .depth = passes >> PATINA_PASS_DEPTH & 1u,
                                 .normal = passes >> PATINA_PASS_NORMAL & 1u,
                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
-                                .shadow = plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u)};
+                                .shadow = plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
+                                .discs = plan->surface == PATINA_SURFACE_SPLATS ? (uint32_t)builder->scene->points : 0};
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
@@ -350,7 +357,8 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
     PT_REASON(PT_ADD(builder, extract, extract,
                      {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_SHADING, 0),
                       pt_plane_at(PT_PLANE_DEPTH, 0), pt_plane_at(PT_PLANE_NORMALS, 0), pt_plane_at(PT_PLANE_SOURCE, 0),
-                      pt_plane_at(PT_PLANE_ARRIVED, 0), pt_plane_at(PT_PLANE_SHADOW, 0)}),
+                      pt_plane_at(PT_PLANE_ARRIVED, 0), pt_plane_at(PT_PLANE_SHADOW, 0),
+                      pt_plane_at(extract.discs ? PT_PLANE_NORMAL : PT_PLANE_SHADING, 0)}),
               "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
               extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
@@ -398,7 +406,7 @@ static void plan_marks(struct pt_builder *builder)
     }
 }
 
-static const char *const of_points[] = {"scatter", "normals", "surface", "pull", "fill", "push"};
+static const char *const of_points[] = {"scatter", "splat", "normals", "surface", "blend", "pull", "fill", "push"};
 
 static void skip_all(struct pt_builder *builder, const char *reason, const char *const *names, size_t count)
 {
@@ -410,20 +418,30 @@ static void skip_all(struct pt_builder *builder, const char *reason, const char 
 static void plan_surfaces(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    int estimate = 0;
+    int estimate = 0, discs = plan->surface == PATINA_SURFACE_SPLATS;
     if (!plan->points_scattered) {
         skip_all(builder, "no cloud is in view", of_points, sizeof of_points / sizeof *of_points);
         return;
     }
-    plan_scatter(builder);
+    if (discs)
+        pt_plan_splat(builder);
+    else
+        plan_scatter(builder);
+    if (!discs) {
+        pt_skip(builder, "splat", "the settings ask for filling");
+        pt_skip(builder, "blend", "the settings ask for filling");
+    }
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count) {
-            plan_surface(builder, i);
+            pt_plan_surface(builder, i);
             estimate |= !plan->instances[i].args.has_normals;
         }
     if (!estimate)
         pt_skip(builder, "normals", "every cloud in view has normals");
-    plan_filling(builder);
+    if (discs)
+        pt_plan_blend(builder);
+    else
+        plan_filling(builder);
 }
 
 // Returns the plane that holds the layer's colour.
@@ -566,7 +584,8 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
          plan->crop[2], plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
     LINE("expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)\n",
          (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
-         (double)plan->expected.normal, pt_means_name(pt_means_of(plan->quality, plan->fill)));
+         (double)plan->expected.normal,
+         pt_means_name(plan->surface == PATINA_SURFACE_SPLATS ? PT_MEANS_SPLATS : pt_means_of(plan->quality, plan->fill)));
     LINE("points %llu, scattered %llu, chunks %llu, culled %llu\n", (unsigned long long)plan->points,
          (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
          (unsigned long long)plan->chunks_culled);

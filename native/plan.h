@@ -19,6 +19,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(DEFF, 4, 0)           \
     X(SHADING, 16, 0)       \
     X(ARRIVED, 4, 0)        \
+    X(ALBEDO, 16, 0)        \
     X(COLOR_A, 16, 0)       \
     X(COLOR_B, 16, 0)       \
     X(KEYS_BEHIND, 8, 0)    \
@@ -55,7 +56,7 @@ _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_S
 
 // Those from PT_MARKS on belong to the frame's shadows, not to the cloud.
 enum pt_instance_buffer {
-    PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS, PT_OPACITIES,
+    PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII,
     PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS
 };
 
@@ -107,6 +108,7 @@ struct pt_plan_light {
 struct pt_plan_instance {
     const struct pt_instance *instance;
     struct instance_args args;
+    float radius, radius_scale; // of discs, as disc_args has them
     struct chunk_view *chunks; // those in view
     struct pt_bounds *bounds;  // of each of them
     uint32_t chunk_count;
@@ -140,6 +142,7 @@ struct pt_plan {
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
+    uint32_t surface;       // as set
     uint32_t quality, fill; // as set, or as the error target chose them
     patina_expected_error expected;
     uint32_t layers;        // at most so many are peeled; 1: no peeling

@@ -71,6 +71,12 @@ void pt_plan_meshes(struct pt_builder *builder, int shown);
 void pt_plan_mesh_shade(struct pt_builder *builder);
 // plan.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
+// plan_splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
+void pt_plan_splat(struct pt_builder *builder);
+void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of every instance
+
+// plan.c: normal and layer distance of an instance's pixels.
+void pt_plan_surface(struct pt_builder *builder, uint32_t instance);
 
 // ---- views -------------------------------------------------------------------------------------------------------------
 

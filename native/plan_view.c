@@ -128,10 +128,23 @@ static void chunk_product(const struct camera *camera, const struct object *obje
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
 
-// Bounds on screen of the chunk's box, a pixel wider than exact, its middle depth and one that no point lies beyond; 0 when it
-// is outside the view.
+// The largest radius of the chunk's discs, world units; 0 where points stay pixels.
+static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
+                         const struct pt_chunk *chunk, double thinned)
+{
+    if (scene->settings.surface != PATINA_SURFACE_SPLATS)
+        return 0.0;
+    if (instance->style.radius > 0.0f)
+        return (double)instance->style.radius * thinned;
+    if (instance->cloud->info.has_radii)
+        return (double)instance->cloud->info.radius_most * object->scale * thinned;
+    return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
+}
+
+// Bounds on screen of the chunk's box and what lies within `reach` of it, a pixel wider than exact, its middle depth and one
+// that nothing lies beyond; 0 when it is outside the view.
 static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chunk, const double rows[9],
-                        const double translation[3], double rect[4], double *z_middle, double *z_beyond)
+                        const double translation[3], double reach, double rect[4], double *z_middle, double *z_beyond)
 {
     const double z_far = camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip;
     const double z_near = camera->orthographic ? 0.0 : camera->near_clip;
@@ -161,20 +174,26 @@ static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chun
     }
     slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
     *z_middle = 0.5 * (fmax(z_min, z_near) + fmax(z_max, z_near)); // of the part before the eye
-    *z_beyond = z_max + slop;
+    *z_beyond = z_max + slop + reach;
+    const double nearest_z = z_min - reach;
     if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
         return 0;
-    double nearest = camera->orthographic ? 1.0 : fmax(z_min, z_near) - error[2];
+    double nearest = camera->orthographic ? 1.0 : fmax(nearest_z, z_near) - error[2];
     for (int k = 0; k < 2; k++) {
         double far = fmax(fabs(rect[k]), fabs(rect[2 + k])), wider = INFINITY;
         if (camera->orthographic)
             wider = error[k];
         else if (nearest > 0.0)
             wider = (error[k] + far * error[2]) / nearest + far * 0x1p-20;
+        // sideways, and along the view at the rim's slope
+        double step = k ? camera->ys : camera->xs, start = k ? camera->bottom : camera->left;
+        double slope = fmax(fabs(start + step * rect[k]), fabs(start + step * rect[2 + k]));
+        if (reach > 0.0)
+            wider += camera->orthographic ? reach / step : reach * (1.0 + slope) / (step * fmax(nearest, 0.0));
         rect[k] -= wider;
         rect[2 + k] += wider;
     }
-    if (!camera->orthographic && z_min < z_near) { // corners behind the camera bound nothing
+    if (!camera->orthographic && nearest_z < z_near) { // corners behind the camera bound nothing
         rect[0] = rect[1] = 0.0;
         rect[2] = camera->width;
         rect[3] = camera->height;
@@ -297,7 +316,8 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         struct seen seen = { .chunk = c };
         double rows[9], translation[3], eye[4], z, beyond, angle = 0.0, spread = 0.0;
         chunk_product(camera, object, chunk, rows, translation);
-        if (!chunk_bounds(camera, chunk, rows, translation, seen.rect, &z, &beyond))
+        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, thinning(scene)), seen.rect,
+                          &z, &beyond))
             continue;
         chunk_eye(camera, object, chunk, eye);
         int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
@@ -378,8 +398,14 @@ static void choose_filling(const patina_settings *settings, struct pt_plan *plan
 {
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
+    plan->surface = settings->surface;
     plan->quality = settings->quality;
     plan->fill = settings->fill;
+    if (plan->surface == PATINA_SURFACE_SPLATS) {
+        plan->expected = pt_expected_error(PT_MEANS_SPLATS, s);
+        plan->levels = plan->iterations = 0;
+        return;
+    }
     if (settings->error_target > 0.0f)
         pt_means_settings(pt_means_for((double)settings->error_target, s), &plan->quality, &plan->fill);
     plan->expected = pt_expected_error(pt_means_of(plan->quality, plan->fill), s);
@@ -536,6 +562,8 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     const struct pt_instance *instance = &scene->instances[i];
     struct pt_plan_instance *out = &plan->instances[i];
     out->instance = instance;
+    out->radius = (float)fmin((double)instance->style.radius * thinning(scene), (double)PT_DISC_MOST);
+    out->radius_scale = (float)fmin(survey->objects[i].scale * thinning(scene), (double)PT_DISC_MOST);
     set_instance(&survey->camera, &survey->objects[i], instance, thinning(scene), &out->args);
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
@@ -547,7 +575,8 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         double rows[9], translation[3], bounds[4], z, beyond;
         uint32_t *rect = out->bounds[out->chunk_count].rect;
         chunk_product(&survey->camera, &survey->objects[i], chunk, rows, translation);
-        if (!chunk_bounds(&survey->camera, chunk, rows, translation, bounds, &z, &beyond) ||
+        double reach = disc_reach(scene, instance, &survey->objects[i], chunk, thinning(scene));
+        if (!chunk_bounds(&survey->camera, chunk, rows, translation, reach, bounds, &z, &beyond) ||
             !rect_in_window(&plan->view, bounds, rect))
             continue;
         uint32_t count = drawn_points(scene, chunk);

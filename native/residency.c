@@ -46,6 +46,7 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         { PT_IDS, cloud->ids, cloud->slots * 4 },
         { PT_SURFACE, cloud->surface, cloud->info.count * 4 },
         { PT_OPACITIES, cloud->opacities, cloud->info.count },
+        { PT_RADII, cloud->radii, cloud->info.count * 4 },
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         if (!parts[i].data)

@@ -9,7 +9,7 @@
 #include "glad/gl.h"
 
 enum {
-    PT_GL_VARIANTS = 24,      // programs of one kernel: its passes and special cases
+    PT_GL_VARIANTS = 32,      // programs of one kernel: its passes and special cases
     PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
     PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
     PT_GL_TEXTURES = 5,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl
@@ -29,6 +29,7 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
     PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
     PT_GL_SCRATCH_WOKEN,  // fill: tiles that the next step has to look at
+    PT_GL_SCRATCH_SUMS,   // blend: of the pixels of a band
     PT_GL_SCRATCH_TILES,  // what each tile holds
     PT_GL_SCRATCH_TILE_LISTS,
     PT_GL_SCRATCH_TILE_COUNTS,
@@ -120,6 +121,10 @@ int pt_gl_raster(struct pt_gl_device *d, const struct raster_args *args, size_t 
                  struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel);
 int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
                   uint32_t count, const atomic_int *cancel);
+int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt_buffer *const *buffers,
+                const atomic_int *cancel);
+int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt_buffer *const *buffers,
+                const atomic_int *cancel);
 int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
               const atomic_int *cancel);
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);

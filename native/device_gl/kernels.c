@@ -195,6 +195,12 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
     }
     if (kernel == PT_KERNEL_raster)
         return pt_gl_raster(d, arguments, argument_size, buffers, count, cancel);
+    if (kernel == PT_KERNEL_splat) {
+        pt_gl_tiles_forget(d);
+        return pt_gl_splat(d, arguments, buffers, cancel);
+    }
+    if (kernel == PT_KERNEL_blend)
+        return pt_gl_blend(d, arguments, buffers, cancel);
     if (kernel == PT_KERNEL_lit)
         return pt_gl_lit(d, argument_size, buffers, count, cancel);
     int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_extract;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
-// passes over all chunks of all instances (or one of 64 bits); lit: one instance.
+// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend: a pass a band of rows; lit: one instance.
 #include "device_gl.h"
 
 #include <stdlib.h>
@@ -99,23 +99,107 @@ static int run_instance(struct pt_gl_device *d, const struct instance_buffers *b
     return result;
 }
 
+// Of scatter and splat, by pass.
+static const char *const passes[] = {"#define PASS 0\n", "#define PASS 1\n", "#define PASS 2\n"};
+
 int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
                   uint32_t count, const atomic_int *cancel)
 {
-    static const char *const definitions[] = {"#define PASS 0\n", "#define PASS 1\n", "#define PASS 2\n"};
     uint32_t first = d->base.info.key64 ? 2 : 0, last = d->base.info.key64 ? 2 : 1;
     const struct pt_buffer *limit = args->behind ? buffers[1 + 4 * args->instances] : buffers[0]; // any stands in
     int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "scatter");
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 6, limit->name, 0, limit->size, "scatter");
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
-        result = pt_gl_kernel_program(d, PT_KERNEL_scatter, pass, definitions[pass]);
+        result = pt_gl_kernel_program(d, PT_KERNEL_scatter, pass, passes[pass]);
         for (uint32_t i = 0; i < args->instances && 4 * i + 4 < count && result == PATINA_OK; i++) {
             struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[4 * i + 1], buffers[4 * i + 2], buffers[4 * i + 3],
                                          buffers[4 * i + 4]};
             result = run_instance(d, &b, pass, cancel);
         }
     }
+    return result;
+}
+
+// ---- discs ---------------------------------------------------------------------------------------------------------------
+
+// All points of instance i, whose buffers start at buffers[0]: chunks, positions, ids, surface, radii and the rest up to `count`,
+// from binding 2 on.
+static int run_discs(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t pass, uint32_t i, struct pt_buffer *const *buffers,
+                     uint32_t count, const atomic_int *cancel)
+{
+    struct instance_buffers b = {kernel, 2, buffers[0], buffers[1], buffers[2], buffers[3]};
+    int result = PATINA_OK;
+    for (uint32_t k = 4; k < count && result == PATINA_OK; k++) {
+        int missing = !buffers[k] || !buffers[k]->name; // any stands in
+        result = pt_gl_bind(d, 2 + k, missing ? d->arguments : buffers[k]->name, 0,
+                            missing ? sizeof(struct splat_args) : buffers[k]->size, pt_kernel_names[kernel]);
+    }
+    d->gl.ProgramUniform1ui(d->programs[kernel][pass], 2, i);
+    return result == PATINA_OK ? run_instance(d, &b, pass, cancel) : result;
+}
+
+int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt_buffer *const *buffers,
+                const atomic_int *cancel)
+{
+    uint32_t first = d->base.info.key64 ? 2 : 0, last = d->base.info.key64 ? 2 : 1;
+    const struct pt_buffer *limit = args->behind ? buffers[1 + 5 * args->instances] : buffers[0]; // any stands in
+    int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "splat");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 7, limit->name, 0, limit->size, "splat");
+    for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
+        result = pt_gl_kernel_program(d, PT_KERNEL_splat, pass, passes[pass]);
+        for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
+            result = run_discs(d, PT_KERNEL_splat, pass, i, buffers + 1 + 5 * i, 5, cancel);
+    }
+    return result;
+}
+
+enum { ADD = 0, MEAN = 1, BAND_BYTES = 1 << 26, SUM_BYTES = 64 };
+
+static int blend_band(struct pt_gl_device *d, const struct blend_args *args, struct pt_buffer *const *buffers, uint32_t first,
+                      uint32_t end, const atomic_int *cancel)
+{
+    const struct pt_gl_scratch *sums = &d->scratch[PT_GL_SCRATCH_SUMS];
+    const uint32_t zero = 0, width = args->view.width;
+    int result = PATINA_OK;
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, sums->name);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)((size_t)(end - first) * width * SUM_BYTES),
+                             GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    for (uint32_t step = ADD; step <= MEAN; step++) {
+        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_blend][step], 3, (GLint)first);
+        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_blend][step], 4, (GLint)end);
+    }
+    for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
+        result = run_discs(d, PT_KERNEL_blend, ADD, i, buffers + 4 + 7 * i, 7, cancel);
+    return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_blend, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
+}
+
+int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt_buffer *const *buffers,
+                const atomic_int *cancel)
+{
+    const size_t most = d->block_size < BAND_BYTES ? d->block_size : BAND_BYTES;
+    const uint32_t width = args->view.width, height = args->view.height;
+    uint32_t rows = (uint32_t)(most / SUM_BYTES / width);
+    rows = rows < 1 ? 1 : rows < height ? rows : height;
+    int result = pt_gl_kernel_program(d, PT_KERNEL_blend, ADD, "#define STEP 0\n");
+    if (result == PATINA_OK)
+        result = pt_gl_kernel_program(d, PT_KERNEL_blend, MEAN, "#define STEP 1\n");
+    if (result == PATINA_OK)
+        result = pt_gl_scratch(d, PT_GL_SCRATCH_SUMS, (size_t)rows * width * SUM_BYTES, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 1, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, (size_t)rows * width * SUM_BYTES, "blend");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 9, buffers[2]->name, 0, buffers[2]->size, "blend");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 10, buffers[3]->name, 0, buffers[3]->size, "blend");
+    if (result == PATINA_OK)
+        result = pt_gl_bind_texture(d, 0, buffers[0]);
+    if (result == PATINA_OK)
+        result = pt_gl_bind_texture(d, 2, buffers[1]);
+    for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)
+        result = blend_band(d, args, buffers, y, y + rows < height ? y + rows : height, cancel);
     return result;
 }
 

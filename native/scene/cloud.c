@@ -37,6 +37,19 @@ static int read_normal(const patina_array *array, uint64_t index, double n[3])
     return finite3(n) && (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0);
 }
 
+// 0 or more and finite.
+static float read_radius(const patina_array *array, uint64_t index)
+{
+    float f;
+    double value;
+    memcpy(&f, element(array, index), sizeof f);
+    if (array->type == PATINA_FLOAT64) {
+        memcpy(&value, element(array, index), sizeof value);
+        f = (float)value;
+    }
+    return f > 0.0f ? fminf(f, PT_DISC_MOST) : 0.0f;
+}
+
 // In 1/255, rounded; what is not a number is opaque.
 static uint8_t read_opacity(const patina_array *array, uint64_t index)
 {
@@ -77,6 +90,7 @@ struct build {
     double box_min[3], box_max[3];
     struct block {
         uint32_t drawn, offset, translucent;
+        float radius_most;
         uint64_t invalid_positions, invalid_normals, invalid_colors;
         double box_min[3], box_max[3];
     } *blocks;
@@ -457,6 +471,10 @@ static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32
                 cloud->opacities[i] = read_opacity(&build->desc.opacity, i);
                 build->blocks[b].translucent |= cloud->opacities[i] < 255;
             }
+            if (cloud->radii) {
+                cloud->radii[i] = read_radius(&build->desc.radius, i);
+                build->blocks[b].radius_most = fmaxf(build->blocks[b].radius_most, cloud->radii[i]);
+            }
             if (build->desc.normal.data)
                 build->blocks[b].invalid_normals += !read_normal(&build->desc.normal, i, n);
             if (cloud->color_format == PT_COLOR_SRGB8) {
@@ -556,11 +574,12 @@ static int allocate(struct patina_cloud *cloud)
     cloud->surface = pt_pages_alloc(cloud->info.count * 4);
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
     cloud->opacities = cloud->info.has_opacities ? pt_pages_alloc(opacity_bytes(cloud)) : NULL;
+    cloud->radii = cloud->info.has_radii ? pt_pages_alloc(cloud->info.count * 4) : NULL;
     if (!cloud->positions || !cloud->ids || !cloud->surface || (cloud->color_format && !cloud->colors) ||
-        (cloud->info.has_opacities && !cloud->opacities))
+        (cloud->info.has_opacities && !cloud->opacities) || (cloud->info.has_radii && !cloud->radii))
         return PATINA_ERROR_MEMORY;
     cloud->info.bytes = cloud->slots * 16 + cloud->info.count * 4 + (cloud->colors ? color_bytes(cloud) : 0) +
-                        (cloud->opacities ? opacity_bytes(cloud) : 0) + cloud->chunk_count * sizeof *cloud->chunks;
+                        (cloud->opacities ? opacity_bytes(cloud) : 0) + (cloud->radii ? cloud->info.count * 4 : 0) + cloud->chunk_count * sizeof *cloud->chunks;
     return PATINA_OK;
 }
 
@@ -598,6 +617,7 @@ static int build_cloud(struct build *build)
     for (uint32_t b = 0; b < build->block_count; b++) {
         cloud->info.invalid_positions += build->blocks[b].invalid_positions;
         cloud->info.invalid_normals += build->blocks[b].invalid_normals;
+        cloud->info.radius_most = fmaxf(cloud->info.radius_most, build->blocks[b].radius_most);
         cloud->info.invalid_colors += build->blocks[b].invalid_colors;
     }
     memcpy(cloud->info.box_min, build->box_min, sizeof build->box_min);
@@ -647,7 +667,8 @@ static int check_desc(patina_cloud_desc *desc)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "origin: not finite");
     if ((error = pt_check_array(&desc->position, "position", floats, 3, 3)) ||
         (error = pt_check_array(&desc->normal, "normal", floats, 3, 3)) ||
-        (error = pt_check_array(&desc->opacity, "opacity", floats | 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1)))
+        (error = pt_check_array(&desc->opacity, "opacity", floats | 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1)) ||
+        (error = pt_check_array(&desc->radius, "radius", floats, 1, 1)))
         return error;
     return pt_check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 3, 4);
 }
@@ -683,7 +704,8 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
                                            .count = desc->count,
                                            .has_normals = desc->normal.data != NULL,
                                            .has_colors = desc->color.data != NULL,
-                                           .has_opacities = desc->opacity.data != NULL };
+                                           .has_opacities = desc->opacity.data != NULL,
+                                           .has_radii = desc->radius.data != NULL };
         memcpy(cloud->info.origin, desc->origin, sizeof desc->origin);
         cloud->color_format = color_format(&desc->color);
         build.cloud = cloud;
@@ -772,6 +794,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_pages_free(cloud->surface, cloud->info.count * 4);
     pt_pages_free(cloud->colors, color_bytes(cloud));
     pt_pages_free(cloud->opacities, opacity_bytes(cloud));
+    pt_pages_free(cloud->radii, cloud->info.count * 4);
     free(cloud->chunks);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);

@@ -47,6 +47,7 @@ struct patina_cloud {
     uint32_t *surface; // count: octahedral normal and spacing class (kernel_args.h)
     void *colors;      // count x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // count, or NULL where every point is opaque
+    float *radii;       // count, object units, or NULL
     enum pt_color_format color_format;
     double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };

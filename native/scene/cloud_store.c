@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTION = 1 << 16, VERSION = 2, SECTIONS = 6 };
+enum { SECTION = 1 << 16, VERSION = 3, SECTIONS = 7 };
 static const char magic[8] = "patina\n\x1a";
 
 struct header {
@@ -55,6 +55,7 @@ static void list_sections(struct patina_cloud *cloud, struct section sections[SE
         {(void **)&cloud->surface, count * 4},
         {&cloud->colors, cloud->color_format ? count * pt_color_size(cloud->color_format) + 4 : 0},
         {(void **)&cloud->opacities, cloud->info.has_opacities ? count + 4 : 0},
+        {(void **)&cloud->radii, cloud->info.has_radii ? count * 4 : 0},
     };
     memcpy(sections, list, sizeof list);
 }
@@ -173,7 +174,8 @@ static int check_header(const char *path, const struct header *header, uint64_t 
         header->slots > 2 * header->info.count + 16ull * header->chunk_count ||
         header->chunk_count > header->info.count || header->info.drawn > header->info.count ||
         header->info.has_colors != (header->color_format != PT_COLOR_NONE) || header->info.has_opacities > 1 ||
-        header->info.has_normals > 1 || !isfinite(header->spacing_base))
+        header->info.has_normals > 1 || header->info.has_radii > 1 || !isfinite(header->info.radius_most) ||
+        !isfinite(header->spacing_base))
         return refuse(path, "its header is damaged");
     return PATINA_OK;
 }

@@ -66,14 +66,14 @@ static uint64_t add_array(uint64_t hash, const patina_array *array, uint64_t cou
 
 int pt_desc_fingerprint(const patina_cloud_desc *desc, uint64_t values[2])
 {
-    const patina_array *arrays[] = { &desc->position, &desc->normal, &desc->opacity, &desc->color };
-    for (int i = 0; i < 4; i++)
+    const patina_array *arrays[] = { &desc->position, &desc->normal, &desc->opacity, &desc->radius, &desc->color };
+    for (int i = 0; i < 5; i++)
         if (arrays[i]->data && (arrays[i]->type > PATINA_INT32 || arrays[i]->stride))
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: array %d is not tightly packed, or of an "
                            "unknown type", i);
     values[0] = mix(0, desc->count);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 4; i++)
         values[0] = add_array(values[0], arrays[i], desc->count);
-    values[1] = add_array(mix(1, desc->count), arrays[3], desc->count);
+    values[1] = add_array(mix(1, desc->count), arrays[4], desc->count);
     return PATINA_OK;
 }

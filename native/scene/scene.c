@@ -112,6 +112,8 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         style->ambient = style->diffuse = 1.0f;
     if (!(style->transparency >= 0.0f) || !(style->transparency <= 1.0f))
         return fail(scene, "cloud style: transparency must be between 0 and 1");
+    if (!(style->radius >= 0.0f) || !isfinite(style->radius))
+        return fail(scene, "cloud style: radius must be 0 or more");
     if (style->shadow_off > 7)
         return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
@@ -260,6 +262,8 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
     if (s.quality > PATINA_QUALITY_PAPER || s.fill > PATINA_FILL_OFF || s.smooth > PATINA_SMOOTH_OFF ||
         s.antialias > PATINA_ANTIALIAS_OFF || s.fill_iterations > 64)
         return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
+    if (s.surface > PATINA_SURFACE_SPLATS)
+        return fail(scene, "settings: no such surface");
     if (!(s.error_target >= 0.0f) || !isfinite(s.error_target))
         return fail(scene, "settings: error_target is negative or not finite");
     if (s.strata > PT_STRATA)

@@ -217,6 +217,10 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_word(value, "refined|paper", &s->quality);
     else if (!strcmp(name, "--fill"))
         bad = parse_word(value, "closed|paper|off", &s->fill);
+    else if (!strcmp(name, "--surface"))
+        bad = parse_word(value, "fill|splats", &s->surface);
+    else if (!strcmp(name, "--radius"))
+        bad = parse_width(value, &o->radius);
     else if (!strcmp(name, "--iterations"))
         bad = parse_count(value, 0, 1000, &s->fill_iterations);
     else if (!strcmp(name, "--smooth"))

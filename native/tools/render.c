@@ -96,6 +96,7 @@ static int load_clouds(struct job *job)
 
     patina_cloud_style style = {.struct_size = sizeof style, .lighting = options->lighting};
     style.cull_back = options->cull ? 1 : 0;
+    style.radius = (float)options->radius;
     tool_cancellable(job->progress, NULL);
     for (int i = 0; i < options->file_count; i++) {
         patina_cloud_info info = {.struct_size = sizeof info};

@@ -13,16 +13,15 @@ layout(std430, binding = 5) writeonly buffer normal_block { float normal[]; }; /
 layout(std430, binding = 6) writeonly buffer source_block { float source[]; };
 layout(std430, binding = 7) readonly buffer arrived_block { float arrived[]; };
 layout(std430, binding = 8) writeonly buffer shadow_block { float shadow[]; };
+layout(std430, binding = 9) readonly buffer discs_block { vec4 disc_normals[]; }; // w: how far off the point fell
 
-float source_value(uint width, uint word, uint x, uint y)
+float source_value(uint width, uint origin, uint x, uint y)
 {
-    uint origin = word & ~PT_FROM_MIXED;
     uvec2 from = pt_pixel(origin, width);
     float dx = float(int(from.x) - int(x)), dy = float(int(from.y) - int(y));
     precise float square = dx * dx + dy * dy;
     precise float distance_to = 1.0 + square * pt_rsqrt(square);
-    float value = square > 0.0 ? distance_to : 1.0;
-    return (word & PT_FROM_MIXED) != 0u ? -value : value;
+    return square > 0.0 ? distance_to : 1.0;
 }
 
 // A dispatch for each plane that is asked for.
@@ -53,6 +52,7 @@ void main()
     shadow[to] = some ? arrived[at] : 1.0;
 #else
     uint word = texelFetch(from_plane, int(at)).x;
-    source[to] = some ? source_value(width, word, crop_x + x, crop_y + y) : 0.0;
+    float value = args.discs != 0u ? 1.0 + (read_key(at).x < args.discs ? disc_normals[at].w : 0.0) : source_value(width, word & ~PT_FROM_MIXED, crop_x + x, crop_y + y);
+    source[to] = some ? ((word & PT_FROM_MIXED) != 0u ? -value : value) : 0.0;
 #endif
 }

@@ -88,7 +88,7 @@ void main()
     view_args view = args.view;
     uint id_base = args.instance.id_base, id_count = args.instance.id_count;
     float instance_opacity = args.instance.opacity;
-    bool own_opacity = args.instance.has_opacities != 0u;
+    bool own_opacity = args.instance.has_opacities != 0u, blended = args.instance.color_format == PT_COLOR_OF_PLANE;
     ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
     uint end = pt_tile_end(view, column);
@@ -119,7 +119,8 @@ void main()
             normal = finish_blend(blend_wide(view, size, x, int(y), pt_float(key.y), read_deff(source)), normal);
 #endif
         if (ours)
-            shading[at] = vec4(normal, opacity_of(instance_opacity, own_opacity, key.x - id_base));
+            shading[at] = vec4(normal, blended && own_opacity ? uintBitsToFloat(point_colors[4u * at + 3u])
+                                                              : opacity_of(instance_opacity, own_opacity, key.x - id_base));
     }
 }
 
@@ -133,13 +134,16 @@ struct pixel {
 
 layout(location = 16) uniform vec4 lights[3 * PT_MAX_LIGHTS]; // colour and type; vector; cone, shadow and its scale
 
-vec3 gather_albedo(vec3 style, uint id)
+vec3 gather_albedo(vec3 style, uint id, uint at)
 {
 #if COLOR_FORMAT == 0
     return style;
 #elif COLOR_FORMAT == 2
     return vec3(uintBitsToFloat(point_colors[3u * id]), uintBitsToFloat(point_colors[3u * id + 1u]),
                 uintBitsToFloat(point_colors[3u * id + 2u]));
+#elif COLOR_FORMAT == 3 // blended discs
+    return vec3(uintBitsToFloat(point_colors[4u * at]), uintBitsToFloat(point_colors[4u * at + 1u]),
+                uintBitsToFloat(point_colors[4u * at + 2u]));
 #else // three bytes from byte 3 id on: they lie in one word or two
     uint first = 3u * id, shift = 8u * (first & 3u);
     uint low = point_colors[first >> 2], high = point_colors[(first + 2u) >> 2];
@@ -272,7 +276,7 @@ void main()
         pixel p;
         p.z = pt_float(key.y);
         p.ray = pt_ray(view, int(column.x), int(y));
-        p.albedo = gather_albedo(style, id);
+        p.albedo = gather_albedo(style, id, at);
         vec4 shaded = texelFetch(other_float4_plane, int(at));
         p.n = shaded.xyz;
         // 3. light

@@ -41,6 +41,16 @@
 #define PT_MESH_REACH 1048576.0f
 #define PT_MESH_FARTHEST 1e18f // triangles with a greater coordinate, or none that is a number, are left out
 #define PT_MESH_CORNERS 8 // of a triangle that five planes cut
+// Discs: a point without a radius of its own gets so many spacings. Of random points exp(-pi r^2) stay uncovered: 0.09% at 1.5.
+#define PT_DISC_SPACINGS 1.5f
+#define PT_DISC_LEAST 1e-30f  // a radius below is none: the point stays its pixel
+#define PT_DISC_MOST 1e30f
+#define PT_DISC_FINE 1e12f    // so is a radius this many times smaller than the depth
+#define PT_DISC_TILT 1e-6f    // |n . ray| below: seen edge-on, the point stays its pixel
+#define PT_DISC_FAR 4194304.0f // pixels: centres beyond are not drawn, boxes end there
+#define PT_SUM_SCALE 262144.0f // 2^18: weights, and what they weigh, are summed as integers
+#define PT_SUM_BRIGHTEST 4096.0f // colours above blend as this, so that a term fits 31 bits
+#define PT_COLOR_OF_PLANE 3u  // color_format: the colours buffer is a plane, four floats a pixel, opacity last
 
 #define PT_SPACINGS 64
 #define PT_MAX_LIGHTS 32
@@ -121,7 +131,7 @@ struct cover_args {
 struct instance_args {
     uint32_t id_base, id_count; // ids of this instance: [id_base, id_base + id_count)
     uint32_t has_normals;
-    uint32_t color_format;      // 0 style colour, 1 sRGB 8 bit x 3, 2 float x 3
+    uint32_t color_format;      // 0 style colour, 1 sRGB 8 bit x 3, 2 float x 3, 3 a plane
     uint32_t lit;
     uint32_t shininess;
     float ambient, diffuse, specular;
@@ -131,6 +141,33 @@ struct instance_args {
     float normal_matrix[9];     // object normal -> view space, not yet unit
     float d_min;                // world units
     float spacing[PT_SPACINGS]; // local spacing by class, world units
+};
+
+// A cloud's discs, one of these an instance behind the arguments of splat and blend.
+struct disc_args {
+    struct instance_args instance;
+    uint32_t has_radii; // points have their own, object units
+    float radius;       // world units, of every point; 0: its own, else PT_DISC_SPACINGS times its spacing
+    float radius_scale; // object units -> world, times what strata leave out
+};
+
+// splat: points -> least key of every pixel that their discs cover. SPEC 5, solid; the visibility pass. A disc is flat, has the
+// point's normal (without one: faces the picture) and covers the pixels whose centre's ray meets it; and the pixel that the
+// point falls into, if with that ray beside the disc then at the point's own depth.
+struct splat_args {
+    struct view_args view;
+    uint32_t instances;
+    uint32_t behind; // 1: the limit plane holds
+};
+
+// blend: what the discs within d_eff behind the nearest surface of a pixel show there, weighted by how near their centres lie:
+// w = exp(-2 s^2), s = distance over radius; in its own pixel a disc counts as at least a pixel wide. The sums are integers,
+// PT_SUM_SCALE a unit, so that no order shows.
+//   normal.xyz: unit mean; of instances without normals as it was. normal.w: how many pixels away the point of the key fell.
+//   albedo: mean colour, each disc weighted by its opacity too, and the mean opacity.
+struct blend_args {
+    struct view_args view;
+    uint32_t instances;
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Taken are pixels with
@@ -280,6 +317,7 @@ struct extract_args {
     struct view_args view;
     uint32_t crop_x, crop_y, crop_width, crop_height;
     uint32_t depth, normal, source, shadow;
+    uint32_t discs; // how far a pixel lies from its point is in the normal plane's w where the id is below this
     float world_from_view[9];
 };
 

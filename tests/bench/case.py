@@ -26,7 +26,7 @@ import stage as stages  # noqa: E402
 WARM_UP = 4
 PATIENCE = 6.0  # seconds of frames, after which a slow case stops at five
 QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill": 1, "fill_iterations": 1},
-             "unfilled": {"quality": 1, "fill": 2}}
+             "unfilled": {"quality": 1, "fill": 2}, "splats": {"surface": 1}}
 LAYERS = 8  # rays through the nested tori meet up to eight surfaces
 STEADY_FRAMES, STEADY_STEP = 8, 0.05  # pictures and degrees between them: a third of a pixel at 1024
 FIELDS = ("scene", "mode", "device", "width", "height", "points", "quality", "threads", "ms_median", "ms_min", "ms_max",

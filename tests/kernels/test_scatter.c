@@ -1,130 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // scatter: the least key of every pixel, where the reference says which points may and which must be there.
-#include "harness.h"
+#include "points.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { MOST_INSTANCES = 4, LANES = 16 };
-
-struct cloud {
-    struct chunk_view *chunks;
-    uint32_t chunk_count, slots, points;
-    float *positions;
-    uint32_t *ids, *surface;
-};
-
-struct scene {
-    struct view_args view;
-    struct cloud clouds[MOST_INSTANCES];
-    uint32_t count;
-    const float *limit; // by pixel: only points beyond it count; NULL: all
-};
-
-// A camera: view = rotation * object + shift, screen in pixels.
-struct camera {
-    double rotation[9], shift[3];
-    double focal, center_x, center_y; // pixels at z = 1, or pixels per unit (orthographic)
-    double near_clip;                 // orthographic: z = -view.z - near
-};
-
-static void random_rotation(struct rng *rng, double m[9])
-{
-    float a[3], b[3];
-    rng_direction(rng, a);
-    rng_direction(rng, b);
-    struct ref_vec x = ref_unit(ref_vec_of(a)), y = ref_vec_of(b);
-    y = ref_unit(ref_add(y, ref_scale(x, -ref_dot(x, y))));
-    struct ref_vec z = {x.y * y.z - x.z * y.y, x.z * y.x - x.x * y.z, x.x * y.y - x.y * y.x};
-    double rows[9] = {x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z};
-    memcpy(m, rows, sizeof rows);
-}
-
-static void set_chunk(struct chunk_view *chunk, const struct view_args *view, const struct camera *camera)
-{
-    const double *r = camera->rotation, *t = camera->shift;
-    double shift[3];
-    for (int i = 0; i < 3; i++) {
-        double z = -r[6 + i];
-        chunk->row[i] = (float)(camera->focal * r[i] + (view->perspective ? camera->center_x * z : 0.0));
-        chunk->row[3 + i] = (float)(camera->focal * r[3 + i] + (view->perspective ? camera->center_y * z : 0.0));
-        chunk->row[6 + i] = (float)z;
-    }
-    shift[0] = camera->focal * t[0] + (view->perspective ? camera->center_x * -t[2] : camera->center_x);
-    shift[1] = camera->focal * t[1] + (view->perspective ? camera->center_y * -t[2] : camera->center_y);
-    shift[2] = -t[2] - (view->perspective ? 0.0 : camera->near_clip);
-    for (int i = 0; i < 3; i++) {
-        chunk->hi[i] = (float)shift[i];
-        chunk->lo[i] = (float)(shift[i] - chunk->hi[i]);
-        double eye = 0.0; // rotation^T (eye_view - shift)
-        for (int k = 0; k < 3; k++)
-            eye += r[3 * k + i] * (view->perspective ? -t[k] : k == 2 ? 1.0 : 0.0);
-        chunk->eye[i] = (float)eye;
-    }
-    chunk->eye[3] = view->perspective ? 1.0f : 0.0f;
-}
-
-// Chunks of the given sizes, all seen by one camera; positions come from the caller afterwards.
-static struct cloud *add_cloud(struct harness *h, struct rng *rng, struct scene *scene, const struct camera *camera,
-                               const uint32_t *sizes, uint32_t count, int cull, uint32_t id_base)
-{
-    struct cloud *cloud = &scene->clouds[scene->count++];
-    cloud->chunk_count = count;
-    cloud->chunks = harness_alloc(h, count * sizeof *cloud->chunks);
-    for (uint32_t c = 0; c < count; c++) {
-        struct chunk_view *chunk = &cloud->chunks[c];
-        set_chunk(chunk, &scene->view, camera);
-        chunk->first = cloud->slots;
-        chunk->count = sizes[c];
-        chunk->padded = (sizes[c] + LANES - 1) / LANES * LANES;
-        chunk->cull = cull ? 1 : 0;
-        chunk->id_base = id_base;
-        cloud->slots += chunk->padded;
-        cloud->points += sizes[c];
-    }
-    cloud->positions = harness_alloc(h, 12 * (size_t)cloud->slots);
-    cloud->ids = harness_alloc(h, 4 * (size_t)cloud->slots);
-    cloud->surface = harness_alloc(h, 4 * (size_t)cloud->points);
-    uint32_t *order = harness_alloc(h, 4 * (size_t)cloud->points), next = 0;
-    for (uint32_t i = 0; i < cloud->points; i++) {
-        uint32_t j = rng_below(rng, i + 1);
-        order[i] = order[j];
-        order[j] = i;
-        cloud->surface[i] = rng_below(rng, 8) ? (uint32_t)rng_next(rng) : PT_NORMAL_NONE;
-    }
-    for (uint32_t c = 0; c < count; c++)
-        for (uint32_t i = 0; i < sizes[c]; i++)
-            cloud->ids[cloud->chunks[c].first + i] = order[next++];
-    return cloud;
-}
-
-static float *coordinate(struct cloud *cloud, uint32_t chunk, uint32_t slot, int axis)
-{
-    const struct chunk_view *view = &cloud->chunks[chunk];
-    return cloud->positions + 3 * (size_t)view->first + (size_t)axis * view->padded + slot;
-}
-
-// Points anywhere in the cube [-size, size]^3, padding repeated.
-static void scatter_about(struct rng *rng, struct cloud *cloud, double size)
-{
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
-        for (uint32_t i = 0; i < cloud->chunks[c].count; i++)
-            for (int axis = 0; axis < 3; axis++)
-                *coordinate(cloud, c, i, axis) = (float)rng_range(rng, -size, size);
-}
-
-static void pad(struct cloud *cloud)
-{
-    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
-        const struct chunk_view *chunk = &cloud->chunks[c];
-        for (uint32_t i = chunk->count; i < chunk->padded; i++) {
-            for (int axis = 0; axis < 3; axis++)
-                *coordinate(cloud, c, i, axis) = *coordinate(cloud, c, chunk->count - 1, axis);
-            cloud->ids[chunk->first + i] = cloud->ids[chunk->first + chunk->count - 1];
-        }
-    }
-}
 
 static uint64_t *run_scatter(struct harness *h, struct scene *scene)
 {
@@ -137,7 +17,7 @@ static uint64_t *run_scatter(struct harness *h, struct scene *scene)
     buffers[n++] = harness_buffer(h, empty, pixels * 8);
     for (uint32_t i = 0; i < scene->count; i++) {
         struct cloud *cloud = &scene->clouds[i];
-        pad(cloud);
+        points_pad(cloud);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, cloud->ids, 4 * (size_t)cloud->slots);
@@ -216,40 +96,19 @@ static uint64_t *check_scene(struct harness *h, struct scene *scene)
     return keys;
 }
 
-static struct view_args window(uint32_t width, uint32_t height, int perspective, double focal)
-{
-    struct view_args view = picture_view(width, height, perspective);
-    view.origin_x = 16;
-    view.origin_y = 8;
-    view.ray_xs = view.ray_ys = view.footprint = (float)(1.0 / focal);
-    return view;
-}
-
-static struct camera look(struct rng *rng, const struct view_args *view, double focal, double distance)
-{
-    struct camera camera = {.focal = focal, .near_clip = view->perspective ? 0.0 : -100.0};
-    random_rotation(rng, camera.rotation);
-    camera.shift[0] = rng_range(rng, -0.1, 0.1);
-    camera.shift[1] = rng_range(rng, -0.1, 0.1);
-    camera.shift[2] = -distance;
-    camera.center_x = view->origin_x + view->width * 0.5;
-    camera.center_y = view->origin_y + view->height * 0.5;
-    return camera;
-}
-
 static const uint32_t sizes[] = {1, 15, 16, 17, 300, 1000, 31, 2};
 enum { SIZES = sizeof sizes / sizeof sizes[0] };
 
 static void random_clouds(struct harness *h, int perspective, uint32_t seed)
 {
     struct rng rng = {seed};
-    struct scene scene = {.view = window(67, 45, perspective, perspective ? 60.0 : 20.0)};
+    struct scene scene = {.view = points_window(67, 45, perspective, perspective ? 60.0 : 20.0)};
     for (uint32_t i = 0; i < 3; i++) {
-        struct camera camera = look(&rng, &scene.view, 1.0 / scene.view.ray_xs, 4.0);
+        struct camera camera = points_look(&rng, &scene.view, 1.0 / scene.view.ray_xs, 4.0);
         // The second is mirrored, the third squeezed.
         for (int k = 0; k < 9; k++)
             camera.rotation[k] *= i == 1 ? -1.0 : i == 2 && k % 3 == 0 ? 0.05 : 1.0;
-        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i != 1, i * 5000), i == 0 ? 1.0 : 5.0);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i != 1, i * 5000), i == 0 ? 1.0 : 5.0);
     }
     check_scene(h, &scene);
 }
@@ -270,12 +129,12 @@ static void plane_sizes(struct harness *h)
     struct rng rng = {3};
     for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
         double focal = shapes[i][0];
-        struct scene scene = {.view = window(shapes[i][0], shapes[i][1], 1, focal)};
-        struct camera camera = look(&rng, &scene.view, focal, 3.0);
+        struct scene scene = {.view = points_window(shapes[i][0], shapes[i][1], 1, focal)};
+        struct camera camera = points_look(&rng, &scene.view, focal, 3.0);
         for (int k = 0; k < 6; k++) // squeezed into the window's shape
             camera.rotation[k] *= k < 3 ? 1.0 : (double)shapes[i][1] / shapes[i][0];
         camera.shift[0] = camera.shift[1] = 0.0;
-        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 1.5);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 1.5);
         check_scene(h, &scene);
     }
 }
@@ -285,10 +144,10 @@ static void negative_origin(struct harness *h)
 {
     for (int p = 0; p < 2; p++) {
         struct rng rng = {4};
-        struct scene scene = {.view = window(67, 45, p, p ? 60.0 : 20.0)};
+        struct scene scene = {.view = points_window(67, 45, p, p ? 60.0 : 20.0)};
         scene.view.origin_x = scene.view.origin_y = -32;
-        struct camera camera = look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
-        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 2.0);
+        struct camera camera = points_look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 2.0);
         check_scene(h, &scene);
     }
 }
@@ -299,12 +158,12 @@ static void not_numbers(struct harness *h)
     enum { ODD = sizeof odd / sizeof odd[0] };
     for (int p = 0; p < 2; p++) {
         struct rng rng = {5};
-        struct scene scene = {.view = window(67, 45, p, p ? 60.0 : 20.0)};
-        struct camera camera = look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
-        struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0);
-        scatter_about(&rng, cloud, 1.0);
+        struct scene scene = {.view = points_window(67, 45, p, p ? 60.0 : 20.0)};
+        struct camera camera = points_look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+        struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0);
+        points_scatter_about(&rng, cloud, 1.0);
         for (uint32_t i = 0; i < 1000; i += 2)
-            *coordinate(cloud, 5, i, (int)rng_below(&rng, 3)) = odd[rng_below(&rng, ODD)];
+            *points_coordinate(cloud, 5, i, (int)rng_below(&rng, 3)) = odd[rng_below(&rng, ODD)];
         check_scene(h, &scene);
     }
 }
@@ -315,12 +174,12 @@ static void exact_borders(struct harness *h)
     static const uint32_t one[] = {8};
     struct rng rng = {6};
     for (int p = 0; p < 2; p++) {
-        struct scene scene = {.view = window(4, 2, p, 1.0)};
+        struct scene scene = {.view = points_window(4, 2, p, 1.0)};
         scene.view.origin_x = scene.view.origin_y = 0;
         scene.view.z_near = p ? 0.5f : 0.0f;
         scene.view.z_far = 64.0f;
         struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = 1.0};
-        struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, one, 1, 0, 0);
+        struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, one, 1, 0, 0);
         // Slot i at screen (i % 4, i / 4) exactly.
         const float z[8] = {scene.view.z_near,
                             float_step(p ? 0.5f : 0x1p-126f, p ? -1 : 0),
@@ -332,9 +191,9 @@ static void exact_borders(struct harness *h)
                             8.0f};
         for (uint32_t i = 0; i < 8; i++) {
             float depth = !p && i == 1 ? -z[i] : z[i]; // before the near plane
-            *coordinate(cloud, 0, i, 0) = (float)(i % 4) * (p ? depth : 1.0f);
-            *coordinate(cloud, 0, i, 1) = (float)(i / 4) * (p ? depth : 1.0f);
-            *coordinate(cloud, 0, i, 2) = -depth;
+            *points_coordinate(cloud, 0, i, 0) = (float)(i % 4) * (p ? depth : 1.0f);
+            *points_coordinate(cloud, 0, i, 1) = (float)(i / 4) * (p ? depth : 1.0f);
+            *points_coordinate(cloud, 0, i, 2) = -depth;
         }
         uint64_t *keys = run_scatter(h, &scene);
         for (uint32_t i = 0; i < 8; i++) {
@@ -353,13 +212,13 @@ static void exact_borders(struct harness *h)
 static void camera_plane(struct harness *h)
 {
     struct rng rng = {7};
-    struct scene scene = {.view = window(67, 45, 1, 60.0)};
-    struct camera camera = look(&rng, &scene.view, 60.0, 0.0); // in the middle of the cloud
-    struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0);
-    scatter_about(&rng, cloud, 1.0);
+    struct scene scene = {.view = points_window(67, 45, 1, 60.0)};
+    struct camera camera = points_look(&rng, &scene.view, 60.0, 0.0); // in the middle of the cloud
+    struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0);
+    points_scatter_about(&rng, cloud, 1.0);
     for (uint32_t i = 0; i < 500; i++) // exactly at the eye, and nearly
         for (int axis = 0; axis < 3; axis++)
-            *coordinate(cloud, 5, i, axis) =
+            *points_coordinate(cloud, 5, i, axis) =
                 (float)(-(camera.rotation[axis] * camera.shift[0] + camera.rotation[3 + axis] * camera.shift[1] +
                           camera.rotation[6 + axis] * camera.shift[2]) +
                         (i ? rng_range(&rng, -1.0, 1.0) * pow(10.0, -rng_range(&rng, 0.0, 12.0)) : 0.0));
@@ -373,11 +232,11 @@ static void coincident(struct harness *h)
 {
     for (int p = 0; p < 2; p++) {
         struct rng rng = {8};
-        struct scene scene = {.view = window(67, 45, p, 60.0)};
-        struct camera camera = look(&rng, &scene.view, 60.0, 4.0);
+        struct scene scene = {.view = points_window(67, 45, p, 60.0)};
+        struct camera camera = points_look(&rng, &scene.view, 60.0, 4.0);
         uint32_t bases[3] = {0xFFFFFFFEu - 1382u, 70000u, 0x80000000u};
         for (int i = 0; i < 3; i++) {
-            struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, bases[i]);
+            struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, bases[i]);
             if (i == 0)
                 HARNESS_CHECK(h, cloud->points == 1382);
         }
@@ -402,12 +261,12 @@ static void coincident(struct harness *h)
 static void depth_range(struct harness *h) // far / near = 10^7
 {
     struct rng rng = {9};
-    struct scene scene = {.view = window(67, 45, 1, 60.0)};
+    struct scene scene = {.view = points_window(67, 45, 1, 60.0)};
     scene.view.z_near = 1e-3f;
     scene.view.z_far = 1e4f;
-    struct camera camera = look(&rng, &scene.view, 60.0, 0.0);
+    struct camera camera = points_look(&rng, &scene.view, 60.0, 0.0);
     camera.shift[0] = camera.shift[1] = 0.0;
-    struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0);
+    struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0);
     for (uint32_t c = 0; c < SIZES; c++)
         for (uint32_t i = 0; i < sizes[c]; i++) {
             double z = pow(10.0, rng_range(&rng, -3.5, 4.5)), v[3];
@@ -415,7 +274,7 @@ static void depth_range(struct harness *h) // far / near = 10^7
             v[1] = rng_range(&rng, -0.4, 0.4) * z;
             v[2] = -z;
             for (int a = 0; a < 3; a++)
-                *coordinate(cloud, c, i, a) = (float)(camera.rotation[a] * v[0] + camera.rotation[3 + a] * v[1] +
+                *points_coordinate(cloud, c, i, a) = (float)(camera.rotation[a] * v[0] + camera.rotation[3 + a] * v[1] +
                                                       camera.rotation[6 + a] * v[2]);
         }
     check_scene(h, &scene);
@@ -427,12 +286,12 @@ static void orthographic_scales(struct harness *h)
     for (int i = 0; i < 2; i++) {
         struct rng rng = {10};
         double focal = 67.0 / scales[i];
-        struct scene scene = {.view = window(67, 45, 0, focal)};
+        struct scene scene = {.view = points_window(67, 45, 0, focal)};
         scene.view.z_far = (float)(200.0 * scales[i]); // near = -far = -100 scales
-        struct camera camera = look(&rng, &scene.view, focal, 0.0);
+        struct camera camera = points_look(&rng, &scene.view, focal, 0.0);
         camera.near_clip = -100.0 * scales[i];
         camera.shift[0] = camera.shift[1] = 0.0;
-        scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0), 0.6 * scales[i]);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 1, 0), 0.6 * scales[i]);
         check_scene(h, &scene);
     }
 }
@@ -441,17 +300,17 @@ static void orthographic_scales(struct harness *h)
 static void far_and_flat(struct harness *h)
 {
     struct rng rng = {11};
-    struct scene scene = {.view = window(67, 45, 1, 60.0)};
+    struct scene scene = {.view = points_window(67, 45, 1, 60.0)};
     scene.view.z_far = 1e7f;
-    struct camera camera = look(&rng, &scene.view, 60.0 * 2e6, 5000000.23); // lo counts
-    scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 1.0);
+    struct camera camera = points_look(&rng, &scene.view, 60.0 * 2e6, 5000000.23); // lo counts
+    points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, 0, 0), 1.0);
     check_scene(h, &scene);
     for (int rank = 0; rank < 3; rank++) {
-        struct scene flat = {.view = window(67, 45, 1, 60.0)};
-        struct camera view = look(&rng, &flat.view, 60.0, 4.0);
+        struct scene flat = {.view = points_window(67, 45, 1, 60.0)};
+        struct camera view = points_look(&rng, &flat.view, 60.0, 4.0);
         for (int k = 0; k < 9; k++)
             view.rotation[k] *= k % 3 < rank;
-        scatter_about(&rng, add_cloud(h, &rng, &flat, &view, sizes, SIZES, 1, 0), 1.0);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &flat, &view, sizes, SIZES, 1, 0), 1.0);
         check_scene(h, &flat);
     }
 }
@@ -461,17 +320,17 @@ static void culling(struct harness *h)
 {
     static const uint32_t four[] = {4};
     struct rng rng = {12};
-    struct scene scene = {.view = window(4, 1, 0, 1.0)};
+    struct scene scene = {.view = points_window(4, 1, 0, 1.0)};
     scene.view.origin_x = scene.view.origin_y = 0;
     struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = 1.0};
-    struct cloud *cloud = add_cloud(h, &rng, &scene, &camera, four, 1, 1, 0);
+    struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, four, 1, 1, 0);
     // (0,0,1) towards the viewer, (0,0,-1), (1,0,0) edge-on, none; spacing bits must not matter
     const uint32_t words[4] = {4095u | 4095u << 13 | 7u << 26, 8190u | 8190u << 13, 8190u | 4095u << 13 | 9u << 26,
                                PT_NORMAL_NONE | 3u << 26};
     for (uint32_t i = 0; i < 4; i++) {
-        *coordinate(cloud, 0, i, 0) = (float)i + 0.5f;
-        *coordinate(cloud, 0, i, 1) = 0.5f;
-        *coordinate(cloud, 0, i, 2) = -3.0f;
+        *points_coordinate(cloud, 0, i, 0) = (float)i + 0.5f;
+        *points_coordinate(cloud, 0, i, 1) = 0.5f;
+        *points_coordinate(cloud, 0, i, 2) = -3.0f;
         cloud->surface[cloud->ids[i]] = words[i];
     }
     uint64_t *keys = check_scene(h, &scene);
@@ -488,10 +347,10 @@ static void limits(struct harness *h)
 {
     for (int p = 0; p < 2; p++) {
         struct rng rng = {13};
-        struct scene scene = {.view = window(67, 45, p, p ? 60.0 : 20.0)};
+        struct scene scene = {.view = points_window(67, 45, p, p ? 60.0 : 20.0)};
         for (uint32_t i = 0; i < 3; i++) {
-            struct camera camera = look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
-            scatter_about(&rng, add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i == 1, i * 5000), 2.0);
+            struct camera camera = points_look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+            points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i == 1, i * 5000), 2.0);
         }
         size_t pixels = (size_t)67 * 45, emptied = 0;
         const uint64_t *front = check_scene(h, &scene);
@@ -521,7 +380,7 @@ static void limits(struct harness *h)
 // No instance at all, and a plane that already holds something nearer.
 static void nothing(struct harness *h)
 {
-    struct scene scene = {.view = window(67, 45, 1, 60.0)};
+    struct scene scene = {.view = points_window(67, 45, 1, 60.0)};
     uint64_t *keys = run_scatter(h, &scene);
     for (size_t i = 0; i < (size_t)67 * 45; i++)
         HARNESS_CHECK(h, keys[i] == REF_EMPTY_KEY);
@@ -530,7 +389,7 @@ static void nothing(struct harness *h)
 // Reference alone: a point on the axis falls into the middle pixel, at its distance.
 static void sanity(struct harness *h)
 {
-    struct view_args view = window(64, 64, 1, 100.0);
+    struct view_args view = points_window(64, 64, 1, 100.0);
     struct chunk_view chunk = {.row = {100, 0, -48, 0, 100, -40, 0, 0, -1}, .count = 1, .padded = 1, .id_base = 5};
     float p[3] = {0.01f, 0.01f, -2.0f};
     uint32_t id = 1, words[2] = {0, 0};

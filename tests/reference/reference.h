@@ -98,6 +98,44 @@ struct ref_hit {
 };
 struct ref_hit ref_raster(const struct view_args *view, const struct mesh_args *mesh, const float *vertices,
                           const uint32_t *indices, uint32_t triangle, int x, int y);
+// Does the point at p, chunk coordinates, face away and is left out?
+enum ref_truth ref_culled(const struct chunk_view *chunk, const double p[3], uint32_t word);
+
+// ---- splat.c, blend.c ---------------------------------------------------------------------------------------------------
+
+// A point as a disc.
+struct ref_disc {
+    uint32_t id;
+    int possible, definite; // may be drawn; is drawn
+    struct ref_place place;
+    struct ref_vec n;       // unit, towards the viewer; without a normal: of the picture
+    int has_normal, has_normals; // of the point; of its cloud
+    int edge_on;            // so much that float32 may draw its pixel alone
+    double normal_error, radius;
+};
+struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
+                         const float *positions, const uint32_t *ids, const uint32_t *surface, const float *radii,
+                         uint32_t slot);
+// Whether it covers a pixel of the plane, how deep, and at which squared share of its radius from its middle.
+struct ref_cover {
+    enum ref_truth covered;
+    struct ref_range z, square;
+};
+struct ref_cover ref_disc_at(const struct view_args *view, const struct ref_disc *disc, int x, int y);
+
+struct ref_look { // what blend reads of a point
+    double color[3], opacity;
+};
+struct ref_blend {
+    double color[4], color_error[4]; // albedo and opacity
+    struct ref_vec n;
+    double normal_error;
+    double away;
+    int unsure;
+};
+// nearest: the key's disc, by its place in the list; z, deff: of the pixel; n: its normal before, w aside.
+struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *discs, const struct ref_look *looks,
+                           uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int x, int y);
 
 // ---- one pixel of a filter --------------------------------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ static struct ref_range divide(double a, double error_a, struct ref_range z)
     return range;
 }
 
-static enum ref_truth is_culled(const struct chunk_view *chunk, const double p[3], uint32_t word)
+enum ref_truth ref_culled(const struct chunk_view *chunk, const double p[3], uint32_t word)
 {
     struct ref_vec n;
     if (!chunk->cull || !ref_decode_normal(word, &n))
@@ -105,7 +105,7 @@ struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_vi
     if (floor(sx.lo) != floor(sx.hi) || floor(sy.lo) != floor(sy.hi))
         splat.definite = 0;
 
-    enum ref_truth culled = is_culled(chunk, p, chunk->cull ? surface[id] : 0);
+    enum ref_truth culled = ref_culled(chunk, p, chunk->cull ? surface[id] : 0);
     splat.possible = culled != REF_YES;
     if (culled != REF_NO)
         splat.definite = 0;

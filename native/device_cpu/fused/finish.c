@@ -132,7 +132,7 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
         vm ours = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
         if (!vm_bits(ours))
             continue;
-        vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 7), id, ours);
+        vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 4), pt_cpu_data(call, 7), id, (size_t)y * width + x, ours);
         for (uint32_t k = 0; k < 3; k++)
             vf_store(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
         vf_store(row->color[3] + x, opacity, ours);
@@ -181,7 +181,7 @@ static void shade(const struct finish *finish, struct walk *walk, int32_t y)
                                      pt_lanes_left(x, view->width), &id);
             if (!vm_bits(ours))
                 continue;
-            pt_albedo(&args->instance, pt_cpu_data(&finish->shades[i].call, 4), id, ours, albedo);
+            pt_albedo(&args->instance, pt_cpu_data(&finish->shades[i].call, 4), id, (size_t)y * view->width + x, ours, albedo);
             for (uint32_t k = 0; k < 3; k++)
                 vf_store(out->color[k] + x, albedo[k], ours);
         }
@@ -287,7 +287,10 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
     }
     if (args->source) {
         vf value = vf_zero();
-        if (vm_bits(some))
+        if (vm_bits(some) && args->discs)
+            value = pt_source_of_discs(finish->planes.keys + (size_t)py * width + px,
+                                       finish->planes.normals + 4 * ((size_t)py * width + px), args->discs, mixed, some);
+        else if (vm_bits(some))
             value = pt_source_value(width, pt_source(&finish->planes, (size_t)py * width + px), mixed, some, px, py);
         vf_put(finish->source + out, value, count);
     }

@@ -3,8 +3,9 @@
 // is scan and what is invention); twin of shaders/kernels/extract.comp
 #include "extract.h"
 
-static void extract_source(const struct extract_args *args, const uint64_t *keys, const uint32_t *from, uint32_t y,
-                           float *out)
+// normals: where discs were drawn, the row's.
+static void extract_source(const struct extract_args *args, const uint64_t *keys, const uint32_t *from, const float *normals,
+                           uint32_t y, float *out)
 {
     const struct view_args *view = &args->view;
     for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
@@ -16,7 +17,9 @@ static void extract_source(const struct extract_args *args, const uint64_t *keys
         }
         vi word = vi_load(from + x), source = vi_and(word, vi_set(~PT_FROM_MIXED));
         vm mixed = vm_not(vi_eq(word, source));
-        vf_store(out + x, pt_source_value(view->width, source, mixed, some, args->crop_x + x, args->crop_y + y), lanes);
+        vf value = args->discs ? pt_source_of_discs(keys + x, normals + 4 * (size_t)x, args->discs, mixed, some)
+                               : pt_source_value(view->width, source, mixed, some, args->crop_x + x, args->crop_y + y);
+        vf_store(out + x, value, lanes);
     }
 }
 
@@ -59,7 +62,8 @@ static void extract_row(void *context, uint32_t y)
         extract_normal(args, keys, (const float *)pt_cpu_data(call, 2) + 4 * row,
                        (float *)pt_cpu_data(call, 4) + 3 * out);
     if (args->source)
-        extract_source(args, keys, (const uint32_t *)pt_cpu_data(call, 1) + row, y,
+        extract_source(args, keys, (const uint32_t *)pt_cpu_data(call, 1) + row,
+                       args->discs ? (const float *)pt_cpu_data(call, 8) + 4 * row : NULL, y,
                        (float *)pt_cpu_data(call, 5) + out);
     if (args->shadow)
         extract_shadow(args, keys, (const float *)pt_cpu_data(call, 6) + row, (float *)pt_cpu_data(call, 7) + out);

@@ -36,6 +36,16 @@ static inline vf pt_source_value(uint32_t width, vi source, vm mixed, vm some, u
     return vf_select(some, value, vf_zero());
 }
 
+// The same of discs; normals: of the pixels, w how far off their points fell. Ids from `discs` on are no points.
+static inline vf pt_source_of_discs(const uint64_t *keys, const float *normals, uint32_t discs, vm mixed, vm some)
+{
+    vf pixels[4], value = vf_set(1.0f);
+    vf_load4(normals, pixels);
+    value = vf_select(vi_lt_unsigned(vi_load_id(keys), vi_set(discs)), value + pixels[3], value);
+    value = vf_select(mixed, vf_zero() - value, value);
+    return vf_select(some, value, vf_zero());
+}
+
 // View-space normals in world space, 0 where nothing is.
 static inline void pt_world_normal(const float m[9], const vf n[3], vm some, vf world[3])
 {

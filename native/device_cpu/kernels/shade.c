@@ -40,10 +40,10 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         vm ours = pt_of_instance(shade->planes.keys + at, &args->instance, pt_lanes_left(x, rect[2]), &id);
         if (!vm_bits(ours))
             continue;
-        pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, ours, color);
+        pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, at, ours, color);
         vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, pt_cpu_data(shade->call, 8), x, y, id, ours, color,
                                    normal);
-        normal[3] = color[3] = pt_opacity(&args->instance, pt_cpu_data(shade->call, 7), id, ours);
+        normal[3] = color[3] = pt_opacity(&args->instance, pt_cpu_data(shade->call, 4), pt_cpu_data(shade->call, 7), id, at, ours);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * color[3];
         vf_store4(shading + 4 * at, normal, vm_bits(ours));

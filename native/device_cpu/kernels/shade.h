@@ -8,7 +8,7 @@
 
 enum { PT_BLEND_MOST = 8 };
 
-static const uint32_t pt_color_bytes[] = { 0, 3, 12 }; // of a point, by color_format
+static const uint32_t pt_color_bytes[] = { 0, 3, 12, 0 }; // of a point, by color_format
 
 // Weights of the blend by squared distance.
 static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1])
@@ -42,9 +42,16 @@ static inline void pt_blend_normals(const struct pt_seen_row *const *around, int
     }
 }
 
-// The points' own colours, before light.
-static inline void pt_albedo(const struct instance_args *instance, const void *colors, vi id, vm ours, vf albedo[3])
+// The points' own colours, before light; at: the first pixel in the plane, where they were blended.
+static inline void pt_albedo(const struct instance_args *instance, const void *colors, vi id, size_t at, vm ours, vf albedo[3])
 {
+    if (instance->color_format == PT_COLOR_OF_PLANE) {
+        vf pixels[4];
+        vf_load4((const float *)colors + 4 * at, pixels);
+        for (int k = 0; k < 3; k++)
+            albedo[k] = pixels[k];
+        return;
+    }
     for (int k = 0; k < 3; k++)
         albedo[k] = vf_set(instance->color[k]);
     if (instance->color_format == 1 && instance->id_count < 1u << 29) { // byte offsets fit a signed index
@@ -61,20 +68,26 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
     vi_store(ids, id, vm_first(PT_LANES));
     for (; lanes; lanes &= lanes - 1)
         for (int k = 0, i = __builtin_ctz(lanes); k < 3; k++) {
-            size_t at = 3 * (size_t)ids[i] + (size_t)k;
-            rgb[k][i] = instance->color_format == 1 ? pt_srgb_table[((const uint8_t *)colors)[at]]
-                                                    : ((const float *)colors)[at];
+            size_t channel = 3 * (size_t)ids[i] + (size_t)k;
+            rgb[k][i] = instance->color_format == 1 ? pt_srgb_table[((const uint8_t *)colors)[channel]]
+                                                    : ((const float *)colors)[channel];
         }
     for (int k = 0; k < 3; k++)
         albedo[k] = vf_load(rgb[k]);
 }
 
 // The points' opacity, times the instance's.
-static inline vf pt_opacity(const struct instance_args *instance, const uint8_t *opacities, vi id, vm ours)
+static inline vf pt_opacity(const struct instance_args *instance, const void *colors, const uint8_t *opacities, vi id, size_t at,
+                            vm ours)
 {
     vf opacity = vf_set(instance->opacity);
     if (!instance->has_opacities)
         return opacity;
+    if (instance->color_format == PT_COLOR_OF_PLANE) {
+        vf pixels[4];
+        vf_load4((const float *)colors + 4 * at, pixels);
+        return pixels[3];
+    }
     vi byte = vi_and(vi_gather_bytes(opacities, id, ours), vi_set(255));
     return opacity * (vi_convert(byte) * vf_set(1.0f / 255.0f));
 }

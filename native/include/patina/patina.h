@@ -159,6 +159,8 @@ typedef struct patina_cloud_desc {
                            // Optional; kept in steps of 1/255, a byte a point
     double origin[3];      // added to every position, in float64
     uint32_t threads;      // 0 = one per core
+    patina_array radius;   // 1 x FLOAT32/FLOAT64, of the point's disc, object units; negative or NaN = 0. Optional; for
+                           // PATINA_SURFACE_SPLATS. 4 bytes a point
 } patina_cloud_desc;
 
 typedef struct patina_cloud_info {
@@ -175,6 +177,8 @@ typedef struct patina_cloud_info {
     double origin[3];
     double layer_distance;   // automatic d~: what d_min = 0 stands for at the median spacing, object units. Each chunk
                              // takes its own spacing's
+    uint32_t has_radii;
+    float radius_most;       // of the points' own radii
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -281,6 +285,8 @@ typedef struct patina_cloud_style {
                                   // Opacity is 1 - transparency, times the point's own. Paper [D 5]. Its shadow
                                   // is as much lighter, by this number alone
     uint32_t shadow_off;          // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
+    float radius;                 // of every point's disc, world units, for PATINA_SURFACE_SPLATS; 0 = the point's own, else
+                                  // 1.5 times the local spacing
 } patina_cloud_style;
 
 typedef struct patina_mesh_style {
@@ -320,6 +326,10 @@ typedef struct patina_camera {
 
 enum patina_quality { PATINA_QUALITY_REFINED = 0, PATINA_QUALITY_PAPER = 1 }; // filled depth: tangent plane | source's
 enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OFF = 2 };
+// How points become a surface. FILL: image-space filling, as quality and fill say. SPLATS: each point is a flat disc across its
+// normal (without one: across the view), discs within a layer distance of the nearest one are blended; quality, fill, their
+// iterations and error_target say nothing then. Light maps of shadows are filled either way.
+enum patina_surface { PATINA_SURFACE_FILL = 0, PATINA_SURFACE_SPLATS = 1 };
 enum patina_smooth { PATINA_SMOOTH_ALLEVIATED = 0, PATINA_SMOOTH_GAUSSIAN = 1, PATINA_SMOOTH_BOX = 2, PATINA_SMOOTH_OFF = 3 };
 enum patina_antialias { PATINA_ANTIALIAS_LAYERS = 0, PATINA_ANTIALIAS_BACKGROUND = 1, PATINA_ANTIALIAS_OFF = 2 };
 
@@ -353,6 +363,7 @@ typedef struct patina_settings {
                                  // shadow_samples (stats: shadow_pending); not with shadow_lazy
     uint32_t own_background;   // 1 = background lies behind the points, and world_color only lights them
     float background[3];       // linear, with own_background; not where the film is transparent
+    uint32_t surface;            // patina_surface
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -486,7 +497,7 @@ PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress 
                                  patina_task **out); // patina_cloud_create
 PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
                                       patina_task **out); // patina_cloud_set_colors
-// Two numbers that tell whether points changed: of count, positions, normals and opacities; of count and colours. Not
+// Two numbers that tell whether points changed: of count, positions, normals, opacities and radii; of count and colours. Not
 // against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
 // written once the task is done. About as fast as memory is read.
 PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);

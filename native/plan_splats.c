@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The passes of discs: visibility, then (with the surfaces known) what the discs on the nearest surface show. SPEC 5, solid.
+#include "plan_passes.h"
+
+#include <string.h>
+
+// Binds what both kernels read of an instance; `blend` reads colours too.
+static uint32_t bind_instance(struct pt_ref *refs, uint32_t i, int blend)
+{
+    static const enum pt_instance_buffer list[] = {PT_CHUNKS, PT_POSITIONS, PT_IDS,      PT_SURFACE,
+                                                   PT_RADII,  PT_COLORS,    PT_OPACITIES};
+    const uint32_t count = blend ? 7 : 5;
+    for (uint32_t k = 0; k < count; k++)
+        refs[k] = pt_buffer_of(list[k], i);
+    return count;
+}
+
+// Arguments with the discs of every instance in view behind them.
+static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref *planes, uint32_t plane_count,
+                      const struct pt_ref *last)
+{
+    struct pt_plan *plan = builder->plan;
+    const size_t head = blend ? sizeof(struct blend_args) : sizeof(struct splat_args);
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 1 + 7 * (size_t)plan->instance_count) * sizeof *refs);
+    char *args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args));
+    if (!refs || !args) {
+        builder->failed = 1;
+        return;
+    }
+    struct disc_args *discs = (struct disc_args *)(void *)(args + head);
+    uint32_t instances = 0, count = plane_count;
+    memcpy(refs, planes, plane_count * sizeof *planes);
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        const struct pt_plan_instance *instance = &plan->instances[i];
+        if (!instance->chunk_count)
+            continue;
+        discs[instances++] = (struct disc_args){.instance = instance->args,
+                                                .has_radii = instance->instance->cloud->info.has_radii,
+                                                .radius = instance->radius,
+                                                .radius_scale = instance->radius_scale};
+        count += bind_instance(refs + count, i, blend);
+    }
+    if (last)
+        refs[count++] = *last;
+    struct splat_args splat = {.view = plan->view, .instances = instances, .behind = last != NULL};
+    struct blend_args mix = {.view = plan->view, .instances = instances};
+    memcpy(args, blend ? (void *)&mix : (void *)&splat, head);
+    struct pt_pass *pass = pt_add(builder, blend ? PT_KERNEL_blend : PT_KERNEL_splat, blend ? "blend" : "splat", args,
+                                  head + instances * sizeof *discs, refs, count);
+    if (blend)
+        PT_REASON(pass, "discs within a layer distance of the nearest, %u instances", instances);
+    else if (last)
+        PT_REASON(pass, "layer %u: discs behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
+    else
+        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view, as discs",
+                  (unsigned long long)plan->points_scattered, (unsigned long long)(plan->chunks - plan->chunks_culled),
+                  instances);
+}
+
+void pt_plan_splat(struct pt_builder *builder)
+{
+    static const char *const left_out[] = {"scatter", "pull", "fill", "push"};
+    const struct pt_ref keys = pt_keys_of(builder, 0), limit = pt_plane_at(PT_PLANE_LIMIT, 0);
+    for (size_t i = 0; i < sizeof left_out / sizeof *left_out; i++)
+        pt_skip(builder, left_out[i], "the settings ask for discs");
+    add_discs(builder, 0, &keys, 1, builder->layer > 1 ? &limit : NULL);
+}
+
+void pt_plan_blend(struct pt_builder *builder)
+{
+    const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
+                                    pt_plane_at(PT_PLANE_ALBEDO, 0)};
+    add_discs(builder, 1, planes, 4, NULL);
+}

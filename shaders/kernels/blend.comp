@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// blend: normal and colour of the discs that lie on the nearest surface of each pixel. SPEC 5, solid; twin of
+// native/device_cpu/kernels/blend.c
+//
+// Over a band of rows, as many as the sums have room for. STEP 0: discs are added up; STEP 1: means.
+#version 430 core
+#include "shared/kernel_args.h"
+
+#if STEP == 0
+layout(local_size_x = 64) in;
+#else
+layout(local_size_x = 32, local_size_y = 8) in;
+#endif
+
+#define SUMS 8u // colour 3, opacity, normal 3, weight: two words each, the low one first
+
+layout(std430, binding = 0) readonly buffer arguments_block { blend_args args; disc_args discs[]; };
+layout(std430, binding = 1) buffer sums_block { uint sums[]; };
+layout(std430, binding = 7) readonly buffer colors_block { uint point_colors[]; };
+layout(std430, binding = 8) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
+layout(std430, binding = 9) buffer normal_block { vec4 normal[]; };
+layout(std430, binding = 10) writeonly buffer albedo_block { vec4 albedo[]; };
+
+layout(location = 3) uniform int band_first;
+layout(location = 4) uniform int band_end;
+
+#include "lib/disc.glsl"
+#include "lib/planes.glsl"
+#include "lib/srgb.glsl"
+
+#if STEP == 0
+
+vec3 albedo_of(uint id)
+{
+    uint format = discs[instance].instance.color_format;
+    if (format == 2u)
+        return vec3(uintBitsToFloat(point_colors[3u * id]), uintBitsToFloat(point_colors[3u * id + 1u]),
+                    uintBitsToFloat(point_colors[3u * id + 2u]));
+    if (format == 1u) { // three bytes from byte 3 id on: they lie in one word or two
+        uint first = 3u * id, shift = 8u * (first & 3u);
+        uint low = point_colors[first >> 2], high = point_colors[(first + 2u) >> 2];
+        uint bytes = low >> shift | (shift > 8u ? high << (32u - shift) : 0u);
+        return vec3(pt_srgb(bytes & 255u), pt_srgb((bytes >> 8) & 255u), pt_srgb((bytes >> 16) & 255u));
+    }
+    return vec3(discs[instance].instance.color[0], discs[instance].instance.color[1], discs[instance].instance.color[2]);
+}
+
+float opacity_of(uint id)
+{
+    float opacity = discs[instance].instance.opacity;
+    if (discs[instance].instance.has_opacities == 0u)
+        return opacity;
+    uint byte_value = (opacities[id >> 2] >> (8u * (id & 3u))) & 255u;
+    precise float product = opacity * (float(byte_value) * 0.00392156885936856); // 1 / 255
+    return product;
+}
+
+void add(uint at, float weight, float term)
+{
+    precise float product = term * weight;
+    int value = int(product);
+    uint before = atomicAdd(sums[at], uint(value));
+    uint high = (value < 0 ? 0xFFFFFFFFu : 0u) + (before + uint(value) < before ? 1u : 0u);
+    if (high != 0u)
+        atomicAdd(sums[at + 1u], high);
+}
+
+void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color, precise vec3 n)
+{
+    float z, square;
+    bool beside;
+    uint pixel = uint(y) * view.width + uint(x);
+    uvec2 key = read_key(pixel);
+    if (!disc_pixel(view, d, x, y, z, square, beside))
+        return;
+    precise float farthest = pt_float(key.y) + read_deff(pixel);
+    if (key.y == PT_KEY_EMPTY_Z || !(pt_float(key.y) <= z && z <= farthest))
+        return;
+    if (key.x == id) {
+        precise float dx = float(x - d.own.x), dy = float(y - d.own.y);
+        precise float away = dx * dx + dy * dy;
+        precise float distance_to = away * pt_rsqrt(pt_max(away, 1.0));
+        normal[pixel].w = distance_to;
+    }
+    float weight = disc_weight(view, d, x, y, square, beside);
+    uint at = 2u * SUMS * (pixel - uint(band_first) * view.width);
+    add(at, weight, color.x);
+    add(at + 2u, weight, color.y);
+    add(at + 4u, weight, color.z);
+    add(at + 6u, weight, color.w);
+    add(at + 8u, weight, n.x);
+    add(at + 10u, weight, n.y);
+    add(at + 12u, weight, n.z);
+    add(at + 14u, weight, PT_SUM_SCALE);
+}
+
+void main()
+{
+    chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
+    view_args view = args.view;
+    uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
+    for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
+        disc d;
+        if (!disc_of(view, chunk, i, d))
+            continue;
+        vec3 rgb = albedo_of(d.id);
+        precise float opacity = opacity_of(d.id) * PT_SUM_SCALE;
+        precise vec4 color = vec4(pt_max(pt_min(rgb.x, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
+                                  pt_max(pt_min(rgb.y, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
+                                  pt_max(pt_min(rgb.z, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity, opacity);
+        precise vec3 n = d.n * PT_SUM_SCALE;
+        for (int y = max(d.box.y, band_first); y <= min(d.box.w, band_end - 1); y++)
+            for (int x = d.box.x; x <= d.box.z; x++)
+                add_pixel(view, d, chunk.id_base + d.id, x, y, color, n);
+    }
+}
+
+#else
+
+// A sum as a float, in steps that are the same everywhere.
+float sum_of(uint at)
+{
+    uint low = sums[at], high = sums[at + 1u];
+    bool negative = (high & 0x80000000u) != 0u;
+    if (negative) {
+        high = ~high + (low == 0u ? 1u : 0u);
+        low = 0u - low;
+    }
+    precise float value = float(high) * 4294967296.0 + float(low);
+    return negative ? -value : value;
+}
+
+bool has_normals(uint id)
+{
+    for (uint i = 0u; i < args.instances; i++)
+        if (id - discs[i].instance.id_base < discs[i].instance.id_count && discs[i].instance.has_normals != 0u)
+            return true;
+    return false;
+}
+
+// The mean normal, on the side that the nearest disc's lies on.
+vec3 mean_normal(view_args view, vec3 sum, int x, int y, vec3 n)
+{
+    float square = pt_dot(sum, sum);
+    if (!(1.0 <= square))
+        return n;
+    precise vec3 mean = sum * pt_rsqrt(square);
+    precise float facing = 0.0 - n.z;
+    if (view.perspective != 0u) {
+        vec2 ray = pt_ray(view, x, y);
+        facing = (n.x * ray.x + n.y * ray.y) - n.z;
+    }
+    return 0.0 < facing ? vec3(pt_negate(mean.x), pt_negate(mean.y), pt_negate(mean.z)) : mean;
+}
+
+void main()
+{
+    view_args view = args.view;
+    int x = int(gl_GlobalInvocationID.x), y = int(gl_GlobalInvocationID.y) + band_first;
+    if (uint(x) >= view.width || y >= band_end)
+        return;
+    uint pixel = uint(y) * view.width + uint(x), at = 2u * SUMS * (pixel - uint(band_first) * view.width);
+    uvec2 key = read_key(pixel);
+    if (key.y == PT_KEY_EMPTY_Z)
+        return;
+    float opacity = sum_of(at + 6u), weight = pt_max(sum_of(at + 14u), 1.0);
+    vec3 color = vec3(0.0);
+    if (1.0 <= opacity) {
+        precise vec3 mean = vec3(sum_of(at), sum_of(at + 2u), sum_of(at + 4u)) * pt_rcp(opacity);
+        color = mean;
+    }
+    precise float share = opacity * pt_rcp(weight);
+    albedo[pixel] = vec4(color, opacity < weight ? pt_min(share, 1.0) : 1.0); // opaque: 1 exactly
+    if (has_normals(key.x))
+        normal[pixel].xyz = mean_normal(view, vec3(sum_of(at + 8u), sum_of(at + 10u), sum_of(at + 12u)), x, y, normal[pixel].xyz);
+}
+
+#endif

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Points as flat discs: where they lie on screen, and which pixels they cover how deep. SPEC 5, solid; twin of
+// native/device_cpu/kernels/disc.h, which says what the numbers are.
+#ifndef PT_DISC_GLSL
+#define PT_DISC_GLSL
+
+#include "lib/math.glsl"
+
+layout(location = 0) uniform uint first_chunk; // of this dispatch
+layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
+layout(location = 2) uniform uint instance;    // whose points these are
+
+layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = 3) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = 4) readonly buffer ids_block { uint ids[]; };
+layout(std430, binding = 5) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = 6) readonly buffer radii_block { float radii[]; };
+
+struct disc {
+    float x, y, z, radius;
+    float gx, gy, e, f, g;
+    ivec4 box; // x0, y0, x1, y1, both ends included
+    ivec2 own;
+    vec3 n;
+    uint id; // in its cloud
+};
+
+float pt_clamp_far(float x) { return pt_min(pt_max(x, -PT_DISC_FAR), PT_DISC_FAR); }
+
+float disc_radius(uint id, uint word)
+{
+    float own = discs[instance].radius;
+    if (own > 0.0)
+        return own;
+    if (discs[instance].has_radii != 0u) {
+        precise float scaled = radii[id] * discs[instance].radius_scale;
+        return pt_min(scaled, PT_DISC_MOST);
+    }
+    precise float r = discs[instance].instance.spacing[word >> PT_SPACING_SHIFT] * PT_DISC_SPACINGS;
+    return r;
+}
+
+// 2. box; false: outside the window.
+bool disc_box(view_args view, inout disc d)
+{
+    float before = 1.0;
+    bool around = false;
+    if (view.perspective != 0u) {
+        precise float nearest = d.z - d.radius, least = d.z * 0.0009765625;
+        around = !(least < nearest);
+        before = pt_rcp(around ? 1.0 : nearest);
+    }
+    bool drawn = true;
+    for (int k = 0; k < 2; k++) {
+        float at = k == 0 ? d.x : d.y, start = k == 0 ? view.ray_x0 : view.ray_y0, size = k == 0 ? view.ray_xs : view.ray_ys;
+        int origin = k == 0 ? view.origin_x : view.origin_y;
+        float lower = float(origin), upper = float(origin + int(k == 0 ? view.width : view.height) - 1);
+        precise float reach = d.radius;
+        if (view.perspective != 0u) {
+            precise float slope = start + size * at;
+            precise float square = slope * slope + 1.0;
+            reach = (reach * (square * pt_rsqrt(square))) * before;
+        }
+        precise float pixels = 1.001 * pt_rcp(size);
+        reach = reach * pixels;
+        reach = around ? PT_DISC_FAR : reach;
+        precise float begin = (at - reach) + 0.5, end = (at + reach) - 0.5;
+        float own = floor(at), first = floor(pt_clamp_far(begin)), last = floor(pt_clamp_far(end));
+        first = pt_max(pt_min(first, own), lower);
+        last = pt_min(pt_max(last, own), upper);
+        drawn = drawn && first <= last;
+        d.box[k] = int(first) - origin;
+        d.box[2 + k] = int(last) - origin;
+        d.own[k] = int(own) - origin;
+    }
+    return drawn;
+}
+
+// 3. plane and ellipse
+void disc_shape(view_args view, uint word, inout disc d)
+{
+    float xs = view.ray_xs, ys = view.ray_ys;
+    precise float u = 0.0, v = 0.0;
+    vec3 n = vec3(0.0, 0.0, 1.0);
+    bool none = true;
+    if (view.perspective != 0u) {
+        u = view.ray_x0 + xs * d.x;
+        v = view.ray_y0 + ys * d.y;
+    }
+    if (discs[instance].instance.has_normals != 0u && (word & PT_NORMAL_BITS) != PT_NORMAL_NONE) {
+        vec3 object = pt_decode_normal(word);
+        precise vec3 own;
+        for (int k = 0; k < 3; k++) {
+            precise float sum = (discs[instance].instance.normal_matrix[3 * k] * object.x +
+                                 discs[instance].instance.normal_matrix[3 * k + 1] * object.y) +
+                                discs[instance].instance.normal_matrix[3 * k + 2] * object.z;
+            own[k] = sum;
+        }
+        float square = pt_dot(own, own);
+        none = !(1e-30 <= square);
+        precise vec3 unit = own * pt_rsqrt(square);
+        n = none ? n : unit;
+    }
+    precise float facing = (n.x * u + n.y * v) - n.z;
+    float size = pt_abs(facing);
+    bool flat_disc = PT_DISC_LEAST <= d.radius && PT_DISC_TILT <= size;
+    float inverse = pt_rcp(flat_disc ? size : 1.0);
+    if (0.0 < facing)
+        n = vec3(pt_negate(n.x), pt_negate(n.y), pt_negate(n.z));
+    precise float gx = (n.x * xs) * inverse, gy = (n.y * ys) * inverse;
+    d.n = none ? vec3(0.0) : n;
+    precise float fine = pt_rcp(flat_disc ? d.radius : 1.0);
+    if (view.perspective != 0u) {
+        gx = pt_negate(gx);
+        gy = pt_negate(gy);
+        fine = d.z * fine;
+    }
+    flat_disc = flat_disc && fine <= PT_DISC_FINE;
+    precise float ax = xs - gx * u, ay = gx * v, bx = gy * u, by = ys - gy * v;
+    precise float e = ((ax * ax + ay * ay) + gx * gx) * fine * fine;
+    precise float f = ((gx * gy - ax * bx) - ay * by) * (fine + fine) * fine;
+    precise float g = ((bx * bx + by * by) + gy * gy) * fine * fine;
+    d.gx = flat_disc ? gx : 0.0;
+    d.gy = flat_disc ? gy : 0.0;
+    d.e = flat_disc ? e : 1e20;
+    d.f = flat_disc ? f : 0.0;
+    d.g = flat_disc ? g : 1e20;
+}
+
+// 1. The disc of a chunk's point; false: it is not drawn.
+bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
+{
+    uint base = chunk.first - first_slot, at = 3u * base + slot;
+    vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+    precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];
+    precise float x = (((chunk.lo[0] + chunk.row[0] * p.x) + chunk.row[1] * p.y) + chunk.row[2] * p.z) + chunk.hi[0];
+    precise float y = (((chunk.lo[1] + chunk.row[3] * p.x) + chunk.row[4] * p.y) + chunk.row[5] * p.z) + chunk.hi[1];
+    if (view.perspective != 0u) {
+        float r = pt_rcp(z);
+        x = x * r;
+        y = y * r;
+    }
+    // NaN fails every comparison
+    if (!(view.z_near <= z && z <= view.z_far && pt_abs(x) < PT_DISC_FAR && pt_abs(y) < PT_DISC_FAR))
+        return false;
+    d.x = x;
+    d.y = y;
+    d.z = z;
+    d.id = ids[base + slot];
+    uint word = surface[d.id];
+    if (chunk.cull != 0u && (word & PT_NORMAL_BITS) != PT_NORMAL_NONE) {
+        precise vec3 towards = vec3(chunk.eye[0], chunk.eye[1], chunk.eye[2]) - chunk.eye[3] * p;
+        if (pt_dot(pt_decode_normal(word), towards) <= 0.0)
+            return false;
+    }
+    float radius = disc_radius(d.id, word);
+    d.radius = PT_DISC_LEAST <= radius ? radius : 0.0;
+    if (!disc_box(view, d))
+        return false;
+    disc_shape(view, word, d);
+    return true;
+}
+
+// Does the disc cover the pixel? square: distance over radius squared; beside: covered by the point alone.
+bool disc_pixel(view_args view, disc d, int x, int y, out float depth, out float square, out bool beside)
+{
+    precise float dx = (float(view.origin_x + x) + 0.5) - d.x, dy = (float(view.origin_y + y) + 0.5) - d.y;
+    precise float slope = d.gx * dx + d.gy * dy;
+    precise float ellipse = (d.e * dx + d.f * dy) * dx + (d.g * dy) * dy, z = d.z + slope;
+    bool covered = true;
+    if (view.perspective != 0u) {
+        precise float q = 1.0 + slope;
+        covered = PT_DISC_LEAST <= q;
+        float inverse = pt_rcp(q);
+        z = d.z * inverse;
+        ellipse = ellipse * (inverse * inverse);
+    }
+    covered = covered && ellipse <= 1.0;
+    bool own = ivec2(x, y) == d.own;
+    beside = own && !covered;
+    depth = beside ? d.z : z;
+    square = ellipse;
+    return (covered || own) && view.z_near <= depth && depth <= view.z_far;
+}
+
+// exp(-2 square) within 2.4e-4; in its own pixel the disc is a pixel wide at least.
+float disc_weight(view_args view, disc d, int x, int y, float square, bool beside)
+{
+    if (ivec2(x, y) == d.own) {
+        precise float dx = (float(view.origin_x + x) + 0.5) - d.x, dy = (float(view.origin_y + y) + 0.5) - d.y;
+        precise float pixel = (dx * dx + dy * dy) * 2.0;
+        square = beside ? pixel : pt_min(pixel, square);
+    }
+    precise float w = 0.25565624 * square - 1.03321445;
+    w = w * square + 1.90144324;
+    w = w * square - 1.98814547;
+    w = w * square + 0.99976468;
+    return w;
+}
+
+#endif

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "discs.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene, uint32_t instance,
+                    const struct camera *camera, float radius, double largest, int has_normals)
+{
+    const struct cloud *cloud = &scene->points.clouds[instance];
+    struct disc_args *discs = &scene->discs[instance];
+    *discs = (struct disc_args){.instance = {.id_base = cloud->chunks[0].id_base,
+                                             .id_count = cloud->points,
+                                             .has_normals = has_normals != 0,
+                                             .opacity = 1.0f},
+                                .has_radii = radius == 0.0f,
+                                .radius = radius,
+                                .radius_scale = 1.0f};
+    for (int k = 0; k < 9; k++)
+        discs->instance.normal_matrix[k] = (float)camera->rotation[k];
+    for (int k = 0; k < PT_SPACINGS; k++)
+        discs->instance.spacing[k] = (float)(largest * k / PT_SPACINGS);
+    scene->radii[instance] = harness_alloc(h, 4 * (size_t)cloud->points);
+    for (uint32_t i = 0; i < cloud->points; i++)
+        scene->radii[instance][i] = rng_below(rng, 8) ? (float)rng_range(rng, 0.0, largest) : 0.0f;
+}
+
+struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
+{
+    struct pt_buffer *buffers[2 + 5 * MOST_INSTANCES];
+    const struct scene *points = &scene->points;
+    const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct splat_args);
+    char args[sizeof(struct splat_args) + sizeof scene->discs];
+    uint64_t *empty = harness_alloc(h, pixels * 8);
+    for (size_t i = 0; i < pixels; i++)
+        empty[i] = REF_EMPTY_KEY;
+    uint32_t n = 0;
+    buffers[n++] = harness_buffer(h, empty, pixels * 8);
+    for (uint32_t i = 0; i < points->count; i++) {
+        struct cloud *cloud = &scene->points.clouds[i];
+        points_pad(cloud);
+        buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
+        buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->ids, 4 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->points);
+        buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->points);
+    }
+    const struct splat_args splat = {.view = points->view, .instances = points->count, .behind = points->limit != NULL};
+    if (points->limit)
+        buffers[n++] = harness_buffer(h, points->limit, pixels * 4);
+    memcpy(args, &splat, head);
+    memcpy(args + head, scene->discs, points->count * sizeof *scene->discs);
+    harness_run(h, PT_KERNEL_splat, args, head + points->count * sizeof *scene->discs, buffers, n);
+    return buffers[0];
+}
+
+static int by_id(const void *a, const void *b)
+{
+    const struct ref_disc *x = a, *y = b;
+    return x->id < y->id ? -1 : x->id > y->id;
+}
+
+struct ref_disc *discs_reference(struct harness *h, const struct disc_scene *scene, uint32_t *count)
+{
+    uint32_t total = 0, n = 0;
+    for (uint32_t i = 0; i < scene->points.count; i++)
+        total += scene->points.clouds[i].points;
+    struct ref_disc *discs = harness_alloc(h, (total + 1) * sizeof *discs);
+    for (uint32_t i = 0; i < scene->points.count; i++) {
+        const struct cloud *cloud = &scene->points.clouds[i];
+        for (uint32_t c = 0; c < cloud->chunk_count; c++)
+            for (uint32_t s = 0; s < cloud->chunks[c].count; s++)
+                discs[n++] = ref_disc(&scene->points.view, &scene->discs[i], &cloud->chunks[c], cloud->positions, cloud->ids,
+                                      cloud->surface, scene->radii[i], s);
+    }
+    qsort(discs, n, sizeof *discs, by_id);
+    *count = n;
+    return discs;
+}
+
+const struct ref_disc *discs_find(const struct ref_disc *discs, uint32_t count, uint32_t id)
+{
+    const struct ref_disc wanted = {.id = id};
+    return bsearch(&wanted, discs, count, sizeof *discs, by_id);
+}

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Random clouds as discs, for the tests of splat and blend.
+#ifndef PT_DISCS_H
+#define PT_DISCS_H
+
+#include "points.h"
+
+struct disc_scene {
+    struct scene points;
+    struct disc_args discs[MOST_INSTANCES];
+    float *radii[MOST_INSTANCES];
+};
+
+// After the points' positions: args of every instance. radius: of all points, 0: radii of their own between none and
+// `largest`. Normals turn with the camera.
+void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene, uint32_t instance,
+                    const struct camera *camera, float radius, double largest, int has_normals);
+// Runs splat; returns the key plane.
+struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene);
+// Every point of the scene, by rising id; count is the number of points.
+struct ref_disc *discs_reference(struct harness *h, const struct disc_scene *scene, uint32_t *count);
+const struct ref_disc *discs_find(const struct ref_disc *discs, uint32_t count, uint32_t id); // NULL: none
+
+#endif

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// blend: means of the discs on each pixel's nearest surface, over keys that splat made.
+#include "discs.h"
+
+#include <math.h>
+#include <string.h>
+
+static const uint32_t sizes[] = {1, 15, 16, 17, 300, 500, 31, 2};
+enum { SIZES = sizeof sizes / sizeof sizes[0] };
+
+struct planes {
+    uint64_t *keys;
+    float *deff, *normal, *albedo;
+};
+
+// What blend reads of the points beside their discs.
+struct paint {
+    void *colors[MOST_INSTANCES];
+    uint8_t *opacities[MOST_INSTANCES];
+    size_t color_bytes[MOST_INSTANCES];
+};
+
+static struct view_args window(uint32_t width, uint32_t height, int perspective, double focal)
+{
+    struct view_args view = points_window(width, height, perspective, focal);
+    view.ray_x0 = (float)(-(view.origin_x + 0.5 * width) / focal);
+    view.ray_y0 = (float)(-(view.origin_y + 0.5 * height) / focal);
+    return view;
+}
+
+// Bytes, floats (brighter than blends take among them) or the style's colour, by instance.
+static struct paint paint(struct harness *h, struct rng *rng, struct disc_scene *scene)
+{
+    struct paint out = {.colors = {NULL}};
+    for (uint32_t i = 0; i < scene->points.count; i++) {
+        struct instance_args *args = &scene->discs[i].instance;
+        const size_t count = scene->points.clouds[i].points;
+        args->color_format = (i + 1) % 3;
+        args->opacity = i ? 0.7f : 1.0f;
+        args->has_opacities = i == 2;
+        for (int k = 0; k < 3; k++)
+            args->color[k] = (float)rng_unit(rng);
+        out.color_bytes[i] = count * (args->color_format == 2 ? 12 : 3) + 4;
+        out.colors[i] = harness_alloc(h, out.color_bytes[i]);
+        for (size_t k = 0; k < 3 * count; k++)
+            if (args->color_format == 2)
+                ((float *)out.colors[i])[k] = (float)(rng_below(rng, 50) ? rng_range(rng, -0.5, 1.5) : 60000.0);
+            else
+                ((uint8_t *)out.colors[i])[k] = (uint8_t)rng_below(rng, 256);
+        out.opacities[i] = harness_alloc(h, count + 4);
+        for (size_t k = 0; k < count; k++)
+            out.opacities[i][k] = (uint8_t)rng_below(rng, 256);
+    }
+    return out;
+}
+
+static struct ref_look look_of(const struct disc_scene *scene, const struct paint *paint, uint32_t id)
+{
+    struct ref_look look = {.opacity = 0};
+    for (uint32_t i = 0; i < scene->points.count; i++) {
+        const struct instance_args *args = &scene->discs[i].instance;
+        const uint32_t at = id - args->id_base;
+        if (at >= args->id_count)
+            continue;
+        look.opacity = (double)args->opacity * (args->has_opacities ? paint->opacities[i][at] / 255.0 : 1.0);
+        for (int k = 0; k < 3; k++)
+            look.color[k] = args->color_format == 0   ? (double)args->color[k]
+                            : args->color_format == 1 ? ref_srgb(((const uint8_t *)paint->colors[i])[3 * at + (uint32_t)k])
+                                                      : (double)((const float *)paint->colors[i])[3 * at + (uint32_t)k];
+    }
+    return look;
+}
+
+static struct planes run(struct harness *h, struct disc_scene *scene, const struct paint *paint)
+{
+    const struct scene *points = &scene->points;
+    const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct blend_args);
+    struct pt_buffer *buffers[4 + 7 * MOST_INSTANCES];
+    char args[sizeof(struct blend_args) + sizeof scene->discs];
+    struct planes out;
+    struct pt_buffer *keys = discs_splat(h, scene);
+    struct pt_buffer *zero = harness_buffer(h, harness_alloc(h, pixels * 16), pixels * 16);
+    struct pt_buffer *albedo = harness_buffer(h, harness_alloc(h, pixels * 16), pixels * 16);
+    struct pt_buffer *deff = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
+    struct pt_buffer *from = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
+    uint32_t n = 0;
+    buffers[n++] = keys;
+    buffers[n++] = deff;
+    buffers[n++] = zero;
+    buffers[n++] = albedo;
+    for (uint32_t i = 0; i < points->count; i++) {
+        const struct cloud *cloud = &points->clouds[i];
+        struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->points);
+        const struct surface_args of_pixels = {.view = points->view, .instance = scene->discs[i].instance};
+        HARNESS_RUN(h, surface, &of_pixels, keys, surface, zero, deff, from);
+        buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
+        buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, cloud->ids, 4 * (size_t)cloud->slots);
+        buffers[n++] = surface;
+        buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->points);
+        buffers[n++] = harness_buffer(h, paint->colors[i], paint->color_bytes[i]);
+        buffers[n++] = harness_buffer(h, paint->opacities[i], cloud->points + 4);
+    }
+    const struct blend_args blend = {.view = points->view, .instances = points->count};
+    memcpy(args, &blend, head);
+    memcpy(args + head, scene->discs, points->count * sizeof *scene->discs);
+    out.keys = harness_read(h, keys);
+    out.deff = harness_read(h, deff);
+    out.normal = harness_read(h, zero);
+    float *before = harness_alloc(h, pixels * 16);
+    memcpy(before, out.normal, pixels * 16);
+    harness_run(h, PT_KERNEL_blend, args, head + points->count * sizeof *scene->discs, buffers, n);
+    out.normal = harness_read(h, zero);
+    out.albedo = harness_read(h, albedo);
+    harness_same(h, "normal", out.normal, pixels * 4, 4, 4, points->view.width);
+    harness_same(h, "albedo", out.albedo, pixels * 4, 4, 4, points->view.width);
+    // the reference needs the normals as they were
+    uint32_t count;
+    const struct ref_disc *discs = discs_reference(h, scene, &count);
+    struct ref_look *looks = harness_alloc(h, (count + 1) * sizeof *looks);
+    for (uint32_t i = 0; i < count; i++)
+        looks[i] = look_of(scene, paint, discs[i].id);
+    size_t unsure = 0, shown = 0;
+    for (size_t p = 0; p < pixels; p++) {
+        const int x = (int)(p % points->view.width), y = (int)(p / points->view.width);
+        if (out.keys[p] == REF_EMPTY_KEY)
+            continue;
+        const struct ref_disc *nearest = discs_find(discs, count, ref_key_id(out.keys[p]));
+        HARNESS_CHECK(h, nearest != NULL);
+        if (!nearest)
+            continue;
+        const struct ref_blend expected =
+            ref_blend(&points->view, discs, looks, count, (uint32_t)(nearest - discs), (float)ref_key_z(out.keys[p]), out.deff[p],
+                      before + 4 * p, x, y);
+        shown++;
+        unsure += expected.unsure != 0;
+        if (expected.unsure)
+            continue;
+        for (int k = 0; k < 4; k++)
+            if (!harness_near(out.albedo[4 * p + (size_t)k], expected.color[k], expected.color_error[k]))
+                harness_fail(h, "albedo", x, y, "channel %d: got %.9g, expected %.9g +- %.2g", k, out.albedo[4 * p + (size_t)k],
+                             expected.color[k], expected.color_error[k]);
+        const double n_of[3] = {expected.n.x, expected.n.y, expected.n.z};
+        for (int k = 0; k < 3; k++)
+            if (!harness_near(out.normal[4 * p + (size_t)k], n_of[k], expected.normal_error))
+                harness_fail(h, "normal", x, y, "axis %d: got %.9g, expected %.9g +- %.2g", k, out.normal[4 * p + (size_t)k],
+                             n_of[k], expected.normal_error);
+        if (!harness_near(out.normal[4 * p + 3], expected.away, TOL_DISTANCE * expected.away))
+            harness_fail(h, "away", x, y, "got %.9g, expected %.9g", out.normal[4 * p + 3], expected.away);
+    }
+    harness_unsure(h, unsure, shown, TOL_UNSURE_SHARE);
+    return out;
+}
+
+static void random_discs(struct harness *h, int perspective, uint32_t seed, double largest, int with_normals)
+{
+    struct rng rng = {seed};
+    const double focal = perspective ? 60.0 : 20.0;
+    struct disc_scene scene = {.points = {.view = window(67, 45, perspective, focal)}};
+    for (uint32_t i = 0; i < 3; i++) {
+        struct camera camera = points_look(&rng, &scene.points.view, focal, 4.0);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, i == 1, i * 5000),
+                             i == 0 ? 1.0 : 1.8);
+        discs_describe(h, &rng, &scene, i, &camera, i == 1 ? 0.1f : 0.0f, largest, with_normals && i != 2);
+    }
+    const struct paint colors = paint(h, &rng, &scene);
+    run(h, &scene, &colors);
+}
+
+static void perspective(struct harness *h)
+{
+    random_discs(h, 1, 1, 0.2, 1);
+}
+
+static void orthographic(struct harness *h)
+{
+    random_discs(h, 0, 2, 0.2, 1);
+}
+
+static void no_normals(struct harness *h)
+{
+    random_discs(h, 1, 3, 0.2, 0);
+}
+
+static void under_a_pixel(struct harness *h)
+{
+    random_discs(h, 1, 4, 1e-3, 1);
+    random_discs(h, 0, 5, 0.0, 1);
+}
+
+// A flat sheet of many discs of one colour gives that colour and that normal, exactly opaque.
+static void sheet(struct harness *h)
+{
+    static const uint32_t many[] = {4000, 4000, 4000};
+    struct rng rng = {6};
+    struct disc_scene scene = {.points = {.view = window(67, 45, 0, 20.0)}};
+    struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .shift = {0, 0, -4}, .focal = 20.0};
+    camera.center_x = scene.points.view.origin_x + 33.5;
+    camera.center_y = scene.points.view.origin_y + 22.5;
+    struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 3, 0, 0);
+    for (uint32_t c = 0; c < 3; c++)
+        for (uint32_t i = 0; i < many[c]; i++) {
+            *points_coordinate(cloud, c, i, 0) = (float)rng_range(&rng, -2.0, 2.0);
+            *points_coordinate(cloud, c, i, 1) = (float)rng_range(&rng, -2.0, 2.0);
+        }
+    for (uint32_t i = 0; i < cloud->points; i++)
+        cloud->surface[i] = 4095u | 4095u << 13;
+    discs_describe(h, &rng, &scene, 0, &camera, 0.2f, 0.0, 1);
+    struct paint colors = paint(h, &rng, &scene);
+    memset(colors.colors[0], 128, colors.color_bytes[0]);
+    const struct planes planes = run(h, &scene, &colors);
+    for (size_t p = 0; p < (size_t)67 * 45; p++) {
+        if (planes.keys[p] == REF_EMPTY_KEY)
+            continue;
+        if (!harness_near(planes.albedo[4 * p], ref_srgb(128), 1e-5) || planes.albedo[4 * p + 3] != 1.0f)
+            harness_fail(h, "albedo", (int)(p % 67), (int)(p / 67), "got %.9g, opacity %.9g", planes.albedo[4 * p],
+                         planes.albedo[4 * p + 3]);
+        HARNESS_CHECK(h, harness_near(planes.normal[4 * p + 2], 1.0, 1e-6));
+    }
+}
+
+// So many bright discs in one place that sums pass 32 bits.
+static void overflow(struct harness *h)
+{
+    static const uint32_t many[] = {4096, 4096, 4096, 100};
+    struct rng rng = {7};
+    struct disc_scene scene = {.points = {.view = window(17, 9, 1, 60.0)}};
+    struct camera camera = points_look(&rng, &scene.points.view, 60.0, 4.0);
+    camera.shift[0] = camera.shift[1] = 0.0;
+    struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 4, 0, 0);
+    for (uint32_t i = 0; i < cloud->points; i++)
+        cloud->surface[i] = PT_NORMAL_NONE;
+    discs_describe(h, &rng, &scene, 0, &camera, 0.05f, 0.0, 0);
+    scene.discs[0].instance.color_format = 2;
+    struct paint colors = {.color_bytes = {12 * (size_t)cloud->points + 4}};
+    colors.colors[0] = harness_alloc(h, colors.color_bytes[0]);
+    colors.opacities[0] = harness_alloc(h, cloud->points + 4);
+    for (uint32_t i = 0; i < cloud->points; i++) {
+        float *rgb = (float *)colors.colors[0] + 3 * (size_t)i;
+        rgb[0] = 4000.0f;
+        rgb[1] = i % 2 ? -3000.0f : 1000.0f;
+        rgb[2] = 1e-3f;
+    }
+    const struct planes planes = run(h, &scene, &colors);
+    size_t shown = 0;
+    for (size_t p = 0; p < (size_t)17 * 9; p++) {
+        if (planes.keys[p] == REF_EMPTY_KEY)
+            continue;
+        shown++;
+        const float *got = planes.albedo + 4 * p;
+        HARNESS_CHECK(h, harness_near(got[0], 4000.0, 0.01) && harness_near(got[1], -1000.0, 0.01) && harness_near(got[2], 1e-3, 1e-5));
+    }
+    HARNESS_CHECK(h, shown > 0);
+}
+
+static void plane_sizes(struct harness *h)
+{
+    static const uint32_t shapes[][2] = {{1, 1}, {16384, 1}, {1, 333}};
+    static const uint32_t few[] = {16, 40, 1};
+    struct rng rng = {8};
+    for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
+        const double focal = shapes[i][0];
+        struct disc_scene scene = {.points = {.view = window(shapes[i][0], shapes[i][1], 1, focal)}};
+        struct camera camera = points_look(&rng, &scene.points.view, focal, 3.0), turned = camera;
+        for (int k = 0; k < 6; k++) // squeezed into the window's shape
+            camera.rotation[k] *= k < 3 ? 1.0 : (double)shapes[i][1] / shapes[i][0];
+        camera.shift[0] = camera.shift[1] = 0.0;
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, few, 3, 0, 0), 1.5);
+        discs_describe(h, &rng, &scene, 0, &turned, 0.0f, 0.01, 1);
+        const struct paint colors = paint(h, &rng, &scene);
+        run(h, &scene, &colors);
+    }
+}
+
+// Reference alone: two discs in one pixel, at the middle and at the rim of a third's.
+static void sanity(struct harness *h)
+{
+    const struct view_args view = window(64, 64, 0, 10.0);
+    struct ref_disc discs[2] = {{.id = 0, .possible = 1, .definite = 1, .n = {0, 0, 1}, .has_normal = 1, .has_normals = 1, .radius = 1.0}};
+    discs[0].place = (struct ref_place){1, {48.5, 48.5}, {40.5, 40.5}, {2.0, 2.0}};
+    discs[1] = discs[0];
+    discs[1].id = 1;
+    discs[1].place.x = (struct ref_range){53.5, 53.5}; // half a radius off
+    const struct ref_look looks[2] = {{{1.0, 0.0, 0.0}, 1.0}, {{0.0, 1.0, 0.0}, 1.0}};
+    const float n[3] = {0.0f, 0.0f, 1.0f};
+    const struct ref_blend both = ref_blend(&view, discs, looks, 2, 0, 2.0f, 0.5f, n, 32, 32);
+    HARNESS_CHECK(h, !both.unsure && harness_near(both.color[0], 1.0 / (1.0 + exp(-0.5)), 1e-3));
+    HARNESS_CHECK(h, both.away == 0.0 && both.color[3] == 1.0 && both.n.z > 0.999);
+    discs[1].place.z = (struct ref_range){3.0, 3.0};
+    HARNESS_CHECK(h, ref_blend(&view, discs, looks, 2, 0, 2.0f, 0.5f, n, 32, 32).color[0] == 1.0);
+}
+
+int main(int argc, char **argv)
+{
+    static const struct harness_case cases[] = {
+        {"sanity", sanity, 1},
+        {"random discs, perspective", perspective, 0},
+        {"random discs, orthographic", orthographic, 0},
+        {"without normals", no_normals, 0},
+        {"discs under a pixel", under_a_pixel, 0},
+        {"a sheet of one colour", sheet, 0},
+        {"sums beyond 32 bits", overflow, 0},
+        {"plane sizes", plane_sizes, 0},
+    };
+    return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
+}
