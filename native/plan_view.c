@@ -602,7 +602,7 @@ static void place_mesh(struct pt_plan *plan, const struct camera *camera, const 
     *out = (struct pt_plan_mesh){ .instance = instance };
     set_object(camera, instance->style.world_from_object, &object);
     chunk_product(camera, &object, &mesh->box, rows, translation);
-    if (!pt_mesh_drawn(mesh) || !chunk_bounds(camera, &mesh->box, rows, translation, bounds, &z, &beyond) ||
+    if (!pt_mesh_drawn(mesh) || !chunk_bounds(camera, &mesh->box, rows, translation, 0.0, bounds, &z, &beyond) ||
         !rect_in_window(&plan->view, bounds, out->rect))
         return;
     struct mesh_args *args = &out->args;

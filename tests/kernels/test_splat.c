@@ -24,7 +24,7 @@ static uint64_t *check_scene(struct harness *h, struct disc_scene *scene)
         for (uint32_t i = 0; i < count; i++) {
             if (!discs[i].definite)
                 continue;
-            const struct ref_cover cover = ref_disc_at(view, &discs[i], x, y);
+            const struct ref_met cover = ref_disc_at(view, &discs[i], x, y);
             if (cover.covered == REF_YES && !(scene->points.limit && !(cover.z.lo > scene->points.limit[p])))
                 farthest = fmin(farthest, cover.z.hi);
         }
@@ -40,7 +40,7 @@ static uint64_t *check_scene(struct harness *h, struct disc_scene *scene)
             harness_fail(h, "keys", x, y, "got id %u, which no drawn point has", ref_key_id(keys[p]));
             continue;
         }
-        const struct ref_cover cover = ref_disc_at(view, disc, x, y);
+        const struct ref_met cover = ref_disc_at(view, disc, x, y);
         if (cover.covered == REF_NO)
             harness_fail(h, "keys", x, y, "got id %u, whose disc is not there", disc->id);
         else if (!(z >= cover.z.lo && z <= cover.z.hi))
@@ -292,7 +292,7 @@ static void sanity(struct harness *h)
         }
         HARNESS_CHECK(h, disc.possible && disc.definite);
         HARNESS_CHECK(h, up >= 19 && up <= 21 && across == (lean ? 15 : up));
-        const struct ref_cover beside = ref_disc_at(&view, &disc, 35, 32);
+        const struct ref_met beside = ref_disc_at(&view, &disc, 35, 32);
         HARNESS_CHECK(h, harness_near(0.5 * (beside.z.lo + beside.z.hi), lean ? 2.3 : 2.0, 1e-3));
     }
 }

@@ -6,7 +6,7 @@
 #include <math.h>
 
 // Weight of a disc at a pixel and how far float32 may be off; its own pixel counts it as a pixel wide at least.
-static double weight_of(const struct view_args *view, const struct ref_disc *disc, const struct ref_cover *cover, int x, int y,
+static double weight_of(const struct view_args *view, const struct ref_disc *disc, const struct ref_met *cover, int x, int y,
                         double *error)
 {
     const double px = 0.5 * (disc->place.x.lo + disc->place.x.hi), py = 0.5 * (disc->place.y.lo + disc->place.y.hi);
@@ -32,7 +32,7 @@ struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *
     double terms = 0.0, normal_error = 0.0;
     struct ref_vec normal = {0, 0, 0};
     for (uint32_t i = 0; i < count; i++) {
-        const struct ref_cover cover = ref_disc_at(view, &discs[i], x, y);
+        const struct ref_met cover = ref_disc_at(view, &discs[i], x, y);
         double error, w;
         if (!discs[i].possible || cover.covered == REF_NO || (i != nearest && cover.z.lo > farthest + slack))
             continue;

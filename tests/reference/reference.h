@@ -117,11 +117,11 @@ struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *a
                          const float *positions, const uint32_t *ids, const uint32_t *surface, const float *radii,
                          uint32_t slot);
 // Whether it covers a pixel of the plane, how deep, and at which squared share of its radius from its middle.
-struct ref_cover {
+struct ref_met {
     enum ref_truth covered;
     struct ref_range z, square;
 };
-struct ref_cover ref_disc_at(const struct view_args *view, const struct ref_disc *disc, int x, int y);
+struct ref_met ref_disc_at(const struct view_args *view, const struct ref_disc *disc, int x, int y);
 
 struct ref_look { // what blend reads of a point
     double color[3], opacity;

@@ -84,7 +84,7 @@ static enum ref_truth falls_into(const struct view_args *view, const struct ref_
 }
 
 // The ray against the disc itself.
-static struct ref_cover meet(const struct view_args *view, const struct ref_disc *disc, int x, int y)
+static struct ref_met meet(const struct view_args *view, const struct ref_disc *disc, int x, int y)
 {
     const double z = middle(disc->place.z), px = middle(disc->place.x), py = middle(disc->place.y);
     const struct ref_ray pixel = ref_ray(view, x, y);
@@ -92,7 +92,7 @@ static struct ref_cover meet(const struct view_args *view, const struct ref_disc
     const double du = pixel.u - (view->ray_x0 + (double)view->ray_xs * px), dv = pixel.v - (view->ray_y0 + (double)view->ray_ys * py);
     struct ref_vec ray = own, offset = {du, dv, 0.0};
     double depth, scale = view->perspective ? z : 1.0;
-    struct ref_cover out = {.covered = REF_NO, .square = {2.0, 2.0}};
+    struct ref_met out = {.covered = REF_NO, .square = {2.0, 2.0}};
     if (!(disc->radius > 0.0))
         return out;
     if (view->perspective) {
@@ -130,9 +130,9 @@ static struct ref_cover meet(const struct view_args *view, const struct ref_disc
     return out;
 }
 
-struct ref_cover ref_disc_at(const struct view_args *view, const struct ref_disc *disc, int x, int y)
+struct ref_met ref_disc_at(const struct view_args *view, const struct ref_disc *disc, int x, int y)
 {
-    struct ref_cover out = meet(view, disc, x, y);
+    struct ref_met out = meet(view, disc, x, y);
     const enum ref_truth own = falls_into(view, disc, x, y);
     if (own != REF_NO) { // the pixel of the point is covered anyway, beside the disc at the point's depth
         if (out.covered == REF_NO)
