@@ -437,56 +437,6 @@ def test_quad_view():
     yield lambda: settled(20000)
 
 
-def resident():
-    with open("/proc/self/statm", encoding="ascii") as file:
-        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def test_long_session():
-    """Import, orbit, paint, undo, redo, duplicate, animate, render, another file: memory stays flat."""
-    from check_import import columns, write_ply
-    paths = [write_ply(f"session{i}.ply", columns(seed=i)) for i in range(2)]
-    window = bpy.context.window_manager.windows[0]
-    override = {"window": window, "area": area(), "region": window_region()}
-    rounds, used = int(os.environ.get("PATINA_SESSION_ROUNDS", "8")), []
-    errors = []
-    for number in range(rounds):
-        scene = setup()
-        scene.render.resolution_x, scene.render.resolution_y = 160, 120
-        scene.camera.matrix_world = Matrix.Translation((0, 0, 6))
-        with bpy.context.temp_override(**override):
-            bpy.ops.import_scene.patina_points(filepath=str(paths[number % 2]))
-            bpy.ops.ed.undo_push(message="import")
-        yield lambda: settled(500)
-        for step in range(5):
-            view().view_rotation = Quaternion((0, 1, 0), 0.2 * step)
-            yield lambda: settled(500)
-        obj = bpy.context.view_layer.objects.active
-        obj.data.attributes["Col"].data.foreach_set("color_srgb", np.tile(np.float32([1, number % 2, 0, 1]), 500))
-        obj.data.update()
-        with bpy.context.temp_override(**override):
-            bpy.ops.ed.undo_push(message="paint")
-            bpy.ops.object.duplicate()
-            bpy.ops.ed.undo_push(message="duplicate")
-        yield lambda: settled(1000)
-        with bpy.context.temp_override(**override):
-            bpy.ops.ed.undo()
-        yield lambda: settled(500)
-        with bpy.context.temp_override(**override):
-            bpy.ops.ed.redo()
-        yield lambda: settled(1000)
-        bpy.context.view_layer.objects.active.keyframe_insert("location", frame=1)
-        bpy.context.scene.frame_set(2)
-        check(render()["Combined"][..., 3].any(), "an empty render")
-        errors += [found.message for found in viewport._VIEWPORTS if found.message]
-        used.append(resident())
-        bpy.ops.outliner.orphans_purge(do_recursive=True)
-    print(f"  resident memory after each round, MB: {' '.join(f'{value:.0f}' for value in used)}")
-    check(not errors, f"{errors}")
-    half = len(used) // 2
-    check(used[-1] - used[half - 1] < 25, f"memory grows: {used}")
-
-
 def orbit(seconds):
     """Turns the view for so long; keeps the viewport's figures meanwhile: works of pictures, in seconds, and draws."""
     found, works, draws, uploads = shown(), {}, [], []

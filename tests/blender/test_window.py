@@ -3,7 +3,7 @@
 
     xvfb-run -a -s "-screen 0 1280x800x24" blender --factory-startup --python tests/blender/test_window.py [-- NAME ...]
 
-NAME figures_ten_million measures instead. A test is a generator: it yields what it waits for, a function that says whether it has come.
+NAME figures_ten_million measures instead; long_session is for long_session.py. A test is a generator: it yields what it waits for, a function that says whether it has come.
 """
 
 import os
@@ -22,6 +22,9 @@ PATIENCE = 30.0  # seconds for one thing to come
 def tests():
     import check_viewport
     names = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
+    if names == ["long_session"]:
+        import session_rounds
+        yield "long_session", session_rounds.long_session
     for name, test in vars(check_viewport).items():
         if name.startswith("test_") and (not names or any(part in name for part in names)) or name in names:
             yield name.removeprefix("test_"), test
@@ -77,4 +80,4 @@ def finish(code):
 
 
 bpy.context.preferences.view.show_splash = False
-bpy.app.timers.register(Runner(), first_interval=0.5)
+bpy.app.timers.register(Runner(), first_interval=0.5, persistent=True)
