@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from . import native, passes, render, sync, viewport
+from .sync import motion
 
 BUILDING = 0.5  # share of the progress bar for reading the scene; the rest is the picture
 
@@ -27,6 +31,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     # No __init__: Blender 4.4+ demands *args and **kwargs there. Instances come and go with every render and change of
     # shading; what lasts is in sync.clouds.CACHE and render.device_for.
     _viewport: viewport.Viewport | None = None  # of an instance that draws a 3D view
+    _moment, _moments = 0, 1  # of a final picture: which is under way, and how many
 
     def update_render_passes(self, scene: bpy.types.Scene | None = None,
                              renderlayer: bpy.types.ViewLayer | None = None) -> None:
@@ -66,39 +71,69 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
             self._render_eye(depsgraph, eye)
 
     def _render_eye(self, depsgraph: bpy.types.Depsgraph, eye: str) -> None:
-        layer = depsgraph.view_layer_eval
+        """One picture, the mean of its moments where motion is blurred."""
+        frame, moments = depsgraph.scene_eval.frame_current_final, motion.moments(depsgraph.scene_eval)
+        color, ms, told = 0.0, 0.0, set()
+        try:
+            for self._moment, moment in enumerate(moments):
+                self._moments = len(moments)
+                if len(moments) > 1:
+                    self._go_to(frame + moment.offset)
+                description, picture = self._render_moment(depsgraph, eye, moment, math.floor(frame), told)
+                color, ms = color + picture.planes["COMBINED"], ms + picture.stats["ms"]
+                if moment.gives_data:
+                    data = description, picture
+        finally:
+            if len(moments) > 1:
+                self._go_to(frame)
+        description, picture = data
+        picture.planes["COMBINED"] = color / np.float32(len(moments)) if len(moments) > 1 else color
+        passes.write(self, depsgraph.view_layer_eval, description, picture.planes, eye)
+        layers = picture.stats["layers"]
+        self._status(f"{picture.stats['points']:,} points, {ms:.1f} ms, {picture.device}" +
+                     (f", {layers} layers" if layers > 1 else ""), 1.0)
+
+    def _render_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment, frame: int,
+                       told: set[str]) -> tuple[sync.SceneDescription, render.Picture]:
+        """The scene as it stands now. told: notices so far, each is reported once."""
         camera, place = self.camera_override or depsgraph.scene_eval.camera, None
         if eye and camera:
             self.active_view_set(eye)
             place = (self.camera_model_matrix(camera), self.camera_shift_x(camera))
         view = sync.final_view(camera, depsgraph, place)
-        description = sync.describe(depsgraph, view, self._poll_reading)
-        for notice in description.notices:
-            self._tell('WARNING', notice)
+        description = replace(sync.describe(depsgraph, view, self._poll_reading, frame), samples=moment.samples)
+        if self._moments * len(moment.samples) > 1:
+            description = render.without_antialiasing(description)
         self._status("Rendering", BUILDING)
-        picture = render.draw(description, {item.plane for item in passes.enabled(layer)}, self._poll_drawing,
-                              depsgraph.scene_eval.patina.tile_size)
-        if picture.notice:
-            self._tell('WARNING', picture.notice)
-        passes.write(self, layer, description, picture.planes, eye)
-        layers = picture.stats["layers"]
-        self._status(f"{picture.stats['points']:,} points, {picture.stats['ms']:.1f} ms, {picture.device}" +
-                     (f", {layers} layers" if layers > 1 else ""), 1.0)
+        picture = render.draw(description, {item.plane for item in passes.enabled(depsgraph.view_layer_eval)},
+                              self._poll_drawing, depsgraph.scene_eval.patina.tile_size)
+        for notice in filter(None, (*description.notices, picture.notice)):
+            if notice not in told:
+                self._tell('WARNING', notice)
+                told.add(notice)
+        return description, picture
+
+    def _go_to(self, frame: float) -> None:
+        self.frame_set(math.floor(frame), frame - math.floor(frame))
 
     def _poll_reading(self, what: str, progress: float) -> bool:
         self._status(what, BUILDING * progress)
         return self._stopped()
 
     def _poll_drawing(self, progress: float) -> bool:
-        self.update_progress(BUILDING + (1.0 - BUILDING) * progress)
+        self._progress(BUILDING + (1.0 - BUILDING) * progress)
         return self._stopped()
+
+    def _progress(self, share: float) -> None:
+        """Of the moment under way."""
+        self.update_progress((self._moment + share) / self._moments)
 
     def _stopped(self) -> bool:
         return self.test_break()
 
     def _status(self, text: str, progress: float) -> None:
         self.update_stats("", text)
-        self.update_progress(progress)
+        self._progress(progress)
 
     def _tell(self, kind: str, text: str) -> None:
         self.report({kind}, f"Patina: {text}")

@@ -48,6 +48,11 @@ def forget_device() -> None:
         _device = None
 
 
+def without_antialiasing(description: SceneDescription) -> SceneDescription:
+    """For pictures that several samples make: their mean is smooth by itself."""
+    return replace(description, settings=replace(description.settings, antialias=ANTIALIAS_OFF))
+
+
 def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool],
          tile_size: int = 0) -> Picture:
     """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel.
@@ -106,10 +111,8 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
              tile_size: int) -> Picture:
     """Tile by tile, each the mean of its samples: a tile's pixels are those of the whole picture (the library keeps a
     guard band around it), so tiles only save memory."""
-    if description.samples > 1:
-        description = replace(description, settings=replace(description.settings, antialias=ANTIALIAS_OFF))
     regions = tiles(description.settings.region, tile_size)
-    if len(regions) > 1 or description.samples > 1:  # all of them take from whole shadow textures
+    if len(regions) > 1 or len(description.samples) > 1:  # all of them take from whole shadow textures
         description = replace(description, settings=replace(description.settings, shadow_lazy=0))
     x0, y0, x1, y1 = description.settings.region
     picture: dict[str, np.ndarray] = {}
@@ -139,19 +142,19 @@ def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[
                stats: dict[str, Any]) -> dict[str, np.ndarray]:
     """Planes of one region. stats: milliseconds add up, the rest is of the last picture."""
     planes: dict[str, np.ndarray] = {}
-    for sample in range(description.samples):
+    for sample in description.samples:
         with native.Scene() as scene:
             describe(scene, replace(description, camera=shifted(description, sample)), wanted)
             frame.render(scene)
         before = stats.get("ms", 0.0)
         stats.update(frame.stats())
         stats["ms"] += before
-        if sample == 0:
+        if not planes:
             planes = {name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted}
         else:
             planes["COMBINED"] += frame.read("COMBINED")
-    if description.samples > 1:
-        planes["COMBINED"] /= np.float32(description.samples)
+    if len(description.samples) > 1:
+        planes["COMBINED"] /= np.float32(len(description.samples))
     return planes
 
 

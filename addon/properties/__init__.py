@@ -107,6 +107,10 @@ class PatinaSceneProperties(PropertyGroup):
         name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
         description="Pictures, each shifted by a part of a pixel, that a final render takes the mean of. More than one stand "
                     "in for anti-aliasing; data passes come from the first")
+    motion_steps: IntProperty(
+        name="Steps", override=_OVERRIDE, default=8, min=1, soft_max=64, max=1024,
+        description="Moments while the shutter is open that a final render takes the mean of. Samples for anti-aliasing are "
+                    "spread over them, at least one each")
     tile_size: IntProperty(
         name="Tile Size", override=_OVERRIDE, default=0, min=0, max=16384, subtype='PIXEL',
         description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: tiles of 4096 "

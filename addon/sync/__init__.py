@@ -31,17 +31,19 @@ class SceneDescription:
     camera: Camera
     settings: Settings
     device: DeviceChoice
-    samples: int  # of a final picture
+    samples: tuple[int, ...]  # of a final picture: the numbers of those to take the mean of
     mist: Mist | None
     shadow_file: str  # baked shadow textures; empty: none
     notices: list[str]  # what the artist should know about things left out, a sentence each
 
 
-def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, float], bool]) -> SceneDescription:
+def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, float], bool],
+             frame: int | None = None) -> SceneDescription:
     """Reads the scene of a final render. poll(what, progress of it) is called during long steps and returns True to
-    cancel."""
+    cancel. frame: whose files sequences show, where the scene stands at a moment beside it."""
     notices: list[str] = []
-    return describe_items(depsgraph, view, notices, clouds.collect(depsgraph, clouds.taking_now(poll, notices), notices))
+    return describe_items(depsgraph, view, notices,
+                          clouds.collect(depsgraph, clouds.taking_now(poll, notices), notices, frame=frame))
 
 
 def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trusted,
@@ -68,7 +70,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         camera=view.camera,
         settings=settings.read(scene, view, background),
         device=settings.device(scene),
-        samples=settings.samples(scene),
+        samples=tuple(range(settings.samples(scene))),
         mist=world.mist(scene.world),
         shadow_file=settings.shadow_file(scene),
         notices=notices,

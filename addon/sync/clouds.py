@@ -183,8 +183,10 @@ Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud
 
 
 def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
-            visible: Callable[[bpy.types.DepsgraphObjectInstance], bool] = lambda instance: True) -> list[CloudItem]:
-    """Every visible cloud, instances too. Iterates the depsgraph only; keeps no reference into it."""
+            visible: Callable[[bpy.types.DepsgraphObjectInstance], bool] = lambda instance: True,
+            frame: int | None = None) -> list[CloudItem]:
+    """Every visible cloud, instances too. Iterates the depsgraph only; keeps no reference into it. frame: whose files
+    sequences show; None: of the scene's."""
     items: list[CloudItem] = []
     taken: dict[tuple, native.Cloud | Pending | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
@@ -202,7 +204,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             continue
         link = None
         if obj.patina.linked_file:
-            link = linked.source_of(obj, depsgraph.scene_eval.frame_current, notices)
+            link = linked.source_of(obj, depsgraph.scene_eval.frame_current if frame is None else frame, notices)
             if link is None:
                 continue
         count = depsgraph.scene_eval.patina.mesh_points if solid else 0

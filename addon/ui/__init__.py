@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from . import panels, presets, sequence, standard, statistics, styles
+from . import motion, panels, presets, sequence, standard, statistics, styles
 
-_MODULES = (presets, styles, panels, sequence, statistics, standard)
+_MODULES = (presets, styles, panels, motion, sequence, statistics, standard)
 
 
 def register() -> None:
