@@ -26,6 +26,8 @@ def enum_number(group: PropertyGroup, name: str) -> int:
 
 
 class PatinaSceneProperties(PropertyGroup):
+    version: IntProperty(  # of the form of these properties: migrate.py
+        name="Version", default=0, min=0, options={'HIDDEN'})
     style: PointerProperty(type=PatinaStyleProperties)
     studio: PointerProperty(type=PatinaStudioProperties, override=_OVERRIDE)
     error_target: FloatProperty(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from .. import migrate
 from . import clouds, lights, settings, world
 from .camera import Camera, CameraError, View, final_view, viewport_view
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
@@ -63,6 +64,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
                    items: list[CloudItem]) -> SceneDescription:
     """Lights, world and settings of a scene around clouds that the caller has."""
     scene = depsgraph.scene_eval
+    notices += filter(None, [migrate.notice(scene)])
     background = world.background(scene.world, notices)
     return SceneDescription(
         clouds=items,

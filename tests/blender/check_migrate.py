@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of older versions: what their scenes meant is what they show."""
+
+import contextlib
+
+import bpy
+from harness import SCRATCH, add_points, check, new_scene, render, reports
+
+from patina import migrate
+
+CURRENT = len(migrate.STEPS)
+
+
+@contextlib.contextmanager
+def before_migration():
+    """As an add-on that knew no versions: nothing is stamped."""
+    migrate.unregister()
+    try:
+        yield
+    finally:
+        migrate.register()
+
+
+def saved(name):
+    path = str(SCRATCH / name)
+    bpy.ops.wm.save_as_mainfile(filepath=path, check_existing=False)
+    return path
+
+
+def load(path):
+    bpy.ops.wm.open_mainfile(filepath=path, load_ui=False)
+    return bpy.context.scene
+
+
+def test_an_old_file_keeps_its_picture():
+    """A scene of before version 1 that said nothing of meshes left them out; it still does, and one that asked keeps that."""
+    scene = new_scene()
+    check(scene.patina.version == 0, "a new scene has no stamp yet")
+    asked = bpy.data.scenes.new("asked")
+    asked.render.engine, asked.patina.meshes = 'PATINA', 'POINTS'
+    other = bpy.data.scenes.new("other")
+    other.render.engine = 'BLENDER_WORKBENCH'
+    with before_migration():
+        path = saved("old.blend")
+    load(path)
+    scenes = bpy.data.scenes
+    check([scenes[name].patina.meshes for name in ("test", "asked")] == ['OFF', 'POINTS'], "meshes")
+    check(scenes["test"].patina.is_property_set("meshes"), "what was meant is written down")
+    check(not scenes["other"].patina.is_property_set("meshes"), "another engine's scene is left alone")
+    check({scene.patina.version for scene in scenes} == {CURRENT}, "stamps")
+    for name in ("asked", "other"):
+        scenes.remove(scenes[name])
+
+
+def test_a_present_file_is_left_alone():
+    scene = new_scene()
+    path = saved("present.blend")
+    check(scene.patina.version == CURRENT, "saving stamps")
+    check(not load(path).patina.is_property_set("meshes"), "a step was done again")
+
+
+def test_steps_are_done_once_in_order():
+    new_scene()
+    with before_migration():
+        path = saved("steps.blend")
+    done, steps = [], migrate.STEPS
+    migrate.STEPS = (lambda scene: done.append(1), lambda scene: done.append(2))
+    try:
+        load(path)
+        check(done == [1, 2], f"steps {done}")
+        scene = load(saved("steps.blend"))
+        check(done == [1, 2] and scene.patina.version == 2, f"steps {done}")
+        migrate.STEPS += (lambda scene: done.append(3),)
+        load(path)
+        check(done == [1, 2, 3], f"only the new one: {done}")
+    finally:
+        migrate.STEPS = steps
+
+
+def test_a_newer_file_is_said():
+    scene = new_scene()
+    scene.patina.version = CURRENT + 1
+    load(saved("newer.blend"))
+    check(bpy.context.scene.patina.version == CURRENT + 1, "its stamp stays")
+    add_points([(0, 0, -4)])
+    render()
+    check(any("newer version of Patina" in text for _, text in reports), f"{reports}")
