@@ -65,7 +65,9 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
     """Lights, world and settings of a scene around clouds that the caller has."""
     scene = depsgraph.scene_eval
     notices += filter(None, [migrate.notice(scene)])
-    background = world.background(scene.world, notices)
+    studio = scene.patina.studio
+    replaced = studio.use_light and studio.use_background  # then nothing of the world is drawn
+    background = world.background(None if replaced else scene.world, notices)
     return SceneDescription(
         clouds=items,
         lights=lights.collect(depsgraph, notices),
