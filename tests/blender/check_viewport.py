@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The 3D viewport in Rendered mode, in a real window. See test_window.py for what a yield means."""
 
+import io
 import os
+import sys
 import threading
 import time
 
@@ -109,6 +111,41 @@ def test_styles_at_once_and_one_step_of_undo():
     picture = screenshot("styles")
     check(picture.shape[0] > 100, "drawn")
     yield lambda: settled(60000)
+
+
+def test_panels_draw():
+    """Panels draw without an error, with every switch off and with every one on. Blender prints what a panel raises."""
+    scene = setup()
+    obj = add_points(*sphere(2000, 1.5, (0, 0, 0)))
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    area().spaces[0].show_region_ui = True
+    editor = next(found for found in bpy.context.window.screen.areas if found.type == 'PROPERTIES')
+    switches = [(group, kind.identifier) for owner in (scene, obj) for group in groups(owner.patina)
+                for kind in group.bl_rna.properties if kind.type == 'BOOLEAN' and not kind.is_array]
+    said, sys.stderr = sys.stderr, io.StringIO()
+    try:
+        for on in (False, True):
+            for group, name in switches:
+                setattr(group, name, on)
+            for tab in ('RENDER', 'OUTPUT', 'VIEW_LAYER', 'SCENE', 'WORLD', 'OBJECT', 'DATA'):
+                editor.spaces[0].context = tab
+                area().tag_redraw()
+                editor.tag_redraw()
+                until = time.perf_counter() + 0.3
+                yield lambda: time.perf_counter() > until
+    finally:
+        said, sys.stderr = sys.stderr.getvalue(), said
+        editor.spaces[0].context = 'RENDER'
+    check("Traceback" not in said, said)
+
+
+def groups(group):
+    """A property group and those within."""
+    yield group
+    for kind in group.bl_rna.properties:
+        if kind.type == 'POINTER' and kind.fixed_type.identifier.startswith("Patina"):
+            yield from groups(getattr(group, kind.identifier))
 
 
 def test_draws_points():
