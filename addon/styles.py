@@ -199,8 +199,11 @@ def write(path: Path, style: Style) -> None:
 def _properties(group: bpy.types.Struct, names: Iterable[str]) -> Iterator[tuple[str, bpy.types.Property]]:
     """Path and definition of properties of a group, those of groups within it too."""
     for name in names:
+        name, _, rest = name.partition(".")
         found = group.properties[name]
-        if found.type == 'POINTER':
+        if rest:
+            yield from ((f"{name}.{path}", item) for path, item in _properties(found.fixed_type, [rest]))
+        elif found.type == 'POINTER':
             inner = [key for key in found.fixed_type.properties.keys() if key not in {"rna_type", "name"}]
             yield from ((f"{name}.{path}", item) for path, item in _properties(found.fixed_type, inner))
         else:
