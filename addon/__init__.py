@@ -15,7 +15,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import engine, migrate, operators, properties, render, ui, viewport
-from .sync import clouds
+from .sync import clouds, meshes
 
 _MODULES = (properties, migrate, engine, operators, ui)
 _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
@@ -26,6 +26,7 @@ def _forget(*_) -> None:
     """Another file: its data may carry the names of the last one's."""
     viewport.close_all()
     clouds.CACHE.clear()
+    meshes.CACHE.clear()
 
 
 @persistent
@@ -49,4 +50,5 @@ def unregister() -> None:
     for module in reversed(_MODULES):
         module.unregister()
     clouds.CACHE.clear()
+    meshes.CACHE.clear()
     render.forget_device()

@@ -117,6 +117,16 @@ class _CloudStyle(_Descriptor):
                 ("shadow_off", c_uint32), ("radius", c_float)]
 
 
+class _MeshDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", _Array), ("normal", _Array),
+                ("color", _Array), ("triangle_count", c_uint64), ("indices", c_void_p)]
+
+
+class _MeshStyle(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("color", c_float * 3),
+                ("shadow_off", c_uint32)]
+
+
 class _LightDesc(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("type", c_uint32), ("color", c_float * 3), ("power", c_float),
                 ("position", c_double * 3), ("direction", c_double * 3), ("side", c_double * 3), ("angle", c_float),
@@ -174,6 +184,8 @@ _CALLS = {
     "patina_cloud_open": (c_char_p, _OUT),
     "patina_cloud_set_colors": (c_void_p, POINTER(_Array)),
     "patina_cloud_get_info": (c_void_p, POINTER(_CloudInfo)),
+    "patina_mesh_create": (POINTER(_MeshDesc), _OUT),
+    "patina_mesh_destroy": (c_void_p,),
     "patina_file_open": (c_char_p, c_void_p, _OUT),
     "patina_file_destroy": (c_void_p,),
     "patina_file_get_info": (c_void_p, POINTER(_FileInfo)),
@@ -186,6 +198,7 @@ _CALLS = {
     "patina_scene_create": (_OUT,),
     "patina_scene_destroy": (c_void_p,),
     "patina_scene_add_cloud": (c_void_p, c_void_p, POINTER(_CloudStyle)),
+    "patina_scene_add_mesh": (c_void_p, c_void_p, POINTER(_MeshStyle)),
     "patina_scene_add_light": (c_void_p, POINTER(_LightDesc)),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
     "patina_scene_set_settings": (c_void_p, POINTER(_Settings)),
@@ -215,7 +228,7 @@ _CALLS = {
 _RESULTS = {
     "patina_version": c_char_p, "patina_message": c_size_t, "patina_log_next": c_size_t,
     "patina_progress_destroy": None, "patina_progress_cancel": None, "patina_progress_value": c_float,
-    "patina_device_destroy": None, "patina_cloud_destroy": None, "patina_file_destroy": None,
+    "patina_device_destroy": None, "patina_cloud_destroy": None, "patina_mesh_destroy": None, "patina_file_destroy": None,
     "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
     "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_task_destroy": None,
 }
@@ -454,6 +467,20 @@ class Cloud(_Handle):
         return Task("set_colors", self._handle, byref(_view(colors, self.count)), keep=(self, colors))
 
 
+class Mesh(_Handle):
+    """Triangles, three corners each: positions (3 n, 3), normals (3 n, 3) or None, linear colors (3 n, 3|4) or None, all
+    float32."""
+
+    _kind = "mesh"
+
+    def __init__(self, positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None) -> None:
+        corners = len(positions)
+        super().__init__(byref(_MeshDesc(vertex_count=corners, position=_view(positions, corners),
+                                         normal=_view(normals, corners), color=_view(colors, corners),
+                                         triangle_count=corners // 3)))
+        self.count = corners // 3
+
+
 class File(_Handle):
     """An opened point file. Arrays are float32, 8-bit colours uint8 RGBA (sRGB), other colours float32 (linear)."""
 
@@ -504,11 +531,15 @@ class Scene(_Handle):
 
     def __init__(self) -> None:
         super().__init__()
-        self._clouds: list[Cloud] = []  # the native scene points to them
+        self._clouds: list[Cloud | Mesh] = []  # the native scene points to them
 
     def add_cloud(self, cloud: Cloud, **style: Any) -> None:
         self._call("add_cloud", cloud._handle, byref(_CloudStyle(**style)))
         self._clouds.append(cloud)
+
+    def add_mesh(self, mesh: Mesh, **style: Any) -> None:
+        self._call("add_mesh", mesh._handle, byref(_MeshStyle(**style)))
+        self._clouds.append(mesh)
 
     def add_light(self, **light: Any) -> None:
         self._call("add_light", byref(_LightDesc(**light)))

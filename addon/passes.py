@@ -77,8 +77,8 @@ def _mist(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
 def _object_index(keys: np.ndarray, scene: SceneDescription) -> np.ndarray:
     """The pass index of the object that each pixel shows."""
     ids = (keys[..., 0] & np.uint64(0xFFFFFFFF)).astype(np.int64)
-    bases = np.cumsum([0, *(item.cloud.count for item in scene.clouds)])
-    indices = np.array([*(item.pass_index for item in scene.clouds), 0], np.float32)
+    bases = np.cumsum([0, *(item.cloud.count for item in scene.clouds), *(item.mesh.count for item in scene.meshes)])
+    indices = np.array([*(item.pass_index for item in (*scene.clouds, *scene.meshes)), 0], np.float32)
     found = np.searchsorted(bases, ids, side='right') - 1
     return indices[np.minimum(found, len(indices) - 1)][..., None]
 

@@ -200,3 +200,5 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
         scene.add_light(**asdict(light))
     for item in description.clouds:
         scene.add_cloud(item.cloud, **asdict(item.style))
+    for item in description.meshes:
+        scene.add_mesh(item.mesh, **asdict(item.style))

@@ -96,12 +96,13 @@ class PatinaSceneProperties(PropertyGroup):
         description="Processor threads; 0 follows Blender's own setting. Never changes the picture")
 
     meshes: EnumProperty(
-        name="Meshes", override=_OVERRIDE, default='OFF',
-        description="Whether meshes with faces are in the picture",
+        name="Meshes", override=_OVERRIDE, default='TRIANGLES',
+        description="How meshes with faces are in the picture",
         items=(
+            ('TRIANGLES', "As They Are", "Exactly, with the material's base color and lit: meshes hide points and points hide "
+                                         "meshes", 2),
             ('OFF', "Not Drawn", "Only points; a warning names the meshes", 0),
-            ('POINTS', "As Points", "Points are spread over the faces, with the material's base color and lit: meshes hide "
-                                    "points and points hide meshes", 1)))
+            ('POINTS', "As Points", "Points are spread over the faces, and filled, smoothed and lit as the others are", 1)))
     mesh_points: IntProperty(
         name="Points per Mesh", override=_OVERRIDE, default=500000, min=100, soft_max=5000000,
         description="How many points are spread over each mesh")

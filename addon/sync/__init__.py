@@ -17,10 +17,11 @@ from . import clouds, lights, settings, world
 from .camera import Camera, CameraError, View, final_view, viewport_view
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
 from .lights import Light
+from .meshes import MeshItem
 from .settings import DeviceChoice, Settings
 from .world import Mist
 
-__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Mist", "Pending",
+__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "MeshItem", "Mist", "Pending",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "viewport_view"]
 
@@ -28,6 +29,7 @@ __all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "
 @dataclass(frozen=True)
 class SceneDescription:
     clouds: list[CloudItem]
+    meshes: list[MeshItem]
     lights: list[Light]
     camera: Camera
     settings: Settings
@@ -61,15 +63,16 @@ def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trust
 
 
 def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str],
-                   items: list[CloudItem]) -> SceneDescription:
-    """Lights, world and settings of a scene around clouds that the caller has."""
+                   items: list[CloudItem | MeshItem]) -> SceneDescription:
+    """Lights, world and settings of a scene around clouds and meshes that the caller has."""
     scene = depsgraph.scene_eval
     notices += filter(None, [migrate.notice(scene)])
     studio = scene.patina.studio
     replaced = studio.use_light and studio.use_background  # then nothing of the world is drawn
     background = world.background(None if replaced else scene.world, notices)
     return SceneDescription(
-        clouds=items,
+        clouds=[item for item in items if isinstance(item, CloudItem)],
+        meshes=[item for item in items if isinstance(item, MeshItem)],
         lights=lights.collect(depsgraph, notices),
         camera=view.camera,
         settings=settings.read(scene, view, background),

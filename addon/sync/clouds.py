@@ -178,17 +178,19 @@ class CloudCache:
 CACHE = CloudCache()
 
 
-# What collect() asks for each object with points: (object, identity, linked file) → its cloud, or None without points.
-Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | None"]
+TRIANGLES = "triangles"  # at the end of an identity: the object's faces are drawn
+
+# What collect() asks for each object with points or faces: (object, identity, linked file) → its cloud or mesh, or None without.
+Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | native.Mesh | None"]
 
 
 def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             visible: Callable[[bpy.types.DepsgraphObjectInstance], bool] = lambda instance: True,
-            frame: int | None = None) -> list[CloudItem]:
-    """Every visible cloud, instances too. Iterates the depsgraph only; keeps no reference into it. frame: whose files
-    sequences show; None: of the scene's."""
-    items: list[CloudItem] = []
-    taken: dict[tuple, native.Cloud | Pending | None] = {}  # by place in memory: it holds while the depsgraph does
+            frame: int | None = None) -> list[CloudItem | meshes.MeshItem]:
+    """Every visible cloud and mesh, instances too. Iterates the depsgraph only; keeps no reference into it. frame: whose
+    files sequences show; None: of the scene's."""
+    items: list[CloudItem | meshes.MeshItem] = []
+    taken: dict[tuple, native.Cloud | Pending | native.Mesh | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
     distances: dict[str, float] = {}
@@ -207,14 +209,17 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             link = linked.source_of(obj, depsgraph.scene_eval.frame_current if frame is None else frame, notices)
             if link is None:
                 continue
-        count = depsgraph.scene_eval.patina.mesh_points if solid else 0
-        place = link.identity() if link else (obj.data.as_pointer(), count, *_attribute_names(obj))
+        patina = depsgraph.scene_eval.patina
+        faces_as = 0 if not solid else TRIANGLES if patina.meshes == 'TRIANGLES' else patina.mesh_points
+        place = link.identity() if link else (obj.data.as_pointer(), faces_as, *_attribute_names(obj))
         if place not in taken:
-            identity = place if link else (*_identity(obj, used), count)
+            identity = place if link else (*_identity(obj, used), faces_as)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
-        if cloud:
+        if isinstance(cloud, native.Mesh):
+            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index))
+        elif cloud:
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
@@ -224,6 +229,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
                 scale = max(map(abs, instance.matrix_world.to_scale()))
                 distances[obj.original.name_full] = built.layer_distance * scale
     CACHE.trim(used)
+    meshes.CACHE.trim(used)
     estimates.keep(distances)
     if not items:
         notices.append("no visible object has points to draw")
@@ -236,7 +242,9 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
 def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
     """Builds each cloud at once, polling; content decides whether it is built anew."""
 
-    def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> native.Cloud | None:
+    def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> native.Cloud | native.Mesh | None:
+        if identity[-1] == TRIANGLES:
+            return meshes.CACHE.obtain(identity, obj)
         arrays = None if link else _read(obj, notices, identity[-1])
         if arrays is None and link is None:
             return None
@@ -261,7 +269,7 @@ class Trusted:
     """Clouds of a viewport, read again only after Blender said that their data changed."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple, tuple[Pending | None, list[str]]] = {}
+        self._known: dict[tuple, tuple[Pending | native.Mesh | None, list[str]]] = {}
         self._used: set[tuple] = set()
         self.reads = 0  # how often points were read, for tests
 
@@ -274,7 +282,7 @@ class Trusted:
         self._known = {key: known for key, known in self._known.items() if key in self._used}  # objects go
         self._used = set()
 
-        def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | None:
+        def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | native.Mesh | None:
             owners = (obj, obj.data, *(slot.material for slot in obj.material_slots if slot.material))
             key = (*identity, tuple((_kind(owner), owner.original.name_full) for owner in owners))
             self._used.add(key)
@@ -282,6 +290,9 @@ class Trusted:
                 said: list[str] = []
                 if link:
                     self._known[key] = (PendingLink(link), said)
+                elif identity[-1] == TRIANGLES:
+                    self.reads += 1
+                    self._known[key] = (meshes.CACHE.obtain(identity, obj), said)
                 else:
                     self.reads += 1
                     arrays = _read(obj, said, identity[-1])
@@ -366,6 +377,12 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         shininess=patina.shininess,
         transparency=1.0 - patina.opacity,
         shadow_off=_shadow_off(obj))
+
+
+def _mesh_style(obj: bpy.types.Object, matrix: Matrix) -> meshes.MeshStyle:
+    color = meshes.first_color(obj)
+    return meshes.MeshStyle(world_from_object=row_major(matrix), color=color if any(color) else (NOTHING,) * 3,
+                            shadow_off=_shadow_off(obj) & 3)
 
 
 def _shadow_off(obj: bpy.types.Object) -> int:

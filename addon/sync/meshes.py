@@ -1,19 +1,100 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes with faces → points on their faces, evenly spread, with normals and their materials' base colours.
+"""Meshes with faces → their triangles, or points evenly spread on them, with normals and their materials' base colours.
 
-So that meshes hide points and points hide meshes by the one rule of the picture: who is nearer. Faces smaller than the
-spacing of the points come out as their neighbours do.
+Either way meshes hide points and points hide meshes by the one rule of the picture: who is nearer.
 """
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
+
+from .. import native
 
 WHITE = (0.8, 0.8, 0.8, 1.0)
 
 # The additive recurrence of the plastic number: each next point falls into the largest gap of those before it.
 _STEP = np.array([0.7548776662466927, 0.5698402909980532])
+
+
+@dataclass(frozen=True)
+class MeshStyle:
+    """patina_mesh_style."""
+
+    world_from_object: tuple[float, ...]
+    color: tuple[float, float, float]
+    shadow_off: int
+
+
+@dataclass(frozen=True)
+class MeshItem:
+    mesh: native.Mesh
+    style: MeshStyle
+    pass_index: int  # of the object
+
+
+class MeshCache:
+    """Meshes by the identity of the data they were made from; what the last picture did not use goes."""
+
+    def __init__(self) -> None:
+        self._entries: dict[tuple, tuple[bytes, native.Mesh]] = {}
+
+    def obtain(self, identity: tuple, obj: bpy.types.Object) -> native.Mesh | None:
+        """Of an evaluated object; None without faces. Content decides whether it is made anew."""
+        arrays = triangles(obj)
+        if arrays is None:
+            return None
+        digest = hashlib.blake2b(digest_size=16)
+        for array in arrays:
+            digest.update(b"" if array is None else array)
+        known, mesh = self._entries.get(identity, (b"", None))
+        if known != digest.digest():
+            mesh = native.Mesh(*arrays)
+            self._entries[identity] = (digest.digest(), mesh)
+        return mesh
+
+    def trim(self, used: set[tuple]) -> None:
+        self._entries = {identity: entry for identity, entry in self._entries.items() if identity in used}
+
+    def clear(self) -> None:
+        self._entries = {}
+
+
+CACHE = MeshCache()
+
+
+def triangles(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray | None] | None:
+    """Positions (3 n, 3), normals (3 n, 3) and linear colours (3 n, 4) of the corners of an evaluated object's n triangles,
+    float32; colours only where materials differ. None without faces."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    if not len(mesh.loop_triangles):
+        return None
+    corners = _get(mesh.loop_triangles, "vertices", 3, np.int32).reshape(-1)
+    loops = _get(mesh.loop_triangles, "loops", 3, np.int32).reshape(-1)
+    positions = _get(mesh.vertices, "co", 3, np.float32)[corners]
+    if bpy.app.version >= (4, 1, 0):
+        normals = _get(mesh.corner_normals, "vector", 3, np.float32)[loops]
+    else:
+        mesh.calc_normals_split()
+        normals = _get(mesh.loops, "normal", 3, np.float32)[loops]
+    palette = _palette(obj)
+    colors = None
+    if (palette != palette[0]).any():
+        materials = _get(mesh.loop_triangles, "material_index", 1, np.int32)
+        colors = np.repeat(palette[np.clip(materials, 0, len(palette) - 1)], 3, axis=0)
+    return positions, normals, colors
+
+
+def first_color(obj: bpy.types.Object) -> tuple[float, ...]:
+    return tuple(map(float, _palette(obj)[0, :3]))
+
+
+def _palette(obj: bpy.types.Object) -> np.ndarray:
+    return np.array([base_color(slot.material) for slot in obj.material_slots] or [WHITE], np.float32)
 
 
 def sample(obj: bpy.types.Object, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -42,7 +123,7 @@ def sample(obj: bpy.types.Object, count: int) -> tuple[np.ndarray, np.ndarray, n
         own = _get(mesh.vertices, "normal", 3, np.float32)[corners[triangle[smooth]]]
         normals[smooth] = (weights[smooth, :, None] * own).sum(axis=1)
     materials = _get(mesh.loop_triangles, "material_index", 1, np.int32)[triangle]
-    palette = np.array([base_color(slot.material) for slot in obj.material_slots] or [WHITE], np.float32)
+    palette = _palette(obj)
     return (positions.astype(np.float32), normals.astype(np.float32),
             palette[np.clip(materials, 0, len(palette) - 1)])
 

@@ -34,6 +34,7 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
         shown = found.shown
         stats, level = shown.stats, shown.wish.level
         rows = [("Points", f"{stats['points']:,}"), ("Drawn", f"{stats['points_scattered']:,}"),
+                ("Triangles", f"{stats['triangles']:,}"),
                 ("Chunks", f"{stats['chunks'] - stats['chunks_culled']:,} of {stats['chunks']:,}"),
                 ("Spacing", f"{stats['spacing_px']:.2f} pixels"),
                 ("Expected Error", f"{stats['expected']['color']:.2%} of white"),

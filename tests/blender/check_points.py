@@ -181,7 +181,7 @@ def test_point_cloud_object():
 
 
 def test_meshes_with_faces_are_named():
-    new_scene()
+    new_scene().patina.meshes = 'OFF'
     mesh = bpy.data.meshes.new("triangle")
     mesh.from_pydata([(0, 0, -2), (1, 0, -2), (0, 1, -2)], [], [(0, 1, 2)])
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("triangle", mesh))
