@@ -262,6 +262,8 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
     }
     struct antialias_args args = {
         .view = plan->view, .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS, .behind = builder->layer > 1};
+    args.mesh_base = (uint32_t)builder->scene->points;
+    args.mesh_count = (uint32_t)builder->scene->triangles;
     const struct pt_ref refs[] = {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0),
                                   pt_plane_at(color, 0), pt_plane_at(PT_PLANE_THROUGH, 0)};
     PT_REASON(pt_add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.behind ? 5 : 4),

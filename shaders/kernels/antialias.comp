@@ -114,6 +114,7 @@ void main()
             sum = sum + read_float4(q);
     }
     precise float coverage = pt_max(0.833333313465 - count * 0.333333343267, 0.166666671634); // 5/6, 1/3, 1/6
+    coverage = read_key(at).x - args.mesh_base < args.mesh_count ? PT_MESH_COVERAGE : coverage;
     precise float share = (1.0 - coverage) * pt_rcp(count);
     precise vec4 mix_color = read_float4(at) * coverage + sum * share;
     mixed[index] = mix_color;

@@ -110,9 +110,10 @@ void main()
     triangle t = find_triangle(index, x, y);
     vec2 ray = pt_ray(view, int(x), int(y));
     vec3 n = plane_normal(t, ray);
-    // 3. layer distance
+    // 3. layer distance of what is as dense as the pixels
     float inverse = pt_rcp(pt_max(pt_cosine(view, n, ray), PT_COSINE_FLOOR));
-    deff[at] = pt_layer_distance(view, 0.0, 0.0, pt_float(key.y), inverse);
+    float z = pt_float(key.y);
+    deff[at] = pt_layer_distance(view, 0.0, pt_footprint(view, z), z, inverse);
     // 4. a point's normal stays: pixels around may show it
     bool measured = (from[at] & ~PT_FROM_MIXED) == at && other.y != PT_KEY_EMPTY_Z;
     if (!measured)

@@ -40,6 +40,7 @@
 #define PT_MESH_UNIT 256.0f
 #define PT_MESH_REACH 1048576.0f
 #define PT_MESH_FARTHEST 1e18f // triangles with a greater coordinate, or none that is a number, are left out
+#define PT_MESH_COVERAGE 0.75f // of a pixel at a mesh's edge: 1/2 to 1 along the axes (mean 3/4) and across (mean 5/6)
 #define PT_MESH_CORNERS 8 // of a triangle that five planes cut
 // Discs: a point without a radius of its own gets so many spacings. Of random points exp(-pi r^2) stay uncovered: 0.09% at 1.5.
 #define PT_DISC_SPACINGS 1.5f
@@ -117,8 +118,8 @@ struct raster_args {
     uint32_t behind; // 1: only what lies beyond the limit plane counts
 };
 
-// cover: pixels where the mesh lies before what the keys show, or where that is not beyond the limit, show the mesh. d_eff is a
-// pixel's footprint on the triangle. The normal plane keeps the normal of a point that was measured there: pixels may have been
+// cover: pixels where the mesh lies before what the keys show, or where that is not beyond the limit, show the mesh. d_eff is
+// that of a surface whose points are a pixel apart. The normal plane keeps the normal of a point that was measured there: pixels may have been
 // filled from it.
 struct cover_args {
     struct view_args view;
@@ -270,6 +271,7 @@ struct antialias_args {
     struct view_args view;
     uint32_t layers; // 1: edges between layers too, 0: background edges only
     uint32_t behind; // 1: the through plane holds
+    uint32_t mesh_base, mesh_count; // ids of triangles: an edge pixel's centre lies on them, so they cover more of it
 };
 
 // peel: a finished layer is blended behind those before it, and says what may show behind it. [D 4, 5], SPEC 3

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // [D 3.5], SPEC 2.4: the Laplace cross on depth, taken as steps. With k of the four neighbours far, the edge is taken to
-// cover max(5/6 - k/3, 1/6) of the pixel; the rest shows the far neighbours.
+// cover max(5/6 - k/3, 1/6) of the pixel, on a mesh 3/4; the rest shows the far neighbours.
 #include "reference.h"
 #include "tolerances.h"
 
@@ -39,7 +39,8 @@ struct ref_color ref_antialias(const struct antialias_args *args, const struct r
             terms[c] += fabs((double)planes->color[4 * neighbour + (size_t)c]);
         }
     }
-    double coverage = far ? fmax(5.0 / 6.0 - far / 3.0, 1.0 / 6.0) : 1.0;
+    int mesh = ref_key_id(planes->keys[pixel]) - args->mesh_base < args->mesh_count;
+    double coverage = far && mesh ? 0.75 : far ? fmax(5.0 / 6.0 - far / 3.0, 1.0 / 6.0) : 1.0;
     for (int c = 0; c < 4; c++) {
         double own = planes->color[4 * pixel + (size_t)c], share = far ? (1.0 - coverage) / far : 0.0;
         out.color[c] = own * coverage + share * behind[c];

@@ -100,7 +100,7 @@ struct ref_cover ref_cover(const struct cover_args *args, const float *vertices,
     double off = TOL_LAYER + (cosine + turn_error > (double)PT_COSINE_FLOOR ? turn_error / floored : 0.0);
     out.inverse = 1.0 / floored;
     out.inverse_error = out.inverse * off;
-    out.deff = ref_layer_minimum(view, 0.0, 0.0, ref_key_z(mesh_key)) * out.inverse;
+    out.deff = ref_layer_minimum(view, 0.0, ref_footprint(view, ref_key_z(mesh_key)), ref_key_z(mesh_key)) * out.inverse;
     out.deff_error = out.deff * off;
     return out;
 }

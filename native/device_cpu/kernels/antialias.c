@@ -49,7 +49,7 @@ static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struc
         return 0;
     edge->pixel = at;
     memcpy(edge->color, colors + 4 * (size_t)at, sizeof edge->color);
-    pt_mix_edge(edge->color, sum, count);
+    pt_mix_edge(edge->color, sum, count, (uint32_t)keys[at] - job->args->mesh_base < job->args->mesh_count);
     return 1;
 }
 

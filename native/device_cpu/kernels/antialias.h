@@ -17,9 +17,9 @@ static const int8_t pt_cross[4][2] = { { 1, 0 }, { 0, 1 }, { -1, 0 }, { 0, -1 } 
 #define PT_COVERAGE_LEAST ((float)(1.0 / 6.0))
 
 // sum: of the colours of the `count` > 0 neighbours that are farther, empty ones counting as nothing.
-static inline void pt_mix_edge(float color[4], const float sum[4], float count)
+static inline void pt_mix_edge(float color[4], const float sum[4], float count, int mesh)
 {
-    float coverage = pt_max(PT_COVERAGE_NONE - count * PT_COVERAGE_STEP, PT_COVERAGE_LEAST);
+    float coverage = mesh ? PT_MESH_COVERAGE : pt_max(PT_COVERAGE_NONE - count * PT_COVERAGE_STEP, PT_COVERAGE_LEAST);
     float share = (1.0f - coverage) * pt_rcp(count);
     for (int k = 0; k < 4; k++)
         color[k] = color[k] * coverage + sum[k] * share;

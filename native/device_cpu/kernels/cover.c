@@ -132,9 +132,9 @@ static void cover_pixels(const struct pt_cpu_call *call, uint32_t x, uint32_t y,
     find_triangle(call, index, x, y, front, &t);
     vf_ray(view, x, y, ray);
     plane_normal(args, &t, ray, n);
-    // 3. layer distance
+    // 3. layer distance of what is as dense as the pixels
     n[3] = vf_rcp(vf_max(vf_cosine(view, n, ray), vf_set(PT_COSINE_FLOOR)));
-    vf_store(deff + at, vf_layer_distance(view, 0.0f, vf_zero(), vi_float(z), n[3]), front);
+    vf_store(deff + at, vf_layer_distance(view, 0.0f, vf_footprint(view, vi_float(z)), vi_float(z), n[3]), front);
     // 4. a point's normal stays: pixels around may show it
     vi own = vi_add(vi_set((uint32_t)at), vi_lanes());
     vm measured = vm_and(vi_eq(vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED)), own),
