@@ -66,6 +66,7 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         layout.prop(patina, "meshes")
         if patina.meshes == 'POINTS':
             layout.prop(patina, "mesh_points")
+        layout.operator_menu_enum("scene.patina_combine", "engine", text="Combine by Depth with")
 
 
 class PATINA_PT_transparency(PatinaPanel, Panel):

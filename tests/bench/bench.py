@@ -12,6 +12,7 @@ of them, in the same order; "absent" what could not be measured, and why.
     --quick   one size and density of each scene: within two minutes
     --full    scenes x devices x qualities x sizes x densities, and 10^8 points where memory allows: hours
 
+--only meshes: as triangles against as points; only --full does it too.
 --only import: a LAZ of 30 million points into Blender, 1 million with --quick; else only --full does it.
 """
 
@@ -28,6 +29,7 @@ from typing import Any
 
 import case as cases
 import imports
+import meshes
 import machine
 import page
 import papers
@@ -41,7 +43,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
 GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
-          "effects", "styles", "peers", "hard", "import")
+          "effects", "styles", "peers", "hard", "import", "meshes")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -130,7 +132,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "frames": options.frames,
         "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
         "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
-        "rows": [], "details": [], "absent": [], "hard": "", "import": "",
+        "rows": [], "details": [], "absent": [], "hard": "", "import": "", "meshes": "",
     }
     for case in chosen(options):
         reason = too_large(case)
@@ -145,6 +147,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             split(result, row)
     if not options.only or "hard" in options.only:
         result["hard"] = hard_cases(options)
+    if "meshes" in options.only or options.full:
+        result["meshes"] = meshes.measure(options.library)
     if "import" in options.only or options.full:
         result["import"] = imports.measure(1_000_000 if options.quick else 30_000_000, options.library)
     return result

@@ -144,6 +144,8 @@ def update(result: dict[str, Any], root: Path) -> str:
     program = root / "build/out/release/tests/scenes/test_holes"
     if program.is_file():
         parts["holes"] = holes(program)
+    if result.get("meshes"):
+        parts["meshes"] = result["meshes"]
     if result.get("hard"):
         parts["hard"] = hard(result["hard"])
     path = root / "README.md"

@@ -112,6 +112,8 @@ def markdown(result: dict[str, Any]) -> str:
         text += [papers.markdown(result), ""]
     if result.get("hard"):
         text += ["## Hard cases", "", result["hard"], ""]
+    if result.get("meshes"):
+        text += ["## Meshes", "", result["meshes"], ""]
     if result.get("import"):
         text += ["## Large imports", "", result["import"], ""]
     skipped = {name: reason for row in joined(result) for name, reason in (row.get("skipped") or {}).items()}

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points in a picture of Cycles: a plane of points and a plane of faces cross, each shows where it is nearer."""
+
+import os
+import tempfile
+
+import bpy
+import numpy as np
+from harness import add_points, check, check_close, new_scene
+
+
+def crossing():
+    """The faces lean to the left, the points to the right: they meet in the middle of the picture."""
+    scene = new_scene(64, 48)
+    x, y = np.meshgrid(np.linspace(-2, 2, 400), np.linspace(-2, 2, 400))
+    points = np.stack([x, y, -4.0 + 0.5 * x], -1).reshape(-1, 3)
+    add_points(points, np.tile(np.uint8((0, 255, 0, 255)), (len(points), 1)), None)
+    mesh = bpy.data.meshes.new("faces")
+    mesh.from_pydata([(-2, -2, -3), (2, -2, -5), (2, 2, -5), (-2, 2, -3)], [], [(0, 1, 2, 3)])
+    material = bpy.data.materials.new("red light")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    nodes = material.node_tree.nodes
+    light = nodes.new('ShaderNodeEmission')
+    light.inputs["Color"].default_value = (1, 0, 0, 1)
+    output = next(node for node in nodes if node.type == 'OUTPUT_MATERIAL')
+    material.node_tree.links.new(light.outputs[0], output.inputs["Surface"])
+    mesh.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("faces", mesh))
+    scene.render.engine = 'CYCLES'
+    scene.cycles.samples = 1
+    scene.cycles.device = 'CPU'
+    scene.cycles.use_denoising = False
+    scene.patina.antialias = 'OFF'
+    scene.render.film_transparent = True
+    return scene
+
+
+def picture(scene):
+    """What F12 leaves in Render Result, through a file: the composite."""
+    path = os.path.join(tempfile.mkdtemp(), "out.exr")
+    scene.render.image_settings.file_format = 'OPEN_EXR'
+    scene.render.image_settings.color_depth = '32'
+    scene.render.image_settings.exr_codec = 'ZIP'
+    scene.render.filepath = path
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(path)
+    pixels = np.array(image.pixels[:], np.float32).reshape(image.size[1], image.size[0], 4)
+    bpy.data.images.remove(image)
+    os.remove(path)
+    return pixels
+
+
+def test_cycles_and_points_hide_each_other():
+    scene = crossing()
+    check(bpy.ops.scene.patina_combine(engine='CYCLES') == {'FINISHED'}, "refused")
+    points, before = bpy.data.scenes[f"{scene.name} Points"], len(bpy.data.scenes)
+    check(points.objects["points"] == scene.objects["points"], "the objects were copied")
+    pixels = picture(scene)
+    check_close(pixels[24, 20], (1, 0, 0, 1), 1e-3, "left, the faces are nearer")
+    check_close(pixels[24, 44], (0, 1, 0, 1), 2e-3, "right, the points are nearer")
+    green = (pixels[..., 1] > 0.5).sum(axis=1)
+    check(abs(int(green[24]) - 32) <= 2, f"{green[24]} of 64 pixels of a row show points: they meet in the middle")
+
+    # half-transparent points let the faces through
+    scene.objects["points"].patina.opacity = 0.5
+    check_close(picture(scene)[24, 44], (0.5, 0.5, 0, 1), 5e-3, "through the points")
+
+    # once more: nothing is there twice, and what was set for the points stays
+    scene.objects["points"].patina.opacity = 1.0
+    points.patina.fill = 'OFF'
+    check(bpy.ops.scene.patina_combine(engine='CYCLES') == {'FINISHED'}, "refused the second time")
+    check(len(bpy.data.scenes) == before, f"{len(bpy.data.scenes)} scenes")
+    check(bpy.data.scenes[f"{scene.name} Points"].patina.fill == 'OFF', "the points' settings were lost")
+    check_close(picture(scene)[24, 44], (0, 1, 0, 1), 2e-3, "right, the second time")
+    check_close(picture(scene)[24, 20], (1, 0, 0, 1), 1e-3, "left, the second time")
+
+
+def test_needs_a_camera():
+    scene = crossing()
+    scene.camera = None
+    before = len(bpy.data.scenes)
+    try:
+        done = bpy.ops.scene.patina_combine()
+    except RuntimeError as error:
+        check("no camera" in str(error), str(error))
+    else:
+        check(done == {'CANCELLED'}, f"{done}")
+    check(len(bpy.data.scenes) == before, "a scene was left behind")
