@@ -217,7 +217,8 @@ static void plan_shade(struct pt_builder *builder, uint32_t i)
     args.light_count = instance->args.lit ? args.light_count : 0;
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
-    uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u);
+    uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) |
+                             (uint32_t)pt_effects_want_normals(builder->scene);
     const int discs = plan->surface == PATINA_SURFACE_SPLATS; // blended already
     if (discs) {
         args.instance.color_format = PT_COLOR_OF_PLANE;
@@ -509,7 +510,7 @@ static void plan_points(struct pt_builder *builder)
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    static const char *const others[] = {"raster", "cover", "mark", "lit", "shade", "edl", "smooth", "antialias", "peel"};
+    static const char *const others[] = {"raster", "cover", "mark", "lit", "shade", "obscure", "edl", "smooth", "antialias", "peel"};
     builder->plan->light_count = 0;
     skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
     skip_all(builder, reason, others, sizeof others / sizeof *others);

@@ -60,6 +60,7 @@ void pt_skip(struct pt_builder *builder, const char *name, const char *reason);
 
 // ---- effects: plan_effects.c --------------------------------------------------------------------------------------------
 
+int pt_effects_want_normals(const struct patina_scene *scene);
 // On what shading gave, in place: before smoothing.
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color);
 

@@ -70,6 +70,7 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
     [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},   [PT_KERNEL_mark] = {1},
     [PT_KERNEL_lit] = {1, 2, 3},        [PT_KERNEL_edl] = {1},
+    [PT_KERNEL_obscure] = {1, 2, 3, 4},
 };
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
@@ -92,7 +93,8 @@ static int tiled(enum pt_kernel kernel)
 {
     return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_fill ||
            kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
-           kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark || kernel == PT_KERNEL_edl;
+           kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark || kernel == PT_KERNEL_edl ||
+           kernel == PT_KERNEL_obscure;
 }
 
 static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
@@ -115,6 +117,19 @@ static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
     for (uint32_t i = 0; i < 4 && result == PATINA_OK; i++)
         if (asked[i])
             result = run_over(d, PT_KERNEL_extract, i, definitions[i], args->crop_width, args->crop_height);
+    return result;
+}
+
+// Every pixel is gathered before any is blurred.
+static int run_obscure(struct pt_gl_device *d)
+{
+    static const char *const definitions[] = {"#define STEP 0\n", "#define STEP 1\n"};
+    int result = PATINA_OK;
+    for (uint32_t step = 0; step < 2 && result == PATINA_OK; step++) {
+        result = pt_gl_kernel_program(d, PT_KERNEL_obscure, step, definitions[step]);
+        if (result == PATINA_OK)
+            result = pt_gl_dispatch_tiles(d, PT_KERNEL_obscure, step, PT_GL_TILES_POINTS);
+    }
     return result;
 }
 
@@ -159,6 +174,8 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
         return pt_gl_push(d);
     case PT_KERNEL_antialias:
         return pt_gl_antialias(d);
+    case PT_KERNEL_obscure:
+        return run_obscure(d);
     case PT_KERNEL_normals:
     case PT_KERNEL_surface:
     case PT_KERNEL_smooth:

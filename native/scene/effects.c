@@ -16,6 +16,10 @@ static int check(const patina_scene *scene, patina_effects *e)
     e->edl_radius = e->edl_radius == 0.0f ? 1.4f : e->edl_radius;
     if (!within(e->edl_radius, 1.0f, 16.0f))
         return refuse(scene, "edl_radius must be within 1 and 16 pixels, or 0");
+    if (!within(e->obscurance_strength, 0.0f, 10.0f))
+        return refuse(scene, "obscurance_strength must be within 0 and 10");
+    if (!within(e->obscurance_radius, 0.0f, 1e30f))
+        return refuse(scene, "obscurance_radius must be 0 or more");
     return PATINA_OK;
 }
 

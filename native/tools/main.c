@@ -34,6 +34,7 @@ static const char usage[] =
     "  --edl STRENGTH[,RADIUS]            eye-dome lighting (1 = well seen), neighbours RADIUS pixels away (1.4)\n"
     "  --background R,G,B                 linear; also the ambient light, unless told\n"
     "  --ambient R,G,B                    linear; the ambient light\n"
+    "  --obscurance STRENGTH[,RADIUS]     ambient obscurance (1 = well seen), RADIUS in world units (a 32nd of all)\n"
     "  --shadows                          the brighter light casts shadows\n"
     "  --sun AZIMUTH,HEIGHT[,DIAMETER]    where from and how wide, degrees (default: over the left shoulder, sharp)\n"
     "  --samples N                        of a sun with a diameter, 1 to 4096 (16)\n"

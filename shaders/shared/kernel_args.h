@@ -314,6 +314,24 @@ struct edl_args {
     float scale, gain;
 };
 
+#define PT_OBSCURE_TAPS 8
+#define PT_OBSCURE_TURNS 16  // of the taps, by column and row modulo 4
+#define PT_OBSCURE_MOST 32.0f // pixels that the radius may span; where it would span more, it is shortened
+#define PT_OBSCURE_BIAS 0.1f // of the cosine: so low above a surface all is its own roughness
+#define PT_OBSCURE_GAIN 5.0f  // deep folds are black then
+#define PT_OBSCURE_BLUR 2     // pixels: 5 x 5 with half weights at the rim hold every turn equally
+
+// obscure: ambient obscurance. How much of what a surface sees within the radius r is near, by taps on a spiral that is
+// turned by the pixel's place in the full picture: mean over the taps of GAIN max(cos - BIAS, 0) (1 - |v|^2 / r^2), v from
+// the pixel's point to the tap's, cos between v and the normal shown. Then the mean over 5 x 5 pixels of the same layer
+// (|z_q - z| <= 2 d_eff), weights 1 and at the rim 1/2; colour times 1 - strength of that, at least 0.
+struct obscure_args {
+    struct view_args view;
+    float radius, strength;
+    float spiral[2 * PT_OBSCURE_TAPS]; // x, y in radii
+    float turns[2 * PT_OBSCURE_TURNS]; // cosine, sine
+};
+
 // extract: depth, world-space normal, source, shadow. Any may be left out.
 struct extract_args {
     struct view_args view;

@@ -149,6 +149,7 @@ struct ref_planes {
     const uint8_t *opacities; // by id - id_base
     const float *through;    // light that earlier layers let through
     const float *arrived;
+    const float *obscured;
     const float *albedo; // colours without light
     const uint32_t *shadows; // words, by light and id - id_base
 };
@@ -242,6 +243,10 @@ struct ref_peel ref_peel(const struct peel_args *args, const struct ref_planes *
 struct ref_color ref_compose(const struct compose_args *args, const struct ref_planes *planes, int x, int y);
 
 // Effects: of pixels that are not empty. errors of 0: to the bit.
+double ref_obscured(const struct obscure_args *args, const struct ref_planes *planes, int x, int y, double *error,
+                    int *unsure); // before the mean
+// planes->obscured: of every pixel, before the mean.
+struct ref_color ref_obscure(const struct obscure_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_color ref_edl(const struct edl_args *args, const struct ref_planes *planes, int x, int y);
 
 struct ref_extract {

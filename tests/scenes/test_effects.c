@@ -15,6 +15,8 @@ static const struct {
 } shows[] = {
     {"eye-dome lighting", {.edl_strength = 1.0f}, 0.0f},
     {"eye-dome lighting, wide", {.edl_strength = 0.7f, .edl_radius = 16.0f}, 0.0f},
+    {"obscurance", {.obscurance_strength = 1.0f}, 0.0f},
+    {"obscurance and eye-dome lighting", {.obscurance_strength = 2.0f, .obscurance_radius = 0.5f, .edl_strength = 0.5f}, 0.0f},
 };
 enum { SHOWS = sizeof shows / sizeof shows[0] };
 
@@ -176,6 +178,7 @@ static void test_refusals(void **state)
     (void)state;
     const patina_effects wrong[] = {
         {.edl_strength = -1.0f}, {.edl_strength = NAN}, {.edl_strength = 11.0f}, {.edl_radius = 17.0f}, {.edl_radius = 0.5f},
+        {.obscurance_strength = -1.0f}, {.obscurance_radius = -1.0f}, {.obscurance_radius = INFINITY},
     };
     patina_scene *scene = NULL;
     CHECK(patina_scene_create(&scene), NULL);

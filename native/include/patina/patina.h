@@ -375,6 +375,9 @@ typedef struct patina_effects {
     // Eye-dome lighting: what lies behind its neighbours on screen is darker, so that shape shows without light or normals.
     float edl_strength; // 0..10, 1 = well seen; 0 = none
     float edl_radius;   // pixels to the neighbours, 1..16; 0 = 1.4
+    // Ambient obscurance: folds and corners are darker, by what surrounds a point within a radius.
+    float obscurance_strength; // 0..10, 1 = well seen; 0 = none
+    float obscurance_radius;   // world units, at most 32 pixels on screen; 0 = a 32nd of the diagonal of all clouds
 } patina_effects;
 
 PATINA_API int patina_scene_create(patina_scene **out);
