@@ -205,7 +205,8 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
     set_lights(builder->plan, scene, receives, args);
 }
 
-static void plan_shade(struct pt_builder *builder, uint32_t i)
+// color: COLOR_A, or UNLIT for the points' own colours.
+static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane color)
 {
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
@@ -226,14 +227,15 @@ static void plan_shade(struct pt_builder *builder, uint32_t i)
     }
     if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && !discs)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
+    pt_own_colors(color, &args);
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0),
                       discs ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(PT_COLORS, i), pt_shading_of(builder),
-                      pt_plane_at(PT_PLANE_COLOR_A, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, i),
+                      pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, i),
                       pt_plane_at(PT_PLANE_ARRIVED, 0)}),
               "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
-              instance->args.lit ? "lit" : "unlit", args.light_count, args.blend);
+              args.instance.lit ? "lit" : "unlit", args.light_count, args.blend);
 }
 
 // Returns the plane that holds the finished colour.
@@ -257,6 +259,7 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
     } else {
         pt_skip(builder, "smooth", "switched off in the settings");
     }
+    pt_plan_drawn_effects(builder, color);
     if (settings->antialias == PATINA_ANTIALIAS_OFF) {
         pt_skip(builder, "antialias", "switched off in the settings");
         return color;
@@ -345,12 +348,13 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
     const patina_settings *settings = &builder->scene->settings;
     struct compose_args compose = compose_args(builder->plan);
     for (int k = 0; k < 3 && !settings->film_transparent; k++)
-        compose.background[k] = (settings->own_background ? settings->background : settings->world_color)[k];
+        compose.background[k] = pt_background(settings)[k];
     compose.background[3] = settings->film_transparent ? 0.0f : 1.0f;
-    PT_REASON(PT_ADD(builder, compose, compose,
-                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
-              "%s", settings->film_transparent ? "transparent film"
-                    : settings->own_background ? "over its own background" : "over the world colour");
+    if (!pt_plan_focus(builder, color, &compose))
+        PT_REASON(PT_ADD(builder, compose, compose,
+                         {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
+                  "%s", settings->film_transparent ? "transparent film"
+                        : settings->own_background ? "over its own background" : "over the world colour");
 
     struct extract_args extract = extract_args(builder, settings->passes);
     if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {
@@ -456,10 +460,13 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     if (builder->layer == 1)
         plan_marks(builder);
     uint32_t finish = plan->pass_count;
-    for (uint32_t i = 0; i < plan->instance_count; i++)
-        if (plan->instances[i].chunk_count)
-            plan_shade(builder, i);
-    pt_plan_mesh_shade(builder);
+    for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
+        enum pt_plane shaded = own ? PT_PLANE_UNLIT : PT_PLANE_COLOR_A;
+        for (uint32_t i = 0; i < plan->instance_count; i++)
+            if (plan->instances[i].chunk_count)
+                plan_shade(builder, i, shaded);
+        pt_plan_mesh_shade(builder, shaded);
+    }
     enum pt_plane color = plan_image_filters(builder);
     if (plan->layers > 1)
         plan_peel(builder, color);
@@ -506,16 +513,19 @@ static void plan_points(struct pt_builder *builder)
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
     if (plan->layers == 1)
         put_together(builder);
+    pt_plan_paper(builder);
 }
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    static const char *const others[] = {"raster", "cover", "mark", "lit", "shade", "obscure", "edl", "smooth", "antialias", "peel"};
+    static const char *const others[] = {"raster", "cover",  "mark",  "lit", "shade",     "obscure", "edl",
+                                         "toon",   "smooth", "hatch", "fog", "antialias", "peel"};
     builder->plan->light_count = 0;
     skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
     skip_all(builder, reason, others, sizeof others / sizeof *others);
     plan_output(builder, PT_PLANE_COLOR_A);
     put_together(builder);
+    pt_plan_paper(builder);
 }
 
 int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan)

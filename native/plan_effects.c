@@ -34,10 +34,13 @@ static void plan_edl(struct pt_builder *builder, enum pt_plane color)
 
 // ---- ambient obscurance ------------------------------------------------------------------------------------------------
 
-// A 32nd of the diagonal of all clouds' boxes: the folds of a statue, the corners of a room.
-static double usual_radius(const struct patina_scene *scene)
+// Of all clouds, world; lower > upper where there is no point.
+static void scene_box(const struct patina_scene *scene, double lower[3], double upper[3])
 {
-    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY}, square = 0.0;
+    for (int k = 0; k < 3; k++) {
+        lower[k] = INFINITY;
+        upper[k] = -INFINITY;
+    }
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const patina_cloud_info *info = &scene->instances[i].cloud->info;
         double linear[9], translation[3], corner[3], moved[3];
@@ -52,6 +55,13 @@ static double usual_radius(const struct patina_scene *scene)
             }
         }
     }
+}
+
+// A 32nd of the diagonal of all clouds' boxes: the folds of a statue, the corners of a room.
+static double usual_radius(const struct patina_scene *scene)
+{
+    double lower[3], upper[3], square = 0.0;
+    scene_box(scene, lower, upper);
     for (int k = 0; k < 3; k++)
         square += (upper[k] - lower[k]) * (upper[k] - lower[k]);
     return isfinite(square) && square > 0.0 ? sqrt(square) / 32.0 : 1.0;
@@ -86,14 +96,192 @@ static void plan_obscure(struct pt_builder *builder, enum pt_plane color)
               "ambient obscurance, strength %.2f, within %.4g", (double)args.strength, radius);
 }
 
-int pt_effects_want_normals(const struct patina_scene *scene) { return scene->effects.obscurance_strength > 0.0f; }
+// ---- toon --------------------------------------------------------------------------------------------------------------
+
+#define TOON_SHARP 0.05f // least share of a band that its edge takes
+
+static void plan_toon(struct pt_builder *builder, enum pt_plane color)
+{
+    const patina_effects *effects = &builder->scene->effects;
+    if (!effects->toon_bands) {
+        pt_skip(builder, "toon", "no bands of light are asked for");
+        return;
+    }
+    struct toon_args args = {.view = builder->plan->view,
+                             .bands = (float)effects->toon_bands - 0.5f,
+                             .inverse = (float)(1.0 / (effects->toon_bands - 0.5)),
+                             .steepness = 1.0f / fmaxf(effects->toon_softness, TOON_SHARP)};
+    PT_REASON(PT_ADD(builder, toon, args,
+                     {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_UNLIT, 0), pt_plane_at(color, 0)}),
+              "light in %u bands", effects->toon_bands);
+}
+
+// ---- hatching ------------------------------------------------------------------------------------------------------------
+
+// A place near the scene's middle where planes of all spacings meet, along an axis: coordinates from there are small.
+static double anchor_of(const double lower[3], const double upper[3], const double axis[3])
+{
+    double middle[3], square = 0.0;
+    for (int k = 0; k < 3; k++) {
+        middle[k] = 0.5 * (lower[k] + upper[k]);
+        square += (upper[k] - lower[k]) * (upper[k] - lower[k]);
+    }
+    if (!(square > 0.0) || !isfinite(square))
+        return 0.0;
+    double grid = exp2(ceil(log2(sqrt(square))) + 1.0);
+    return grid * round(pt_dot(axis, middle) / grid);
+}
+
+static void plan_hatch(struct pt_builder *builder, enum pt_plane color)
+{
+    // level cuts, then a steep hand's slant, then across; none along an axis of the world, where walls and floors lie
+    static const double axes[PT_HATCH_LEVELS][3] = {{0.16, 0.24, 0.957}, {0.72, -0.36, 0.593}, {-0.50, -0.76, 0.415}};
+    static const float tones[PT_HATCH_LEVELS] = {1.15f, 1.75f, 3.0f}; // the first begins below 87 % of white, by eye
+    const struct patina_scene *scene = builder->scene;
+    const patina_effects *effects = &scene->effects;
+    if (!effects->hatch_levels) {
+        pt_skip(builder, "hatch", "no hatching is asked for");
+        return;
+    }
+    struct hatch_args args = {.view = builder->plan->view,
+                              .levels = effects->hatch_levels,
+                              .eye_z = scene->camera.orthographic ? (float)scene->camera.near_clip : 0.0f,
+                              .spacing = effects->hatch_spacing,
+                              .width = 0.6f * effects->hatch_spacing,
+                              .opacity = effects->hatch_opacity,
+                              .ground = effects->hatch_ground};
+    double camera[9], position[3], lower[3], upper[3];
+    pt_camera_axes(&scene->camera, camera, position);
+    scene_box(scene, lower, upper);
+    for (int level = 0; level < PT_HATCH_LEVELS; level++) {
+        double axis[3], view[3], length = sqrt(pt_dot(axes[level], axes[level]));
+        for (int k = 0; k < 3; k++) {
+            axis[k] = axes[level][k] / length;
+            args.color[k] = effects->hatch_color[k];
+        }
+        pt_apply(camera, axis, view);
+        for (int k = 0; k < 3; k++)
+            args.axes[3 * level + k] = (float)view[k];
+        args.offsets[level] = (float)(pt_dot(axis, position) - anchor_of(lower, upper, axis));
+        args.tones[level] = tones[level];
+    }
+    PT_REASON(PT_ADD(builder, hatch, args, {pt_keys_of(builder, 0), pt_shading_of(builder), pt_plane_at(color, 0)}),
+              "strokes in %u directions, %.1f pixels apart", args.levels, (double)args.spacing);
+}
+
+// ---- fog ---------------------------------------------------------------------------------------------------------------
+
+static void plan_fog(struct pt_builder *builder, enum pt_plane color)
+{
+    const struct patina_scene *scene = builder->scene;
+    const patina_effects *effects = &scene->effects;
+    if (!(effects->fog_density > 0.0f)) {
+        pt_skip(builder, "fog", "no fog is asked for");
+        return;
+    }
+    double from = scene->camera.orthographic ? scene->camera.near_clip : 0.0; // what z counts from
+    double deep = (double)effects->fog_end - (double)effects->fog_start;
+    struct fog_args args = {.view = builder->plan->view,
+                            .start = (float)((double)effects->fog_start - from),
+                            .inverse = (float)fmin(1.0 / deep, 1e30),
+                            .density = effects->fog_density};
+    for (int k = 0; k < 3; k++)
+        args.color[k] = effects->fog_fixed ? effects->fog_color[k] : pt_background(&scene->settings)[k];
+    PT_REASON(PT_ADD(builder, fog, args, {pt_keys_of(builder, 0), pt_plane_at(color, 0)}), "fog from %.4g to %.4g",
+              (double)effects->fog_start, (double)effects->fog_end);
+}
+
+// ---- depth of field ------------------------------------------------------------------------------------------------------
+
+static int focuses(const struct patina_scene *scene) { return scene->effects.focus_aperture > 0.0f; }
+
+// Radius in pixels of the circle of confusion of what is infinitely far, in orthographic views of a world unit out of focus.
+static double focus_scale(const struct patina_scene *scene)
+{
+    const patina_camera *camera = &scene->camera;
+    const patina_effects *effects = &scene->effects;
+    double width = fmax((camera->right - camera->left) / scene->settings.width,
+                        (camera->top - camera->bottom) / scene->settings.height); // of a pixel: at distance 1, or anywhere
+    return fmin(0.5 * (double)effects->focus_aperture / ((double)effects->focus_distance * width), 1e9);
+}
+
+static double focus_most(const struct patina_scene *scene)
+{
+    const patina_camera *camera = &scene->camera;
+    double distance = (double)scene->effects.focus_distance, scale = focus_scale(scene);
+    if (camera->orthographic)
+        return fmin(scale * fmax(fabs(distance - camera->near_clip), fabs(camera->far_clip - distance)), PT_FOCUS_MOST);
+    return fmin(scale * fmax(fabs(1.0 - distance / camera->near_clip), 1.0), PT_FOCUS_MOST);
+}
+
+int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct compose_args *compose)
+{
+    const struct patina_scene *scene = builder->scene;
+    if (!focuses(scene)) {
+        pt_skip(builder, "focus", "all is in focus");
+        return 0;
+    }
+    double most = focus_most(scene), distance = (double)scene->effects.focus_distance;
+    struct focus_args args = {.view = compose->view,
+                              .crop_x = compose->crop_x,
+                              .crop_y = compose->crop_y,
+                              .crop_width = compose->crop_width,
+                              .crop_height = compose->crop_height,
+                              .distance = (float)(scene->camera.orthographic ? distance - scene->camera.near_clip : distance),
+                              .scale = (float)focus_scale(scene),
+                              .most = (float)most,
+                              .reach = (uint32_t)fmin(ceil(most + 0.5), PT_FOCUS_MOST)};
+    for (int k = 0; k < 4; k++)
+        args.background[k] = compose->background[k];
+    PT_REASON(PT_ADD(builder, focus, args,
+                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
+              "depth of field, sharp at %.4g, circles of at most %.1f pixels", distance, most);
+    pt_skip(builder, "compose", "depth of field does it");
+    return 1;
+}
+
+// ---- paper ---------------------------------------------------------------------------------------------------------------
+
+void pt_plan_paper(struct pt_builder *builder)
+{
+    const patina_effects *effects = &builder->scene->effects;
+    const struct pt_plan *plan = builder->plan;
+    const float *tint = effects->paper_color;
+    if (tint[0] == 1.0f && tint[1] == 1.0f && tint[2] == 1.0f && !(effects->paper_grain > 0.0f)) {
+        pt_skip(builder, "paper", "no paper is asked for");
+        return;
+    }
+    struct paper_args args = {.view = plan->view,
+                              .crop_width = plan->crop[2],
+                              .crop_height = plan->crop[3],
+                              .x = plan->pixel_offset[0],
+                              .y = plan->pixel_offset[1],
+                              .color = {tint[0], tint[1], tint[2]},
+                              .grain = effects->paper_grain};
+    PT_REASON(PT_ADD(builder, paper, args, {pt_plane_at(PT_PLANE_COMBINED, 0)}), "paper, grain %.2f",
+              (double)args.grain);
+}
 
 // ---- all ---------------------------------------------------------------------------------------------------------------
+
+int pt_effects_want_normals(const struct patina_scene *scene)
+{
+    return scene->effects.obscurance_strength > 0.0f || scene->effects.hatch_levels;
+}
+
+int pt_effects_want_albedo(const struct patina_scene *scene) { return scene->effects.toon_bands > 0; }
 
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color)
 {
     plan_obscure(builder, color);
     plan_edl(builder, color);
+    plan_toon(builder, color);
+}
+
+void pt_plan_drawn_effects(struct pt_builder *builder, enum pt_plane color)
+{
+    plan_hatch(builder, color);
+    plan_fog(builder, color);
 }
 
 uint32_t pt_effects_reach(const struct patina_scene *scene)
@@ -104,5 +292,7 @@ uint32_t pt_effects_reach(const struct patina_scene *scene)
         reach += (uint32_t)lround((double)effects->edl_radius);
     if (effects->obscurance_strength > 0.0f)
         reach += (uint32_t)PT_OBSCURE_MOST + PT_OBSCURE_BLUR;
+    if (focuses(scene))
+        reach += PT_FOCUS_MOST;
     return reach;
 }

@@ -55,7 +55,7 @@ void pt_plan_meshes(struct pt_builder *builder, int shown)
             plan_cover(builder, i, shown);
 }
 
-void pt_plan_mesh_shade(struct pt_builder *builder)
+void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)
 {
     const struct pt_plan *plan = builder->plan;
     struct shade_args args;
@@ -71,10 +71,11 @@ void pt_plan_mesh_shade(struct pt_builder *builder)
                                            .ambient = 1.0f,
                                            .diffuse = 1.0f,
                                            .opacity = 1.0f};
+    pt_own_colors(color, &args);
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
-                      pt_plane_at(PT_PLANE_COLOR_A, 0), pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE),
+                      pt_plane_at(color, 0), pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE),
                       pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE), pt_plane_at(PT_PLANE_ARRIVED, 0)}),
               "meshes, %u lights", args.light_count);
 }

@@ -44,6 +44,19 @@ static inline struct pt_ref pt_mesh_buffer_of(enum pt_mesh_buffer which, uint32_
     return (struct pt_ref){PT_OF_MESH, which, mesh};
 }
 
+// Shading into UNLIT: as without lights.
+static inline void pt_own_colors(enum pt_plane color, struct shade_args *args)
+{
+    if (color == PT_PLANE_UNLIT)
+        args->instance.lit = args->light_count = args->blend = args->arrived = 0;
+}
+
+// What lies behind the points.
+static inline const float *pt_background(const patina_settings *settings)
+{
+    return settings->own_background ? settings->background : settings->world_color;
+}
+
 // ---- passes ------------------------------------------------------------------------------------------------------------
 
 // Adds a pass for the layer at hand; arguments and refs are copied into the plan. Never NULL.
@@ -61,15 +74,22 @@ void pt_skip(struct pt_builder *builder, const char *name, const char *reason);
 // ---- effects: plan_effects.c --------------------------------------------------------------------------------------------
 
 int pt_effects_want_normals(const struct patina_scene *scene);
+int pt_effects_want_albedo(const struct patina_scene *scene);
 // On what shading gave, in place: before smoothing.
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color);
+// On the smoothed colour, in place.
+void pt_plan_drawn_effects(struct pt_builder *builder, enum pt_plane color);
+// In place of composing; 0: composing is still to be planned.
+int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct compose_args *compose);
+// On the picture.
+void pt_plan_paper(struct pt_builder *builder);
 
 // ---- meshes: plan_mesh.c -----------------------------------------------------------------------------------------------
 
 // Draws the meshes in view over the layer's filled points; shown: they are shaded, too.
 void pt_plan_meshes(struct pt_builder *builder, int shown);
-// Lights and colours what they show.
-void pt_plan_mesh_shade(struct pt_builder *builder);
+// Lights and colours what they show, into COLOR_A, or UNLIT for their own colours.
+void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color);
 // plan.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
 // plan_splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.

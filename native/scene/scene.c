@@ -32,6 +32,7 @@ int patina_scene_create(patina_scene **out)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "a scene: out of memory");
     pt_handle_init(&scene->handle);
     patina_settings defaults = { .struct_size = sizeof defaults };
+    patina_scene_set_effects(scene, NULL);
     return patina_scene_set_settings(scene, &defaults);
 }
 

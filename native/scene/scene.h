@@ -30,7 +30,7 @@ struct patina_scene {
     patina_camera camera;
     int has_camera;
     patina_settings settings; // defaults made explicit
-    patina_effects effects;   // likewise; all zero: none
+    patina_effects effects;   // likewise
 };
 
 // Small 3 x 3 algebra in float64, row-major.

@@ -332,6 +332,68 @@ struct obscure_args {
     float turns[2 * PT_OBSCURE_TURNS]; // cosine, sine
 };
 
+#define PT_TOON_DARK 1e-6f // less albedo or light than this is none
+
+// toon: bands of light over colours as they are. light = luminance of the colour / that of the albedo; its root times `bands`
+// (their number less 1/2, so that full light is in the middle of the last) goes in steps of 1, each a smooth step 1 / steepness
+// wide; the first band is the darkest there is. Colour times band / light.
+struct toon_args {
+    struct view_args view;
+    float bands, inverse; // inverse: 1 / bands
+    float steepness;
+};
+
+#define PT_HATCH_LEVELS 3
+#define PT_HATCH_GRAZING 0.01f // least (n . r)^2: 84 degrees; flatter, strokes run together
+
+// hatch: strokes where planes across an axis cut the surface: they follow its form, and lie still in the scene. A level's
+// planes are 2^k world units apart, k so that strokes on screen are 1/2 to 1 of the spacing apart; every other one thins out
+// before the next k. Wider where the colour's tone (root of its luminance) is darker: width max(1 - tones tone, 0).
+struct hatch_args {
+    struct view_args view;
+    uint32_t levels;
+    float eye_z;   // orthographic: near, as in shade
+    float spacing; // pixels
+    float width;   // of a stroke on black, pixels
+    float opacity, ground; // of the ink; share by which colours give way to white beneath
+    float color[3];
+    float tones[PT_HATCH_LEVELS];
+    float offsets[PT_HATCH_LEVELS];  // of the camera along the axis
+    float axes[3 * PT_HATCH_LEVELS]; // unit, view space
+};
+
+// fog: colour (1 - s) + fog alpha s with s = density clamp((z - start) inverse, 0, 1).
+struct fog_args {
+    struct view_args view;
+    float start, inverse, density;
+    float color[3];
+};
+
+#define PT_FOCUS_MOST 32            // largest circle of confusion, radius in pixels
+#define PT_FOCUS_SHARP 0.56418958f  // a circle of a pixel's area
+#define PT_FOCUS_DENSITY 0.31830989f // 1 / pi: light of a circle of radius 1, a pixel
+
+// focus: depth of field of a thin lens, over the background, into the crop. A pixel's circle of confusion has the radius
+// c = min(scale |1 - distance / z|, most), in orthographic views min(scale |z - distance|, most); empty pixels lie
+// infinitely far. Of a pixel p, every q within reach at r pixels gives its colour with the weight clamp(c - r + 1/2, 0, 1) /
+// max(pi c^2, 1). Those before p (z_q < z_p) cover it by their weights' sum N, at most wholly; the others, p too, with
+// min(c_q, c_p) for c, are what is seen between: their mean times 1 - min(N, 1).
+struct focus_args {
+    struct view_args view;
+    uint32_t crop_x, crop_y, crop_width, crop_height; // in the planes
+    float background[4]; // premultiplied
+    float distance, scale, most;
+    uint32_t reach; // pixels, at most PT_FOCUS_MOST
+};
+
+// paper: the picture times color (1 - grain noise), the noise of the pixel's place in the full picture.
+struct paper_args {
+    struct view_args view;
+    uint32_t crop_width, crop_height, x, y; // x, y: of the crop in the full picture
+    float color[3];
+    float grain;
+};
+
 // extract: depth, world-space normal, source, shadow. Any may be left out.
 struct extract_args {
     struct view_args view;

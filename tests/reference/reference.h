@@ -249,6 +249,13 @@ double ref_obscured(const struct obscure_args *args, const struct ref_planes *pl
 struct ref_color ref_obscure(const struct obscure_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_color ref_edl(const struct edl_args *args, const struct ref_planes *planes, int x, int y);
 
+struct ref_color ref_toon(const struct toon_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_color ref_hatch(const struct hatch_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_color ref_fog(const struct fog_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_color ref_focus(const struct focus_args *args, const struct ref_planes *planes, int x, int y); // in the crop
+// x, y: in the crop, as combined.
+struct ref_color ref_paper(const struct paper_args *args, const float *combined, int x, int y);
+
 struct ref_extract {
     double depth; // +inf: nothing
     struct ref_vec normal;

@@ -17,6 +17,14 @@ static const struct {
     {"eye-dome lighting, wide", {.edl_strength = 0.7f, .edl_radius = 16.0f}, 0.0f},
     {"obscurance", {.obscurance_strength = 1.0f}, 0.0f},
     {"obscurance and eye-dome lighting", {.obscurance_strength = 2.0f, .obscurance_radius = 0.5f, .edl_strength = 0.5f}, 0.0f},
+    {"toon", {.toon_bands = 3, .toon_softness = 0.4f, .edl_strength = 1.0f}, 0.01f}, // an edge is 1/0.4 as steep as the light
+    {"hatching", {.hatch_levels = 3, .hatch_ground = 0.5f}, 0.05f}, // strokes' edges are a pixel wide
+    {"fog", {.fog_start = 2.0f, .fog_end = 4.0f, .fog_density = 0.9f, .fog_fixed = 1, .fog_color = {0.2f, 0.5f, 1.0f}}, 0.0f},
+    {"depth of field", {.focus_aperture = 0.2f, .focus_distance = 3.0f}, 1e-3f}, // circles' rims are a pixel wide
+    {"depth of field, wide", {.focus_aperture = 3.0f, .focus_distance = 2.4f}, 1e-3f},
+    {"paper", {.paper_color = {0.9f, 0.8f, 0.6f}, .paper_grain = 0.5f}, 0.0f},
+    {"all", {.edl_strength = 0.5f, .obscurance_strength = 1.0f, .toon_bands = 5, .hatch_levels = 1, .fog_start = 1.0f,
+             .fog_end = 9.0f, .fog_density = 0.5f, .focus_aperture = 0.05f, .focus_distance = 3.0f, .paper_grain = 0.1f}, 0.05f},
 };
 enum { SHOWS = sizeof shows / sizeof shows[0] };
 
@@ -179,6 +187,10 @@ static void test_refusals(void **state)
     const patina_effects wrong[] = {
         {.edl_strength = -1.0f}, {.edl_strength = NAN}, {.edl_strength = 11.0f}, {.edl_radius = 17.0f}, {.edl_radius = 0.5f},
         {.obscurance_strength = -1.0f}, {.obscurance_radius = -1.0f}, {.obscurance_radius = INFINITY},
+        {.toon_bands = 1}, {.toon_bands = 17}, {.toon_softness = 1.5f}, {.hatch_levels = 4}, {.hatch_spacing = 1.0f},
+        {.hatch_opacity = 2.0f}, {.hatch_color = {NAN}}, {.fog_density = 1.0f}, {.fog_density = 2.0f, .fog_end = 1.0f},
+        {.fog_fixed = 2}, {.paper_grain = -1.0f}, {.paper_color = {-1.0f}}, {.focus_aperture = 1.0f},
+        {.focus_aperture = -1.0f},
     };
     patina_scene *scene = NULL;
     CHECK(patina_scene_create(&scene), NULL);

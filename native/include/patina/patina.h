@@ -378,6 +378,28 @@ typedef struct patina_effects {
     // Ambient obscurance: folds and corners are darker, by what surrounds a point within a radius.
     float obscurance_strength; // 0..10, 1 = well seen; 0 = none
     float obscurance_radius;   // world units, at most 32 pixels on screen; 0 = a 32nd of the diagonal of all clouds
+    // Toon: light, with obscurance and eye-dome lighting, goes in bands; the points' own colours stay. Full light changes nothing.
+    uint32_t toon_bands; // 2..16; 0 = none
+    float toon_softness; // 0..1: share of a band that its edge takes
+    // Hatching: strokes where parallel planes cut the surface: they follow its form and lie still in the scene. Wider where the
+    // picture is darker; each further level in another direction, from darker tones on.
+    uint32_t hatch_levels; // 1..3; 0 = none
+    float hatch_spacing;   // pixels between strokes, 3 or more; 0 = 6
+    float hatch_opacity;   // of the ink, 0..1; 0 = 1
+    float hatch_ground;    // 0..1: share by which the colours give way to white beneath
+    float hatch_color[3];  // linear; all zero = black
+    // Depth fog, over the points and not over the background.
+    float fog_density;         // share that it hides at its end and beyond, 0..1; 0 = none
+    float fog_start, fog_end;  // distances along the view from the camera
+    uint32_t fog_fixed;        // 1 = fog_color; 0 = the background's
+    float fog_color[3];        // linear
+    // Depth of field of a thin lens, on the composed picture by the depth of the nearest layer.
+    float focus_aperture; // diameter of the lens, world units: focal length / f-number; 0 = all is in focus. Circles of confusion
+                          // have a radius of at most 32 pixels
+    float focus_distance; // along the view from the camera, world units
+    // Paper: the picture is multiplied by a colour and a grain, which lies still on screen.
+    float paper_color[3]; // linear; all zero = white
+    float paper_grain;    // 0..1; 0 = none
 } patina_effects;
 
 PATINA_API int patina_scene_create(patina_scene **out);

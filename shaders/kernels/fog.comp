@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// fog: colours fade with depth; twin of native/device_cpu/kernels/fog.c
+#version 430 core
+#include "lib/math.glsl"
+#include "lib/planes.glsl"
+#include "lib/tiles.glsl"
+
+layout(std430, binding = 0) readonly buffer arguments_block { fog_args args; };
+layout(std430, binding = 2) buffer color_block { vec4 color[]; };
+
+void main()
+{
+    view_args view = args.view;
+    float start = args.start, inverse = args.inverse, density = args.density;
+    vec3 veil = vec3(args.color[0], args.color[1], args.color[2]);
+    uvec2 column = pt_tile_column(view);
+    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
+        uint at = y * view.width + column.x;
+        float z = read_z(at);
+        if (z == pt_float(PT_KEY_EMPTY_Z))
+            continue;
+        precise float share = pt_min(pt_max((z - start) * inverse, 0.0), 1.0) * density;
+        vec4 c = color[at];
+        precise vec3 faded = c.xyz * (1.0 - share) + veil * (share * c.w);
+        color[at] = vec4(faded, c.w);
+    }
+}
