@@ -150,6 +150,16 @@ class _Settings(_Descriptor):
                 ("background", c_float * 3), ("surface", c_uint32)]
 
 
+class _Effects(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("edl_strength", c_float), ("edl_radius", c_float),
+                ("obscurance_strength", c_float), ("obscurance_radius", c_float), ("toon_bands", c_uint32),
+                ("toon_softness", c_float), ("hatch_levels", c_uint32), ("hatch_spacing", c_float),
+                ("hatch_opacity", c_float), ("hatch_ground", c_float), ("hatch_color", c_float * 3),
+                ("fog_density", c_float), ("fog_start", c_float), ("fog_end", c_float), ("fog_fixed", c_uint32),
+                ("fog_color", c_float * 3), ("focus_aperture", c_float), ("focus_distance", c_float),
+                ("paper_color", c_float * 3), ("paper_grain", c_float)]
+
+
 class _ExpectedError(Structure):
     _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float)]
 
@@ -202,6 +212,7 @@ _CALLS = {
     "patina_scene_add_light": (c_void_p, POINTER(_LightDesc)),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
     "patina_scene_set_settings": (c_void_p, POINTER(_Settings)),
+    "patina_scene_set_effects": (c_void_p, POINTER(_Effects)),
     "patina_frame_create": (c_void_p, _OUT),
     "patina_frame_destroy": (c_void_p,),
     "patina_frame_render": (c_void_p, c_void_p),
@@ -549,6 +560,9 @@ class Scene(_Handle):
 
     def set_settings(self, **settings: Any) -> None:
         self._call("set_settings", byref(_Settings(**settings)))
+
+    def set_effects(self, **effects: Any) -> None:
+        self._call("set_effects", byref(_Effects(**effects)))
 
 
 class Frame(_Handle):

@@ -195,6 +195,7 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
     settings["layer_passes"] = _bits(name for name, layer in planes if layer)
     settings["layers"] = max(settings["layers"], *(layer for _, layer in planes), 0)  # a pass wants its layer peeled
     scene.set_settings(**settings)
+    scene.set_effects(**asdict(description.effects))
     scene.set_camera(**asdict(description.camera))
     for light in description.lights:
         scene.add_light(**asdict(light))

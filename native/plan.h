@@ -167,7 +167,7 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
 
 // plan_view.c: how the camera sees the scene.
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
-// How far, in pixels, the effects of a picture carry influence; at most 160, a picture's widest guard. (plan_effects.c)
+// How far, in pixels, the effects of a picture carry influence. (plan_effects.c)
 uint32_t pt_effects_reach(const struct patina_scene *scene);
 // Every chunk of the instance as the plan's view sees it, inside or outside; nothing is culled.
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,

@@ -643,8 +643,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     choose_filling(&scene->settings, plan);
     choose_layers(&scene->settings, plan);
     uint32_t cell = 1u << plan->levels;
-    uint32_t effects = pt_effects_reach(scene), margin = 8 + 4 * cell;
-    uint32_t guard = round_up(margin > effects ? margin : effects, cell > 16 ? cell : 16);
+    // Effects see no farther beyond the picture: a wider guard would fill holes at its border otherwise than without them.
+    uint32_t guard = round_up(8 + 4 * cell, cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
     survey.camera = bare;

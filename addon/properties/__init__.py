@@ -13,6 +13,7 @@ from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
 
 from .. import styles
 from ..native import MOST_LAYERS
+from .effects import PatinaEffectsProperties
 from .sequence import PatinaSequenceProperties
 from .studio import PatinaStudioProperties
 from .style import PatinaStyleProperties
@@ -30,6 +31,7 @@ class PatinaSceneProperties(PropertyGroup):
         name="Version", default=0, min=0, options={'HIDDEN'})
     style: PointerProperty(type=PatinaStyleProperties)
     studio: PointerProperty(type=PatinaStudioProperties, override=_OVERRIDE)
+    effects: PointerProperty(type=PatinaEffectsProperties, override=_OVERRIDE)
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
@@ -199,7 +201,8 @@ class PatinaViewLayerProperties(PropertyGroup):
                     "layers behind opaque surfaces too")
 
 
-_CLASSES = (PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaSceneProperties,
+_CLASSES = (PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
+            PatinaSceneProperties,
             PatinaObjectProperties, PatinaViewLayerProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties))
 

@@ -13,15 +13,17 @@ from dataclasses import dataclass
 import bpy
 
 from .. import migrate
-from . import clouds, lights, settings, world
-from .camera import Camera, CameraError, View, final_view, viewport_view
+from . import clouds, effects, lights, settings, world
+from .camera import Camera, CameraError, Focus, View, final_view, viewport_view
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
+from .effects import Effects
 from .lights import Light
 from .meshes import MeshItem
 from .settings import DeviceChoice, Settings
 from .world import Mist
 
-__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "MeshItem", "Mist", "Pending",
+__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "MeshItem", "Mist",
+           "Pending", "Effects", "Focus",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "viewport_view"]
 
@@ -33,6 +35,7 @@ class SceneDescription:
     lights: list[Light]
     camera: Camera
     settings: Settings
+    effects: Effects
     device: DeviceChoice
     samples: tuple[int, ...]  # of a final picture: the numbers of those to take the mean of
     mist: Mist | None
@@ -76,6 +79,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         lights=lights.collect(depsgraph, notices),
         camera=view.camera,
         settings=settings.read(scene, view, background),
+        effects=effects.read(scene, view.focus, notices),
         device=settings.device(scene),
         samples=tuple(range(settings.samples(scene))),
         mist=world.mist(scene.world),

@@ -30,6 +30,14 @@ class Camera:
 
 
 @dataclass(frozen=True)
+class Focus:
+    """A lens with depth of field: what it is sharp at, along the view, and its diameter; Blender's units."""
+
+    distance: float
+    aperture: float
+
+
+@dataclass(frozen=True)
 class View:
     """What is drawn: the full picture's size, the part of it, and the camera of the full picture."""
 
@@ -37,6 +45,7 @@ class View:
     height: int
     region: tuple[int, int, int, int]  # x0, y0, x1, y1 from the bottom left; the whole picture when no border
     camera: Camera
+    focus: Focus | None = None  # None: all is sharp
 
 
 def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
@@ -62,7 +71,7 @@ def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
         orthographic=int(data.type == 'ORTHO'),
         world_from_camera=row_major(place),
         left=left + moved, right=right + moved, bottom=bottom, top=top,
-        near_clip=data.clip_start, far_clip=data.clip_end))
+        near_clip=data.clip_start, far_clip=data.clip_end), focus_of(camera))
 
 
 def viewport_view(region: bpy.types.Region, space: bpy.types.SpaceView3D, rv3d: bpy.types.RegionView3D,
@@ -76,7 +85,22 @@ def viewport_view(region: bpy.types.Region, space: bpy.types.SpaceView3D, rv3d: 
     return View(region.width, region.height, viewport_region(region, space, rv3d, scene), Camera(
         orthographic=int(orthographic),
         world_from_camera=tuple(np.linalg.inv(np.array(rv3d.view_matrix, np.float64)).ravel().tolist()),
-        left=left, right=right, bottom=bottom, top=top, near_clip=clips[0], far_clip=clips[1]))
+        left=left, right=right, bottom=bottom, top=top, near_clip=clips[0], far_clip=clips[1]),
+        focus_of(space.camera or scene.camera) if rv3d.view_perspective == 'CAMERA' else None)
+
+
+def focus_of(camera: bpy.types.Object | None) -> Focus | None:
+    """The depth of field of a camera object, as Cycles has it: the lens is as wide as the focal length in thousandths of a unit
+    over the f-number, in orthographic views a unit over it."""
+    if camera is None or camera.type != 'CAMERA' or not camera.data.dof.use_dof:
+        return None
+    data, lens = camera.data, camera.data.dof
+    distance = lens.focus_distance
+    if lens.focus_object:
+        place = camera.matrix_world.normalized()
+        distance = abs((lens.focus_object.matrix_world.translation - place.translation).dot(place.col[2].to_3d()))
+    length = 1.0 if data.type == 'ORTHO' else 0.001 * data.lens
+    return Focus(max(distance, 1e-6), length / max(lens.aperture_fstop, 1e-5))
 
 
 def viewport_region(region: bpy.types.Region, space: bpy.types.SpaceView3D, rv3d: bpy.types.RegionView3D,

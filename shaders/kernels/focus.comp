@@ -42,8 +42,10 @@ void find_largest(view_args view, uint x, uint y)
     ivec2 last = min(corner + 15 + 2 * reach, ivec2(view.width, view.height) - 1);
     float most = 0.0;
     for (int qy = max(corner.y, 0) + int(gl_LocalInvocationID.y); qy <= last.y; qy += 16)
-        for (int qx = max(corner.x, 0) + int(gl_LocalInvocationID.x); qx <= last.x; qx += 16)
-            most = pt_max(most, circle_of(read_z(uint(qy) * view.width + uint(qx))));
+        for (int qx = max(corner.x, 0) + int(gl_LocalInvocationID.x); qx <= last.x; qx += 16) {
+            float z = read_z(uint(qy) * view.width + uint(qx));
+            most = z < pt_float(PT_KEY_EMPTY_Z) ? pt_max(most, circle_of(z)) : most; // empty pixels spread nothing
+        }
     atomicMax(largest, pt_bits(most));
     barrier();
 }

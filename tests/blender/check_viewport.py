@@ -174,6 +174,7 @@ def test_same_as_final():
     add_points(positions, colors, normals)
     settings = scene.patina
     settings.fill, settings.smooth, settings.antialias = 'CLOSED', 'ALLEVIATED', 'LAYERS'
+    settings.effects.use_edl = settings.effects.use_obscurance = settings.effects.use_paper = True
     view().view_rotation = Quaternion((0.8, 0.3, 0.4, 0.2)).normalized()
     yield lambda: settled(40000)
     picture = shown().shown

@@ -67,8 +67,9 @@ static void load_row(const struct focus *focus, int32_t y, const struct row *row
         for (int k = 0; k < 4; k++)
             vf_store(row->color[k] + x, vf_select(some, color[k], zero), all);
     }
-    for (uint32_t x = 0; x < inside; x++)
-        row->largest[x / BLOCK] = pt_max(row->largest[x / BLOCK], row->circle[x]);
+    for (uint32_t x = 0; x < inside; x++) // empty pixels spread nothing
+        if (row->z[x] < pt_float(PT_KEY_EMPTY_Z))
+            row->largest[x / BLOCK] = pt_max(row->largest[x / BLOCK], row->circle[x]);
     for (int32_t x = -PT_ROW_PAD; x < (int32_t)view->width + PT_ROW_PAD; x++)
         if (x < 0 || x >= (int32_t)inside)
             row->z[x] = pt_float(0x7FC00000u);
