@@ -35,16 +35,18 @@ FIELDS = ("scene", "mode", "device", "width", "height", "points", "quality", "th
 
 @dataclass(frozen=True)
 class Mode:
-    """What a mode asks for beyond lit surfaces: fields of patina_settings, patina_cloud_style and patina_light_desc."""
+    """What a mode asks for beyond lit surfaces: fields of patina_settings, patina_cloud_style, patina_light_desc and
+    patina_effects."""
 
     settings: dict[str, Any] = field(default_factory=dict)
     style: dict[str, Any] = field(default_factory=dict)
     light: dict[str, Any] = field(default_factory=dict)
+    effects: dict[str, Any] = field(default_factory=dict)
 
     def missing(self) -> str:
         """The first field that the binding does not have yet, or ""."""
         for wanted, known in ((self.settings, native._Settings), (self.style, native._CloudStyle),
-                              (self.light, native._LightDesc)):
+                              (self.light, native._LightDesc), (self.effects, native._Effects)):
             names = {name for name, *_ in known._fields_}
             for name in wanted:
                 if name not in names:
@@ -62,6 +64,18 @@ MODES = {
     "shadows 5": Mode(settings={"shadow_samples": 5, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
     "shadows 10": Mode(settings={"shadow_samples": 10, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
 }
+
+# Depth cues and means of drawing, by themselves; the torus lies 3.6 from the camera.
+CUES = {
+    "eye-dome lighting": {"edl_strength": 1.0},
+    "ambient obscurance": {"obscurance_strength": 1.0},
+    "toon bands": {"toon_bands": 3, "toon_softness": 0.15},
+    "hatching": {"hatch_levels": 2},
+    "fog": {"fog_start": 2.5, "fog_end": 5.0, "fog_density": 1.0},
+    "depth of field": {"focus_distance": 3.2, "focus_aperture": 0.05},
+    "paper": {"paper_color": (0.93, 0.88, 0.78), "paper_grain": 0.15},
+}
+MODES |= {name: Mode(effects=effects) for name, effects in CUES.items()}
 
 
 def fill_scene(scene: native.Scene, cloud: native.Cloud, shown: stages.Stage, mode: Mode, turn: float) -> None:
@@ -149,6 +163,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
         fill_scene(scene, cloud, shown, mode, turn)
         scene.set_settings(width=case["width"], height=case["height"], film_transparent=1, world_color=[0.05] * 3,
                            passes=int(not scene_known), **{**QUALITIES[case["quality"]], **mode.settings})
+        scene.set_effects(**mode.effects)
         scene.set_camera(**shown.camera(turn).fields())
         return scene
 

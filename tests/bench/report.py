@@ -101,6 +101,7 @@ def markdown(result: dict[str, Any]) -> str:
         text += ["## Other programs, the same points, camera and truth", "", errors_table(against), "",
                  *notes(joined(result, "peers")), ""]
     for group, title in (("effects", "Layers and shadows of the torus"),
+                         ("cues", "Depth cues and means of drawing on the torus, one by one"),
                          ("styles", "Styles, one row each"),
                          ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
                          ("shadows", "A ball's shadow on a plane"), ("patterns", "Patterns and noise"),

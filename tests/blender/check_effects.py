@@ -70,21 +70,21 @@ def test_edl():
 
 
 def test_obscurance():
-    """Where a sphere stands on a floor it is dark; the open floor is not."""
+    """Where a wall stands on a floor both are dark; away from it neither is."""
     scene = new_scene(96, 96)
     for name in ("fill", "smooth", "antialias"):
         scene.patina.property_unset(name)
     x, y = np.meshgrid(np.linspace(-2, 2, 220), np.linspace(-2, 2, 220))
     floor = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], 1)
     add_points(floor, np.full((x.size, 4), 255, np.uint8), np.tile((0.0, 0.0, 1.0), (x.size, 1)), "floor")
-    positions, colors, normals = sphere(20000, 0.6, (0, 0, 0.6))
-    add_points(positions, np.full_like(colors, 255), normals, "ball")
+    add_points(floor[:, (0, 2, 1)] + (0, 0, 2), np.full((x.size, 4), 255, np.uint8), np.tile((0.0, -1.0, 0.0), (x.size, 1)), "wall")
     scene.camera.matrix_world = Matrix.Translation((0, -4, 2.5)) @ Matrix.Rotation(1.05, 4, 'X')
     scene.patina.effects.obscurance_radius = 0.4
     plain, dark = before_and_after(scene, "use_obscurance")
     ratio = dark.sum(axis=2) / np.maximum(plain.sum(axis=2), 1e-6)
-    contact, open_floor = ratio[pixel(scene, (0, -0.25, 0))], ratio[pixel(scene, (1.4, -0.9, 0))]
-    check(contact < 0.75 and open_floor > 0.95, f"contact {contact:.2f}, floor {open_floor:.2f}")
+    corner = [ratio[pixel(scene, place)] for place in ((0, -0.06, 0), (0.5, 0, 0.06))]
+    away = [ratio[pixel(scene, place)] for place in ((0.2, -1.0, 0), (0.2, 0, 1.0))]
+    check(max(corner) < 0.85 and min(away) > 0.97, f"corner {corner}, away {away}")
 
 
 def test_fog():
