@@ -20,7 +20,7 @@ static const struct {
     {"toon", {.toon_bands = 3, .toon_softness = 0.4f, .edl_strength = 1.0f}, 0.01f}, // an edge is 1/0.4 as steep as the light
     {"hatching", {.hatch_levels = 3, .hatch_ground = 0.5f}, 0.05f}, // strokes' edges are a pixel wide
     {"fog", {.fog_start = 2.0f, .fog_end = 4.0f, .fog_density = 0.9f, .fog_fixed = 1, .fog_color = {0.2f, 0.5f, 1.0f}}, 0.0f},
-    {"depth of field", {.focus_aperture = 0.2f, .focus_distance = 3.0f}, 1e-3f}, // circles' rims are a pixel wide
+    {"depth of field", {.focus_aperture = 1.2f, .focus_distance = 2.2f}, 1e-3f}, // circles' rims are a pixel wide
     {"depth of field, wide", {.focus_aperture = 3.0f, .focus_distance = 2.4f}, 1e-3f},
     {"paper", {.paper_color = {0.9f, 0.8f, 0.6f}, .paper_grain = 0.5f}, 0.0f},
     {"all", {.edl_strength = 0.5f, .obscurance_strength = 1.0f, .toon_bands = 5, .hatch_levels = 1, .fog_start = 1.0f,
