@@ -11,6 +11,9 @@
 // Radius of the window for image-space normals: two spacings, at least 3 pixels so that a point's place within its pixel
 // averages out, at most 16 (beyond, points are too far apart on screen for a surface to be seen anyway).
 enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16, BLEND_MOST = 8 };
+// Of each filling filter in a light's map, at most: more widen steep surfaces (tests/scenes/test_shadow: 0.20% in place of
+// 0.18% wrong), one leaves holes that light leaks through.
+enum { MAP_ITERATIONS = 2 };
 
 static const struct {
     uint32_t bytes, levels;
@@ -63,6 +66,7 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
         args.radius = wanted < ESTIMATE_LEAST  ? ESTIMATE_LEAST
                       : wanted > ESTIMATE_MOST ? ESTIMATE_MOST
                                                : (uint32_t)wanted;
+        args.steep = !builder->layer;
         PT_REASON(PT_ADD(builder, normals, args,
                          {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0)}),
                   "instance %u has no normals: estimated from the depth of %u x %u pixels", i, 2 * args.radius + 1,
@@ -533,6 +537,8 @@ int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan)
     struct pt_builder builder = {.scene = scene, .plan = plan};
     *plan = (struct pt_plan){0};
     int error = pt_plan_view(scene, plan);
+    if (plan->iterations > MAP_ITERATIONS)
+        plan->iterations = MAP_ITERATIONS;
     if (!error && pt_plan_shows(plan)) {
         plan_surfaces(&builder);
         pt_plan_meshes(&builder, 0);

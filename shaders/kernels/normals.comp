@@ -18,9 +18,26 @@ struct window_sums {
 
 float linear_depth(view_args view, float z) { return view.perspective != 0u ? pt_rcp(z) : z; }
 
-// 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32. A pixel of the same surface:
-// |z_q - z| <= max(distance, slope * max(|dx|, |dy|)).
-window_sums gather(view_args view, int radius, int x, int y, float z, float w, float distance_limit, float slope)
+// Depth of a pixel; nothing there, or beyond the plane: empty.
+float depth_at(view_args view, int x, int y)
+{
+    bool inside = x >= 0 && y >= 0 && x < int(view.width) && y < int(view.height);
+    return inside ? read_z(uint(y) * view.width + uint(x)) : pt_float(PT_KEY_EMPTY_Z);
+}
+
+// What z changes by from a pixel's neighbour `before` to the one `after` it, as far as both sides agree.
+float step_along(float before, float z, float after)
+{
+    bool known_before = before < pt_float(PT_KEY_EMPTY_Z), known_after = after < pt_float(PT_KEY_EMPTY_Z);
+    precise float a = z - before, b = after - z;
+    float first = known_before ? a : b, second = known_after ? b : a;
+    bool alike = (0.0 < first && 0.0 < second) || (first < 0.0 && second < 0.0);
+    return (known_before || known_after) && alike ? (pt_abs(first) < pt_abs(second) ? first : second) : 0.0;
+}
+
+// 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32. Which pixels: kernel_args.h.
+window_sums gather(view_args view, int radius, int x, int y, float z, float w, float distance_limit, float slope,
+                   vec2 steps)
 {
     precise window_sums s = window_sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (int dy = -radius; dy <= radius; dy++)
@@ -29,11 +46,13 @@ window_sums gather(view_args view, int radius, int x, int y, float z, float w, f
             if (qx < 0 || qy < 0 || qx >= int(view.width) || qy >= int(view.height))
                 continue;
             float zq = read_z(uint(qy) * view.width + uint(qx));
-            precise float apart = zq - z;
-            precise float reach = slope * float(max(abs(dx), abs(dy)));
-            if (!(pt_abs(apart) <= pt_max(distance_limit, reach)))
-                continue; // another surface, or nothing
             float fx = float(dx), fy = float(dy);
+            precise float along = steps.x * fx, up = steps.y * fy;
+            precise float apart = (zq - z) - (along + up);
+            precise float reach = slope * float(max(abs(dx), abs(dy)));
+            precise float steep = PT_STEEP * (pt_abs(along) + pt_abs(up));
+            if (!(pt_abs(apart) <= pt_max(pt_max(distance_limit, reach), steep)))
+                continue; // another surface, or nothing
             precise float dw = linear_depth(view, zq) - w;
             s.n = s.n + 1.0;
             s.x = s.x + fx;
@@ -78,7 +97,7 @@ vec3 fit(view_args view, window_sums s, float w, vec2 ray)
     return found ? unit : vec3(0.0);
 }
 
-void normal_pixel(view_args view, int radius, uint id_base, uint id_count, float d_min, uint x, uint y)
+void normal_pixel(view_args view, int radius, bool steep, uint id_base, uint id_count, float d_min, uint x, uint y)
 {
     uint at = y * view.width + x;
     uvec2 key = read_key(at);
@@ -89,7 +108,13 @@ void normal_pixel(view_args view, int radius, uint id_base, uint id_count, float
     float spacing = args.instance.spacing[surface[id] >> PT_SPACING_SHIFT];
     float distance_limit = pt_layer_distance(view, d_min, spacing, z, 1.0);
     precise float slope = 4.0 * pt_footprint(view, z); // 76 degrees
-    window_sums s = gather(view, radius, int(x), int(y), z, w, distance_limit, slope);
+    int column = int(x), row = int(y);
+    vec2 steps = vec2(0.0);
+    if (steep) {
+        steps.x = step_along(depth_at(view, column - 1, row), z, depth_at(view, column + 1, row));
+        steps.y = step_along(depth_at(view, column, row - 1), z, depth_at(view, column, row + 1));
+    }
+    window_sums s = gather(view, radius, column, row, z, w, distance_limit, slope, steps);
     normals[at] = vec4(fit(view, s, w, pt_ray(view, int(x), int(y))), 0.0);
 }
 
@@ -99,7 +124,8 @@ void main()
     uint id_base = args.instance.id_base, id_count = args.instance.id_count;
     float d_min = args.instance.d_min;
     int radius = int(args.radius);
+    bool steep = args.steep != 0u;
     uvec2 column = pt_tile_column(view);
     for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
-        normal_pixel(view, radius, id_base, id_count, d_min, column.x, y);
+        normal_pixel(view, radius, steep, id_base, id_count, d_min, column.x, y);
 }

@@ -66,6 +66,7 @@
 // lit: so many of the 8 texels around must shadow the point as well: one or two texels by themselves are a stray point, whose
 // shadow is a speck. A line of texels has them.
 #define PT_SHADOW_SUPPORT 2
+#define PT_STEEP 0.5f // normals
 
 // A window of pixels of the full picture, at a level of the pyramid (a pixel of level l is 2^l wide).
 // Ray of the pixel (x, y): u = ray_x0 + ray_xs * X with X = (((origin_x >> level) + x) + 0.5) * 2^level, v likewise.
@@ -172,11 +173,15 @@ struct blend_args {
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Taken are pixels with
-// |z_q - z| <= max(d, 4 footprint(z) max(|dx|, |dy|)), d = d_eff facing the viewer.
+// |z_q - (z + step)| <= max(d, 4 footprint(z) max(|dx|, |dy|)), d = d_eff facing the viewer; 4: 76 degrees. step = 0, or with
+// `steep` s_x dx + s_y dy, and what is taken may be off by PT_STEEP (|s_x dx| + |s_y dy|) too. s is what z changes by to the
+// next pixel of the row or column: of the changes on both sides the lesser where they go the same way, else 0; where one side
+// shows nothing, that on the other.
 struct normals_args {
     struct view_args view;
     struct instance_args instance;
     uint32_t radius; // of the window, 1..16
+    uint32_t steep;  // 1: of a light's map, where a low sun sees the ground at a few degrees
 };
 
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff; from = the pixel itself.

@@ -5,9 +5,11 @@
 #include <math.h>
 #include <string.h>
 
+static uint32_t steep; // of all pictures
+
 static struct normals_args arguments(const struct picture *picture, uint32_t radius)
 {
-    struct normals_args args = {.view = picture->view, .radius = radius};
+    struct normals_args args = {.view = picture->view, .radius = radius, .steep = steep};
     args.instance.id_base = picture->id_base;
     args.instance.id_count = (uint32_t)(picture->count * 3 /
                                         4); // the rest belongs to somebody else, and counts as neighbour
@@ -178,6 +180,46 @@ static void analytic(struct harness *h)
     harness_note(h, "planes of known slope: at most %.2g radians off", worst);
 }
 
+// A rough plane at 88 degrees, as a low sun sees the ground.
+static void steep_plane(struct harness *h)
+{
+    struct rng rng = {3};
+    struct picture picture = picture_random(h, &rng, picture_view(45, 29, 0), PICTURE_FLAT, 1.0);
+    const double angle = 88 * 0.017453292519943295;
+    const struct ref_vec n = {sin(angle) * 0.6, sin(angle) * 0.8, cos(angle)};
+    for (size_t i = 0; i < picture.count; i++) {
+        struct ref_ray ray = ref_ray(&picture.view, (int)(i % 45), (int)(i / 45));
+        double rough = 0.4 * (rng_unit(&rng) - 0.5) * (double)picture.view.ray_xs * tan(angle);
+        picture.keys[i] = ref_key((float)(1000.0 + (n.x * ray.u + n.y * ray.v) / n.z + rough), picture.id_base + (uint32_t)i);
+    }
+    size_t found[2] = {0};
+    for (steep = 0; steep < 2; steep++) {
+        struct normals_args args = arguments(&picture, 3);
+        args.instance.id_count = (uint32_t)picture.count;
+        for (int i = 0; i < PT_SPACINGS; i++)
+            args.instance.spacing[i] = 1e-4f;
+        uint32_t *words = words_without(h, &rng, picture.count);
+        check(h, &picture, &args, words);
+        const float *got = run(h, &picture, &args, words, picture.normal);
+        for (size_t i = 0; i < picture.count; i++)
+            found[steep] += fabs(ref_dot(ref_vec_of(got + 4 * i), n)) > cos(0.02);
+    }
+    steep = 0;
+    harness_note(h, "within a degree in %zu of %zu pixels, in %zu without `steep`", found[1], picture.count, found[0]);
+    if (found[1] < picture.count * 9 / 10 || found[0] > picture.count / 2)
+        harness_fail(h, "normal", 0, 0, "found in %zu and %zu of %zu pixels", found[1], found[0], picture.count);
+}
+
+static void steeply(struct harness *h)
+{
+    steep = 1;
+    kinds(h);
+    shapes(h);
+    lines(h);
+    analytic(h);
+    steep = 0;
+}
+
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
@@ -185,6 +227,8 @@ int main(int argc, char **argv)
         {"shapes of planes", shapes, 0},
         {"points on a line", lines, 0},
         {"planes of known slope", analytic, 0},
+        {"a steep plane", steep_plane, 0},
+        {"all of these, steep", steeply, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

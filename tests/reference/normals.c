@@ -22,6 +22,21 @@ static double linear(const struct view_args *view, double z)
     return view->perspective ? 1.0 / z : z;
 }
 
+static double depth_at(const struct view_args *view, const struct ref_planes *planes, int x, int y)
+{
+    int inside = x >= 0 && y >= 0 && x < (int)view->width && y < (int)view->height;
+    return inside ? ref_key_z(planes->keys[(size_t)y * view->width + (size_t)x]) : INFINITY;
+}
+
+// What depth changes by to the next pixel, where both sides rise or both fall: the gentler side's.
+static double step_along(double before, double z, double after)
+{
+    double into = isfinite(before) ? z - before : after - z, out = isfinite(after) ? after - z : z - before;
+    if ((!isfinite(before) && !isfinite(after)) || into * out <= 0.0)
+        return 0.0;
+    return fabs(into) < fabs(out) ? into : out;
+}
+
 static enum ref_truth gather(const struct normals_args *args, const struct ref_planes *planes, int x, int y,
                              struct samples *out)
 {
@@ -32,6 +47,11 @@ static enum ref_truth gather(const struct normals_args *args, const struct ref_p
     uint32_t word = planes->surface[ref_key_id(key) - instance->id_base];
     double m = ref_layer_minimum(view, instance->d_min, instance->spacing[word >> PT_SPACING_SHIFT], z);
     int radius = (int)args->radius;
+    double steps[2] = {0.0, 0.0};
+    if (args->steep) {
+        steps[0] = step_along(depth_at(view, planes, x - 1, y), z, depth_at(view, planes, x + 1, y));
+        steps[1] = step_along(depth_at(view, planes, x, y - 1), z, depth_at(view, planes, x, y + 1));
+    }
     out->count = 0;
     out->centre = linear(view, z);
     out->greatest = 0.0;
@@ -43,11 +63,14 @@ static enum ref_truth gather(const struct normals_args *args, const struct ref_p
             uint64_t neighbour = planes->keys[(size_t)qy * view->width + (size_t)qx];
             if (neighbour == REF_EMPTY_KEY)
                 continue;
-            // The same surface: within a layer distance, or no steeper than four pixels' width a pixel.
-            double step = fabs(ref_key_z(neighbour) - z);
-            double most = fmax(m, 4.0 * ref_footprint(view, z) * fmax(abs(dx), abs(dy)));
-            struct ref_range threshold = {most * (1.0 - TOL_WINDOW), most * (1.0 + TOL_WINDOW)};
-            enum ref_truth taken = ref_less_equal(ref_exactly(step), threshold);
+            // The same surface: within a layer distance, or no steeper than four pixels' width a pixel; from where the
+            // pixel's own steps lead, give or take half as far.
+            double along = steps[0] * dx, up = steps[1] * dy, far = fabs(along) + fabs(up);
+            double off = fabs(ref_key_z(neighbour) - z - along - up);
+            double most = fmax(fmax(m, 4.0 * ref_footprint(view, z) * fmax(abs(dx), abs(dy))), (double)PT_STEEP * far);
+            double error = most * TOL_WINDOW + TOL_WINDOW * (far + fabs(ref_key_z(neighbour) - z)) * (far > 0.0);
+            struct ref_range threshold = {most - error, most + error};
+            enum ref_truth taken = ref_less_equal(ref_exactly(off), threshold);
             if (taken == REF_UNSURE)
                 return REF_UNSURE;
             if (taken == REF_NO)

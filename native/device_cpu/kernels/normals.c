@@ -9,7 +9,7 @@
 struct center { // PT_LANES pixels
     vi x, y, pixel;
     vf z, w;
-    vf distance, slope; // a pixel of the same surface: |z_q - z| <= max(distance, slope * max(|dx|, |dy|))
+    vf distance, slope, step[2]; // what belongs to the same surface: kernel_args.h
     vm ours;
 };
 
@@ -22,6 +22,28 @@ static vf linear_depth(const struct view_args *view, vf z)
     if (view->perspective)
         return vf_rcp(z);
     return z;
+}
+
+// Depths 1 and 2 pixels on along (dx, dy), those before the pixel with -dx, -dy; and which of them show something.
+static vf depth_at(const struct view_args *view, const uint64_t *keys, const struct center *c, int32_t dx, int32_t dy, vm *known)
+{
+    vi x = vi_add(c->x, vi_set((uint32_t)dx)), y = vi_add(c->y, vi_set((uint32_t)dy));
+    vm inside = vm_and(c->ours, vm_and(vi_lt_unsigned(x, vi_set(view->width)), vi_lt_unsigned(y, vi_set(view->height))));
+    vf z = vi_float(vi_gather_z(keys, vi_add(c->pixel, vi_set((uint32_t)(dy * (int32_t)view->width + dx))), inside));
+    *known = vm_and(inside, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
+    return z;
+}
+
+// What z changes by from pixel to pixel along (dx, dy), as far as both sides agree.
+static vf step_along(const struct view_args *view, const uint64_t *keys, const struct center *c, int32_t dx, int32_t dy)
+{
+    vm known_before, known_after;
+    vf before = depth_at(view, keys, c, -dx, -dy, &known_before), after = depth_at(view, keys, c, dx, dy, &known_after);
+    vf a = c->z - before, b = after - c->z;
+    a = vf_select(known_before, a, b);
+    b = vf_select(known_after, b, a);
+    vm alike = vm_or(vm_and(vf_lt(vf_zero(), a), vf_lt(vf_zero(), b)), vm_and(vf_lt(a, vf_zero()), vf_lt(b, vf_zero())));
+    return vf_select(vm_and(vm_or(known_before, known_after), alike), vf_select(vf_lt(vf_abs(a), vf_abs(b)), a, b), vf_zero());
 }
 
 static uint32_t larger(int32_t a, int32_t b)
@@ -44,8 +66,10 @@ static struct sums gather(const struct normals_args *args, const uint64_t *keys,
                                                vi_lt_unsigned(qy, vi_set(view->height))));
             vi q = vi_add(c->pixel, vi_set((uint32_t)(dy * (int32_t)view->width + dx)));
             vf zq = vi_float(vi_gather_z(keys, q, inside));
+            const vf along = c->step[0] * vf_set((float)dx), up = c->step[1] * vf_set((float)dy);
             vf tolerance = vf_max(c->distance, c->slope * vf_set((float)larger(dx, dy)));
-            vm same = vm_and(inside, vf_le(vf_abs(zq - c->z), tolerance));
+            tolerance = vf_max(tolerance, vf_set(PT_STEEP) * (vf_abs(along) + vf_abs(up)));
+            vm same = vm_and(inside, vf_le(vf_abs((zq - c->z) - (along + up)), tolerance));
             if (!vm_bits(same))
                 continue; // other surfaces, or nothing
             const vf fx = vf_set((float)dx), fy = vf_set((float)dy);
@@ -98,6 +122,8 @@ static void normal_pixels(const struct normals_args *args, const struct pt_cpu_c
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
     center.distance = vf_layer_distance(view, instance->d_min, spacing, center.z, vf_set(1.0f));
     center.slope = vf_set(4.0f) * vf_footprint(view, center.z); // 76 degrees
+    for (int k = 0; k < 2; k++)
+        center.step[k] = args->steep ? step_along(view, keys, &center, 1 - k, k) : vf_zero();
 
     struct sums sums = gather(args, keys, &center);
     vf a, b, c, n[3], ray[2] = { vf_zero(), vf_zero() };
