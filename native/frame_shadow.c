@@ -256,6 +256,16 @@ static void set_window(const struct pt_plan *map, const double window[4], float 
     }
 }
 
+// Of all chunks those that the picture drew: points of the others have no mark. Returns how many.
+static uint32_t keep_seen(const struct pt_plan_instance *seen, struct chunk_view *chunks, uint32_t count)
+{
+    uint32_t kept = 0;
+    for (uint32_t c = 0; c < count && kept < seen->chunk_count; c++) // both in the cloud's order
+        if (chunks[c].first == seen->chunks[kept].first)
+            chunks[kept++] = chunks[c];
+    return kept;
+}
+
 // Tests the points of one instance against the map in the planes.
 static int test_instance(struct update *update, const struct patina_scene *view, struct pt_plan *map, uint32_t i,
                          struct lit_args *args)
@@ -267,12 +277,16 @@ static int test_instance(struct update *update, const struct patina_scene *view,
     struct pt_buffer chunk_buffer = { 0 };
     struct chunk_view *chunks;
     struct pt_resident *resident;
-    uint32_t light = args->base;
+    uint32_t light = args->base, count = instance->cloud->chunk_count;
     int error = pt_plan_chunks(view, map, instance, &args->instance, &chunks);
+    if (!error && args->marked)
+        count = keep_seen(&update->plan->instances[i], chunks, count);
+    if (!error && !count)
+        return PATINA_OK;
     if (!error)
         error = pt_residency_take(&frame->residency, device, instance->cloud, &resident);
     if (!error)
-        error = device->ops->buffer_create(device, instance->cloud->chunk_count * sizeof *chunks, chunks, 1, &chunk_buffer);
+        error = device->ops->buffer_create(device, count * sizeof *chunks, chunks, 1, &chunk_buffer);
     if (error)
         return error;
     struct pt_buffer *const bound[] = { &planes[PT_PLANE_KEYS][0], &planes[PT_PLANE_FROM][0], &planes[PT_PLANE_DEFF][0],

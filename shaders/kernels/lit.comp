@@ -81,7 +81,10 @@ bool in_shadow(view_args view, chunk_view chunk, uint at, uint id)
     int column = int(floor(x)) - view.origin_x, row = int(floor(y)) - view.origin_y;
     uint pixel = uint(row) * view.width + uint(column);
     float map = read_z(pixel);
-    if (!(map < z))
+    // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
+    precise float least = 0.999 * pt_layer_distance(view, args.instance.d_min, 0.0, z, 1.0);
+    precise float nearest = map + least;
+    if (!(nearest < z))
         return false;
     bool none;
     precise vec2 ray = vec2(view.ray_x0 + view.ray_xs * x, view.ray_y0 + view.ray_ys * y);

@@ -42,6 +42,7 @@ class Mode:
     style: dict[str, Any] = field(default_factory=dict)
     light: dict[str, Any] = field(default_factory=dict)
     effects: dict[str, Any] = field(default_factory=dict)
+    still: bool = False  # lights that cast stay where they are, and their shadow textures are kept
 
     def missing(self) -> str:
         """The first field that the binding does not have yet, or ""."""
@@ -60,6 +61,7 @@ MODES = {
     "layers": Mode(settings={"layers": LAYERS}),
     "3 layers": Mode(settings={"layers": 3}, style={"transparency": 0.5}),
     "6 layers": Mode(settings={"layers": 6}, style={"transparency": 0.5}),
+    "shadows kept": Mode(light={"shadows": 1}, still=True),
     "shadows 1": Mode(settings={"shadow_samples": 1, "shadow_lazy": 1}, light={"shadows": 1}),
     "shadows 5": Mode(settings={"shadow_samples": 5, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
     "shadows 10": Mode(settings={"shadow_samples": 10, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
@@ -79,12 +81,12 @@ MODES |= {name: Mode(effects=effects) for name, effects in CUES.items()}
 
 
 def fill_scene(scene: native.Scene, cloud: native.Cloud, shown: stages.Stage, mode: Mode, turn: float) -> None:
-    """Adds cloud and lights. Where lights cast shadows, they turn too: a kept shadow texture would be no work."""
+    """Adds cloud and lights. Lights that cast shadows turn too, unless the mode lets them be."""
     scene.add_cloud(cloud, **{**shown.style, **mode.style})
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     for light in shown.lights:
         light = {**light, **mode.light}
-        if mode.light:
+        if mode.light and not mode.still:
             x, y, z = light["direction"]
             light["direction"] = [c * x - s * y, s * x + c * y, z]
         scene.add_light(**light)

@@ -2,7 +2,10 @@
 """VTK draws a cloud: peer_vtk.py MODE IN.npz OUT.npz. Run by peers.py with the system's Python, which has python3-vtk9.
 
 IN: position, normal, color (linear, float32), matrix (frames, 4, 4) world from camera, fov, near, far, size, towards,
-power, world, spacing. OUT: rgba, depth of the first camera. Prints the times of the frames as JSON."""
+power, world, spacing. OUT: rgba, depth of the first camera. Prints the times of the frames as JSON.
+
+vtkShadowMapBakerPass draws its maps anew when the time stamp of a light or of an actor says that it changed, and else
+keeps them: "shadow map" lets the light be, "shadow map, moving light" turns it with each frame."""
 
 from __future__ import annotations
 
@@ -16,7 +19,8 @@ import vtk
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
 MODES = ("points 1 px", "points 3 px", "points 5 px", "points 3 px + EDL", "gaussian", "points 3 px + 6 peels",
-         "points 3 px + shadow map")
+         "points 3 px + shadow map", "points 3 px + shadow map, moving light")
+TURN = 1.0  # degrees a frame that a moving light turns around z
 
 
 def cloud(data: dict[str, np.ndarray]) -> vtk.vtkPolyData:
@@ -64,6 +68,12 @@ def aim(camera: vtk.vtkCamera, matrix: np.ndarray, data: dict[str, np.ndarray]) 
     camera.SetClippingRange(1.0, 10.0)
 
 
+def place(light: vtk.vtkLight, towards: np.ndarray, degrees: float) -> None:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    x, y, z = towards
+    light.SetPosition(10.0 * (c * x - s * y), 10.0 * (s * x + c * y), 10.0 * z)
+
+
 def main() -> None:
     mode, source, target = sys.argv[1:4]
     data = dict(np.load(source))
@@ -80,7 +90,7 @@ def main() -> None:
     light = vtk.vtkLight()
     light.SetLightTypeToSceneLight()
     light.SetPositional(False)
-    light.SetPosition(*(10.0 * data["towards"]))
+    place(light, data["towards"], 0.0)
     light.SetFocalPoint(0.0, 0.0, 0.0)
     light.SetIntensity(float(data["power"]) / np.pi)
     renderer.AddLight(light)
@@ -96,7 +106,7 @@ def main() -> None:
         renderer.SetUseDepthPeeling(1)
         renderer.SetMaximumNumberOfPeels(6)
         renderer.SetOcclusionRatio(0.0)
-    if mode.endswith("shadow map"):
+    if "shadow map" in mode:
         light.SetPositional(True)  # VTK fits the map of a light to its cone
         light.SetConeAngle(20.0)
         baker, shadows, steps = vtk.vtkShadowMapBakerPass(), vtk.vtkShadowMapPass(), vtk.vtkSequencePass()
@@ -113,6 +123,8 @@ def main() -> None:
     times = []
     for index, matrix in enumerate(data["matrix"]):
         aim(renderer.GetActiveCamera(), matrix, data)
+        if mode.endswith("moving light"):
+            place(light, data["towards"], index * TURN)
         start = time.perf_counter()
         window.Render()
         window.WaitForCompletion()
@@ -120,6 +132,7 @@ def main() -> None:
         if index >= 2:
             times.append(1e3 * (time.perf_counter() - start))
     aim(renderer.GetActiveCamera(), data["matrix"][0], data)
+    place(light, data["towards"], 0.0)
     window.Render()
     colors, depths = vtk.vtkUnsignedCharArray(), vtk.vtkFloatArray()
     window.GetRGBACharPixelData(0, 0, size - 1, size - 1, 0, colors)

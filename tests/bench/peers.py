@@ -23,7 +23,8 @@ from truth import linear
 HERE = Path(__file__).resolve().parent
 PYTHON = "/usr/bin/python3"  # Debian's, for its VTK
 POINTS, SIZE = 1_000_000, 1024
-EFFECTS = {"points 3 px + 6 peels": "6 layers", "points 3 px + shadow map": "shadows 1"}  # VTK's → our mode
+EFFECTS = {"points 3 px + 6 peels": "6 layers", "points 3 px + shadow map": "shadows kept",
+           "points 3 px + shadow map, moving light": "shadows 1"}  # VTK's → our mode
 STYLE_ERRORS = ("coverage_iou", "false_holes", "false_growth", "outer_growth", "depth_rms_spacings")
 VTK = ("points 1 px", "points 3 px", "points 5 px", "points 3 px + EDL", "gaussian")
 

@@ -70,7 +70,8 @@ def effects(result: dict[str, Any]) -> str:
     """Layers and shadows of the headline's cloud, and what VTK takes for the same."""
     rows = joined(result, "effects")
     peer = {row["mode"]: row for row in rows if row["device"].startswith("VTK")}
-    names = {"6 layers": "six layers of half transparent points", "shadows 1": "hard shadows of the sun"}
+    names = {"6 layers": "six layers of half transparent points", "shadows kept": "hard shadows of a sun at rest, the camera moves",
+             "shadows 1": "hard shadows of a sun that moves, and the camera"}
     body = []
     for row in rows:
         if row["mode"] in peer and not row["device"].startswith("VTK"):

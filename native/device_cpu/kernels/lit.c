@@ -2,7 +2,7 @@
 // lit: points against the filled map of a light. [D 6], SPEC 4; twin of shaders/kernels/lit.comp
 //
 // Words of a cloud's points belong to one chunk each, so threads never meet. Surface words lie in file order, a cache miss
-// each: only points behind the map are asked for theirs, and lit points are not written at all.
+// each: only points well behind the map are asked for theirs, and lit points are not written at all.
 #include "device_cpu/rows.h"
 
 struct lit {
@@ -102,7 +102,9 @@ static uint32_t in_shadow(const struct lit *lit, const struct chunk_view *chunk,
     vi column = vi_sub(vf_int(vf_floor(at[0])), origin_x), row = vi_sub(vf_int(vf_floor(at[1])), origin_y);
     vi pixel = vi_add(vi_mul(row, vi_set(view->width)), column);
     vf map = vi_float(vi_gather_z(keys, pixel, inside));
-    vm behind = vm_and(inside, vf_lt(map, z));
+    // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
+    vf least = vf_set(0.999f) * vf_layer_distance(view, lit->args.instance.d_min, vf_zero(), z, vf_set(1.0f));
+    vm behind = vm_and(inside, vf_lt(map + least, z));
     if (!vm_bits(behind))
         return 0;
     vf d = layer_distance(lit, at, z, id, behind, &none);
