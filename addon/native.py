@@ -146,8 +146,8 @@ class _Settings(_Descriptor):
                 ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
                 ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
                 ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
-                ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("own_background", c_uint32),
-                ("background", c_float * 3), ("surface", c_uint32)]
+                ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("shadow_error", c_float),
+                ("own_background", c_uint32), ("background", c_float * 3), ("surface", c_uint32)]
 
 
 class _Effects(_Descriptor):
@@ -169,7 +169,8 @@ class _FrameStats(_Descriptor):
                 ("points_scattered", c_uint64), ("triangles", c_uint64), ("chunks", c_uint64), ("chunks_culled", c_uint64),
                 ("ms", c_double), ("plane_bytes", c_uint64), ("layers", c_uint32), ("spacing_px", c_float),
                 ("expected", _ExpectedError), ("shadow_bytes", c_uint64), ("shadow_maps", c_uint32),
-                ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32)]
+                ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32),
+                ("shadow_samples", c_uint32), ("shadow_error", c_float)]
 
 
 # ---- the library ---------------------------------------------------------------------------------------------
@@ -224,6 +225,7 @@ _CALLS = {
     "patina_frame_bake_shadows": (c_void_p, c_void_p),
     "patina_frame_save_shadows": (c_void_p, c_char_p),
     "patina_frame_load_shadows": (c_void_p, c_void_p, c_char_p),
+    "patina_frame_read_shadows": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, _OUT),
@@ -594,6 +596,12 @@ class Frame(_Handle):
     def load_shadows(self, scene: Scene, path: str) -> None:
         """Raises PatinaError with the reason when the file is damaged, stale, or of another scene."""
         self._call("load_shadows", scene._handle, os.fsencode(path))
+
+    def shadows(self, instance: int, light: int, count: int) -> np.ndarray:
+        """The share of a casting light that arrives at each of the instance's `count` points, float32."""
+        values = np.empty(count, np.float32)
+        self._call("read_shadows", instance, light, values.ctypes.data, values.nbytes)
+        return values
 
     def cancel(self) -> None:
         library().patina_frame_cancel(self._handle)

@@ -395,9 +395,13 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     frame->stats.shadow_height = frame->shadow_size[1];
     for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
         frame->stats.shadow_bytes += frame->shadows.words[i].size;
-    for (uint32_t i = 0; i < plan->light_count; i++)
-        frame->stats.shadow_pending += frame->shadows.lights[i].samples < plan->lights[i].samples &&
-                                       !frame->shadows.lights[i].settled;
+    frame->light_count = plan->light_count;
+    for (uint32_t i = 0; i < plan->light_count; i++) {
+        const struct pt_shadow_light *light = &frame->shadows.lights[i];
+        frame->stats.shadow_pending += light->samples < plan->lights[i].samples && !light->settled;
+        frame->stats.shadow_samples = light->samples > frame->stats.shadow_samples ? light->samples : frame->stats.shadow_samples;
+        frame->stats.shadow_error = fmaxf(frame->stats.shadow_error, light->error);
+    }
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
     frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
@@ -539,6 +543,12 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
     for (uint32_t i = 0; i < frame->layer_count; i++)
         PUT("%s{\"points\":%llu,\"pixels\":%llu}", i ? "," : "", (unsigned long long)frame->layers[i].points,
             (unsigned long long)frame->layers[i].pixels);
+    PUT("],\"lights\":[");
+    for (uint32_t i = 0; i < frame->light_count; i++) {
+        const struct pt_shadow_light *light = &frame->shadows.lights[i];
+        unsigned long long parts = (unsigned long long)((double)light->error * 1e6 + 0.5);
+        PUT("%s{\"samples\":%u,\"error\":%llu.%06llu}", i ? "," : "", light->samples, parts / 1000000, parts % 1000000);
+    }
     PUT("]}");
 #undef PUT
     return length;

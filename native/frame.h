@@ -43,6 +43,7 @@ struct patina_frame {
     uint32_t layer_most;      // that the settings allowed
     uint32_t layer_passes;    // bits of what was kept of each
     uint32_t crop[4], plane_width;
+    uint32_t light_count;     // that cast shadows
     int keys_valid, picture_valid;
     int all_lit; // no light cast a shadow: there is no plane that says so
 };

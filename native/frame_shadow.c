@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIRST_COMPARED = 4 }; // samples after which a light may stop because all agree; then at every doubling
+enum { FIRST_COMPARED = 4 }; // samples after which a light may stop, because all agree or enough is known; then at every doubling
 
 // ---- what is at hand ---------------------------------------------------------------------------------------------------
 
@@ -396,12 +396,40 @@ static int clear_words(struct update *update, uint32_t index)
     return error;
 }
 
+// Whether the error after so many samples is compared with that after half of them, or the last stop before the end.
+static int measures_at(const struct update *update, uint32_t index, uint32_t samples)
+{
+    uint32_t most = update->plan->lights[index].samples;
+    return update->scene->settings.shadow_error > 0.0f && most > 1 &&
+           ((samples >= FIRST_COMPARED / 2 && !(samples & (samples - 1))) || samples == most);
+}
+
+// before: the sums of the last stop, in and out.
+static int measure_error(struct update *update, uint32_t index, struct pt_shadow_sums *before)
+{
+    struct pt_shadow_light *light = &update->frame->shadows.lights[index];
+    struct pt_shadow_sums now = { 0 };
+    int error = pt_shadow_sums_read(update->frame, index, &now);
+    if (!error && before->words && before->samples < now.samples) {
+        light->error = pt_shadow_error(before, &now);
+        light->settled |= light->error <= update->scene->settings.shadow_error;
+    }
+    pt_shadow_sums_free(before);
+    *before = now;
+    return error;
+}
+
 static int test_light(struct update *update, uint32_t index)
 {
     struct patina_frame *frame = update->frame;
     struct pt_shadow_light *light = &frame->shadows.lights[index];
+    struct pt_shadow_sums before = { 0 };
     uint32_t wanted = samples_wanted(update->scene, update->plan, index, light), done = light->samples;
     int error = done || done == wanted ? PATINA_OK : clear_words(update, index);
+    if (!error && done < wanted && measures_at(update, index, done))
+        error = measure_error(update, index, &before);
+    if (!done)
+        light->error = 0.0f;
     for (uint32_t stop = FIRST_COMPARED; done < wanted && !error && !light->settled; done++) {
         while (stop < done + 1)
             stop *= 2;
@@ -409,8 +437,8 @@ static int test_light(struct update *update, uint32_t index)
         int compare = stop == done + 1;
         light->samples = 0; // half a sample is none
         if (atomic_load(&frame->cancel))
-            return PATINA_ERROR_CANCELLED;
-        if (compare)
+            error = PATINA_ERROR_CANCELLED;
+        if (!error && compare)
             error = frame->device->ops->buffer_write(frame->device, &frame->shadows.differs, 0, &differs, sizeof differs);
         if (!error)
             error = take_sample(update, index, done, compare);
@@ -421,7 +449,10 @@ static int test_light(struct update *update, uint32_t index)
             light->settled = compare && !differs;
             light->partial = (uint32_t)pt_plan_lazy(update->scene, update->plan);
         }
+        if (!error && measures_at(update, index, done + 1))
+            error = measure_error(update, index, &before);
     }
+    pt_shadow_sums_free(&before);
     return error;
 }
 

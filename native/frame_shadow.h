@@ -12,7 +12,8 @@ struct pt_shadow_light {
     double *key; // pt_light_key
     size_t key_count;
     uint32_t samples; // in the words; 0: the words say nothing
-    uint32_t settled; // every point's samples agree: more would say the same
+    uint32_t settled; // no more are wanted: every point's samples agree, or the error target is met
+    float error;      // expected, as pt_shadow_error has it; 0: not measured, or there is none
     uint32_t partial; // lazy: only points that one picture showed; the next tests anew
 };
 
@@ -32,6 +33,17 @@ int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene
 int pt_shadows_stale(const struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan);
 // Tests what is to be tested, and tells the plan's shade passes what the words mean. With shadow_lazy the marks are set.
 int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan);
+// What a light's samples took from each point, instance after instance; all zero before the first reading.
+struct pt_shadow_sums {
+    uint32_t *words;
+    size_t count;
+    uint32_t samples;
+};
+// frame_shadow_error.c
+int pt_shadow_sums_read(struct patina_frame *frame, uint32_t light, struct pt_shadow_sums *sums);
+void pt_shadow_sums_free(struct pt_shadow_sums *sums);
+// Expected error of `after`, root mean square over the points in the penumbra, from `before` with some of its samples.
+float pt_shadow_error(const struct pt_shadow_sums *before, const struct pt_shadow_sums *after);
 // All of the scene's textures, whole, without a picture.
 int pt_shadows_bake(struct patina_frame *frame, const struct patina_scene *scene);
 // What arrives of the light at each point of the instance.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Shadow textures in a file (SPEC 4). Little-endian:
 //   "patshado", u32 version, u32 lights, u32 instances, u32 bytes a word, u64 checksum of all that follows
-//   per light: u32 samples, u32 settled, u32 numbers, then float64 numbers: what it depends on (pt_light_key)
+//   per light: u32 samples, u32 settled, f32 error, u32 numbers, then float64 numbers: what it depends on (pt_light_key)
 //   per instance: u64 fingerprint (0: receives no shadows), u64 points, then the words, light by light
 #include "frame.h"
 
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { VERSION = 1, HEADER_BYTES = 32 };
+enum { VERSION = 2, HEADER_BYTES = 32 };
 static const char magic[8] = { 'p', 'a', 't', 's', 'h', 'a', 'd', 'o' };
 
 // ---- writing -----------------------------------------------------------------------------------------------------------
@@ -69,6 +69,7 @@ static int put_textures(const struct patina_frame *frame, uint32_t width, struct
         const struct pt_shadow_light *light = &shadows->lights[i];
         put32(bytes, light->samples);
         put32(bytes, light->settled);
+        put(bytes, &light->error, 4);
         put32(bytes, (uint32_t)light->key_count);
         put(bytes, light->key, light->key_count * sizeof *light->key);
     }
@@ -193,7 +194,8 @@ static int take_light(struct reader *reader, const struct patina_scene *scene, c
 {
     uint32_t count = 0;
     size_t wanted = pt_light_key(scene, &plan->lights[i], NULL, 0);
-    if (take(reader, &light->samples, 4) || take(reader, &light->settled, 4) || take(reader, &count, 4))
+    if (take(reader, &light->samples, 4) || take(reader, &light->settled, 4) || take(reader, &light->error, 4) ||
+        take(reader, &count, 4))
         return PATINA_ERROR_FORMAT;
     double *key = malloc(wanted * sizeof *key), *ours = malloc(wanted * sizeof *ours);
     int error = key && ours ? PATINA_OK : pt_fail(&reader->frame->handle, PATINA_ERROR_MEMORY, "loading shadows: out of memory");

@@ -401,6 +401,7 @@ static void plan_marks(struct pt_builder *builder)
         pt_skip(builder, "mark",
                 none               ? none
                 : plan->layers > 1 ? "what later layers show is not known yet"
+                : builder->scene->settings.shadow_lazy ? "the error target is measured on whole shadow textures"
                                    : "whole shadow textures, to be kept");
     if (none)
         pt_skip(builder, "lit", none);

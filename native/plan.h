@@ -182,7 +182,8 @@ int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan);
 int pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
 int pt_receives(const struct pt_instance *instance); // shadows, at all
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
-// Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late.
+// Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late. Not
+// with an error target: a part of the picture would stop at other samples than the whole.
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
 
 // The maps of one sample: those of all opaque casters; of all but one that must not shadow itself, for that one; and of

@@ -41,7 +41,7 @@ int pt_receives(const struct pt_instance *instance)
 
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan)
 {
-    return scene->settings.shadow_lazy && plan->layers <= 1;
+    return scene->settings.shadow_lazy && plan->layers <= 1 && !(scene->settings.shadow_error > 0.0f);
 }
 
 // What it takes of 255 parts of light.
@@ -455,7 +455,8 @@ static int plan_light(const struct patina_scene *scene, struct pt_plan *plan, co
             planned->width = view.settings.width;
             planned->height = view.settings.height;
         }
-    snprintf(planned->reason, sizeof planned->reason, "%s, %u sample%s, %s %u x %u texels, %s", names[light->type],
+    snprintf(planned->reason, sizeof planned->reason, "%s, %s%u sample%s, %s %u x %u texels, %s", names[light->type],
+             planned->samples > 1 && scene->settings.shadow_error > 0.0f ? "to the error target, at most " : "",
              planned->samples, planned->samples > 1 ? "s" : "", planned->cube ? "six maps of" : "a map of",
              planned->width, planned->height, planned->capped ? "as fine as is allowed" : "a point a texel");
     plan->light_count++;
@@ -533,6 +534,7 @@ size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light
     put(&key, (double)scene->settings.shadow_resolution);
     put(&key, (double)scene->settings.quality);
     put(&key, (double)scene->settings.fill);
+    put(&key, (double)scene->settings.shadow_error);
     for (uint32_t i = 0; i < scene->instance_count; i++)
         put_instance(&key, scene, planned, i);
     for (uint32_t i = 0; i < scene->mesh_count; i++)

@@ -78,6 +78,11 @@ class PatinaSceneProperties(PropertyGroup):
     shadow_samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=16, min=1, max=4096, soft_max=256,
         description="Points of a light's area that shadows are gathered from; sharp lights need one")
+    shadow_error: FloatProperty(
+        name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
+        precision=1,
+        description="Expected error of soft shadows, in percent of their light: each light takes as many samples as it needs, "
+                    "at most 256. 0: as many as are set below")
     shadow_resolution: IntProperty(
         name="Resolution", override=_OVERRIDE, default=4096, min=16, max=16384, subtype='PIXEL',
         description="Most texels along a side of a light's depth map; it has fewer where the points lie wider")

@@ -40,6 +40,7 @@ class Settings:
     shadow_resolution: int
     shadow_lazy: int
     error_target: float = 0.0
+    shadow_error: float = 0.0
     strata: int = 0  # of 6 that are drawn; 0: all
     shadow_progressive: int = 0
     own_background: int = 0
@@ -63,7 +64,8 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         background=tuple(studio.background) if studio.use_background else world_color,
         layers=patina.layers,
         error_target=0.0 if quality else 0.01 * patina.error_target,
-        shadow_samples=patina.shadow_samples,
+        shadow_samples=0 if patina.shadow_error else patina.shadow_samples,
+        shadow_error=0.01 * patina.shadow_error,
         shadow_resolution=patina.shadow_resolution,
         shadow_lazy=1)  # a final picture
 

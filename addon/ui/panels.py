@@ -93,7 +93,10 @@ class PATINA_PT_shadows(PatinaPanel, Panel):
         layout.use_property_decorate = False
         patina = context.scene.patina
         layout.active = patina.use_shadows
-        layout.prop(patina, "shadow_samples")
+        layout.prop(patina, "shadow_error")
+        row = layout.row()
+        row.active = not patina.shadow_error
+        row.prop(patina, "shadow_samples")
         layout.prop(patina, "shadow_resolution")
         layout.prop(patina, "shadow_file")
         row = layout.row(align=True)

@@ -43,6 +43,9 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
                 ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]
         if level != pace.FULL:
             rows.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
+        if stats["shadow_samples"]:
+            expected = f", expected error {stats['shadow_error']:.2%}" if stats["shadow_error"] else ""
+            rows.append(("Shadows", f"{stats['shadow_samples']} samples{expected}"))
         _table(layout, rows)
         for notice in found.notices:
             sentence(layout, notice, 'INFO')

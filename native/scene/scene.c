@@ -280,7 +280,9 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: layer_passes can be COMBINED, DEPTH and NORMAL only");
     if (s.shadow_samples > 4096 || s.shadow_resolution > 16384 || s.shadow_lazy > 1 || s.shadow_progressive > 1)
         return fail(scene, "settings: at most 4096 shadow samples and 16384 texels; shadow_lazy and shadow_progressive are 0 or 1");
-    s.shadow_samples = s.shadow_samples ? s.shadow_samples : 1;
+    if (!(s.shadow_error >= 0.0f) || !isfinite(s.shadow_error))
+        return fail(scene, "settings: shadow_error is negative or not finite");
+    s.shadow_samples = s.shadow_samples ? s.shadow_samples : s.shadow_error > 0.0f ? 256 : 1;
     s.shadow_resolution = s.shadow_resolution ? s.shadow_resolution : 4096;
     if (!s.passes)
         s.passes = (1u << PATINA_PASS_COUNT) - 1;

@@ -211,6 +211,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = !*(o->load_shadows = value);
     else if (!strcmp(name, "--samples"))
         bad = parse_count(value, 1, 4096, &s->shadow_samples);
+    else if (!strcmp(name, "--shadow-error"))
+        bad = parse_error(value, &s->shadow_error);
     else if (!strcmp(name, "--ortho"))
         bad = parse_width(value, &o->ortho_width);
     else if (!strcmp(name, "--quality"))
@@ -294,7 +296,7 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         memcpy(options->settings.background, options->settings.world_color, sizeof options->ambient);
         memcpy(options->settings.world_color, options->ambient, sizeof options->ambient);
     }
-    if (!options->settings.shadow_samples)
+    if (!options->settings.shadow_samples && !(options->settings.shadow_error > 0.0f))
         options->settings.shadow_samples = 16;
     options->settings.shadow_lazy = 1; // a picture has no use for whole textures, and measured frames are to compute theirs
     if ((options->save_shadows || options->load_shadows) && !options->shadows)

@@ -195,7 +195,8 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     }
     printf("}, \"layers\": %u, \"skipped\": %s, \"peak_mb\": %.1f", stats->layers,
            times->skipped ? times->skipped : "{}", peak_megabytes());
-    printf(", \"spacing_px\": %.4f, \"expected_error\": {\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f}}\n",
+    printf(", \"spacing_px\": %.4f, \"expected_error\": {\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f}",
            (double)stats->spacing_px, (double)stats->expected.color, (double)stats->expected.coverage,
            (double)stats->expected.depth, (double)stats->expected.normal);
+    printf(", \"shadow_samples\": %u, \"shadow_error\": %.6f}\n", stats->shadow_samples, (double)stats->shadow_error);
 }

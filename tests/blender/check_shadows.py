@@ -75,6 +75,22 @@ def test_switches():
     check(not lit(lambda scene: setattr(scene.objects["floor"].patina, "self_shadows", False)), "others' shadows fall")
 
 
+def test_error_target():
+    """The tighter the target, the nearer to the shadow of many samples; the samples set are not asked."""
+    scene = stage('AREA')
+    bpy.data.lights[-1].size = 3.0
+
+    def shadow(error, samples):
+        scene.patina.shadow_error, scene.patina.shadow_samples = error, samples
+        return render()["Shadow"][..., 0]
+
+    many, one = shadow(0.0, 512), shadow(0.0, 1)
+    soft = (many > 0.0) & (many < 1.0)
+    loose, tight = (float(np.sqrt(np.square(shadow(error, 1) - many)[soft].mean())) for error in (20.0, 2.0))
+    check(tight < 0.02 and loose < 0.2 and tight < 0.5 * loose, f"off by {loose} and {tight}")
+    check(np.sqrt(np.square(one - many)[soft].mean()) > 0.2, "one sample is far off")
+
+
 def test_bake_and_load():
     path = str(SCRATCH / "scene.patina-shadows")
     scene = stage(angle=0.1)

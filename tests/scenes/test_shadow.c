@@ -11,7 +11,7 @@
 
 #define PI 3.14159265358979323846
 
-enum { PLANE = 160000, BALL = 80000 };
+enum { PLANE = 160000, BALL = 80000, FEW = 24000, ROUND = 12000 };
 static const double radius = 0.5, lift = 0.55; // of the ball, and its middle above the plane
 static const double half_side = 2.0;
 static double spacing; // of the plane's points
@@ -196,7 +196,7 @@ static double disc_seen(const float *q, const patina_light_desc *sun, int grid)
 static void test_soft_converges(void **state)
 {
     (void)state;
-    enum { FEW = 24000, ROUND = 12000, STEPS = 9 };
+    enum { STEPS = 9 };
     patina_device *device = support_device_first();
     struct points points = ball_on_plane(FEW, ROUND, POINTS_NORMALS);
     patina_cloud *cloud = points_upload(&points);
@@ -234,6 +234,63 @@ static void test_soft_converges(void **state)
     assert_true(slope_top / slope_bottom <= -0.5);
     free(truth);
     patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+    points_free(&points);
+    patina_device_destroy(device);
+}
+
+static double off_in_penumbra(const float *values, const float *truth, uint64_t count)
+{
+    double square = 0, between = 0;
+    for (uint64_t i = 0; i < count; i++)
+        if (truth[i] > 0.0f && truth[i] < 1.0f) {
+            square += ((double)values[i] - (double)truth[i]) * ((double)values[i] - (double)truth[i]);
+            between++;
+        }
+    return sqrt(square / fmax(between, 1.0));
+}
+
+// Samples double until the error is expected to be at most the target; against our own 4096 it is. The tighter, the more.
+static void test_error_target(void **state)
+{
+    (void)state;
+    static const float targets[] = {0.2f, 0.1f, 0.05f, 0.025f};
+    patina_device *device = support_device_first();
+    struct points points = ball_on_plane(FEW, ROUND, POINTS_NORMALS);
+    patina_cloud *cloud = points_upload(&points);
+    for (uint32_t type = PATINA_LIGHT_SUN; type <= PATINA_LIGHT_AREA; type += 3) {
+        patina_light_desc light = sun_at(50, 25);
+        light.angle = 0.3f;
+        light.type = type;
+        light.position[0] = 1.5, light.position[2] = 2.5;
+        patina_scene *scene = scene_of(cloud, NULL);
+        float *truth = bake(device, scene, &light, 4096, points.count, NULL);
+        uint32_t before = 0;
+        for (size_t k = 0; k < sizeof targets / sizeof *targets; k++) {
+            patina_settings settings = settings_default(64, 64);
+            patina_camera camera = {.struct_size = sizeof camera};
+            patina_frame_stats stats = {.struct_size = sizeof stats};
+            patina_frame *frame = frame_on(device);
+            float *values = malloc(points.count * sizeof *values);
+            settings.shadow_error = targets[k];
+            CHECK(patina_scene_set_settings(scene, &settings), scene);
+            CHECK(patina_scene_frame_camera(scene, 20, 60, 0, &camera), scene);
+            CHECK(patina_scene_set_camera(scene, &camera), scene);
+            CHECK(patina_frame_render(frame, scene), frame);
+            CHECK(patina_frame_get_stats(frame, &stats), frame);
+            CHECK(patina_frame_read_shadows(frame, 0, 0, values, points.count * sizeof *values), frame);
+            double off = off_in_penumbra(values, truth, points.count);
+            printf("  %s, target %.3f: %u samples, expected %.4f, is %.4f\n", type == PATINA_LIGHT_SUN ? "sun  " : "panel",
+                   (double)targets[k], stats.shadow_samples, (double)stats.shadow_error, off);
+            assert_true(stats.shadow_error <= targets[k] && stats.shadow_error > 0.0f && off <= (double)stats.shadow_error);
+            assert_true(stats.shadow_samples >= before && stats.shadow_maps == stats.shadow_samples && !stats.shadow_pending);
+            before = stats.shadow_samples;
+            free(values);
+            patina_frame_destroy(frame);
+        }
+        free(truth);
+        patina_scene_destroy(scene);
+    }
     patina_cloud_destroy(cloud);
     points_free(&points);
     patina_device_destroy(device);
@@ -296,6 +353,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_sun_heights),
         cmocka_unit_test(test_near_lights),
         cmocka_unit_test(test_soft_converges),
+        cmocka_unit_test(test_error_target),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

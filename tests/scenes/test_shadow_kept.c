@@ -232,6 +232,60 @@ static void test_progressive(void **state)
     patina_device_destroy(device);
 }
 
+// With an error target every device stops at the same samples; so do refining step by step and asking for a lazy picture;
+// another target starts anew, and a file keeps to its own.
+static void test_error_target(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/patina_shadow_XXXXXX";
+    close(mkstemp(path));
+    struct stage stage = stage_lit();
+    stage.settings.shadow_samples = 32;
+    stage.settings.shadow_error = 0.25f;
+    float *truth = NULL;
+    uint32_t maps = 0;
+    for (uint32_t d = 0; d < support_device_count(); d++) {
+        patina_device *device = support_device_open(support_device_name(d), 3, 2);
+        if (!device)
+            continue;
+        patina_frame *frame = frame_on(device), *slow = frame_on(device);
+        stage.settings.shadow_lazy = d % 2;
+        patina_frame_stats stats = render(frame, &stage), last = {0};
+        assert_true(stats.shadow_samples >= 4 && stats.shadow_samples < 32 && stats.shadow_error > 0.0f && stats.shadow_error <= 0.25f);
+        stage.settings.shadow_lazy = 0;
+        stage.settings.shadow_progressive = 1;
+        for (last.shadow_pending = 1; last.shadow_pending;)
+            last = render(slow, &stage);
+        stage.settings.shadow_progressive = 0;
+        float *values = read_all(frame, 3), *steps = read_all(slow, 3);
+        assert_memory_equal(values, steps, 3 * (TORUS + FLOOR) * sizeof *values);
+        assert_true(stats.shadow_error == last.shadow_error && stats.shadow_samples == last.shadow_samples);
+        free(steps);
+        if (truth && (memcmp(truth, values, 3 * (TORUS + FLOOR) * sizeof *values) || stats.shadow_maps != maps))
+            support_die("%s: other shadows to an error target than %s", support_device_name(d), support_device_name(0));
+        if (truth)
+            free(values);
+        else
+            truth = values;
+        maps = stats.shadow_maps;
+        assert_int_equal(render(frame, &stage).shadow_maps, 0);
+        CHECK(patina_frame_save_shadows(frame, path), frame);
+        CHECK(patina_frame_load_shadows(slow, stage.scene, path), slow);
+        last = render(slow, &stage);
+        assert_true(!last.shadow_maps && last.shadow_error == stats.shadow_error && last.shadow_samples == stats.shadow_samples);
+        stage.settings.shadow_error = 0.4f;
+        assert_true(render(frame, &stage).shadow_maps > 0);
+        assert_int_equal(patina_frame_load_shadows(slow, stage.scene, path), PATINA_ERROR_FORMAT);
+        stage.settings.shadow_error = 0.25f;
+        patina_frame_destroy(frame);
+        patina_frame_destroy(slow);
+        patina_device_destroy(device);
+    }
+    unlink(path);
+    free(truth);
+    stage_end(&stage);
+}
+
 // A sun as good as a point stops when all points agree; one with a disc does not.
 static void test_early_stop(void **state)
 {
@@ -364,7 +418,7 @@ static void test_files(void **state)
     spoil(path, bad, 0, 0);
     refuse(other, &stage, bad, "no file of shadow");
     spoil(path, bad, 8, 0);
-    refuse(other, &stage, bad, "of version 0");
+    refuse(other, &stage, bad, "of version 3");
     stage.settings.shadow_samples = 4;
     CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
     refuse(other, &stage, path, "baked with 3 samples, the scene asks for 4");
@@ -487,6 +541,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_lazy_is_whole),
         cmocka_unit_test(test_what_a_texture_depends_on),
         cmocka_unit_test(test_progressive),
+        cmocka_unit_test(test_error_target),
         cmocka_unit_test(test_early_stop),
         cmocka_unit_test(test_switches),
         cmocka_unit_test(test_files),

@@ -363,6 +363,8 @@ def test_shadows():
     assert read_png("kept.png") == read_png("dark.png")
     refused = run("render", *view, "-o", "x.png", "--shadows", "--samples", "9", "--load-shadows", "kept", code=1).stderr
     assert "stale" in refused and "8 samples" in refused, refused
+    said = json.loads(run("render", *view, "--shadows", "--shadow-error", "0.2", "--stats", "json").stdout)
+    assert said["shadow_samples"] in (4, 8, 16, 32) and 0 < said["shadow_error"] <= 0.2, said
     assert "need --shadows" in run("render", *view, "--save-shadows", "kept", code=2).stderr
     assert "no value" in run("render", *view, "-o", "x.png", "--sun", "0,91", code=2).stderr
 

@@ -147,6 +147,9 @@ static void test_bad_lights_and_shadows(void **state)
     }
     patina_settings settings = { .struct_size = sizeof settings, .shadow_samples = 4097 };
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
+    settings = (patina_settings){ .struct_size = sizeof settings, .shadow_error = -0.1f };
+    assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
+    assert_message(stage.scene, "shadow_error is negative");
     settings = (patina_settings){ .struct_size = sizeof settings, .shadow_resolution = 16385 };
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "shadow samples");

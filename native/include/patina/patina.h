@@ -355,12 +355,16 @@ typedef struct patina_settings {
     uint32_t strata;           // 1..6: draw only every 32nd, 16th, .. 1st point of each chunk, rounded up to 16 points:
                                // a quick picture while navigating, filling closes the gaps. 0 = all
     // Shadow textures [D 6], of lights that cast: for every point and light the share of the light that arrives.
-    uint32_t shadow_samples;     // of a light's area, 1..4096; 0 = 1: its middle
+    uint32_t shadow_samples;     // of a light's area, 1..4096; 0 = 1: its middle; with shadow_error at most so many, 0 = 256
     uint32_t shadow_resolution;  // most texels on a side of a light's map; 0 = 4096. Fewer where the points lie wider
     uint32_t shadow_lazy;        // 1 = only points that the picture shows are tested, and the next frame tests anew: for
                                  // final pictures. 0 = whole textures, kept until something that they depend on changes
     uint32_t shadow_progressive; // 1 = one sample after a change, and every further render of the frame doubles them up to
                                  // shadow_samples (stats: shadow_pending); not with shadow_lazy
+    float shadow_error;          // > 0: a light's samples double until their expected error is at most this share of its
+                                 // light. Expected from what the last doubling changed, root mean square over the points
+                                 // in the penumbra; borders, a spacing wide, are off beyond that. Whole textures are made,
+                                 // also with shadow_lazy. 0 = shadow_samples as set
     uint32_t own_background;   // 1 = background lies behind the points, and world_color only lights them
     float background[3];       // linear, with own_background; not where the film is transparent
     uint32_t surface;            // patina_surface
@@ -466,6 +470,8 @@ typedef struct patina_frame_stats {
     uint32_t shadow_maps;       // light views drawn for this picture; 0 when every texture was at hand
     uint32_t shadow_width, shadow_height; // of the largest of them, texels
     uint32_t shadow_pending;    // progressive: lights that further renders still refine
+    uint32_t shadow_samples;    // of the light that took most
+    float shadow_error;         // the largest of the lights' expected errors, with settings.shadow_error
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
@@ -503,7 +509,7 @@ PATINA_API int patina_frame_load_shadows(patina_frame *frame, const patina_scene
 PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
 // Milliseconds by pass, why each other pass was left out, and of each layer the points in chunks that were scattered and
 // the pixels that it covers, as JSON: {"passes":{..},"skipped":{..},"layers":[{"points":..,"pixels":..},..]}; one layer
-// that was not peeled has no pixel count.
+// that was not peeled has no pixel count. "lights":[{"samples":..,"error":..},..] of the casting lights' shadows.
 // Returns the full length; truncates to size.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
 // The plan as text, a line a pass, without rendering. Returns the full length.
