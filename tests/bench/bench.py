@@ -37,6 +37,7 @@ import peers
 import plots
 import readme
 import report
+import soft
 import stage
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -146,6 +147,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         for row in others(options.quick, options.library) if not options.only or group in options.only else ():
             say(row)
             split(result, row)
+    if not options.only or "shadows" in options.only:
+        result["soft"] = soft.measure(options.device[0])
     if not options.only or "hard" in options.only:
         result["hard"] = hard_cases(options)
     if "meshes" in options.only or options.full:

@@ -154,6 +154,30 @@ def densities(rows: list[Row], path: Path) -> bool:
     return True
 
 
+def soft(found: dict[str, Any] | None, path: Path) -> bool:
+    """Error of soft shadows against milliseconds, with the line of 1 / sqrt(n)."""
+    if not found:
+        return False
+    steps = found["steps"]
+    ms, rms = [step["ms"] for step in steps], [step["rms"] for step in steps]
+    figure, axis = plt.subplots(figsize=(8, 5.5))
+    axis.plot(ms, rms, "o-", label=f"against own 4096 samples: n^{found['falls']:.2f}")
+    axis.plot(ms, [rms[0] / step["samples"] ** 0.5 for step in steps], "k:", label="1 / √n")
+    axis.plot(*zip(*[(step["ms"], step["expected"]) for step in steps if step["expected"]]), "s--", color="tab:orange",
+              label="expected by the library")
+    axis.axhline(found["bias_rms"], color="tab:red", linewidth=1, label="4096 samples against the exact penumbra")
+    for step in steps:
+        axis.annotate(str(step["samples"]), (step["ms"], step["rms"]), textcoords="offset points", xytext=(5, 5))
+    axis.set(xscale="log", yscale="log", xlabel=f"ms for the shadows of {found['points']:,} points",
+             ylabel="rms error in the penumbra", title=f"Soft shadows, 1 to 256 samples, {found['device']}")
+    axis.grid(True, which="both", alpha=0.25)
+    axis.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return True
+
+
 def draw(result: dict[str, Any], folder: Path) -> list[str]:
     """Draws what the run holds; the names of the files."""
     title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
@@ -163,6 +187,7 @@ def draw(result: dict[str, Any], folder: Path) -> list[str]:
     for name, done in (("pareto.png", lambda path: pareto(against, path, title)),
                        ("scaling.png", lambda path: scaling(result, path)),
                        ("passes.png", lambda path: passes(joined(result, "headline", "points"), path)),
+                       ("soft.png", lambda path: soft(result.get("soft"), path)),
                        ("densities.png", lambda path: bool(scenes) and densities(scenes, path))):
         if done(folder / name):
             drawn.append(name)

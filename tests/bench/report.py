@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import papers
+import soft
 from metrics import MEANING
 
 Row = dict[str, Any]
@@ -109,6 +110,8 @@ def markdown(result: dict[str, Any]) -> str:
         rows = joined(result, group)
         if rows:
             text += [f"## {title}", "", errors_table(rows), ""]
+    if result.get("soft"):
+        text += [soft.markdown(result["soft"]), ""]
     if joined(result, "papers"):
         text += [papers.markdown(result), ""]
     if result.get("hard"):
