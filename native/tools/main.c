@@ -18,6 +18,8 @@ static const char usage[] =
     "  --region X0,Y0,X1,Y1               only these pixels, from the bottom left\n"
     "  --camera AZIMUTH,ELEVATION[,FOV]   degrees; frames the clouds (default 30,40)\n"
     "  --look X,Y,Z,X,Y,Z[,FOV]           from the first point to the second\n"
+    "  --panorama WxH                     all around, as an equirectangular picture; north (y) is its middle\n"
+    "  --eye X,Y,Z                        where a panorama is seen from (0,0,0)\n"
     "  --ortho WIDTH                      parallel projection, WIDTH world units wide\n"
     "  --quality refined|paper            depth of filled pixels: tangent plane, or as in the paper\n"
     "  --fill closed|paper|off            hole filling; --iterations N (0: automatic)\n"

@@ -41,7 +41,7 @@ static int parse_count(const char *text, uint32_t least, uint32_t most, uint32_t
     return 0;
 }
 
-static int parse_size(const char *text, patina_settings *settings)
+static int parse_size(const char *text, uint32_t *out_width, uint32_t *out_height)
 {
     unsigned width, height;
     char rest;
@@ -49,8 +49,8 @@ static int parse_size(const char *text, patina_settings *settings)
         return -1;
     if (!width || !height || width > MAX_SIZE || height > MAX_SIZE)
         return -1;
-    settings->width = width;
-    settings->height = height;
+    *out_width = width;
+    *out_height = height;
     return 0;
 }
 
@@ -196,11 +196,15 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     else if (!strcmp(name, "--batch"))
         bad = parse_count(value, 0, UINT32_MAX, &o->batch);
     else if (!strcmp(name, "--size"))
-        bad = parse_size(value, s);
+        bad = parse_size(value, &s->width, &s->height);
     else if (!strcmp(name, "--region"))
         bad = parse_region(value, s->region);
     else if (!strcmp(name, "--camera"))
         bad = parse_camera(value, o);
+    else if (!strcmp(name, "--panorama"))
+        bad = parse_size(value, &o->panorama[0], &o->panorama[1]);
+    else if (!strcmp(name, "--eye"))
+        bad = parse_numbers(value, o->eye, 3, 3) < 0;
     else if (!strcmp(name, "--look"))
         bad = parse_look(value, o);
     else if (!strcmp(name, "--sun"))
@@ -305,6 +309,9 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)
         return tool_misuse("render: nothing to do; name the picture with -o OUT.png");
+    if (options->panorama[0] && (options->repeat || options->json || options->planes || options->load_shadows ||
+                                 options->save_shadows || options->ortho_width > 0))
+        return tool_misuse("--panorama makes a picture, without --repeat, --stats, --dump-planes, --ortho or kept shadows");
     if (options->json && !options->repeat)
         options->repeat = 1;
     return TOOL_OK;

@@ -19,6 +19,7 @@ struct job {
     patina_frame *frame;
     struct tool_box box;
     float *pixels;
+    patina_panorama panorama; // where the options ask for one
     patina_frame_stats stats; // of the picture
 };
 
@@ -117,6 +118,12 @@ static int load_clouds(struct job *job)
 
 static int set_view(struct job *job, double turn, patina_camera *camera)
 {
+    if (job->options.panorama[0]) {
+        uint32_t side;
+        tool_panorama(&job->options, &job->box, &job->panorama);
+        const int bad = patina_panorama_camera(&job->panorama, 0, camera, &side);
+        return bad ? bad : patina_scene_set_camera(job->scene, camera);
+    }
     const int code = tool_camera(&job->options, job->scene, &job->box, turn, camera);
     return code ? code : patina_scene_set_camera(job->scene, camera);
 }
@@ -170,6 +177,11 @@ static int dump_plan(struct job *job)
 static int draw(struct job *job, double *ms)
 {
     const double start = now_ms();
+    if (job->options.panorama[0]) {
+        const int bad = tool_draw_panorama(&job->options, &job->panorama, job->scene, job->frame, &job->pixels, &job->stats);
+        *ms = now_ms() - start;
+        return bad ? tool_failed("panorama", job->frame, bad) : TOOL_OK;
+    }
     int code = patina_frame_render(job->frame, job->scene);
     *ms = now_ms() - start;
     job->stats.struct_size = sizeof job->stats;

@@ -44,7 +44,8 @@ struct tool_options {
     uint32_t threads, batch;
     enum tool_view view;
     double azimuth, elevation, fov; // degrees; fov 0 = the library's default
-    double eye[3], target[3];       // VIEW_LOOK
+    double eye[3], target[3];       // VIEW_LOOK, and the eye of a panorama
+    uint32_t panorama[2];           // width and height; 0 = none
     double ortho_width;             // world units; 0 = perspective
     uint32_t lighting;              // patina_lighting
     double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it

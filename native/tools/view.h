@@ -15,6 +15,12 @@ int tool_camera(const struct tool_options *options, const patina_scene *scene, c
 // A sun over the left shoulder of that camera and a weak one from the right. Returns a patina_error.
 int tool_lights(patina_scene *scene, const struct tool_options *options, const patina_camera *camera);
 
+// The panorama that the options ask for.
+void tool_panorama(const struct tool_options *options, const struct tool_box *box, patina_panorama *panorama);
+// Draws it: gives its pixels, which the caller frees, and of the stats points, width and height. Returns a patina_error.
+int tool_draw_panorama(const struct tool_options *options, const patina_panorama *panorama, patina_scene *scene,
+                       patina_frame *frame, float **pixels, patina_frame_stats *stats);
+
 // Positions and faces of an OBJ file. A PATINA_ERROR code; says where a line is wrong.
 int tool_load_mesh(const char *path, patina_mesh **out);
 

@@ -114,6 +114,9 @@ def test_wrong_use_is_told():
                       ["render", "use.ply", "-o", "x.png", "--camera", "10,nan"],
                       ["render", "use.ply", "-o", "x.png", "--look", "1,1,1,1,1,1"],
                       ["render", "use.ply", "-o", "x.png", "--region", "5,5,5,9"],
+                      ["render", "use.ply", "-o", "x.png", "--panorama", "64"],
+                      ["render", "use.ply", "-o", "x.png", "--panorama", "64x32", "--eye", "1,2"],
+                      ["render", "use.ply", "-o", "x.png", "--panorama", "64x32", "--repeat", "3"],
                       ["render", "use.ply", "-o", "x.png", "--threads", "-1"],
                       ["render", "use.ply", "-o", "x.png", "--repeat", "0"],
                       ["render", "use.ply", "-o", "x.png", "--stats", "xml"],
@@ -271,6 +274,20 @@ def test_ortho_width():
     wide = sum(pixel == (255, 255, 255) for pixel in rows[20])
     assert abs(wide - 40) <= 2, wide  # 2 of 4 units in 80 pixels
     assert all(pixel == (255, 255, 255) for pixel in rows[0][30:50])  # 2 units high
+
+
+def test_panorama():
+    """Points ahead (north), to the right, behind and above of an eye stand where a compass says."""
+    size = ("--panorama", "128x64", "--eye", "5,6,7", "--antialias", "off", "--fill", "off", "--smooth", "off")
+    for place, (x, y) in (((5, 9, 7), (64, 32)), ((8, 6, 7), (96, 32)), ((5, 3, 7), (0, 32)), ((5, 9, 10), (64, 16))):
+        write_ply("around.ply", [place] * 4, [(255, 0, 0)] * 4)
+        run("render", "around.ply", "-o", "around.png", *size)
+        rows = read_png("around.png")[3]
+        assert len(rows) == 64 and len(rows[0]) == 128
+        red = [(column, row) for row, pixels in enumerate(rows) for column, pixel in enumerate(pixels) if pixel[0] > pixel[1] + 40]
+        assert red and all(abs((column - x + 64) % 128 - 64) <= 1 and abs(row - y) <= 1 for column, row in red), (place, red)
+    run("render", "around.ply", "-o", "part.png", *size, "--region", "60,40,70,50")
+    assert read_png("part.png")[3] == [row[60:70] for row in rows[64 - 50:64 - 40]]
 
 
 def test_look_turns_with_its_target():
