@@ -140,6 +140,12 @@ class _Camera(_Descriptor):
                 ("near_clip", c_double), ("far_clip", c_double)]
 
 
+class _Panorama(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
+                ("world_from_camera", c_double * 16), ("longitude", c_double * 2), ("latitude", c_double * 2),
+                ("near_clip", c_double), ("far_clip", c_double)]
+
+
 class _Settings(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
                 ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
@@ -228,6 +234,9 @@ _CALLS = {
     "patina_frame_read_shadows": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_get_stats": (c_void_p, POINTER(_FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
+    "patina_panorama_camera": (POINTER(_Panorama), c_uint32, POINTER(_Camera), POINTER(c_uint32)),
+    "patina_panorama_join": (POINTER(_Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
+    "patina_panorama_join_keys": (POINTER(_Panorama), c_void_p * 6, c_void_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, _OUT),
     "patina_task_read": (c_void_p, c_uint32, c_void_p, c_size_t, _OUT),
     "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
@@ -650,3 +659,33 @@ class Frame(_Handle):
         buffer = ctypes.create_string_buffer(size)
         library().patina_frame_stats_json(self._handle, buffer, size)
         return json.loads(buffer.value or b"{}")
+
+
+class Panorama:
+    """An equirectangular picture; keyword arguments are the fields of patina_panorama."""
+
+    FACES = 6
+
+    def __init__(self, **fields: Any) -> None:
+        self._panorama = _Panorama(**fields)
+        x0, y0, x1, y1 = self._panorama.region
+        self._size = (y1 - y0, x1 - x0)
+
+    def camera(self, face: int) -> tuple[dict[str, Any], int]:
+        """The fields of a face's camera, and the pixels of its side."""
+        camera, side = _Camera(), c_uint32()
+        _check(library().patina_panorama_camera(byref(self._panorama), face, byref(camera), byref(side)))
+        values = {name: getattr(camera, name) for name, _ in _Camera._fields_[1:]}
+        return values | {"world_from_camera": tuple(camera.world_from_camera)}, side.value
+
+    def join(self, plane: str, faces: list[np.ndarray]) -> np.ndarray:
+        """The region's plane from those of the six faces, (height, width, channels)."""
+        name, _ = split_plane(plane)
+        pixels = np.empty((*self._size, faces[0].shape[2]), faces[0].dtype)
+        pointers = (c_void_p * 6)(*(face.ctypes.data for face in faces))
+        if name == "KEYS":
+            _check(library().patina_panorama_join_keys(byref(self._panorama), pointers, pixels.ctypes.data, pixels.nbytes))
+        else:
+            _check(library().patina_panorama_join(byref(self._panorama), PLANES[name][0], pointers, pixels.ctypes.data,
+                                                  pixels.nbytes))
+        return pixels

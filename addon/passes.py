@@ -29,7 +29,7 @@ class RenderPass:
 
 
 def _depth(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
-    """Distance to the camera's plane, as in Blender's engines; the library measures orthographic z from near."""
+    """Distance to the camera's plane, of panoramas to the camera, as in Blender's engines; the library measures orthographic z from near."""
     return np.where(np.isfinite(plane), plane + np.float32(_start(scene)), DEPTH_OF_NOTHING)
 
 
@@ -46,17 +46,30 @@ def _rays(scene: SceneDescription) -> tuple[np.ndarray, np.ndarray]:
     return x, y[:, None]
 
 
+def _around(scene: SceneDescription) -> tuple[np.ndarray, np.ndarray]:
+    """Longitudes (width,) and latitudes (height, 1) of a panorama's pixels."""
+    panorama = scene.panorama
+    x0, y0, x1, y1 = panorama.region
+    angles = [low + (np.arange(first, last) + 0.5) * (high - low) / size for (low, high), first, last, size in (
+        (panorama.longitude, x0, x1, panorama.width), (panorama.latitude, y0, y1, panorama.height))]
+    return angles[0], angles[1][:, None]
+
+
 def _position(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
     """World coordinates, 0 where nothing is. Row by row: float64 only where needed."""
-    x, y = _rays(scene)
+    x, y = _around(scene) if scene.panorama else _rays(scene)
     matrix = np.array(scene.camera.world_from_camera).reshape(4, 4)
     axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
     out = np.zeros((*plane.shape[:2], 3), np.float32)
     for row, z in enumerate(plane[..., 0]):
         some = np.isfinite(z)
         z = z[some].astype(np.float64) + _start(scene)
-        grow = 1.0 if scene.camera.orthographic else z
-        view = np.stack([x[some] * grow, y[row, 0] * grow * np.ones_like(z), -z], 1)
+        if scene.panorama:
+            level = z * np.cos(y[row, 0])
+            view = np.stack([level * np.sin(x[some]), z * np.sin(y[row, 0]), -level * np.cos(x[some])], 1)
+        else:
+            grow = 1.0 if scene.camera.orthographic else z
+            view = np.stack([x[some] * grow, y[row, 0] * grow * np.ones_like(z), -z], 1)
         out[row, some] = view @ axes.T + matrix[:3, 3]
     return out
 
@@ -66,7 +79,7 @@ def _mist(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
     if scene.mist is None:
         return np.ones_like(plane)
     distance = plane[..., 0] + np.float32(_start(scene))
-    if not scene.camera.orthographic:
+    if not scene.camera.orthographic and not scene.panorama:
         x, y = _rays(scene)
         distance = distance * np.sqrt(1.0 + x * x + y * y)
     share = np.clip((distance - scene.mist.start) / max(scene.mist.depth, 1e-6), 0.0, 1.0)

@@ -111,6 +111,8 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
              tile_size: int) -> Picture:
     """Tile by tile, each the mean of its samples: a tile's pixels are those of the whole picture (the library keeps a
     guard band around it), so tiles only save memory."""
+    if description.panorama:
+        return _draw_panorama(device, description, wanted, poll, tile_size)
     regions = tiles(description.settings.region, tile_size)
     if len(regions) > 1 or len(description.samples) > 1:  # all of them take from whole shadow textures
         description = replace(description, settings=replace(description.settings, shadow_lazy=0))
@@ -136,6 +138,22 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
 
         jobs.run(work, frame.cancel, lambda: poll((done + frame.progress()) / len(regions)))
         return Picture(picture, stats, device.name, notice)
+
+
+def _draw_panorama(device: native.Device, description: SceneDescription, wanted: list[str],
+                   poll: Callable[[float], bool], tile_size: int) -> Picture:
+    """Six pictures, joined."""
+    panorama = native.Panorama(**asdict(description.panorama))
+    faces: list[Picture] = []
+    for face in range(panorama.FACES):
+        camera, side = panorama.camera(face)
+        settings = replace(description.settings, width=side, height=side, region=(0, 0, side, side))
+        faces.append(_draw_on(device, replace(description, panorama=None, camera=Camera(**camera), settings=settings), wanted,
+                              lambda share, face=face: poll((face + share) / panorama.FACES), tile_size))
+    planes = {name: panorama.join(name, [face.planes[name] for face in faces]) for name in wanted}
+    stats = faces[0].stats | {"ms": sum(face.stats["ms"] for face in faces),
+                              "layers": max(face.stats["layers"] for face in faces)}
+    return replace(faces[0], planes=planes, stats=stats)
 
 
 def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[str],

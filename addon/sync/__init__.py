@@ -14,7 +14,7 @@ import bpy
 
 from .. import migrate
 from . import clouds, effects, lights, settings, world
-from .camera import Camera, CameraError, Focus, View, final_view, viewport_view
+from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
 from .effects import Effects
 from .lights import Light
@@ -23,7 +23,7 @@ from .settings import DeviceChoice, Settings
 from .world import Mist
 
 __all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "MeshItem", "Mist",
-           "Pending", "Effects", "Focus",
+           "Panorama", "Pending", "Effects", "Focus",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "viewport_view"]
 
@@ -34,6 +34,7 @@ class SceneDescription:
     meshes: list[MeshItem]
     lights: list[Light]
     camera: Camera
+    panorama: Panorama | None  # all around from where the camera stands
     settings: Settings
     effects: Effects
     device: DeviceChoice
@@ -78,6 +79,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         meshes=[item for item in items if isinstance(item, MeshItem)],
         lights=lights.collect(depsgraph, notices),
         camera=view.camera,
+        panorama=view.panorama,
         settings=settings.read(scene, view, background),
         effects=effects.read(scene, view.focus, notices),
         device=settings.device(scene),

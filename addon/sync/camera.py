@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -38,6 +39,20 @@ class Focus:
 
 
 @dataclass(frozen=True)
+class Panorama:
+    """patina_panorama: a picture all around."""
+
+    width: int
+    height: int
+    region: tuple[int, int, int, int]
+    world_from_camera: tuple[float, ...]  # 16, row-major
+    longitude: tuple[float, float]
+    latitude: tuple[float, float]
+    near_clip: float
+    far_clip: float
+
+
+@dataclass(frozen=True)
 class View:
     """What is drawn: the full picture's size, the part of it, and the camera of the full picture."""
 
@@ -46,6 +61,7 @@ class View:
     region: tuple[int, int, int, int]  # x0, y0, x1, y1 from the bottom left; the whole picture when no border
     camera: Camera
     focus: Focus | None = None  # None: all is sharp
+    panorama: Panorama | None = None  # then the camera says no more than where it stands
 
 
 def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
@@ -55,13 +71,15 @@ def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
     if camera is None or camera.type != 'CAMERA':
         raise CameraError("the scene has no camera")
     render = depsgraph.scene_eval.render
+    if camera.data.type == 'PANO':
+        return _panoramic(camera, render, eye[0] if eye else camera.matrix_world)
     width, height = picture_size(render)
     matrix = camera.calc_matrix_camera(depsgraph, x=width, y=height, scale_x=render.pixel_aspect_x,
                                        scale_y=render.pixel_aspect_y)
     data = camera.data
     if data.type not in {'PERSP', 'ORTHO'}:
         kind = data.bl_rna.properties["type"].enum_items[data.type].name.lower()
-        raise CameraError(f"'{camera.name}' is a {kind} camera: Patina draws perspective and orthographic ones")
+        raise CameraError(f"'{camera.name}' is a {kind} camera: Patina draws perspective, orthographic and panoramic ones")
     left, right, bottom, top = window(matrix, data.type == 'ORTHO')
     place, shift = eye or (camera.matrix_world, data.shift_x)
     wide = width * render.pixel_aspect_x >= height * render.pixel_aspect_y
@@ -72,6 +90,23 @@ def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
         world_from_camera=row_major(place),
         left=left + moved, right=right + moved, bottom=bottom, top=top,
         near_clip=data.clip_start, far_clip=data.clip_end), focus_of(camera))
+
+
+def _panoramic(camera: bpy.types.Object, render: bpy.types.RenderSettings, place: Matrix) -> View:
+    """Equirectangular, whatever Blender's panorama says: it has that choice for Cycles only, in its add-on until 4.5. Limits
+    of longitude and latitude count where they are set for it."""
+    data = camera.data
+    settings = data if hasattr(data, "panorama_type") else getattr(data, "cycles", None)
+    longitude, latitude = (-math.pi, math.pi), (-math.pi / 2, math.pi / 2)
+    if getattr(settings, "panorama_type", "") == 'EQUIRECTANGULAR':
+        longitude = (settings.longitude_min, settings.longitude_max)
+        latitude = (settings.latitude_min, settings.latitude_max)
+    width, height = picture_size(render)
+    region = border_region(render, width, height)
+    matrix = row_major(place)
+    return View(width, height, region,
+                Camera(0, matrix, -1.0, 1.0, -1.0, 1.0, data.clip_start, data.clip_end),
+                panorama=Panorama(width, height, region, matrix, longitude, latitude, data.clip_start, data.clip_end))
 
 
 def viewport_view(region: bpy.types.Region, space: bpy.types.SpaceView3D, rv3d: bpy.types.RegionView3D,

@@ -10,6 +10,15 @@ from patina.sync import motion
 SIZE, SCALE = 64, 8  # pixels, and pixels a unit
 
 
+def make_linear(obj):
+    """What is animated moves evenly."""
+    action = obj.animation_data.action
+    curves = action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
+    for curve in curves:
+        for key in curve.keyframe_points:
+            key.interpolation = 'LINEAR'
+
+
 def stage(moving="points"):
     """A tile of 8 x 8 pixels in the middle of the picture at frame 1, a point a pixel; it or the camera moves by 2 units a
     frame, 16 pixels."""
@@ -22,11 +31,7 @@ def stage(moving="points"):
     for frame in (0, 2):
         mover.location.x = 2.0 * sign * (frame - 1)
         mover.keyframe_insert("location", frame=frame)
-    action = mover.animation_data.action
-    curves = action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
-    for curve in curves:
-        for key in curve.keyframe_points:
-            key.interpolation = 'LINEAR'
+    make_linear(mover)
     scene.frame_set(1)
     scene.render.use_motion_blur = True
     scene.render.motion_blur_shutter = 0.5
