@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import bpy
 import numpy as np
@@ -11,6 +11,8 @@ import numpy as np
 # Names looked for, in this order, when the artist names none.
 NORMAL_NAMES = ("normal", "Normal", "normals", "Normals", "nor", "N")
 COLOR_NAMES = ("Col", "Color", "color", "Cd", "rgb", "RGB")
+
+BLOCK = 1 << 19  # points between two looks at what the artist wants
 
 # data_type → property of an element, components
 _LAYOUTS = {'FLOAT': ("value", 1), 'BOOLEAN': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4),
@@ -38,10 +40,11 @@ def normals(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     return None
 
 
-def colors(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
+def colors(data: bpy.types.ID, count: int, name: str, pause: Callable[[], None] = lambda: None) -> np.ndarray | None:
     """Of the named attribute, or of the one Blender would render, or of a usual name.
 
-    Byte colours stay 8-bit sRGB (uint8); float colours are linear. A plain vector counts only when named.
+    Byte colours stay 8-bit sRGB (uint8); float colours are linear. A plain vector counts only when named. pause() is called
+    during long steps and may raise.
     """
     if name:
         attribute = _find(data, name, {'FLOAT_VECTOR', 'FLOAT_COLOR', 'BYTE_COLOR'})
@@ -51,8 +54,19 @@ def colors(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
         return None
     values = _values(attribute, count)
     if values is not None and attribute.data_type == 'BYTE_COLOR':
-        return np.rint(values * np.float32(255)).astype(np.uint8)  # exact: Blender hands out byte / 255
+        return _bytes(values, pause)
     return values
+
+
+def _bytes(values: np.ndarray, pause: Callable[[], None]) -> np.ndarray:
+    """Exact: Blender hands out byte / 255. In place, block by block."""
+    out = np.empty(values.shape, np.uint8)
+    for start in range(0, len(values), BLOCK):
+        pause()
+        block = values[start:start + BLOCK]
+        np.rint(np.multiply(block, np.float32(255), out=block), out=block)
+        out[start:start + BLOCK] = block
+    return out
 
 
 def opacities(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:

@@ -243,13 +243,19 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
     """Builds each cloud at once, polling; content decides whether it is built anew."""
 
     def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> native.Cloud | native.Mesh | None:
-        if identity[-1] == TRIANGLES:
-            return meshes.CACHE.obtain(identity, obj)
-        arrays = None if link else _read(obj, notices, identity[-1])
-        if arrays is None and link is None:
-            return None
         name = obj.name
         progress = Progress()
+
+        def pause() -> None:
+            if poll(f"Reading points of '{name}'", progress.value()):
+                raise native.PatinaCancelled("cancelled", native.CANCELLED)
+
+        if identity[-1] == TRIANGLES:
+            pause()
+            return meshes.CACHE.obtain(identity, obj)
+        arrays = None if link else _read(obj, notices, identity[-1], pause)
+        if arrays is None and link is None:
+            return None
 
         def work() -> native.Cloud:
             if link:
@@ -339,9 +345,11 @@ def _attribute_names(obj: bpy.types.Object) -> tuple[str, ...]:
     return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute)
 
 
-def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int) -> PointArrays | None:
-    """The object's points; mesh_points > 0: so many on its faces."""
+def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
+          pause: Callable[[], None] = lambda: None) -> PointArrays | None:
+    """The object's points; mesh_points > 0: so many on its faces. pause() is called between steps and may raise."""
     data = obj.data
+    pause()
     if mesh_points:
         found = meshes.sample(obj, mesh_points)
         return PointArrays(*found, None) if found else None
@@ -351,8 +359,11 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int) -> PointA
     positions = attributes.positions(data, count)
     if positions is None:
         return None
+    pause()
     normals = attributes.normals(data, count, obj.patina.normal_attribute)
-    colors = attributes.colors(data, count, obj.patina.color_attribute)
+    pause()
+    colors = attributes.colors(data, count, obj.patina.color_attribute, pause)
+    pause()
     opacities = attributes.opacities(data, count, obj.patina.opacity_attribute)
     for kind, name, found in (("colour", obj.patina.color_attribute, colors),
                               ("normal", obj.patina.normal_attribute, normals),

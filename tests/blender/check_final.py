@@ -13,6 +13,7 @@ from mathutils import Matrix, Vector
 
 from patina import native, options
 from patina import render as drawing
+from patina.sync import attributes
 
 
 def test_position():
@@ -187,6 +188,51 @@ def test_cancel_is_soon():
         check(late < 0.4, f"{late:.2f} s")
     else:
         check(bool(asked), "the picture was done before it could be cancelled")
+
+
+def test_reading_may_be_cancelled():
+    """Reading points of Blender asks between its steps, and every half million points of bytes; nothing is read after a yes."""
+    scene = new_scene(32, 24)
+    count = 4 * attributes.BLOCK
+    positions, colors, normals = sphere(1000)
+    add_points(np.tile(positions, (count // 1000 + 1, 1))[:count], np.tile(colors, (count // 1000 + 1, 1))[:count],
+               np.tile(normals, (count // 1000 + 1, 1))[:count])
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view = patina.engine.sync.final_view(scene.camera, depsgraph)
+    gaps, asked, after = [], [], []
+    original = attributes.opacities  # the last thing that is read
+    attributes.opacities = lambda *arguments: after.append(1) or original(*arguments)
+
+    def reading(stop_at):
+        patina.engine.sync.clouds.CACHE.clear()
+        asked.clear(), after.clear(), gaps.clear()
+        last = time.perf_counter()
+
+        def poll(what, progress):
+            nonlocal last
+            if after:
+                return True  # the cloud is being built: enough
+            asked.append(what)
+            gaps.append(time.perf_counter() - last)
+            last = time.perf_counter()
+            return len(asked) == stop_at
+
+        try:
+            patina.engine.sync.describe(depsgraph, view, poll)
+        except native.PatinaCancelled:
+            return
+        check(False, "was not cancelled")
+
+    try:
+        reading(-1)
+        steps = len(asked)
+        check(steps >= 8, f"asked {steps} times while reading {count:,} points")
+        print(f"     longest without asking: {max(gaps) * 1e3:.0f} ms of {sum(gaps) * 1e3:.0f} for {count:,} points")
+        reading(steps - 1)
+        check(len(asked) == steps - 1 and not after, "read on after the cancel")
+    finally:
+        attributes.opacities = original
 
 
 def test_animation():
