@@ -46,11 +46,10 @@ float stroke(uint level, pixel p, float wide)
     precise float square = pt_max(gx * gx + gy * gy, 1e-30);
     float root = pt_rsqrt(square);
     precise float rate = square * root;
-    precise float octave = pt_log2(rate * args.spacing);
-    float whole = floor(octave);
-    precise float fade = octave - whole;
-    uint exponent = uint(int(whole) + 127);
-    float period = pt_float(exponent << 23), inverse = pt_float((254u - exponent) << 23);
+    precise float wanted = rate * args.spacing;
+    uint exponent = pt_bits(wanted) & 0x7F800000u; // the next power of two below
+    float period = pt_float(exponent), inverse = pt_float((254u << 23) - exponent);
+    precise float fade = wanted * inverse - 1.0;
     precise float at = along * inverse;
     precise float line = floor(at + 0.5);
     precise float off = pt_abs(at - line) * (period * root); // pixels

@@ -17,12 +17,11 @@ float hash(uint x, uint y)
     return float(int((word ^ word >> 15) >> 8)) * 5.9604644775390625e-8; // 2^-24
 }
 
-// Hashes of a lattice 2^level pixels wide, blended between its nodes.
-float noise(uint x, uint y, uint level)
+// Hashes of a lattice 8 pixels wide, blended between its nodes.
+float noise(uint x, uint y)
 {
-    uint rest = (1u << level) - 1u, cx = x >> level, cy = y >> level;
-    precise float scale = 1.0 / float(1u << level);
-    precise float u = (float(int(x & rest)) + 0.5) * scale, v = (float(int(y & rest)) + 0.5) * scale;
+    uint cx = x >> 3, cy = y >> 3;
+    precise float u = (float(int(x & 7u)) + 0.5) * 0.125, v = (float(int(y & 7u)) + 0.5) * 0.125;
     float a = hash(cx, cy), b = hash(cx + 1u, cy), c = hash(cx, cy + 1u), d = hash(cx + 1u, cy + 1u);
     precise float low = a + u * (b - a), high = c + u * (d - c);
     precise float value = low + v * (high - low);
@@ -34,7 +33,7 @@ void main()
     uint x = gl_GlobalInvocationID.x, y = gl_GlobalInvocationID.y;
     if (x >= args.crop_width || y >= args.crop_height)
         return;
-    precise float grain = 0.5 * noise(args.x + x, args.y + y, 1u) + 0.5 * noise(args.x + x, args.y + y, 3u);
+    precise float grain = 0.5 * hash(args.x + x, args.y + y) + 0.5 * noise(args.x + x, args.y + y);
     precise float light = 1.0 - args.grain * grain;
     uint at = y * args.crop_width + x;
     vec4 c = combined[at];

@@ -319,7 +319,7 @@ struct edl_args {
     float scale, gain;
 };
 
-#define PT_OBSCURE_TAPS 8
+#define PT_OBSCURE_TAPS 6
 #define PT_OBSCURE_TURNS 16  // of the taps, by column and row modulo 4
 #define PT_OBSCURE_MOST 32.0f // pixels that the radius may span; where it would span more, it is shortened
 #define PT_OBSCURE_BIAS 0.1f // of the cosine: so low above a surface all is its own roughness

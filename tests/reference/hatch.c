@@ -23,15 +23,15 @@ static double stroke(const struct hatch_args *args, int level, const struct pixe
     double rate = sqrt(fmax(gx * gx + gy * gy, 1e-30));
     // each term of the rate is rounded a few times; where they cancel, their sum is off by more
     double rate_error = 24.0 * TOL_UNIT * (fabs(p->xs) + fabs(p->ys)) * (1.0 + fabs(turn)) * (1.0 + ref_length(p->ray)) / rate;
-    double octave = log2(rate * args->spacing), whole = floor(octave), period = exp2(whole), fade = octave - whole;
-    double octave_error = 1.5 * rate_error + TOL_LOG + TOL_UNIT * fabs(octave);
+    double wanted = rate * args->spacing, period = exp2(floor(log2(wanted))), fade = wanted / period - 1.0;
+    double fade_error = 2.0 * (rate_error + 2.0 * TOL_UNIT);
     double at = along / period, line = floor(at + 0.5), off = fabs(at - line) * period / rate;
     double odd = line - 2.0 * floor(line / 2.0), reach = 0.5 * wide * (1.0 - odd * fade);
     double off_error = along_error / rate + off * (rate_error + 8.0 * TOL_UNIT);
-    double reach_error = 0.5 * wide_error + 0.5 * wide * (odd * octave_error + 4.0 * TOL_UNIT);
+    double reach_error = 0.5 * wide_error + 0.5 * wide * (odd * fade_error + 4.0 * TOL_UNIT);
     if (0.5 * wide + 0.5 > off - off_error) // strokes meet: float32 may take the other one
         *unsure |= fabs(at - floor(at) - 0.5) < 2.0 * along_error / period + 1e-6;
-    *unsure |= fade < octave_error || 1.0 - fade < octave_error || rate_error > 0.05;
+    *unsure |= fade < fade_error || 1.0 - fade < fade_error || rate_error > 0.05;
     *error = 2.0 * (off_error + 3.0 * reach_error) + 4.0 * TOL_UNIT;
     return fmin(fmax(reach - off + 0.5, 0.0), 1.0) * fmin(2.0 * reach, 1.0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Paper: a colour and a grain that the picture is multiplied by. The grain is the mean of two lattices of numbers, 2 and 8
-// pixels wide, blended between their nodes.
+// Paper: a colour and a grain that the picture is multiplied by. The grain is the mean of a number a pixel and of a
+// lattice of numbers 8 pixels wide, blended between its nodes.
 #include "reference.h"
 #include "tolerances.h"
 
@@ -26,7 +26,7 @@ static double lattice(uint32_t x, uint32_t y, uint32_t width)
 struct ref_color ref_paper(const struct paper_args *args, const float *combined, int x, int y)
 {
     uint32_t px = args->x + (uint32_t)x, py = args->y + (uint32_t)y;
-    double light = 1.0 - args->grain * (0.5 * lattice(px, py, 2) + 0.5 * lattice(px, py, 8));
+    double light = 1.0 - args->grain * (0.5 * hash(px, py) + 0.5 * lattice(px, py, 8));
     const float *own = combined + 4 * ((size_t)y * args->crop_width + (size_t)x);
     struct ref_color out = {0};
     for (int c = 0; c < 4; c++) {

@@ -47,10 +47,10 @@ static vf stroke(const struct hatch_args *args, uint32_t level, const struct pix
     vf turn = ((axis[0] * p->ray[0] + axis[1] * p->ray[1]) + axis[2] * p->ray[2]) * p->back;
     vf gx = p->width[0] * (axis[0] - turn * p->n[0]), gy = p->width[1] * (axis[1] - turn * p->n[1]);
     vf square = vf_max(gx * gx + gy * gy, vf_set(1e-30f)), root = vf_rsqrt(square), rate = square * root;
-    vf octave = vf_log2(rate * vf_set(args->spacing)), whole = vf_floor(octave), fade = octave - whole;
-    vi exponent = vi_add(vf_int(whole), vi_set(127));
-    vf period = vi_float(vi_mul(exponent, vi_set(1u << 23)));
-    vf inverse = vi_float(vi_mul(vi_sub(vi_set(254), exponent), vi_set(1u << 23)));
+    vf wanted = rate * vf_set(args->spacing);
+    vi exponent = vi_and(vf_bits(wanted), vi_set(0x7F800000u)); // the next power of two below
+    vf period = vi_float(exponent), inverse = vi_float(vi_sub(vi_set(254u << 23), exponent));
+    vf fade = wanted * inverse - one;
     vf at = along * inverse, line = vf_floor(at + half);
     vf off = vf_abs(at - line) * (period * root); // pixels
     vf odd = line - vf_set(2.0f) * vf_floor(line * half); // 0 or 1

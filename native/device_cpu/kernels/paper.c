@@ -17,12 +17,12 @@ static vf hash(vi x, vi y)
     return vi_convert(vi_shr(mix(word, 15), 8)) * vf_set(0x1p-24f);
 }
 
-// Hashes of a lattice 2^level pixels wide, blended between its nodes.
-static vf noise(vi x, vi y, int level)
+// Hashes of a lattice 8 pixels wide, blended between its nodes.
+static vf noise(vi x, vi y)
 {
-    const vi rest = vi_set((1u << level) - 1u), one = vi_set(1);
-    const vf half = vf_set(0.5f), scale = vf_set(1.0f / (float)(1 << level));
-    vi cx = vi_shr(x, level), cy = vi_shr(y, level);
+    const vi rest = vi_set(7), one = vi_set(1);
+    const vf half = vf_set(0.5f), scale = vf_set(0.125f);
+    vi cx = vi_shr(x, 3), cy = vi_shr(y, 3);
     vf u = (vi_convert(vi_and(x, rest)) + half) * scale, v = (vi_convert(vi_and(y, rest)) + half) * scale;
     vf a = hash(cx, cy), b = hash(vi_add(cx, one), cy);
     vf c = hash(cx, vi_add(cy, one)), d = hash(vi_add(cx, one), vi_add(cy, one));
@@ -37,7 +37,7 @@ static void paper_row(void *context, uint32_t y)
     float *out = (float *)pt_cpu_data(call, 0) + 4 * (size_t)y * args->crop_width;
     for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
         vi px = vi_add(vi_set(args->x + x), vi_lanes()), py = vi_set(args->y + y);
-        vf grain = vf_set(0.5f) * noise(px, py, 1) + vf_set(0.5f) * noise(px, py, 3), color[4];
+        vf grain = vf_set(0.5f) * hash(px, py) + vf_set(0.5f) * noise(px, py), color[4];
         vf light = vf_set(1.0f) - vf_set(args->grain) * grain;
         vf_load4(out + 4 * (size_t)x, color);
         for (int k = 0; k < 3; k++)
