@@ -32,6 +32,7 @@ INTERNAL = -10  # PATINA_ERROR_INTERNAL
 PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1)}
 
 MOST_LAYERS = 16  # PATINA_MAX_LAYERS
+MOST_RAMP = 256  # PATINA_MAX_RAMP
 
 
 def split_plane(plane: str) -> tuple[str, int]:
@@ -86,8 +87,8 @@ class _DeviceInfo(_Descriptor):
 
 class _CloudDesc(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", _Array), ("normal", _Array),
-                ("color", _Array), ("opacity", _Array), ("origin", c_double * 3), ("threads", c_uint32),
-                ("radius", _Array)]
+                ("color", _Array), ("opacity", _Array), ("scalar", _Array), ("classes", _Array),
+                ("origin", c_double * 3), ("threads", c_uint32), ("radius", _Array)]
 
 
 class _CloudInfo(_Descriptor):
@@ -96,7 +97,9 @@ class _CloudInfo(_Descriptor):
                 ("spacing_min", c_double), ("spacing_max", c_double), ("invalid_positions", c_uint64),
                 ("invalid_normals", c_uint64), ("invalid_colors", c_uint64), ("has_normals", c_uint32),
                 ("has_colors", c_uint32), ("has_opacities", c_uint32), ("origin", c_double * 3),
-                ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float)]
+                ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float),
+                ("has_scalars", c_uint32), ("has_classes", c_uint32), ("scalar_range", c_float * 2),
+                ("class_bits", c_uint32 * 8)]
 
 
 class _FileInfo(_Descriptor):
@@ -114,7 +117,14 @@ class _CloudStyle(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
                 ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float),
-                ("shadow_off", c_uint32), ("radius", c_float)]
+                ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p), ("ramp_count", c_uint32),
+                ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
+                ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32)]
+
+
+class _Clip(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("world_from_clip", c_double * 16), ("shape", c_uint32), ("cut", c_uint32),
+                ("tint", c_float * 3), ("tint_strength", c_float), ("tint_width", c_float)]
 
 
 class _MeshDesc(_Descriptor):
@@ -153,7 +163,7 @@ class _Settings(_Descriptor):
                 ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
                 ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
                 ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("shadow_error", c_float),
-                ("own_background", c_uint32), ("background", c_float * 3), ("surface", c_uint32)]
+                ("own_background", c_uint32), ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32)]
 
 
 class _Effects(_Descriptor):
@@ -176,7 +186,8 @@ class _FrameStats(_Descriptor):
                 ("ms", c_double), ("plane_bytes", c_uint64), ("layers", c_uint32), ("spacing_px", c_float),
                 ("expected", _ExpectedError), ("shadow_bytes", c_uint64), ("shadow_maps", c_uint32),
                 ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32),
-                ("shadow_samples", c_uint32), ("shadow_error", c_float)]
+                ("shadow_samples", c_uint32), ("shadow_error", c_float), ("chunks_clipped", c_uint64),
+                ("chunks_cut", c_uint64)]
 
 
 # ---- the library ---------------------------------------------------------------------------------------------
@@ -217,6 +228,10 @@ _CALLS = {
     "patina_scene_add_cloud": (c_void_p, c_void_p, POINTER(_CloudStyle)),
     "patina_scene_add_mesh": (c_void_p, c_void_p, POINTER(_MeshStyle)),
     "patina_scene_add_light": (c_void_p, POINTER(_LightDesc)),
+    "patina_scene_add_clip": (c_void_p, POINTER(_Clip)),
+    "patina_ramp": (c_char_p, c_void_p),
+    "patina_cloud_set_scalars": (c_void_p, POINTER(_Array)),
+    "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
     "patina_scene_set_settings": (c_void_p, POINTER(_Settings)),
     "patina_scene_set_effects": (c_void_p, POINTER(_Effects)),
@@ -420,39 +435,47 @@ def _view(array: np.ndarray | None, count: int) -> _Array:
 
 
 def _describe(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
-              opacities: np.ndarray | None, radii: np.ndarray | None, threads: int = 0,
-              origin: tuple[float, ...] = (0.0,) * 3) -> _CloudDesc:
+              opacities: np.ndarray | None, radii: np.ndarray | None = None, scalars: np.ndarray | None = None,
+              classes: np.ndarray | None = None, threads: int = 0, origin: tuple[float, ...] = (0.0,) * 3) -> _CloudDesc:
     count = len(positions)
     return _CloudDesc(count=count, position=_view(positions, count), normal=_view(normals, count),
                       color=_view(colors, count), opacity=_view(opacities, count), radius=_view(radii, count),
-                      threads=threads, origin=origin)
+                      scalar=_view(scalars, count), classes=_view(classes, count), threads=threads, origin=origin)
 
 
-def start_fingerprint(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
-                      opacities: np.ndarray | None, radii: np.ndarray | None = None) -> Task:
-    """A task that gives two numbers: of places, normals, opacities and radii, and of colours."""
+def ramp(name: str) -> np.ndarray:
+    """(MOST_RAMP, 3) float32, linear: a ramp of the library's."""
+    colors = np.empty((MOST_RAMP, 3), np.float32)
+    _check(library().patina_ramp(name.encode(), colors.ctypes.data))
+    return colors
+
+
+def start_fingerprint(*arrays: np.ndarray | None) -> Task:
+    """A task that gives two numbers: of places, normals, opacities, radii and classes, and of colours and scalars. arrays:
+    positions, normals, colors, opacities, radii, scalars, classes."""
     values = (c_uint64 * 2)()
-    return Task("fingerprint", byref(_describe(positions, normals, colors, opacities, radii)), values,
-                keep=(positions, normals, colors, opacities, radii, values), finish=lambda task: tuple(values))
+    return Task("fingerprint", byref(_describe(*arrays)), values, keep=(arrays, values), finish=lambda task: tuple(values))
 
 
 class Cloud(_Handle):
     """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None;
     opacities (n, 1), floats 0 to 1, or None; origin is added to the positions, in float64; radii of discs (n, 1), floats,
-    or None."""
+    or None; scalars (n, 1), any numbers, or None; classes (n, 1) uint8 or None."""
 
     _kind = "cloud"
 
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
                  progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None,
-                 origin: tuple[float, ...] = (0.0,) * 3, radii: np.ndarray | None = None) -> None:
-        super().__init__(byref(_describe(positions, normals, colors, opacities, radii, threads, origin)),
+                 origin: tuple[float, ...] = (0.0,) * 3, radii: np.ndarray | None = None,
+                 scalars: np.ndarray | None = None, classes: np.ndarray | None = None) -> None:
+        super().__init__(byref(_describe(positions, normals, colors, opacities, radii, scalars, classes, threads, origin)),
                          _handle_of(progress))
         self._learn()
 
     @classmethod
     def start(cls, positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
-              opacities: np.ndarray | None, progress: Progress | None = None, radii: np.ndarray | None = None) -> Task:
+              opacities: np.ndarray | None, progress: Progress | None = None, radii: np.ndarray | None = None,
+              scalars: np.ndarray | None = None, classes: np.ndarray | None = None) -> Task:
         """A task that gives the cloud."""
         def take(task: Task) -> Cloud:
             cloud = cls.__new__(cls)
@@ -460,8 +483,8 @@ class Cloud(_Handle):
             cloud._learn()
             return cloud
 
-        return Task("build", byref(_describe(positions, normals, colors, opacities, radii)), _handle_of(progress),
-                    keep=(positions, normals, colors, opacities, radii, progress), finish=take)
+        arrays = (positions, normals, colors, opacities, radii, scalars, classes)
+        return Task("build", byref(_describe(*arrays)), _handle_of(progress), keep=(arrays, progress), finish=take)
 
     @classmethod
     def open(cls, path: Path) -> Cloud:
@@ -481,12 +504,25 @@ class Cloud(_Handle):
         self.footprint = max(info.bytes, 23 * info.count)  # with what of a mapped file may be in memory
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
+        self.has_scalars = bool(info.has_scalars)
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))
 
     def start_colors(self, colors: np.ndarray | None) -> Task:
         """Other colours for the same points; no picture of them may be drawn meanwhile."""
         return Task("set_colors", self._handle, byref(_view(colors, self.count)), keep=(self, colors))
+
+
+    def set_scalars(self, scalars: np.ndarray | None) -> None:
+        """Other scalars for the same points; as start_colors."""
+        self._call("set_scalars", byref(_view(scalars, self.count)))
+        self.has_scalars = scalars is not None
+
+    def scalar_range(self, share: float) -> tuple[float, float]:
+        """The scalars that this share of the points lies below and above."""
+        found = (c_float * 2)()
+        self._call("scalar_range", share, found)
+        return tuple(found)
 
 
 class Mesh(_Handle):
@@ -555,13 +591,21 @@ class Scene(_Handle):
         super().__init__()
         self._clouds: list[Cloud | Mesh] = []  # the native scene points to them
 
-    def add_cloud(self, cloud: Cloud, **style: Any) -> None:
-        self._call("add_cloud", cloud._handle, byref(_CloudStyle(**style)))
+    def add_cloud(self, cloud: Cloud, ramp: bytes = b"", **style: Any) -> None:
+        """ramp: linear RGB, float32, two colours or more; empty: black to white."""
+        fields = _CloudStyle(**style)
+        if ramp:
+            colors = np.frombuffer(ramp, np.float32)  # the library copies it
+            fields.ramp, fields.ramp_count = colors.ctypes.data, len(colors) // 3
+        self._call("add_cloud", cloud._handle, byref(fields))
         self._clouds.append(cloud)
 
     def add_mesh(self, mesh: Mesh, **style: Any) -> None:
         self._call("add_mesh", mesh._handle, byref(_MeshStyle(**style)))
         self._clouds.append(mesh)
+
+    def add_clip(self, **clip: Any) -> None:
+        self._call("add_clip", byref(_Clip(**clip)))
 
     def add_light(self, **light: Any) -> None:
         self._call("add_light", byref(_LightDesc(**light)))

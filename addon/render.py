@@ -12,6 +12,7 @@ import numpy as np
 
 from . import jobs, native
 from .sync import Camera, DeviceChoice, SceneDescription
+from .sync.colors import OWN, SCALAR
 
 ANTIALIAS_OFF = 2  # PATINA_ANTIALIAS_OFF
 
@@ -217,7 +218,12 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
     scene.set_camera(**asdict(description.camera))
     for light in description.lights:
         scene.add_light(**asdict(light))
+    for clip in description.clips:
+        scene.add_clip(**asdict(clip))
     for item in description.clouds:
-        scene.add_cloud(item.cloud, **asdict(item.style))
+        style = item.style
+        if style.color_source == SCALAR and not item.cloud.has_scalars:  # a notice has said so
+            style = replace(style, color_source=OWN)
+        scene.add_cloud(item.cloud, **asdict(style))
     for item in description.meshes:
         scene.add_mesh(item.mesh, **asdict(item.style))

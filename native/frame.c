@@ -153,6 +153,8 @@ static int upload(struct render *render)
     for (uint32_t i = 0; i < plan->mesh_count && plan->triangles; i++)
         if (pt_residency_take_mesh(&render->frame->residency, device, plan->meshes[i].instance->mesh, &render->meshes[i]))
             return pt_fail_again(&render->frame->handle, PATINA_ERROR_MEMORY);
+    if (pt_clip_buffers_fill(device, plan, &render->frame->clips))
+        return pt_fail_again(&render->frame->handle, PATINA_ERROR_MEMORY);
     return PATINA_OK;
 }
 
@@ -164,6 +166,8 @@ static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *r
         return &render->meshes[ref->index]->buffers[ref->which];
     if (ref->which == PT_MARKS || ref->which == PT_SHADOWS)
         return pt_shadows_buffer(render->frame, ref->which, ref->index);
+    if (ref->which == PT_CLIPS || ref->which == PT_DRAWN)
+        return pt_clip_buffer(&render->frame->clips, ref->which);
     return ref->which == PT_CHUNKS ? &render->chunks[ref->index] : &render->clouds[ref->index]->buffers[ref->which];
 }
 
@@ -381,6 +385,8 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .triangles = plan->triangles,
                                          .chunks = plan->chunks,
                                          .chunks_culled = plan->chunks_culled,
+                                         .chunks_clipped = plan->chunks_clipped,
+                                         .chunks_cut = plan->chunks_cut,
                                          .ms = ms };
     frame->stats.plane_bytes = plane_total(frame);
     frame->stats.spacing_px = (float)plan->spacing_px;
@@ -587,5 +593,6 @@ void pt_frame_release(struct patina_frame *frame)
 {
     destroy_planes(frame);
     pt_shadows_release(frame);
+    pt_clip_buffers_release(frame->device, &frame->clips);
     pt_residency_release(&frame->residency, frame->device);
 }

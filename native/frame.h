@@ -29,6 +29,7 @@ struct patina_frame {
     struct pt_residency residency;
     struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS];
     struct pt_shadows shadows;
+    struct pt_clip_buffers clips;
     uint32_t shadow_maps, shadow_size[2]; // of this render
     atomic_int cancel;
     _Atomic float progress;

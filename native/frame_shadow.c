@@ -44,6 +44,7 @@ void pt_shadows_release(struct patina_frame *frame)
         for (int level = 0; level < PT_SLOTS; level++)
             frame->device->ops->buffer_destroy(frame->device, &shadows->planes[p][level]);
     frame->device->ops->buffer_destroy(frame->device, &shadows->differs);
+    pt_clip_buffers_release(frame->device, &shadows->clips);
 }
 
 struct pt_buffer *pt_shadows_buffer(struct patina_frame *frame, uint32_t which, uint32_t instance)
@@ -199,6 +200,8 @@ static struct pt_buffer *map_buffer(struct update *update, const struct pt_plan 
     }
     if (ref->which == PT_CHUNKS)
         return &chunks[ref->index];
+    if (ref->which == PT_CLIPS || ref->which == PT_DRAWN)
+        return pt_clip_buffer(&frame->shadows.clips, ref->which);
     if (pt_residency_take(&frame->residency, frame->device, map->instances[ref->index].instance->cloud, &resident)) {
         pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY);
         return NULL;
@@ -232,6 +235,8 @@ static int draw_map(struct update *update, const struct pt_plan *map)
         if (map->instances[i].chunk_count)
             error = device->ops->buffer_create(device, map->instances[i].chunk_count * sizeof *map->instances[i].chunks,
                                                map->instances[i].chunks, 1, &chunks[i]);
+    if (!error)
+        error = pt_clip_buffers_fill(device, map, &frame->shadows.clips);
     if (!error)
         error = pt_frame_clear_keys(frame, frame->shadows.planes, map, PT_PLANE_KEYS);
     if (!error && map->triangles)

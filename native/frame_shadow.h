@@ -3,7 +3,7 @@
 #ifndef PT_FRAME_SHADOW_H
 #define PT_FRAME_SHADOW_H
 
-#include "plan.h"
+#include "frame_clip.h"
 
 struct patina_frame;
 
@@ -25,6 +25,7 @@ struct pt_shadows {
     struct pt_shadow_light lights[PT_MAX_LIGHTS]; // in the plan's order
     uint32_t light_count;
     struct pt_buffer differs; // one word
+    struct pt_clip_buffers clips; // of the map at hand
 };
 
 // Compares what the plan asks for with what is at hand and makes room. Afterwards pt_shadows_stale says whether any light

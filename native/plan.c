@@ -28,8 +28,8 @@ static const struct {
 static void plan_scatter(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1};
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (2 + 4 * (size_t)plan->instance_count) * sizeof *refs);
+    struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1, .sifted = plan->drawn_words > 0};
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (3 + 4 * (size_t)plan->instance_count) * sizeof *refs);
     uint32_t count = 0;
     if (!refs) {
         builder->failed = 1;
@@ -47,6 +47,8 @@ static void plan_scatter(struct pt_builder *builder)
     }
     if (args.behind)
         refs[count++] = pt_plane_at(PT_PLANE_LIMIT, 0);
+    if (args.sifted)
+        refs[count++] = pt_buffer_of(PT_DRAWN, 0);
     struct pt_pass *pass = pt_add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
     if (args.behind)
         PT_REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
@@ -232,14 +234,17 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && !discs)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     pt_own_colors(color, &args);
+    pt_plan_recolor(builder, instance, &args);
+    int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE;
+    enum pt_instance_buffer colors = args.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0),
-                      discs ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(PT_COLORS, i), pt_shading_of(builder),
+                      of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i), pt_shading_of(builder),
                       pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, i),
                       pt_plane_at(PT_PLANE_ARRIVED, 0)}),
-              "instance %u, %s, %u lights, filled normals blended over %u pixels", i,
-              args.instance.lit ? "lit" : "unlit", args.light_count, args.blend);
+              "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
+              args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");
 }
 
 // Returns the plane that holds the finished colour.
@@ -418,7 +423,7 @@ static void plan_marks(struct pt_builder *builder)
     }
 }
 
-static const char *const of_points[] = {"scatter", "splat", "normals", "surface", "blend", "pull", "fill", "push"};
+static const char *const of_points[] = {"sift", "scatter", "splat", "normals", "surface", "blend", "pull", "fill", "push"};
 
 static void skip_all(struct pt_builder *builder, const char *reason, const char *const *names, size_t count)
 {
@@ -435,6 +440,7 @@ static void plan_surfaces(struct pt_builder *builder)
         skip_all(builder, "no cloud is in view", of_points, sizeof of_points / sizeof *of_points);
         return;
     }
+    pt_plan_sift(builder);
     if (discs)
         pt_plan_splat(builder);
     else
@@ -472,6 +478,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
                 plan_shade(builder, i, shaded);
         pt_plan_mesh_shade(builder, shaded);
     }
+    pt_plan_tint(builder, PT_PLANE_COLOR_A);
     enum pt_plane color = plan_image_filters(builder);
     if (plan->layers > 1)
         plan_peel(builder, color);
@@ -524,7 +531,7 @@ static void plan_points(struct pt_builder *builder)
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
     static const char *const others[] = {"raster", "cover",  "mark",  "lit", "shade",     "obscure", "edl",
-                                         "toon",   "smooth", "hatch", "fog", "antialias", "peel"};
+                                         "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel"};
     builder->plan->light_count = 0;
     skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
     skip_all(builder, reason, others, sizeof others / sizeof *others);
@@ -609,6 +616,9 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
     LINE("points %llu, scattered %llu, chunks %llu, culled %llu\n", (unsigned long long)plan->points,
          (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
          (unsigned long long)plan->chunks_culled);
+    if (plan->chunks_clipped || plan->chunks_cut)
+        LINE("chunks clipped %llu, cut %llu\n", (unsigned long long)plan->chunks_clipped,
+             (unsigned long long)plan->chunks_cut);
     for (uint32_t i = 0; i < plan->pass_count; i++)
         LINE("run  %-10s %s\n", plan->passes[i].name, plan->passes[i].reason);
     for (uint32_t i = 0; i < plan->light_count; i++)

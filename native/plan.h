@@ -56,10 +56,10 @@ enum pt_plane {
 enum { PT_SLOTS = 16 }; // levels or layers that a plane may have
 _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_SLOTS, "planes have too few slots");
 
-// Those from PT_MARKS on belong to the frame's shadows, not to the cloud.
+// PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole.
 enum pt_instance_buffer {
-    PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII,
-    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS
+    PT_CHUNKS, PT_POSITIONS, PT_IDS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES,
+    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN
 };
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_BUFFERS };
@@ -115,6 +115,8 @@ struct pt_plan_instance {
     struct pt_bounds *bounds;  // of each of them
     uint32_t chunk_count;
     uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
+    uint32_t chunks_cut; // of its chunks, those that are sifted
+    int by_class;        // some of them by class
 };
 
 struct pt_plan_mesh {
@@ -140,7 +142,10 @@ struct pt_plan {
     uint32_t skipped_count;
     struct pt_plan_light lights[PT_MAX_LIGHTS]; // those that cast, in the scene's order
     uint32_t light_count;
-    uint64_t points, points_scattered, chunks, chunks_culled;
+    uint64_t points, points_scattered, chunks, chunks_culled, chunks_clipped, chunks_cut;
+    struct clip_view *clips; // of divided chunks, and for tint
+    uint32_t clip_count, clip_room;
+    uint32_t drawn_words;
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
@@ -172,6 +177,21 @@ uint32_t pt_effects_reach(const struct patina_scene *scene);
 // Every chunk of the instance as the plan's view sees it, inside or outside; nothing is culled.
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
                    struct instance_args *args, struct chunk_view **chunks);
+
+// ---- clips and hidden classes: plan_clip.c --------------------------------------------------------------------------------
+
+struct pt_builder;
+struct pt_sieve;
+// Gives a chunk its clips and drawn words, where it is divided.
+int pt_plan_divide(struct pt_plan *plan, struct pt_plan_instance *instance, const struct pt_sieve *sieve,
+                   const struct pt_chunk *chunk, struct chunk_view *out);
+void pt_plan_sift(struct pt_builder *builder);                       // passes before scatter
+void pt_plan_tint(struct pt_builder *builder, enum pt_plane color); // passes on a layer's colour
+
+// ---- colours: plan_color.c -------------------------------------------------------------------------------------------------
+
+// The instance's ramp, exposure and contrast, and the format of what shade reads for its colours.
+void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_instance *instance, struct shade_args *args);
 
 // ---- shadows: plan_light.c -----------------------------------------------------------------------------------------------
 

@@ -5,6 +5,7 @@
 // Suns look in parallel. Other lights look in perspective at the box of the casters while it spans less than 120 degrees
 // (beyond that the texels in the middle shrink to a quarter of those at the edge), else through the six faces of a cube.
 #include "plan.h"
+#include "scene/clip.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -135,17 +136,31 @@ static void extend_by_box(struct extent *extent, const struct pt_chunk *box, con
     }
 }
 
+// The scene with those of its clips that count for shadows. Its handle is not to be touched.
+static struct patina_scene as_cut(const struct patina_scene *scene)
+{
+    struct patina_scene cut = *scene;
+    if (scene->settings.shadow_uncut)
+        cut.clip_count = 0;
+    return cut;
+}
+
 static struct extent look(const struct patina_scene *scene, const struct pt_shadow_group *group, const double axes[9],
                           const double eye[3])
 {
     struct extent extent = { 0 };
+    const struct patina_scene cut = as_cut(scene);
+    struct pt_inverse_clip *room = malloc((cut.clip_count + 1) * sizeof *room); // without: chunks are seen whole
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
         if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
             continue;
+        const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, room) : (struct pt_sieve){ .instance = instance };
         for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-            extend_by_box(&extent, &instance->cloud->chunks[c], instance->style.world_from_object, axes, eye);
+            if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
+                extend_by_box(&extent, &instance->cloud->chunks[c], instance->style.world_from_object, axes, eye);
     }
+    free(room);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (meshes_cast(group) && pt_mesh_casts(&scene->meshes[i]))
             extend_by_box(&extent, &scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, axes, eye);
@@ -331,6 +346,8 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
     struct extent extent = look(scene, group, axes, position);
     if (!extent.some || (!parallel && !(extent.lower[2] < 0.0)))
         return 0;
+    out->clips = scene->clips;
+    out->clip_count = as_cut(scene).clip_count;
     out->instances = instances;
     out->instance_count = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
@@ -397,6 +414,8 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
     for (uint32_t face = 0; face < (planned->cube ? 6u : 1u); face++) {
         struct patina_scene survey = { .instances = scene->instances,
                                        .instance_count = scene->instance_count,
+                                       .clips = scene->clips,
+                                       .clip_count = as_cut(scene).clip_count,
                                        .has_camera = 1 };
         struct pt_plan plan = { 0 };
         if (planned->cube)
@@ -492,6 +511,37 @@ static void put_word(struct key *key, uint64_t word)
     put(key, (double)(word & 0xFFFFFFFFu));
 }
 
+// What is cut out of the instance: clips in its own frame, and hidden classes.
+static void put_cuts(struct key *key, const struct patina_scene *scene, const struct pt_instance *instance)
+{
+    const uint32_t clips = instance->style.clip_off || scene->settings.shadow_uncut ? 0 : scene->clip_count;
+    const double *object = instance->style.world_from_object;
+    int hiding = 0;
+    for (int k = 0; k < 8; k++)
+        hiding |= (instance->cloud->info.class_bits[k] & instance->style.hidden_classes[k]) != 0;
+    for (int k = 0; k < 8 && hiding; k++)
+        put(key, (double)instance->style.hidden_classes[k]);
+    if (hiding)
+        put_word(key, instance->cloud->class_hash);
+    for (uint32_t i = 0; i < clips; i++) {
+        const patina_clip *clip = &scene->clips[i];
+        double turned[9], across[9], from[3], product[9];
+        pt_split_matrix(clip->world_from_clip, turned, from);
+        for (int r = 0; r < 3; r++) { // what moves with the cloud keeps its products with the cloud's axes
+            from[r] -= object[4 * r + 3];
+            for (int c = 0; c < 3; c++)
+                across[3 * c + r] = object[4 * r + c];
+        }
+        put(key, (double)(2 * clip->shape + clip->cut));
+        pt_multiply(across, turned, product);
+        for (int k = 0; k < 9; k++)
+            put(key, product[k]);
+        pt_apply(across, from, product);
+        for (int k = 0; k < 3; k++)
+            put(key, product[k]);
+    }
+}
+
 // Its matrix as the light sees it: the same when light and cloud move together. A sun is everywhere: where the first cloud is.
 static void put_matrix(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned,
                        const double matrix[16])
@@ -519,6 +569,7 @@ static void put_instance(struct key *key, const struct patina_scene *scene, cons
     put(key, (double)instance->style.lighting);
     put(key, (double)instance->style.d_min);
     put_matrix(key, scene, planned, instance->style.world_from_object);
+    put_cuts(key, scene, instance);
 }
 
 size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *planned, double *numbers, size_t room)

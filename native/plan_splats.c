@@ -21,7 +21,7 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
 {
     struct pt_plan *plan = builder->plan;
     const size_t head = blend ? sizeof(struct blend_args) : sizeof(struct splat_args);
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 1 + 7 * (size_t)plan->instance_count) * sizeof *refs);
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 2 + 7 * (size_t)plan->instance_count) * sizeof *refs);
     char *args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args));
     if (!refs || !args) {
         builder->failed = 1;
@@ -42,8 +42,10 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
     }
     if (last)
         refs[count++] = *last;
-    struct splat_args splat = {.view = plan->view, .instances = instances, .behind = last != NULL};
-    struct blend_args mix = {.view = plan->view, .instances = instances};
+    if (plan->drawn_words)
+        refs[count++] = pt_buffer_of(PT_DRAWN, 0);
+    struct splat_args splat = {.view = plan->view, .instances = instances, .behind = last != NULL, .sifted = plan->drawn_words > 0};
+    struct blend_args mix = {.view = plan->view, .instances = instances, .sifted = plan->drawn_words > 0};
     memcpy(args, blend ? (void *)&mix : (void *)&splat, head);
     struct pt_pass *pass = pt_add(builder, blend ? PT_KERNEL_blend : PT_KERNEL_splat, blend ? "blend" : "splat", args,
                                   head + instances * sizeof *discs, refs, count);

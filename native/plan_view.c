@@ -8,6 +8,7 @@
 #include "plan.h"
 
 #include "expected.h"
+#include "scene/clip.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -271,6 +272,7 @@ static double chunk_cosine(int known, double angle, double spread)
 
 struct survey {
     struct camera camera;
+    struct pt_sieve *sieves; // per instance
     struct object *objects;
     struct seen **seen; // per instance
     uint32_t *seen_count;
@@ -308,13 +310,19 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     set_object(camera, instance->style.world_from_object, object);
     int cull = instance->style.cull_back && cloud->info.has_normals && !object->singular && !transparent;
     struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
-    if (!list)
+    struct pt_inverse_clip *clips = pt_arena_take(&plan->arena, (scene->clip_count + 1) * sizeof *clips);
+    if (!list || !clips)
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
+    survey->sieves[i] = pt_sieve_make(scene, instance, clips);
     for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         struct seen seen = { .chunk = c };
         double rows[9], translation[3], eye[4], z, beyond, angle = 0.0, spread = 0.0;
+        if (pt_sieve_chunk(&survey->sieves[i], chunk, NULL, NULL) == PT_CUT_AWAY) {
+            plan->chunks_clipped++;
+            continue;
+        }
         chunk_product(camera, object, chunk, rows, translation);
         if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, thinning(scene)), seen.rect,
                           &z, &beyond))
@@ -582,7 +590,9 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         uint32_t count = drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)beyond, INFINITY);
         set_chunk(&survey->camera, &survey->objects[i], instance, chunk, count, seen->cull,
-                  &out->chunks[out->chunk_count++]);
+                  &out->chunks[out->chunk_count]);
+        if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
+            return PATINA_ERROR_MEMORY;
         join_rect(out->rect, rect);
         plan->points_scattered += count;
     }
@@ -628,7 +638,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     survey.seen_count = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.seen_count);
     plan->mesh_count = scene->mesh_count;
     plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
-    if (!plan->instances || !plan->meshes || !survey.objects || !survey.seen || !survey.seen_count)
+    survey.sieves = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.sieves);
+    if (!plan->instances || !plan->meshes || !survey.sieves || !survey.objects || !survey.seen || !survey.seen_count)
         return PATINA_ERROR_MEMORY;
     int error = set_camera(scene, &survey.camera);
     if (error)

@@ -24,11 +24,17 @@ static void forget_dead(struct pt_residency *residency, struct patina_device *de
     }
 }
 
-// The colours as they are now, in place of what the buffer holds.
+// The colours and scalars as they are now, in place of what the buffer holds.
 static int upload_colors(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
     device->ops->buffer_destroy(device, &resident->buffers[PT_COLORS]);
+    device->ops->buffer_destroy(device, &resident->buffers[PT_SCALARS]);
     resident->colors = atomic_load(&cloud->alive->colors);
+    int error = !cloud->scalars ? PATINA_OK
+                                : device->ops->buffer_create(device, pt_scalar_bytes(cloud), cloud->scalars, 1,
+                                                             &resident->buffers[PT_SCALARS]);
+    if (error)
+        return error;
     if (!cloud->colors)
         return PATINA_OK;
     return device->ops->buffer_create(device, cloud->info.count * pt_color_size(cloud->color_format), cloud->colors, 1,
@@ -47,6 +53,7 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         { PT_SURFACE, cloud->surface, cloud->info.count * 4 },
         { PT_OPACITIES, cloud->opacities, cloud->info.count },
         { PT_RADII, cloud->radii, cloud->info.count * 4 },
+        { PT_CLASSES, cloud->classes, cloud->slots },
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         if (!parts[i].data)

@@ -51,6 +51,9 @@
 // Lit and filtered colour: 2e-5 of the sum of the absolute terms is a tenth of an 8-bit step at 1/20 grey; about 40
 // roundings (sRGB power 8, dot products, 1/pi, sums over lights) use 40 units = 2.4e-6 of it, drivers' pow() the rest.
 #define TOL_COLOR 2e-5
+// Exposure and contrast, beside TOL_LOG: gain, grey and contrast are a product each, before and behind logarithm and power;
+// share of the value, and of its distance in stops from mid grey.
+#define TOL_STOPS (4.0 * TOL_UNIT)
 // Opacity: byte / 255 and its product with the instance's, two products and the constant's rounding; share of the value.
 #define TOL_OPACITY (3.0 * TOL_UNIT)
 // r . v before it is raised to the shininess: reflection (6), view vector (7), dot (3).

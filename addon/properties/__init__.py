@@ -13,6 +13,8 @@ from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
 
 from .. import styles
 from ..native import MOST_LAYERS
+from .clips import PatinaClipProperties
+from .colors import PatinaColorProperties
 from .effects import PatinaEffectsProperties
 from .sequence import PatinaSequenceProperties
 from .studio import PatinaStudioProperties
@@ -86,6 +88,9 @@ class PatinaSceneProperties(PropertyGroup):
     shadow_resolution: IntProperty(
         name="Resolution", override=_OVERRIDE, default=4096, min=16, max=16384, subtype='PIXEL',
         description="Most texels along a side of a light's depth map; it has fewer where the points lie wider")
+    shadow_uncut: BoolProperty(
+        name="Cut Parts Cast Shadows", override=_OVERRIDE, default=False,
+        description="What clip boxes and planes cut away still casts shadows")
     shadow_file: StringProperty(
         name="Baked", override=_OVERRIDE, subtype='FILE_PATH',
         description="Shadow textures to take from a file instead of computing them; empty: none")
@@ -132,6 +137,8 @@ class PatinaSceneProperties(PropertyGroup):
 
 
 class PatinaObjectProperties(PropertyGroup):
+    colors: PointerProperty(type=PatinaColorProperties, override=_OVERRIDE)
+    clip: PointerProperty(type=PatinaClipProperties, override=_OVERRIDE)
     lighting: EnumProperty(
         name="Lighting", override=_OVERRIDE, default='AUTO',
         description="Whether the scene's lights shade the points",
@@ -207,7 +214,7 @@ class PatinaViewLayerProperties(PropertyGroup):
 
 
 _CLASSES = (PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
-            PatinaSceneProperties,
+            PatinaColorProperties, PatinaClipProperties, PatinaSceneProperties,
             PatinaObjectProperties, PatinaViewLayerProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties))
 

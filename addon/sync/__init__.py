@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import bpy
 
 from .. import migrate
-from . import clouds, effects, lights, settings, world
+from . import clips, clouds, effects, lights, settings, world
 from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
+from .clips import Clip
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
 from .effects import Effects
 from .lights import Light
@@ -22,7 +23,7 @@ from .meshes import MeshItem
 from .settings import DeviceChoice, Settings
 from .world import Mist
 
-__all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "MeshItem", "Mist",
+__all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "MeshItem", "Mist",
            "Panorama", "Pending", "Effects", "Focus",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "viewport_view"]
@@ -32,6 +33,7 @@ __all__ = ["Camera", "CameraError", "CloudItem", "CloudStyle", "DeviceChoice", "
 class SceneDescription:
     clouds: list[CloudItem]
     meshes: list[MeshItem]
+    clips: list[Clip]
     lights: list[Light]
     camera: Camera
     panorama: Panorama | None  # all around from where the camera stands
@@ -77,6 +79,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
     return SceneDescription(
         clouds=[item for item in items if isinstance(item, CloudItem)],
         meshes=[item for item in items if isinstance(item, MeshItem)],
+        clips=clips.collect(depsgraph),
         lights=lights.collect(depsgraph, notices),
         camera=view.camera,
         panorama=view.panorama,

@@ -10,13 +10,15 @@ import numpy as np
 
 # Names looked for, in this order, when the artist names none.
 NORMAL_NAMES = ("normal", "Normal", "normals", "Normals", "nor", "N")
+CLASS_NAMES = ("class", "classification", "Classification", "scalar_Classification", "scalar_classification")
 COLOR_NAMES = ("Col", "Color", "color", "Cd", "rgb", "RGB")
 
 BLOCK = 1 << 19  # points between two looks at what the artist wants
 
 # data_type → property of an element, components
 _LAYOUTS = {'FLOAT': ("value", 1), 'BOOLEAN': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4),
-            'BYTE_COLOR': ("color_srgb", 4)}
+            'BYTE_COLOR': ("color_srgb", 4), 'INT': ("value", 1), 'INT8': ("value", 1)}
+_NUMBERS = {'FLOAT', 'INT', 'INT8', 'BOOLEAN'}
 
 
 def positions(data: bpy.types.ID, count: int) -> np.ndarray | None:
@@ -76,6 +78,25 @@ def opacities(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     return None if values is None else np.ascontiguousarray(values[:, -1:])
 
 
+def scalars(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
+    """(count, 1) float32 of the named attribute."""
+    attribute = _find(data, name, _NUMBERS) if name else None
+    return _values(attribute, count) if attribute else None
+
+
+def classes(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
+    """(count, 1) uint8 of the named attribute, or of the first usual name; 0 for what is no class."""
+    for candidate in (name,) if name else CLASS_NAMES:
+        values = scalars(data, count, candidate)
+        if values is not None:
+            return as_classes(values)
+    return None
+
+
+def as_classes(values: np.ndarray) -> np.ndarray:
+    return np.where((values >= 0) & (values <= 255), values, 0).astype(np.uint8)
+
+
 def _color_candidates(data: bpy.types.ID) -> Iterator[bpy.types.Attribute]:
     group = data.color_attributes
     for index in (getattr(group, "render_color_index", -1), getattr(group, "active_color_index", -1)):
@@ -100,7 +121,9 @@ def _values(attribute: bpy.types.Attribute, count: int) -> np.ndarray | None:
     length = len(attribute.data)
     if length != count and length != 1:  # Blender 5.2 may store one value for all points
         return None
-    values = np.empty(length * components, np.float32)
+    whole = attribute.data_type in {'INT', 'INT8'}  # Blender converts none on the way
+    values = np.empty(length * components, np.int32 if whole else np.float32)
     attribute.data.foreach_get(key, values)
+    values = values.astype(np.float32, copy=False)
     values = values.reshape(length, components)
     return values if length == count else np.repeat(values, count, axis=0)

@@ -16,7 +16,7 @@ from .. import jobs, native
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import attributes, estimates, linked, meshes
+from . import attributes, clips, colors, estimates, linked, meshes
 from .camera import row_major
 
 # Clouds that the last picture did not use may stay up to this many bytes (24 a point): enough for the other view
@@ -34,11 +34,14 @@ class PointArrays:
     normals: np.ndarray | None  # (n, 3) float32
     colors: np.ndarray | None  # (n, 4) uint8 sRGB, or (n, 3|4) float32 linear
     opacities: np.ndarray | None  # (n, 1) float32
+    scalars: np.ndarray | None = None  # (n, 1) float32
+    classes: np.ndarray | None = None  # (n, 1) uint8
 
     def fingerprint(self) -> Steps[tuple[int, int]]:
-        """Of the places, normals and opacities, and of the colours: what Blender's update tags miss (undo, geometry
+        """Of the places, normals, opacities and classes, and of the colours and scalars: what Blender's update tags miss (undo, geometry
         nodes, scripts) still shows."""
-        task = native.start_fingerprint(self.positions, self.normals, self.colors, self.opacities)
+        task = native.start_fingerprint(self.positions, self.normals, self.colors, self.opacities, None, self.scalars,
+                                        self.classes)
         yield task
         return task.result()
 
@@ -58,6 +61,13 @@ class CloudStyle:
     shininess: int
     transparency: float
     shadow_off: int
+    color_source: int = colors.OWN
+    ramp: bytes = b""  # linear RGB, float32
+    ramp_range: tuple[float, float] = (0.0, 0.0)  # equal: automatic
+    exposure: float = 0.0
+    contrast: float = 1.0
+    hidden_classes: tuple[int, ...] = (0,) * 8
+    clip_off: int = 0
 
 
 class Pending:
@@ -136,9 +146,12 @@ class CloudCache:
             task = cloud.start_colors(arrays.colors)
         else:
             cloud = None  # frees the old one before the new one is built
-            task = native.Cloud.start(arrays.positions, arrays.normals, arrays.colors, arrays.opacities, progress)
+            task = native.Cloud.start(arrays.positions, arrays.normals, arrays.colors, arrays.opacities, progress,
+                                      scalars=arrays.scalars, classes=arrays.classes)
         yield task
         cloud = task.result() or cloud
+        if recolor:
+            cloud.set_scalars(arrays.scalars)
         self._keep(identity, fingerprint, cloud)
         return cloud
 
@@ -196,7 +209,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     distances: dict[str, float] = {}
     for instance in depsgraph.object_instances:
         obj = instance.object
-        if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera:
+        if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera or clips.cuts(obj):
             continue
         if not visible(instance):
             continue
@@ -266,6 +279,8 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
         cloud = jobs.run(work, progress.cancel, lambda: poll(f"Reading points of '{name}'", progress.value()))
         if cloud.invalid_positions:
             notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
+        if link and link.scalar and not cloud.has_scalars:
+            notices.append(f"'{name}': its file has no attribute '{link.scalar}' to take as scalar")
         return cloud
 
     return take
@@ -342,7 +357,8 @@ def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:
 
 
 def _attribute_names(obj: bpy.types.Object) -> tuple[str, ...]:
-    return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute)
+    return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute, colors.scalar_name(obj),
+            obj.patina.colors.class_attribute)
 
 
 def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
@@ -362,15 +378,20 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
     pause()
     normals = attributes.normals(data, count, obj.patina.normal_attribute)
     pause()
-    colors = attributes.colors(data, count, obj.patina.color_attribute, pause)
+    rgb = attributes.colors(data, count, obj.patina.color_attribute, pause)
+    pause()
+    scalar, class_name = colors.scalar_name(obj), obj.patina.colors.class_attribute
+    scalars = attributes.scalars(data, count, scalar)
+    classes = attributes.classes(data, count, class_name)
     pause()
     opacities = attributes.opacities(data, count, obj.patina.opacity_attribute)
-    for kind, name, found in (("colour", obj.patina.color_attribute, colors),
+    for kind, name, found in (("colour", obj.patina.color_attribute, rgb),
                               ("normal", obj.patina.normal_attribute, normals),
-                              ("opacity", obj.patina.opacity_attribute, opacities)):
+                              ("opacity", obj.patina.opacity_attribute, opacities),
+                              ("scalar", scalar, scalars), ("class", class_name, classes)):
         if name and found is None:
             notices.append(f"'{obj.name}' has no point attribute '{name}' to take as {kind}")
-    return PointArrays(positions, normals, colors, opacities)
+    return PointArrays(positions, normals, rgb, opacities, scalars, classes)
 
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
@@ -387,7 +408,8 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         specular=patina.specular,
         shininess=patina.shininess,
         transparency=1.0 - patina.opacity,
-        shadow_off=_shadow_off(obj))
+        shadow_off=_shadow_off(obj),
+        **colors.style_fields(obj))
 
 
 def _mesh_style(obj: bpy.types.Object, matrix: Matrix) -> meshes.MeshStyle:

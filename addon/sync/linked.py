@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from .. import importers, native
 from ..importers.origin import PROPERTY
-from . import sequence
+from . import attributes, sequence
+from .colors import scalar_name
 
 Corner = tuple[float, float, float]
 
@@ -30,6 +32,7 @@ class Source:
     path: Path
     kept: Path
     origin: Corner | None = None  # float64, that the cloud shall be relative to; None: the file's own
+    scalar: str = ""  # that a ramp is laid over
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.kept.name)
@@ -55,22 +58,22 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    found = source(path, origin)
+    found = source(path, origin, scalar_name(obj))
     if found is None:
         notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
     return found
 
 
-def source(path: Path, origin: Corner | None = None) -> Source | None:
+def source(path: Path, origin: Corner | None = None, scalar: str = "") -> Source | None:
     try:
         status = path.stat()
     except OSError:
         return None
     name = f"{path.resolve()}{origin or ''}"
     place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
-    state = hashlib.blake2b(f"{status.st_size} {status.st_mtime_ns}".encode(), digest_size=6).hexdigest()
+    state = hashlib.blake2b(f"{status.st_size} {status.st_mtime_ns} {scalar}".encode(), digest_size=6).hexdigest()
     folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin)
+    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar)
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
@@ -85,11 +88,13 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
         pass  # not there yet, of another version, or damaged: it is made anew
     progress = progress or importers.Progress()
     points = importers.reader(source.path).read(source.path, importers.Filter(), progress)
-    points.scalars.clear()  # clouds have no use for them
+    for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
+        del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     with progress.inner() as inner:
-        cloud = native.Cloud(points.positions, points.normals, points.colors, inner, origin=offset)
+        cloud = native.Cloud(points.positions, points.normals, points.colors, inner, origin=offset,
+                             scalars=_column(points, source.scalar), classes=_classes(points))
     try:
         for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
             old.unlink()
@@ -111,6 +116,17 @@ def _tidy(newest: Path) -> None:
         if total > KEPT_BYTES and path != newest:
             path.unlink()
             path.with_suffix(".json").unlink(missing_ok=True)
+
+
+def _column(points: importers.PointFile, name: str) -> np.ndarray | None:
+    values = points.scalars.get(name)
+    return None if values is None else np.ascontiguousarray(values, np.float32).reshape(-1, 1)
+
+
+def _classes(points: importers.PointFile) -> np.ndarray | None:
+    found = next((name for name in attributes.CLASS_NAMES if name in points.scalars), "")
+    values = _column(points, found)
+    return None if values is None else attributes.as_classes(values)
 
 
 def _linked(cloud: native.Cloud, origin: Corner) -> Linked:

@@ -45,6 +45,7 @@ class Settings:
     shadow_progressive: int = 0
     own_background: int = 0
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    shadow_uncut: int = 0
 
 
 def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:
@@ -62,6 +63,7 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         world_color=tuple(studio.ambient) if studio.use_light else world_color,
         own_background=int(studio.use_light or studio.use_background),
         background=tuple(studio.background) if studio.use_background else world_color,
+        shadow_uncut=int(patina.shadow_uncut),
         layers=patina.layers,
         error_target=0.0 if quality else 0.01 * patina.error_target,
         shadow_samples=0 if patina.shadow_error else patina.shadow_samples,

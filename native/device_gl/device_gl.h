@@ -9,7 +9,7 @@
 #include "glad/gl.h"
 
 enum {
-    PT_GL_VARIANTS = 32,      // programs of one kernel: its passes and special cases
+    PT_GL_VARIANTS = 64,      // programs of one kernel: its passes and special cases
     PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
     PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
     PT_GL_TEXTURES = 5,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl
@@ -127,6 +127,8 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
                 const atomic_int *cancel);
 int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
               const atomic_int *cancel);
+int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
+               const atomic_int *cancel);
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
 int pt_gl_antialias(struct pt_gl_device *d);

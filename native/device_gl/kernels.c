@@ -71,7 +71,7 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},   [PT_KERNEL_mark] = {1},
     [PT_KERNEL_lit] = {1, 2, 3},        [PT_KERNEL_edl] = {1},
     [PT_KERNEL_obscure] = {1, 2, 3, 4}, [PT_KERNEL_toon] = {1, 0, 0, 2},      [PT_KERNEL_hatch] = {1, 0, 0, 2},
-    [PT_KERNEL_fog] = {1},              [PT_KERNEL_focus] = {1, 0, 0, 2},
+    [PT_KERNEL_fog] = {1},              [PT_KERNEL_focus] = {1, 0, 0, 2},             [PT_KERNEL_tint] = {1},
 };
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
@@ -95,7 +95,8 @@ static int tiled(enum pt_kernel kernel)
     return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_fill ||
            kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
            kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark || kernel == PT_KERNEL_edl ||
-           kernel == PT_KERNEL_obscure || kernel == PT_KERNEL_toon || kernel == PT_KERNEL_hatch || kernel == PT_KERNEL_fog;
+           kernel == PT_KERNEL_obscure || kernel == PT_KERNEL_toon || kernel == PT_KERNEL_hatch || kernel == PT_KERNEL_fog ||
+           kernel == PT_KERNEL_tint;
 }
 
 static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
@@ -185,6 +186,7 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     case PT_KERNEL_toon:
     case PT_KERNEL_hatch:
     case PT_KERNEL_fog:
+    case PT_KERNEL_tint:
         return run_tiles(d, kernel);
     case PT_KERNEL_compose: {
         const struct compose_args *args = arguments;
@@ -232,6 +234,8 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
         return pt_gl_blend(d, arguments, buffers, cancel);
     if (kernel == PT_KERNEL_lit)
         return pt_gl_lit(d, argument_size, buffers, count, cancel);
+    if (kernel == PT_KERNEL_sift)
+        return pt_gl_sift(d, argument_size, buffers, count, cancel);
     int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_focus || kernel == PT_KERNEL_paper || kernel == PT_KERNEL_extract;
     if (!crops && (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1]))
         return PATINA_OK;

@@ -56,18 +56,18 @@ static int plain_lights(const struct shade_args *args)
 }
 
 struct shade_choice {
-    uint32_t normals, format, lit, plain;
+    uint32_t normals, format, lit, plain, recolors;
 };
 
-static uint32_t colors_of(const struct shade_choice *c) { return COLORS + 6 * c->format + 2 * c->lit + c->plain; }
+static uint32_t colors_of(const struct shade_choice *c) { return COLORS + 12 * c->format + 6 * c->recolors + 2 * c->lit + c->plain; }
 
 static int shade_programs(struct pt_gl_device *d, const struct shade_choice *c)
 {
     static const char *const steps[] = {"#define STEP 0\n", "#define STEP 0\n#define BLEND 1\n",
                                         "#define STEP 0\n#define WIDE 1\n"};
-    char definitions[96];
-    snprintf(definitions, sizeof definitions, "#define STEP 1\n#define COLOR_FORMAT %u\n#define LIT %u\n#define PLAIN %u\n",
-             c->format, c->lit, c->plain);
+    char definitions[128];
+    snprintf(definitions, sizeof definitions, "#define STEP 1\n#define COLOR_FORMAT %u\n#define LIT %u\n#define PLAIN %u\n#define RECOLOR %u\n",
+             c->format, c->lit, c->plain, c->recolors);
     int result = pt_gl_kernel_program(d, PT_KERNEL_shade, c->normals, steps[c->normals]);
     return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors_of(c), definitions) : result;
 }
@@ -94,9 +94,10 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 {
     const struct shade_choice choice = { .normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE,
-                                         .format = args->instance.color_format % 4,
+                                         .format = args->instance.color_format % 5,
                                          .lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1,
-                                         .plain = (uint32_t)plain_lights(args)};
+                                         .plain = (uint32_t)plain_lights(args),
+                                         .recolors = args->recolor.source || args->recolor.graded};
     const uint32_t colors = colors_of(&choice);
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;

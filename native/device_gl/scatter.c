@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
-// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend: a pass a band of rows; lit: one instance.
+// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend: a pass a band of rows; lit, sift: one
+// instance.
 #include "device_gl.h"
 
 #include <stdlib.h>
@@ -13,7 +14,7 @@ enum {
 struct instance_buffers {
     enum pt_kernel kernel;
     uint32_t binding; // of chunks; positions, ids and surface follow
-    const struct pt_buffer *chunks, *positions, *ids, *surface;
+    const struct pt_buffer *chunks, *positions, *ids, *surface; // ids: NULL where none are read
 };
 
 struct batch {
@@ -27,9 +28,9 @@ static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, 
     int result = pt_gl_bind(d, b->binding, b->chunks->name, 0, b->chunks->size, what);
     if (result == PATINA_OK)
         result = pt_gl_bind(d, b->binding + 1, b->positions->name, batch->first_slot * 12, batch->slots * 12, what);
-    if (result == PATINA_OK)
+    if (result == PATINA_OK && b->ids)
         result = pt_gl_bind(d, b->binding + 2, b->ids->name, batch->first_slot * 4, batch->slots * 4, what);
-    if (result == PATINA_OK)
+    if (result == PATINA_OK && b->surface)
         result = pt_gl_bind(d, b->binding + 3, b->surface->name, 0, b->surface->size, what);
     return result;
 }
@@ -81,7 +82,7 @@ static int run_instance(struct pt_gl_device *d, const struct instance_buffers *b
     if (!count)
         return PATINA_OK;
     if (b->positions->size <= d->block_size) {
-        struct batch whole = {.chunk_count = count, .slots = b->ids->size / 4};
+        struct batch whole = {.chunk_count = count, .slots = b->positions->size / 12};
         return run_batch(d, b, &whole, pass, cancel);
     }
     struct chunk_view *chunks = malloc(b->chunks->size);
@@ -107,9 +108,12 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
 {
     uint32_t first = d->base.info.key64 ? 2 : 0, last = d->base.info.key64 ? 2 : 1;
     const struct pt_buffer *limit = args->behind ? buffers[1 + 4 * args->instances] : buffers[0]; // any stands in
+    const struct pt_buffer *drawn = args->sifted ? buffers[1 + 4 * args->instances + args->behind] : buffers[0];
     int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "scatter");
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 6, limit->name, 0, limit->size, "scatter");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 7, drawn->name, 0, drawn->size, "scatter");
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_scatter, pass, passes[pass]);
         for (uint32_t i = 0; i < args->instances && 4 * i + 4 < count && result == PATINA_OK; i++) {
@@ -147,6 +151,8 @@ int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt
     int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "splat");
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 7, limit->name, 0, limit->size, "splat");
+    if (result == PATINA_OK && args->sifted)
+        result = pt_gl_bind_texture(d, 1, buffers[1 + 5 * args->instances + args->behind]);
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_splat, pass, passes[pass]);
         for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
@@ -198,6 +204,8 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
         result = pt_gl_bind_texture(d, 0, buffers[0]);
     if (result == PATINA_OK)
         result = pt_gl_bind_texture(d, 2, buffers[1]);
+    if (result == PATINA_OK && args->sifted)
+        result = pt_gl_bind_texture(d, 1, buffers[4 + 7 * args->instances]);
     for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)
         result = blend_band(d, args, buffers, y, y + rows < height ? y + rows : height, cancel);
     return result;
@@ -215,5 +223,17 @@ int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *co
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, PT_KERNEL_lit, argument_size, rest, count);
     struct instance_buffers b = {PT_KERNEL_lit, 4, buffers[3], buffers[4], buffers[5], buffers[6]};
+    return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
+}
+
+int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
+               const atomic_int *cancel)
+{
+    static struct pt_buffer none;
+    struct pt_buffer *rest[] = {buffers[0], &none, buffers[2], buffers[3], buffers[4]};
+    int result = pt_gl_kernel_program(d, PT_KERNEL_sift, 0, "");
+    if (result == PATINA_OK)
+        result = pt_gl_bind_buffers(d, PT_KERNEL_sift, argument_size, rest, count);
+    struct instance_buffers b = {PT_KERNEL_sift, 1, buffers[0], buffers[1], NULL, NULL};
     return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
 }

@@ -614,6 +614,8 @@ static int build_cloud(struct build *build)
     if (pt_progress_cancelled(build->progress))
         return PATINA_ERROR_CANCELLED;
     drop_opaque(cloud, build);
+    if ((error = pt_cloud_take_values(cloud, &build->desc)))
+        return error;
     for (uint32_t b = 0; b < build->block_count; b++) {
         cloud->info.invalid_positions += build->blocks[b].invalid_positions;
         cloud->info.invalid_normals += build->blocks[b].invalid_normals;
@@ -668,7 +670,8 @@ static int check_desc(patina_cloud_desc *desc)
     if ((error = pt_check_array(&desc->position, "position", floats, 3, 3)) ||
         (error = pt_check_array(&desc->normal, "normal", floats, 3, 3)) ||
         (error = pt_check_array(&desc->opacity, "opacity", floats | 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1)) ||
-        (error = pt_check_array(&desc->radius, "radius", floats, 1, 1)))
+        (error = pt_check_array(&desc->radius, "radius", floats, 1, 1)) ||
+        (error = pt_check_values(&desc->scalar, &desc->classes)))
         return error;
     return pt_check_array(&desc->color, "color", 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32, 3, 4);
 }
@@ -795,6 +798,8 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_pages_free(cloud->colors, color_bytes(cloud));
     pt_pages_free(cloud->opacities, opacity_bytes(cloud));
     pt_pages_free(cloud->radii, cloud->info.count * 4);
+    pt_pages_free(cloud->scalars, pt_scalar_bytes(cloud));
+    pt_pages_free(cloud->classes, pt_class_bytes(cloud));
     free(cloud->chunks);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);

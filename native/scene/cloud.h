@@ -19,12 +19,13 @@ struct pt_chunk {
     float spacing;                   // about 1 / sqrt(points per area), object units; 0 unknown
     uint32_t first;                  // slot of the first point
     uint32_t count, padded;          // padded slots repeat the last point
+    uint32_t classes[8];             // of its points: bits as in patina_cloud_info.class_bits
 };
 
 // Whether a cloud still lives, shared with the devices that hold its buffers.
 struct pt_alive {
     atomic_int references, alive;
-    atomic_uint colors; // counts how often they were set
+    atomic_uint colors; // counts how often they and the scalars were set
     _Atomic uint64_t fingerprint; // 0: nobody has asked for it yet
 };
 
@@ -48,6 +49,9 @@ struct patina_cloud {
     void *colors;      // count x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // count, or NULL where every point is opaque
     float *radii;       // count, object units, or NULL
+    float *scalars;     // count, or NULL
+    uint8_t *classes;   // slots, or NULL
+    uint64_t class_hash;
     enum pt_color_format color_format;
     double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
@@ -64,6 +68,12 @@ void pt_decode_normal(uint32_t word, double n[3]);
 
 // Local spacing by sampled nearest neighbours among the `count` points x, y, z.
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);
+
+// Scalars and classes: cloud_values.c. They are taken once chunks and ids stand.
+int pt_check_values(patina_array *scalar, patina_array *classes);
+int pt_cloud_take_values(struct patina_cloud *cloud, const patina_cloud_desc *desc);
+size_t pt_scalar_bytes(const struct patina_cloud *cloud);
+size_t pt_class_bytes(const struct patina_cloud *cloud);
 
 // Of positions, ids, normals and spacings; never 0. Made at the first call, which reads them all: only shadows ask. Any thread.
 uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);

@@ -3,6 +3,37 @@
 #include "cloud.h"
 #include "io/file.h"
 
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+static const struct pt_column *class_column(const struct patina_file *file)
+{
+    static const char prefix[] = "scalar_"; // as CloudCompare writes it
+    for (uint32_t i = 0; i < file->attribute_count; i++) {
+        const char *name = file->attributes[i].name;
+        name += strncasecmp(name, prefix, sizeof prefix - 1) ? 0 : sizeof prefix - 1;
+        if (!strcasecmp(name, "class") || !strcasecmp(name, "classification"))
+            return &file->attributes[i];
+    }
+    return NULL;
+}
+
+// 0..255, others 0. NULL without memory.
+static uint8_t *read_classes(const struct patina_file *file, const struct pt_column *column)
+{
+    uint8_t *classes = malloc(file->count + 1);
+    float *values = malloc(file->count * sizeof *values + 1);
+    int error = !classes || !values ||
+                patina_file_read_attribute(file, (uint32_t)(column - file->attributes), values, file->count * sizeof *values);
+    for (uint64_t i = 0; i < file->count && !error; i++)
+        classes[i] = values[i] >= 0.0f && values[i] <= 255.0f ? (uint8_t)values[i] : 0;
+    free(values);
+    if (error)
+        free(classes);
+    return error ? NULL : classes;
+}
+
 int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out)
 {
     if (!file)
@@ -16,7 +47,14 @@ int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress
         .origin = { file->origin[0], file->origin[1], file->origin[2] },
         .threads = threads,
     };
+    const struct pt_column *column = class_column(file);
+    uint8_t *classes = column ? read_classes(file, column) : NULL;
+    if (column && !classes)
+        return pt_fail(&file->handle, PATINA_ERROR_MEMORY, "classes of %llu points: out of memory",
+                       (unsigned long long)file->count);
+    desc.classes = (patina_array){ .data = classes, .type = PATINA_UINT8, .components = 1 };
     int error = patina_cloud_create(&desc, progress, out);
+    free(classes);
     return error ? pt_fail_again(&file->handle, error) : PATINA_OK;
 }
 

@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTION = 1 << 16, VERSION = 3, SECTIONS = 7 };
+enum { SECTION = 1 << 16, VERSION = 4, SECTIONS = 9 };
 static const char magic[8] = "patina\n\x1a";
 
 struct header {
@@ -25,6 +25,7 @@ struct header {
     uint32_t version, chunk_size, color_format, chunk_count;
     uint64_t slots, size; // of the file
     double spacing_base;
+    uint64_t class_hash;
     patina_cloud_info info;
     uint64_t check; // of all before it, and of the chunks
 };
@@ -56,6 +57,8 @@ static void list_sections(struct patina_cloud *cloud, struct section sections[SE
         {&cloud->colors, cloud->color_format ? count * pt_color_size(cloud->color_format) + 4 : 0},
         {(void **)&cloud->opacities, cloud->info.has_opacities ? count + 4 : 0},
         {(void **)&cloud->radii, cloud->info.has_radii ? count * 4 : 0},
+        {(void **)&cloud->scalars, cloud->info.has_scalars ? pt_scalar_bytes(cloud) : 0},
+        {(void **)&cloud->classes, cloud->info.has_classes ? pt_class_bytes(cloud) : 0},
     };
     memcpy(sections, list, sizeof list);
 }
@@ -101,6 +104,7 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
                             .chunk_count = cloud->chunk_count,
                             .slots = cloud->slots,
                             .spacing_base = cloud->spacing_base,
+                            .class_hash = cloud->class_hash,
                             .info = cloud->info};
     list_sections(&copy, sections);
     memcpy(header.magic, magic, sizeof magic);
@@ -175,7 +179,7 @@ static int check_header(const char *path, const struct header *header, uint64_t 
         header->chunk_count > header->info.count || header->info.drawn > header->info.count ||
         header->info.has_colors != (header->color_format != PT_COLOR_NONE) || header->info.has_opacities > 1 ||
         header->info.has_normals > 1 || header->info.has_radii > 1 || !isfinite(header->info.radius_most) ||
-        !isfinite(header->spacing_base))
+        header->info.has_scalars > 1 || header->info.has_classes > 1 || !isfinite(header->spacing_base))
         return refuse(path, "its header is damaged");
     return PATINA_OK;
 }
@@ -211,6 +215,7 @@ static int open_descriptor(const char *path, int descriptor, struct patina_cloud
     cloud->chunk_count = header.chunk_count;
     cloud->color_format = header.color_format;
     cloud->spacing_base = header.spacing_base;
+    cloud->class_hash = header.class_hash;
     list_sections(cloud, sections);
     if (file_size(sections) != header.size)
         return refuse(path, "its header is damaged");

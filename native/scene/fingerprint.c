@@ -66,14 +66,15 @@ static uint64_t add_array(uint64_t hash, const patina_array *array, uint64_t cou
 
 int pt_desc_fingerprint(const patina_cloud_desc *desc, uint64_t values[2])
 {
-    const patina_array *arrays[] = { &desc->position, &desc->normal, &desc->opacity, &desc->radius, &desc->color };
-    for (int i = 0; i < 5; i++)
+    const patina_array *arrays[] = { &desc->position, &desc->normal, &desc->opacity, &desc->radius,
+                                     &desc->classes,  &desc->color,  &desc->scalar };
+    for (int i = 0; i < 7; i++)
         if (arrays[i]->data && (arrays[i]->type > PATINA_INT32 || arrays[i]->stride))
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: array %d is not tightly packed, or of an "
                            "unknown type", i);
     values[0] = mix(0, desc->count);
-    for (int i = 0; i < 4; i++)
-        values[0] = add_array(values[0], arrays[i], desc->count);
-    values[1] = add_array(mix(1, desc->count), arrays[4], desc->count);
+    values[1] = mix(1, desc->count);
+    for (int i = 0; i < 7; i++)
+        values[i / 5] = add_array(values[i / 5], arrays[i], desc->count);
     return PATINA_OK;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "scene.h"
 
+#include "clip.h"
 #include "kernel_args.h"
 
 #include <float.h>
@@ -40,9 +41,11 @@ void patina_scene_destroy(patina_scene *scene)
 {
     if (!scene)
         return;
+    patina_scene_clear(scene);
     free(scene->instances);
     free(scene->lights);
     free(scene->meshes);
+    free(scene->clips);
     pt_handle_destroy(&scene->handle);
     free(scene);
 }
@@ -51,7 +54,9 @@ int patina_scene_clear(patina_scene *scene)
 {
     if (!scene)
         return fail(NULL, "patina_scene_clear: scene is NULL");
-    scene->instance_count = scene->light_count = scene->mesh_count = 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        free((void *)scene->instances[i].style.ramp);
+    scene->instance_count = scene->light_count = scene->mesh_count = scene->clip_count = 0;
     scene->points = scene->triangles = 0;
     return PATINA_OK;
 }
@@ -66,6 +71,28 @@ static void *grow(void *array, uint32_t count, uint32_t *room, size_t size)
     if (grown)
         *room = wanted;
     return grown;
+}
+
+static int check_color(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
+{
+    if (style->color_source > PATINA_COLOR_DISTANCE)
+        return fail(scene, "cloud style: no such color_source");
+    if (style->color_source == PATINA_COLOR_SCALAR && !cloud->info.has_scalars)
+        return fail(scene, "cloud style: a ramp over scalars, and the cloud has none");
+    if (style->ramp && (style->ramp_count < 2 || style->ramp_count > PATINA_MAX_RAMP))
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: a ramp of %u colours; 2 to %d can be had",
+                       style->ramp_count, PATINA_MAX_RAMP);
+    for (uint32_t i = 0; style->ramp && i < 3 * style->ramp_count; i++)
+        if (!isfinite(style->ramp[i]))
+            return fail(scene, "cloud style: a colour of the ramp is not finite");
+    if (!isfinite(style->ramp_range[0]) || !isfinite(style->ramp_range[1]))
+        return fail(scene, "cloud style: ramp_range is not finite");
+    if (!(fabsf(style->exposure) <= 32.0f) || !(style->contrast >= 0.0f && style->contrast <= 16.0f))
+        return fail(scene, "cloud style: exposure must be between -32 and 32 stops, contrast between 0 and 16");
+    if (style->clip_off > 1)
+        return fail(scene, "cloud style: clip_off is 0 or 1");
+    style->contrast = style->contrast == 0.0f ? 1.0f : style->contrast;
+    return PATINA_OK;
 }
 
 // All zero becomes the identity.
@@ -107,7 +134,8 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         !isfinite(style->ambient + style->diffuse + style->specular))
         return fail(scene, "cloud style: colour and Phong factors must be finite");
     if (style->lighting == PATINA_LIGHTING_AUTO)
-        style->lighting = cloud->info.has_colors ? PATINA_LIGHTING_UNLIT : PATINA_LIGHTING_LIT;
+        style->lighting = cloud->info.has_colors && style->color_source == PATINA_COLOR_OWN ? PATINA_LIGHTING_UNLIT
+                                                                                           : PATINA_LIGHTING_LIT;
     default_grey(style->color);
     if (style->ambient == 0.0f && style->diffuse == 0.0f && style->specular == 0.0f)
         style->ambient = style->diffuse = 1.0f;
@@ -118,7 +146,19 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
     if (style->shadow_off > 7)
         return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
-    return PATINA_OK;
+    return check_color(scene, style, cloud);
+}
+
+static int copy_ramp(patina_cloud_style *style)
+{
+    size_t size = 3 * (size_t)style->ramp_count * sizeof *style->ramp;
+    if (!style->ramp)
+        return PATINA_OK;
+    float *copy = malloc(size);
+    if (copy)
+        memcpy(copy, style->ramp, size);
+    style->ramp = copy;
+    return copy ? PATINA_OK : PATINA_ERROR_MEMORY;
 }
 
 int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style)
@@ -137,6 +177,9 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for instance %u", scene->instance_count);
     scene->instances = grown;
+    if (copy_ramp(&checked))
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for the ramp of instance %u",
+                       scene->instance_count);
     scene->instances[scene->instance_count++] =
         (struct pt_instance){ .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points };
     scene->points += cloud->info.count;
@@ -221,6 +264,29 @@ int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
     return PATINA_OK;
 }
 
+int patina_scene_add_clip(patina_scene *scene, const patina_clip *clip)
+{
+    static const double zero[16];
+    if (!scene || !clip || clip->struct_size != sizeof *clip)
+        return fail(scene, "patina_scene_add_clip: bad arguments");
+    patina_clip checked = *clip;
+    if (!memcmp(checked.world_from_clip, zero, sizeof zero))
+        memcpy(checked.world_from_clip, identity, sizeof identity);
+    if (!all_finite(checked.world_from_clip, 16))
+        return fail(scene, "clip: world_from_clip is not finite");
+    if (checked.shape > PATINA_CLIP_PLANE || checked.cut > 1)
+        return fail(scene, "clip: no such shape, or cut is neither 0 nor 1");
+    if (!isfinite(checked.tint[0] + checked.tint[1] + checked.tint[2]) || !(checked.tint_width >= 0.0f) ||
+        !isfinite(checked.tint_width) || !(checked.tint_strength >= 0.0f && checked.tint_strength <= 1.0f))
+        return fail(scene, "clip: tint and tint_width must be finite, the width 0 or more, the strength between 0 and 1");
+    void *grown = grow(scene->clips, scene->clip_count, &scene->clip_room, sizeof *scene->clips);
+    if (!grown)
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for clip %u", scene->clip_count);
+    scene->clips = grown;
+    scene->clips[scene->clip_count++] = checked;
+    return PATINA_OK;
+}
+
 int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera)
 {
     double axes[9], position[3];
@@ -278,8 +344,10 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
                        PATINA_MAX_LAYERS);
     if (s.layer_passes & ~(1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_NORMAL))
         return fail(scene, "settings: layer_passes can be COMBINED, DEPTH and NORMAL only");
-    if (s.shadow_samples > 4096 || s.shadow_resolution > 16384 || s.shadow_lazy > 1 || s.shadow_progressive > 1)
-        return fail(scene, "settings: at most 4096 shadow samples and 16384 texels; shadow_lazy and shadow_progressive are 0 or 1");
+    if (s.shadow_samples > 4096 || s.shadow_resolution > 16384 || s.shadow_lazy > 1 || s.shadow_progressive > 1 ||
+        s.shadow_uncut > 1)
+        return fail(scene, "settings: at most 4096 shadow samples and 16384 texels; shadow_lazy, shadow_progressive and "
+                           "shadow_uncut are 0 or 1");
     if (!(s.shadow_error >= 0.0f) || !isfinite(s.shadow_error))
         return fail(scene, "settings: shadow_error is negative or not finite");
     s.shadow_samples = s.shadow_samples ? s.shadow_samples : s.shadow_error > 0.0f ? 256 : 1;
@@ -310,16 +378,24 @@ static void box_corners(const struct pt_chunk *box, const double matrix[16], cor
     }
 }
 
-static void each_corner(const patina_scene *scene, corner_work *work, void *context)
+// PATINA_ERROR_MEMORY when there is none; without points, nothing is called back.
+static int each_corner(const patina_scene *scene, corner_work *work, void *context)
 {
+    struct pt_inverse_clip *room = malloc((scene->clip_count + 1) * sizeof *room);
+    if (!room)
+        return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "framing the scene: out of memory");
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const patina_cloud *cloud = scene->instances[i].cloud;
+        struct pt_sieve sieve = pt_sieve_make(scene, &scene->instances[i], room);
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
-            box_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
+            if (pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
+                box_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
     }
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (pt_mesh_drawn(scene->meshes[i].mesh))
             box_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
+    free(room);
+    return PATINA_OK;
 }
 
 struct framing {
@@ -363,10 +439,12 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
     double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
     struct framing framing = { .x = x, .y = y, .z = z, .half_y = tan(0.5 * fov * degree) };
     framing.half_x = framing.half_y * scene->settings.width / scene->settings.height;
-    each_corner(scene, grow_box, &framing);
+    if (each_corner(scene, grow_box, &framing))
+        return PATINA_ERROR_MEMORY;
     for (int k = 0; k < 3; k++)
         framing.center[k] = 0.5 * (framing.lower[k] + framing.upper[k]);
-    each_corner(scene, step_back, &framing);
+    if (each_corner(scene, step_back, &framing))
+        return PATINA_ERROR_MEMORY;
     double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
     double reach = framing.radius > 0.0 ? 1.01 * framing.radius : distance;
     *camera = (patina_camera){ .struct_size = sizeof *camera,

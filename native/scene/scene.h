@@ -8,7 +8,7 @@
 
 struct pt_instance {
     const struct patina_cloud *cloud;
-    patina_cloud_style style; // defaults made explicit
+    patina_cloud_style style; // defaults made explicit; its ramp is the scene's
     uint32_t id_base;
 };
 
@@ -26,6 +26,8 @@ struct patina_scene {
     struct pt_mesh_instance *meshes;
     uint32_t mesh_count, mesh_room;
     uint64_t triangles; // of all meshes
+    patina_clip *clips; // defaults made explicit
+    uint32_t clip_count, clip_room;
     uint64_t points; // of all instances
     patina_camera camera;
     int has_camera;

@@ -255,6 +255,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     } else {
         bad = tool_parse_effect(name, value, &o->effects);
         if (bad > 0)
+            bad = tool_parse_color(name, value, &o->color);
+        if (bad > 0)
             return UNKNOWN;
     }
     return bad ? BAD_VALUE : GOOD;

@@ -98,10 +98,11 @@ static int load_clouds(struct job *job)
     patina_cloud_style style = {.struct_size = sizeof style, .lighting = options->lighting};
     style.cull_back = options->cull ? 1 : 0;
     style.radius = (float)options->radius;
+    float table[PATINA_MAX_RAMP][3];
     tool_cancellable(job->progress, NULL);
     for (int i = 0; i < options->file_count; i++) {
         patina_cloud_info info = {.struct_size = sizeof info};
-        code = patina_cloud_load(options->files[i], job->progress, &job->clouds[i]);
+        code = tool_load_cloud(options->files[i], &options->color, job->progress, &job->clouds[i]);
         if (!code)
             code = patina_cloud_get_info(job->clouds[i], &info);
         if (code)
@@ -109,11 +110,14 @@ static int load_clouds(struct job *job)
         grow_box(&job->box, info.box_min, info.box_max);
         if (options->opacity_count)
             style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);
-        code = patina_scene_add_cloud(job->scene, job->clouds[i], &style);
+        code = tool_set_color(&options->color, job->clouds[i], table, &style);
+        if (!code)
+            code = patina_scene_add_cloud(job->scene, job->clouds[i], &style);
         if (code)
             return tool_failed(options->files[i], job->scene, code);
     }
-    return load_meshes(job);
+    code = tool_add_clips(&options->color, job->scene);
+    return code ? tool_failed("clip", job->scene, code) : load_meshes(job);
 }
 
 static int set_view(struct job *job, double turn, patina_camera *camera)

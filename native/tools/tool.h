@@ -34,7 +34,21 @@ int tool_cancelled(void);
 
 enum tool_view { VIEW_ANGLES, VIEW_LOOK };
 
-enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64 };
+enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS = 64 };
+
+// Colours of points and clips.
+struct tool_color {
+    uint32_t source; // patina_color_source
+    char attribute[64];
+    double range[2];
+    int has_range;
+    const char *ramp; // NULL: viridis
+    float fixed[3], exposure, contrast;
+    uint32_t hidden[8];
+    patina_clip clips[TOOL_CLIPS];
+    int clip_count;
+    float tint[4]; // and width; 0: none
+};
 
 struct tool_options {
     char **files; // into the argument vector
@@ -59,6 +73,7 @@ struct tool_options {
     int repeat; // measured frames; 0 = just the picture
     patina_settings settings;
     patina_effects effects;
+    struct tool_color color;
 };
 
 // Reads between `least` and `most` numbers separated by commas. Returns how many, or -1.
@@ -68,6 +83,17 @@ int tool_parse_effect(const char *name, const char *value, patina_effects *effec
 
 // Fills options from the arguments of `render`; files point into the vector, which is reordered. Returns a tool_exit.
 int tool_parse_render(int count, char **arguments, struct tool_options *options);
+
+// An option of tool_color: 0 taken, -1 a bad value, 1 none of them.
+int tool_parse_color(const char *name, const char *value, struct tool_color *color);
+
+// ---- clouds --------------------------------------------------------------------------------------------------------
+
+// Each returns a patina_error. table: room for the ramp, read until the cloud is added.
+int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out);
+int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, float table[PATINA_MAX_RAMP][3],
+                   patina_cloud_style *style);
+int tool_add_clips(const struct tool_color *color, patina_scene *scene);
 
 // ---- output ------------------------------------------------------------------------------------------------------
 

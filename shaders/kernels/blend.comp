@@ -25,7 +25,6 @@ layout(location = 3) uniform int band_first;
 layout(location = 4) uniform int band_end;
 
 #include "lib/disc.glsl"
-#include "lib/planes.glsl"
 #include "lib/srgb.glsl"
 
 #if STEP == 0

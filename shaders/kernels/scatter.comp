@@ -24,6 +24,7 @@ layout(std430, binding = 3) readonly buffer positions_block { float positions[];
 layout(std430, binding = 4) readonly buffer ids_block { uint ids[]; };
 layout(std430, binding = 5) readonly buffer surface_block { uint surface[]; };
 layout(std430, binding = 6) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = 7) readonly buffer drawn_block { uint drawn[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
@@ -62,8 +63,11 @@ void main()
             x = x * r;
             y = y * r;
         }
-        // 2. clip: NaN fails every comparison
+        // 2. clip: NaN fails every comparison; what was sifted out is not drawn
         if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
+            continue;
+        if (chunk.sifted != 0u &&
+            (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
             continue;
         // 3. limit and early depth test; the sign bit of -0 is dropped
         uint pixel = uint(int(floor(y)) - view.origin_y) * view.width + uint(int(floor(x)) - view.origin_x);

@@ -3,7 +3,8 @@
 // native/device_cpu/kernels/shade.c
 //
 // STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any
-// window); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts
+// window); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts;
+// RECOLOR: by a ramp, exposure, contrast
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -126,6 +127,8 @@ void main()
 
 #else
 
+#include "lib/recolor.glsl"
+
 struct pixel {
     float z;
     vec2 ray;
@@ -138,6 +141,8 @@ vec3 gather_albedo(vec3 style, uint id, uint at)
 {
 #if COLOR_FORMAT == 0
     return style;
+#elif COLOR_FORMAT == 4
+    return vec3(uintBitsToFloat(point_colors[id]));
 #elif COLOR_FORMAT == 2
     return vec3(uintBitsToFloat(point_colors[3u * id]), uintBitsToFloat(point_colors[3u * id + 1u]),
                 uintBitsToFloat(point_colors[3u * id + 2u]));
@@ -277,6 +282,9 @@ void main()
         p.z = pt_float(key.y);
         p.ray = pt_ray(view, int(column.x), int(y));
         p.albedo = gather_albedo(style, id, at);
+#if RECOLOR
+        p.albedo = recolor(view, eye_z, p.ray, p.z, style, p.albedo);
+#endif
         vec4 shaded = texelFetch(other_float4_plane, int(at));
         p.n = shaded.xyz;
         // 3. light

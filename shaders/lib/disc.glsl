@@ -5,6 +5,7 @@
 #define PT_DISC_GLSL
 
 #include "lib/math.glsl"
+#include "lib/planes.glsl"
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
@@ -131,6 +132,9 @@ void disc_shape(view_args view, uint word, inout disc d)
 bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
 {
     uint base = chunk.first - first_slot, at = 3u * base + slot;
+    if (chunk.sifted != 0u &&
+        (read_drawn(chunk.sifted - 1u + slot / PT_SLOTS_A_WORD) >> slot % PT_SLOTS_A_WORD & 1u) == 0u)
+        return false;
     vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
     precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];
     precise float x = (((chunk.lo[0] + chunk.row[0] * p.x) + chunk.row[1] * p.y) + chunk.row[2] * p.z) + chunk.hi[0];

@@ -51,7 +51,21 @@
 #define PT_DISC_FAR 4194304.0f // pixels: centres beyond are not drawn, boxes end there
 #define PT_SUM_SCALE 262144.0f // 2^18: weights, and what they weigh, are summed as integers
 #define PT_SUM_BRIGHTEST 4096.0f // colours above blend as this, so that a term fits 31 bits
+#define PT_COLOR_OF_SCALAR 4u // color_format: a float a point, for a ramp
 #define PT_COLOR_OF_PLANE 3u  // color_format: the colours buffer is a plane, four floats a pixel, opacity last
+
+// Shapes of clip_view.
+#define PT_CLIP_KEEP 0u  // a box: only what lies in it, or in another such box, is drawn
+#define PT_CLIP_CUT 1u   // a box: what lies in it is not
+#define PT_CLIP_PLANE 2u // what has q.z > 0 is not
+
+#define PT_SLOTS_A_WORD 16u // of the drawn words: chunks begin at multiples of it
+#define PT_RAMP_MOST 256    // PATINA_MAX_RAMP
+#define PT_RAMP_SCALAR 1u   // sources of a ramp
+#define PT_RAMP_PLACE 2u
+#define PT_RAMP_DISTANCE 3u
+#define PT_MID_GREY 0.18f   // contrast turns around it
+#define PT_BRIGHTEST 65504.0f // half floats end there
 
 #define PT_SPACINGS 64
 #define PT_MAX_LIGHTS 32
@@ -92,6 +106,25 @@ struct chunk_view {
     uint32_t count, padded;
     uint32_t cull;  // 1: test each point's normal
     uint32_t id_base;
+    uint32_t sifted; // 1 + its first drawn word; 0: all points are drawn
+    uint32_t clip_first, clip_count, clip_keeps; // sift: its clips, and how many of them, the first, are PT_CLIP_KEEP
+};
+
+// A clip in a chunk's coordinates, or (tint) in view space: q = (lo + R p) + hi in this order. In a box every |q| <= 1.
+// Planes: q.z is in world units, the rest is 0.
+struct clip_view {
+    float row[9];
+    float hi[3], lo[3];
+    uint32_t shape;
+    float half_size[3]; // tint: of a box, world units
+    float tint[3], strength, width;
+};
+
+// sift: which points are drawn. A hidden class takes them all; of clips: in one that keeps, if there are any, in none that
+// cuts. Bit-equal everywhere, as scatter is.
+struct sift_args {
+    uint32_t by_class;  // 1: classes are there, and some are hidden
+    uint32_t hidden[8]; // bit c % 32 of word c / 32: class c
 };
 
 // scatter: points -> least key a pixel. [D 3.1]; behind a layer only points with z > limit at their pixel count. [D 5]
@@ -99,6 +132,7 @@ struct scatter_args {
     struct view_args view;
     uint32_t instances;
     uint32_t behind; // 1: the limit plane holds
+    uint32_t sifted; // 1: the drawn words hold; they follow the limit plane, if there is one
 };
 
 // A mesh as this view sees it. Its vertices are projected as a chunk's points are.
@@ -133,7 +167,7 @@ struct cover_args {
 struct instance_args {
     uint32_t id_base, id_count; // ids of this instance: [id_base, id_base + id_count)
     uint32_t has_normals;
-    uint32_t color_format;      // 0 style colour, 1 sRGB 8 bit x 3, 2 float x 3, 3 a plane
+    uint32_t color_format;      // 0 style colour, 1 sRGB 8 bit x 3, 2 float x 3, 3 a plane; shade: 4 scalars
     uint32_t lit;
     uint32_t shininess;
     float ambient, diffuse, specular;
@@ -160,6 +194,7 @@ struct splat_args {
     struct view_args view;
     uint32_t instances;
     uint32_t behind; // 1: the limit plane holds
+    uint32_t sifted; // as in scatter_args
 };
 
 // blend: what the discs within d_eff behind the nearest surface of a pixel show there, weighted by how near their centres lie:
@@ -170,6 +205,7 @@ struct splat_args {
 struct blend_args {
     struct view_args view;
     uint32_t instances;
+    uint32_t sifted; // as in scatter_args
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Taken are pixels with
@@ -225,6 +261,21 @@ struct light_args {
     float points[3 * PT_AREA_POINTS]; // area: positions
 };
 
+// shade: a ramp's colour in place of the point's, then exposure and contrast.
+//   scalar: t = (scalar - zero) along.x; where it is NaN, the style colour
+//   place: t = ((along.x x + along.y y) + along.z z) + zero, in view space
+//   distance: t = (distance - zero) along.x, to the eye or (orthographic) to its plane
+//   colour: entries evenly over t = 0..1, straight between
+//   graded: c = grey (gain c / grey)^contrast, at most PT_BRIGHTEST
+struct recolor_args {
+    uint32_t source; // PT_RAMP_*; 0: no ramp
+    uint32_t graded;
+    float along[3], zero;
+    float gain, contrast;
+    uint32_t entries; // 2..PT_RAMP_MOST
+    float ramp[3 * PT_RAMP_MOST];
+};
+
 // shade: id -> colour, normal, Phong. [D 3.1], deferred. A filled pixel's normal (SPEC 2.2, refined) is the blend, over the
 // (2 blend + 1)^2 window, of the surfaces of the same layer that its pixels show: normal[from], |z_q - z| <= deff[from of
 // this pixel], weight 1 / (1 + distance^2), an eighth of it where q is filled itself; with blend = 0 (paper), and where the blend is nothing, its own source's.
@@ -237,6 +288,16 @@ struct shade_args {
     uint32_t arrived;   // 1: written
     uint32_t light_count;
     struct light_args lights[PT_MAX_LIGHTS];
+    struct recolor_args recolor;
+};
+
+// tint: the colour of pixels whose surface lies near a cut. d: how far inside that box which keeps it most, how far outside a
+// box that cuts or before a plane; weight = strength clamp((width - d) / footprint + 1/2), of the clip where it is greatest.
+struct tint_args {
+    struct view_args view;
+    uint32_t id_base, id_count; // pixels of this instance
+    uint32_t clip_first, clip_count;
+    float eye_z; // as in shade_args
 };
 
 // mark: a byte of 1 for every point that the picture shows, measured or as the source of filled pixels.

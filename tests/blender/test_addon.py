@@ -17,7 +17,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 MODULES = ("check_camera", "check_points", "check_lights", "check_passes", "check_layers", "check_shadows", "check_final",
-           "check_plan", "check_panels", "check_styles", "check_import", "check_formats", "check_linked",
+           "check_plan", "check_color", "check_clip", "check_panels", "check_styles", "check_import", "check_formats",
+           "check_linked",
            "check_sequence", "check_motion", "check_panorama", "check_migrate", "check_meshes", "check_combine",
            "check_session", "check_effects")
 

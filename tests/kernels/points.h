@@ -19,6 +19,8 @@ struct scene {
     struct cloud clouds[MOST_INSTANCES];
     uint32_t count;
     const float *limit; // by pixel: only points beyond it count; NULL: all
+    uint32_t *drawn;    // of sifted chunks; NULL: there are none
+    uint32_t words;
 };
 
 // A camera: view = rotation * object + shift, screen in pixels.

@@ -8,7 +8,7 @@
 
 static uint64_t *run_scatter(struct harness *h, struct scene *scene)
 {
-    struct pt_buffer *buffers[2 + 4 * MOST_INSTANCES];
+    struct pt_buffer *buffers[3 + 4 * MOST_INSTANCES];
     size_t pixels = (size_t)scene->view.width * scene->view.height;
     uint64_t *empty = harness_alloc(h, pixels * 8);
     for (size_t i = 0; i < pixels; i++)
@@ -24,8 +24,11 @@ static uint64_t *run_scatter(struct harness *h, struct scene *scene)
         buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->points);
     }
     struct scatter_args args = {.view = scene->view, .instances = scene->count, .behind = scene->limit != NULL};
+    args.sifted = scene->drawn != NULL;
     if (scene->limit)
         buffers[n++] = harness_buffer(h, scene->limit, pixels * 4);
+    if (scene->drawn)
+        buffers[n++] = harness_buffer(h, scene->drawn, 4 * (size_t)scene->words);
     harness_run(h, PT_KERNEL_scatter, &args, sizeof args, buffers, n);
     uint64_t *keys = harness_read(h, buffers[0]);
     harness_same(h, "keys", keys, pixels, 8, 1, scene->view.width);
@@ -53,9 +56,13 @@ static uint64_t *check_scene(struct harness *h, struct scene *scene)
     for (uint32_t i = 0; i < scene->count; i++) {
         const struct cloud *cloud = &scene->clouds[i];
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
-            for (uint32_t s = 0; s < cloud->chunks[c].count; s++)
-                splats[n++] = ref_scatter(&scene->view, &cloud->chunks[c], cloud->positions, cloud->ids, cloud->surface,
-                                          s);
+            for (uint32_t s = 0; s < cloud->chunks[c].count; s++) {
+                splats[n] = ref_scatter(&scene->view, &cloud->chunks[c], cloud->positions, cloud->ids, cloud->surface, s);
+                const uint32_t word = cloud->chunks[c].sifted;
+                if (word && !(scene->drawn[word - 1 + s / PT_SLOTS_A_WORD] >> s % PT_SLOTS_A_WORD & 1u))
+                    splats[n].possible = 0;
+                n++;
+            }
     }
     for (uint32_t i = 0; i < n; i++) {
         open += splats[i].possible && !splats[i].definite;
@@ -111,6 +118,37 @@ static void random_clouds(struct harness *h, int perspective, uint32_t seed)
         points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i != 1, i * 5000), i == 0 ? 1.0 : 5.0);
     }
     check_scene(h, &scene);
+}
+
+// Some chunks sifted: half of their points, all, none; with a limit and without.
+static void sifted(struct harness *h)
+{
+    for (uint32_t i = 0; i < 4; i++) {
+        struct rng rng = {40 + i};
+        struct scene scene = {.view = points_window(67, 45, i % 2 != 0, i % 2 ? 60.0 : 20.0)};
+        for (uint32_t k = 0; k < 2; k++) {
+            struct camera camera = points_look(&rng, &scene.view, 1.0 / scene.view.ray_xs, 4.0);
+            points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, k != 0, k * 5000), 1.0);
+            for (uint32_t c = k; c < SIZES; c += 2) {
+                scene.clouds[k].chunks[c].sifted = 1 + scene.words;
+                scene.words += scene.clouds[k].chunks[c].padded / PT_SLOTS_A_WORD;
+            }
+        }
+        scene.drawn = harness_alloc(h, 4 * (size_t)scene.words);
+        for (uint32_t k = 0; k < scene.words; k++)
+            scene.drawn[k] = k % 5 ? (uint32_t)rng_next(&rng) & 0xFFFFu : k % 2 ? 0xFFFFu : 0;
+        for (uint32_t k = 0; k < 2 * SIZES; k++) { // padding is drawn as the point that it repeats
+            const struct chunk_view *chunk = &scene.clouds[k / SIZES].chunks[k % SIZES];
+            uint32_t last = (chunk->count - 1) % PT_SLOTS_A_WORD, *word = scene.drawn + chunk->sifted + (chunk->padded / PT_SLOTS_A_WORD) - 2;
+            if (chunk->sifted)
+                *word = (*word & ((2u << last) - 1u)) | (*word >> last & 1u ? 0xFFFFu << last & 0xFFFFu : 0u);
+        }
+        float *limit = harness_alloc(h, (size_t)scene.view.width * scene.view.height * 4);
+        for (uint32_t k = 0; k < scene.view.width * scene.view.height; k++)
+            limit[k] = 3.9f;
+        scene.limit = i > 1 ? limit : NULL;
+        check_scene(h, &scene);
+    }
 }
 
 static void perspective(struct harness *h)
@@ -418,6 +456,7 @@ int main(int argc, char **argv)
         {"camera 5 10^6 away, singular matrices", far_and_flat, 0},
         {"back faces", culling, 0},
         {"behind a layer", limits, 0},
+        {"sifted chunks", sifted, 0},
         {"nothing to draw", nothing, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

@@ -248,6 +248,62 @@ static void shapes(struct harness *h)
     }
 }
 
+// Ramps of all sources and lengths; scalars among which some are NaN and infinite; exposure and contrast.
+static void ramps(struct harness *h)
+{
+    static const uint32_t entries[] = {2, 7, 256};
+    for (uint32_t source = 0; source <= PT_RAMP_DISTANCE; source++)
+        for (uint32_t i = 0; i < 6; i++) {
+            struct rng rng = {source * 10 + i};
+            const int scalar = source == PT_RAMP_SCALAR;
+            struct setup s = make(h, &rng, i % 2, i < 3 ? PICTURE_SURFACES : PICTURE_NOISE, scalar || source > 1 ? 0 : 1 + i % 2);
+            struct recolor_args *recolor = &s.args.recolor;
+            s.args.instance.color_format = scalar ? PT_COLOR_OF_SCALAR : source > 1 ? 0 : s.args.instance.color_format;
+            s.args.instance.lit = i % 3 == 0;
+            recolor->source = source;
+            recolor->entries = entries[i % 3];
+            recolor->graded = i > 1;
+            recolor->gain = i == 2 ? 8.0f : i == 5 ? 0.125f : 1.0f;
+            recolor->contrast = i == 3 ? 2.5f : i == 4 ? 0.3f : 1.0f;
+            for (int k = 0; k < 3; k++)
+                recolor->along[k] = (float)rng_range(&rng, -0.4, 0.4);
+            recolor->zero = scalar ? -4.0f : source == PT_RAMP_DISTANCE ? 2.0f : 0.3f;
+            for (uint32_t k = 0; k < 3 * recolor->entries; k++)
+                recolor->ramp[k] = (float)rng_unit(&rng);
+            for (uint32_t k = 0; k < s.args.instance.id_count && scalar; k++)
+                ((float *)s.colors)[k] = k % 50 == 7    ? NAN
+                                         : k % 50 == 8  ? INFINITY
+                                         : k % 50 == 9  ? -INFINITY
+                                                        : (float)rng_range(&rng, -6.0, 3.0);
+            check(h, &s, TOL_UNSURE_SHARE);
+        }
+}
+
+// Reference alone: the middle of a ramp from black to white; two stops up; a contrast of 2 takes mid grey for itself.
+static void ramp_sanity(struct harness *h)
+{
+    uint64_t key = ref_key(2.0f, 0);
+    uint32_t from = 0;
+    float normal[4] = {0, 0, 1, 1}, deff = 0.1f, scalar = 3.0f;
+    struct shade_args args = {.view = {.width = 1, .height = 1}};
+    args.instance = (struct instance_args){.id_count = 1, .opacity = 1.0f, .color_format = PT_COLOR_OF_SCALAR, .color = {0.9f, 0.1f, 0.1f}};
+    args.recolor = (struct recolor_args){
+        .source = PT_RAMP_SCALAR, .along = {0.5f}, .zero = 2.0f, .entries = 2, .gain = 1.0f, .contrast = 1.0f, .ramp = {0, 0, 0, 1, 1, 1}};
+    struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff, .colors = &scalar};
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.5) < 1e-6);
+    args.recolor.graded = 1;
+    args.recolor.gain = 4.0f;
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 2.0) < 1e-6);
+    args.recolor.gain = 0.36f; // mid grey
+    args.recolor.contrast = 2.0f;
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.18) < 1e-6);
+    args.recolor.gain = 0.18f; // a stop below it: two with the contrast
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.045) < 1e-6);
+    args.recolor.graded = 0;
+    scalar = NAN;
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.9) < 1e-6);
+}
+
 // Reference alone: a white wall, lit head-on by a sun of irradiance pi, is as bright as a mirror of it: 1.
 static void sanity(struct harness *h)
 {
@@ -287,6 +343,8 @@ int main(int argc, char **argv)
         {"materials", materials, 0},
         {"lights", lights, 0},
         {"spots and panels", shapes, 0},
+        {"sanity of ramps", ramp_sanity, 1},
+        {"ramps, exposure, contrast", ramps, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

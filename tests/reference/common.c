@@ -238,3 +238,15 @@ struct ref_range ref_plane_depth(const struct view_args *view, const float norma
         kept.lo = z.lo;
     return kept;
 }
+
+double ref_clip_row(const struct clip_view *clip, int k, const double p[3], double *error)
+{
+    const float *r = clip->row + 3 * k;
+    double value = (double)clip->lo[k] + clip->hi[k], terms = fabs((double)clip->lo[k]) + fabs((double)clip->hi[k]);
+    for (int i = 0; i < 3; i++) {
+        value += r[i] * p[i];
+        terms += fabs(r[i] * p[i]);
+    }
+    *error = TOL_PROJECT * terms;
+    return value;
+}

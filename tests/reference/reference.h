@@ -89,6 +89,12 @@ struct ref_place {
 struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
                            uint32_t slot);
 
+// Row k of (lo + R p) + hi of a clip, with a bound of what float32 adds.
+double ref_clip_row(const struct clip_view *clip, int k, const double p[3], double *error);
+// Is the point of this slot drawn? positions: of the instance; classes: by slot.
+enum ref_truth ref_sift(const struct sift_args *args, const struct chunk_view *chunk, const float *positions,
+                        const uint8_t *classes, const struct clip_view *clips, uint32_t slot);
+
 // ---- raster.c -------------------------------------------------------------------------------------------------------
 
 // A triangle at the centre of the pixel (x, y).
@@ -228,6 +234,8 @@ struct ref_color {
     int unsure;
     int mixed; // anti-aliasing marked the pixel
 };
+struct ref_color ref_tint(const struct tint_args *args, const struct ref_planes *planes, const struct clip_view *clips, int x,
+                          int y);
 struct ref_color ref_smooth(const struct smooth_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_color ref_antialias(const struct antialias_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_peel {

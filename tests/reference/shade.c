@@ -23,6 +23,87 @@ static void albedo_of(const struct instance_args *instance, const struct ref_pla
     }
 }
 
+// ---- ramps, exposure, contrast -------------------------------------------------------------------------------------------
+
+// Where the pixel lies on the ramp, and how far off float32 may put it; 0 when it lies nowhere.
+static int place_on_ramp(const struct shade_args *args, const struct ref_planes *planes, uint32_t id, struct ref_ray ray,
+                         double z, double *t, double *error)
+{
+    const struct recolor_args *recolor = &args->recolor;
+    double slope = recolor->along[0], across = args->view.perspective ? z : 1.0, depth = z + (double)args->eye_z;
+    double p[3] = {ray.u * across, ray.v * across, -depth}, rays[3] = {ray.error_u * across, ray.error_v * across, 0.0};
+    if (recolor->source == PT_RAMP_SCALAR) {
+        double scalar = ((const float *)planes->colors)[id];
+        *t = (scalar - recolor->zero) * slope;
+        *error = 3.0 * TOL_UNIT * fabs(*t);
+        return !isnan(scalar);
+    }
+    if (recolor->source == PT_RAMP_DISTANCE) {
+        double distance = args->view.perspective ? sqrt(p[0] * p[0] + p[1] * p[1] + z * z) : depth;
+        *t = (distance - recolor->zero) * slope;
+        *error = fabs(slope) * (TOL_NORMAL * fabs(distance) + rays[0] + rays[1] + TOL_UNIT * (z + fabs((double)args->eye_z))) +
+                 3.0 * TOL_UNIT * fabs(*t);
+        return 1;
+    }
+    double terms = fabs((double)recolor->zero);
+    *t = recolor->zero;
+    *error = fabs(recolor->along[2]) * TOL_UNIT * (z + fabs((double)args->eye_z));
+    for (int k = 0; k < 3; k++) {
+        *t += recolor->along[k] * p[k];
+        terms += fabs(recolor->along[k] * p[k]);
+        *error += fabs(recolor->along[k]) * rays[k];
+    }
+    *error += TOL_PROJECT * terms;
+    return 1;
+}
+
+static double ramp_value(const struct recolor_args *recolor, double t, int channel)
+{
+    double at = fmin(fmax(t, 0.0), 1.0) * (recolor->entries - 1.0);
+    int low = (int)fmin(floor(at), recolor->entries - 2.0);
+    double from = recolor->ramp[3 * low + channel], to = recolor->ramp[3 * low + 3 + channel];
+    return from + (at - low) * (to - from);
+}
+
+static double steepest(const struct recolor_args *recolor, int channel)
+{
+    double most = 0.0;
+    for (uint32_t i = 0; i + 1 < recolor->entries; i++)
+        most = fmax(most, fabs((double)recolor->ramp[3 * i + 3 + (uint32_t)channel] - recolor->ramp[3 * i + (uint32_t)channel]));
+    return most;
+}
+
+static double graded(const struct recolor_args *recolor, double c)
+{
+    c *= recolor->gain;
+    if (recolor->contrast != 1.0f)
+        c = c > 0.0 ? (double)PT_MID_GREY * pow(c / (double)PT_MID_GREY, recolor->contrast) : 0.0;
+    return fmax(fmin(c, (double)PT_BRIGHTEST), -(double)PT_BRIGHTEST);
+}
+
+// In and out: the point's colour.
+static void recolor(const struct shade_args *args, const struct ref_planes *planes, uint32_t id, struct ref_ray ray, double z,
+                    double albedo[3], double errors[3])
+{
+    const struct recolor_args *recolor = &args->recolor;
+    double t, off;
+    int placed = recolor->source && place_on_ramp(args, planes, id, ray, z, &t, &off);
+    for (int c = 0; c < 3; c++) {
+        errors[c] = TOL_UNIT * fabs(albedo[c]);
+        if (recolor->source)
+            albedo[c] = placed ? ramp_value(recolor, t, c) : args->instance.color[c];
+        if (placed) // entries more or less, and what between two of them is rounded
+            errors[c] = (off + 4.0 * TOL_UNIT) * (recolor->entries - 1.0) * steepest(recolor, c) + 4.0 * TOL_UNIT;
+        if (!recolor->graded)
+            continue;
+        double value = graded(recolor, albedo[c]), more = graded(recolor, albedo[c] + errors[c]);
+        double less = graded(recolor, albedo[c] - errors[c]);
+        double stops = albedo[c] > 0.0 ? fabs(log2(recolor->gain * albedo[c] / (double)PT_MID_GREY)) : 0.0;
+        errors[c] = fmax(more - value, value - less) + fabs(value) * (TOL_POWER + TOL_LOG * recolor->contrast + TOL_STOPS * (1.0 + recolor->contrast * stops));
+        albedo[c] = value;
+    }
+}
+
 // Blends the normals of the surfaces that the pixels of the same layer around a filled one show.
 static void blend(const struct view_args *view, const struct ref_planes *planes, int radius, int x, int y,
                   struct ref_shade *out)
@@ -153,8 +234,9 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
         return out;
     struct ref_ray ray = ref_ray(view, x, y);
     struct ref_vec viewer = ref_viewer(view, ray);
-    double albedo[3], z = ref_key_z(key);
+    double albedo[3], recolored[3], z = ref_key_z(key);
     albedo_of(instance, planes, ref_key_id(key) - instance->id_base, albedo);
+    recolor(args, planes, ref_key_id(key) - instance->id_base, ray, z, albedo, recolored);
     normal_of(args, planes, x, y, &out);
     out.opacity = instance->opacity;
     if (instance->has_opacities)
@@ -163,7 +245,7 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     out.color_error[3] = TOL_OPACITY * out.opacity;
     for (int c = 0; c < 3; c++) {
         out.color[c] = out.opacity * albedo[c];
-        out.color_error[c] = TOL_COLOR * fabs(out.color[c]);
+        out.color_error[c] = TOL_COLOR * fabs(out.color[c]) + out.opacity * recolored[c];
     }
     if (!instance->lit)
         return out;
@@ -202,7 +284,8 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     out.shadow = casting ? arrived / casting : 1.0;
     for (int c = 0; c < 3; c++) {
         out.color[c] = out.opacity * albedo[c] * s.light[c];
-        out.color_error[c] = out.opacity * fabs(albedo[c]) * s.loose[c] + TOL_COLOR * fabs(out.color[c]);
+        out.color_error[c] = out.opacity * fabs(albedo[c]) * s.loose[c] + TOL_COLOR * fabs(out.color[c]) +
+                             out.opacity * recolored[c] * (fabs(s.light[c]) + s.loose[c]);
     }
     return out;
 }

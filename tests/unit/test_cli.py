@@ -386,6 +386,39 @@ def test_shadows():
     assert "no value" in run("render", *view, "-o", "x.png", "--sun", "0,91", code=2).stderr
 
 
+def test_colors_and_clips():
+    """A wall whose left half is of class 2, the right of class 6: ramps, hidden classes, boxes."""
+    step = 2 / 119
+    rows = ["x,y,z,classification,rise"]
+    rows += [f"{x * step - 1},0,{z * step - 1},{2 if x < 60 else 6},{10 * z}" for x in range(120) for z in range(120)]
+    (FOLDER / "wall.csv").write_text("\n".join(rows))
+    view = ["--size", "64x64", "--look", "0,-3,0,0,0,0", "--unlit", "--background", "0,0,0", "-o", "c.png"]
+    left, right = (16, 32), (48, 32)
+
+    def at(*arguments):
+        run("render", "wall.csv", *view, *arguments)
+        rows = read_png("c.png")[3]
+        return [rows[y][x] for x, y in (left, right)]
+
+    assert at("--color", "1,0,0") == [(255, 0, 0)] * 2
+    ground, building = at("--ramp", "classification", "--ramp-colors", "classes")
+    assert ground == (0xA9, 0x79, 0x4A) and building == (0xD9, 0x66, 0x3B), (ground, building)
+    assert at("--color", "1,0,0", "--hide-classes", "2,7") == [(0, 0, 0), (255, 0, 0)]
+    assert at("--color", "1,0,0", "--clip-box", "-1,-1,-1,-0.1,1,1") == [(255, 0, 0), (0, 0, 0)]
+    assert at("--color", "1,0,0", "--cut-box", "-1,-1,-1,-0.1,1,1") == [(0, 0, 0), (255, 0, 0)]
+    tinted = at("--color", "1,0,0", "--cut-box", "-1,-1,-1,-0.1,1,1", "--clip-tint", "0,0,1,5")
+    assert tinted == [(0, 0, 0), (0, 0, 255)], tinted
+    at("--ramp", "rise,0,1190", "--ramp-colors", "grey")
+    rows = read_png("c.png")[3]
+    assert rows[10][32][0] > 200 > 128 > rows[54][32][0], "by an attribute, brighter upwards"
+    assert at("--color", "0.18,0.18,0.18", "--exposure", "1", "--contrast", "2") == at("--color", "0.72,0.72,0.72")
+    for arguments in (["--ramp", "nothing"], ["--ramp", "height", "--ramp-colors", "plaid"]):
+        assert "there is no" in run("render", "wall.csv", *view, *arguments, code=1).stderr
+    for arguments in (["--contrast", "-1"], ["--hide-classes", "2,x"], ["--clip-box", "1,2,3"], ["--clip-tint", "1,0,0,0"],
+                      ["--ramp", "height,1"], ["--exposure", "99"]):
+        run("render", "wall.csv", *view, *arguments, code=2)
+
+
 def test_skipped_passes_have_reasons():
     ball("skipped.ply", 500)
     stats = json.loads(run("render", "skipped.ply", "--stats", "json", "--smooth", "off", "--antialias", "off").stdout)

@@ -182,6 +182,8 @@ static void shade(const struct finish *finish, struct walk *walk, int32_t y)
             if (!vm_bits(ours))
                 continue;
             pt_albedo(&args->instance, pt_cpu_data(&finish->shades[i].call, 4), id, (size_t)y * view->width + x, ours, albedo);
+            if (pt_recolors(args))
+                pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
             for (uint32_t k = 0; k < 3; k++)
                 vf_store(out->color[k] + x, albedo[k], ours);
         }

@@ -25,6 +25,7 @@ struct pt_bins {
     const struct pt_cpu_call *call;
     const struct view_args *view;
     const struct disc_args *discs; // an instance each
+    const uint32_t *drawn;         // bits of sifted chunks
     uint32_t instances, first, stride; // buffers of instance i start at first + i stride: chunks, positions, ids, surface, radii
     uint32_t columns, rows, bins;      // tiles, and one for the large
     uint32_t *begins;                  // first chunk of each instance in the list of all chunks
@@ -94,6 +95,8 @@ static void pt_bin_chunks(void *context, uint32_t begin, uint32_t end, uint32_t 
             pt_disc_place(&source, vi_add(vi_set(i), vi_lanes()), vm_first(pt_lanes_left(i, source.chunk->count)), &discs, &id,
                           &word);
             uint32_t drawn = vm_bits(discs.drawn);
+            if (source.chunk->sifted)
+                drawn &= bins->drawn[source.chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD;
             if (!drawn)
                 continue;
             for (int k = 0; k < 4; k++)

@@ -238,6 +238,7 @@ int PT_KERNEL_ENTRY(blend)(const struct pt_cpu_call *call)
     struct pt_bins bins = { .call = call,
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
+                            .drawn = args->sifted ? pt_cpu_data(call, 4 + 7 * args->instances) : NULL,
                             .instances = args->instances,
                             .first = 4,
                             .stride = 7 };

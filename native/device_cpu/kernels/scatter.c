@@ -16,6 +16,7 @@ struct scatter {
 struct target {
     uint64_t *keys;
     const float *limit; // only what lies beyond counts; NULL: everything
+    const uint32_t *drawn; // bits of sifted chunks
     int shared;         // by several threads
 };
 
@@ -91,9 +92,11 @@ static void scatter_chunk(const struct view_args *view, const struct chunk_view 
             x = x * r;
             y = y * r;
         }
-        // 2. clip: NaN fails every comparison
+        // 2. clip: NaN fails every comparison; what was sifted out is not drawn
         vm inside = vm_and(vm_and(vf_le(z_near, z), vf_le(z, z_far)),
                            vm_and(vm_and(vf_le(left, x), vf_lt(x, right)), vm_and(vf_le(bottom, y), vf_lt(y, top))));
+        if (chunk->sifted)
+            inside = vm_and(inside, vm_of_bits(target.drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
         if (!vm_bits(inside))
             continue;
         // 3. limit and early depth test; the sign bit of -0 is dropped
@@ -141,6 +144,7 @@ static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
     const struct scatter_args *args = call->arguments;
     const struct target target = { .keys = pt_cpu_data(call, 0),
                                    .limit = args->behind ? pt_cpu_data(call, 1 + 4 * args->instances) : NULL,
+                                   .drawn = args->sifted ? pt_cpu_data(call, 1 + 4 * args->instances + args->behind) : NULL,
                                    .shared = pt_pool_threads(call->pool) > 1 };
     uint32_t instance = 0;
     (void)thread;

@@ -3,12 +3,13 @@
 #ifndef PT_SHADE_H
 #define PT_SHADE_H
 
+#include "device_cpu/kernels/recolor.h"
 #include "device_cpu/picture_rows.h"
 #include "device_cpu/srgb.h"
 
 enum { PT_BLEND_MOST = 8 };
 
-static const uint32_t pt_color_bytes[] = { 0, 3, 12, 0 }; // of a point, by color_format
+static const uint32_t pt_color_bytes[] = { 0, 3, 12, 0, 4 }; // of a point, by color_format
 
 // Weights of the blend by squared distance.
 static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1])
@@ -60,7 +61,9 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
             albedo[k] = vf_look_up(pt_srgb_table, 256, vi_and(vi_shr(rgb, 8 * k), vi_set(255)));
         return;
     }
-    if (!instance->color_format)
+    if (instance->color_format == PT_COLOR_OF_SCALAR)
+        albedo[0] = vf_gather(colors, id, ours);
+    if (!instance->color_format || instance->color_format == PT_COLOR_OF_SCALAR)
         return;
     float rgb[3][PT_LANES];
     uint32_t ids[PT_LANES], lanes = vm_bits(ours);

@@ -96,6 +96,7 @@ int PT_KERNEL_ENTRY(splat)(const struct pt_cpu_call *call)
     struct pt_bins bins = { .call = call,
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
+                            .drawn = args->sifted ? pt_cpu_data(call, 1 + 5 * args->instances + args->behind) : NULL,
                             .instances = args->instances,
                             .first = 1,
                             .stride = 5 };

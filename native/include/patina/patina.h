@@ -157,6 +157,8 @@ typedef struct patina_cloud_desc {
                            // UINT8 stays 3 bytes a point at rest; the others become float32, 12 bytes, within +-65504
     patina_array opacity;  // 1 x UINT8/UINT16 (0..max) or FLOAT32/FLOAT64 (0..1, clamped; NaN = 1), times the instance's.
                            // Optional; kept in steps of 1/255, a byte a point
+    patina_array scalar;   // 1 x any type: what a ramp colours (intensity, class, scan number ...). Optional; float32 at rest
+    patina_array classes;  // 1 x UINT8: class of each point, as in LAS; style.hidden_classes hides some. Optional
     double origin[3];      // added to every position, in float64
     uint32_t threads;      // 0 = one per core
     patina_array radius;   // 1 x FLOAT32/FLOAT64, of the point's disc, object units; negative or NaN = 0. Optional; for
@@ -179,15 +181,24 @@ typedef struct patina_cloud_info {
                              // takes its own spacing's
     uint32_t has_radii;
     float radius_most;       // of the points' own radii
+    uint32_t has_scalars, has_classes;
+    float scalar_range[2];   // least and greatest finite scalar; 0, 0 without one
+    uint32_t class_bits[8];  // classes that drawn points have: class c is bit c % 32 of word c / 32
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
-// at rest (position 12, id 4, colour 3, normal and spacing 4, opacity 1), at most 16 more while building.
+// at rest (position 12, id 4, colour 3, normal and spacing 4, opacity 1; a scalar 4 and a class 1 more), at most 16 more
+// while building.
 PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
 PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 // Gives a cloud other colours (as in the descriptor, count elements; NULL data: none) and leaves all else as it is, so
 // that painting uploads colours alone. The one change a cloud allows: no frame may be rendering it meanwhile.
 PATINA_API int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
+// The same for scalars.
+PATINA_API int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar);
+// The scalars that `share` of the points lie below and above, 0 <= share < 0.5; 0: the least and the greatest. What is not
+// finite does not count. PATINA_ERROR_EMPTY without a finite scalar.
+PATINA_API int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2]);
 // Writes the built cloud to a file, and opens it again by mapping: nothing is read but what is drawn, and the memory stays
 // the file's. A file of another version or machine, or a damaged one, is PATINA_ERROR_FORMAT: build the cloud anew. While a
 // cloud is open its file may be replaced (patina_cloud_save does), not written into.
@@ -255,7 +266,8 @@ PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, siz
 PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size);   // sRGB
 PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
 PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
-// Builds a cloud from an opened file.
+// Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
+// gives it classes.
 PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
 // Open + build in one call.
 PATINA_API int patina_cloud_load(const char *path, patina_progress *progress, patina_cloud **out);
@@ -266,7 +278,21 @@ PATINA_API int patina_write_ply(const char *path, const patina_cloud_desc *desc)
 // ---- scene -----------------------------------------------------------------------------------------------------
 
 enum patina_lighting { PATINA_LIGHTING_AUTO = 0, PATINA_LIGHTING_UNLIT = 1, PATINA_LIGHTING_LIT = 2 };
-// AUTO: clouds with colours are shown unlit (the colours hold the light of the day of the scan), others lit.
+// AUTO: clouds shown in colours of their own are unlit (these hold the light of the day of the scan), others lit.
+
+// Where the colour of points comes from. From SCALAR on: a ramp over the point's scalar, the world's z, the object's z, or
+// the distance to the camera (its plane, in orthographic views) of the surface that a pixel shows.
+enum patina_color_source {
+    PATINA_COLOR_OWN = 0, // the point's; where the cloud has none, style.color
+    PATINA_COLOR_FIXED = 1,
+    PATINA_COLOR_SCALAR = 2,
+    PATINA_COLOR_HEIGHT = 3,
+    PATINA_COLOR_OBJECT_HEIGHT = 4,
+    PATINA_COLOR_DISTANCE = 5
+};
+#define PATINA_MAX_RAMP 256
+// A ramp by name: grey, viridis, heat, spectrum, relief, diverging; classes: of LAS classes, for a range of 0 to 255.
+PATINA_API int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3]);
 
 // What a cloud leaves out of shadows [D 6].
 enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2, PATINA_SHADOW_NO_SELF = 4 };
@@ -287,6 +313,16 @@ typedef struct patina_cloud_style {
     uint32_t shadow_off;          // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
     float radius;                 // of every point's disc, world units, for PATINA_SURFACE_SPLATS; 0 = the point's own, else
                                   // 1.5 times the local spacing
+    uint32_t color_source;        // patina_color_source
+    const float *ramp;            // ramp_count x 3, linear; copied. Evenly spaced over the range, straight between, even
+                                  // beyond. NULL = from black to white. A scalar that is NaN takes `color`
+    uint32_t ramp_count;          // 2..PATINA_MAX_RAMP
+    float ramp_range[2];          // values at its ends; equal = automatic: least and greatest value of the cloud's points,
+                                  // for heights and distances of its chunks' boxes
+    float exposure;               // stops, -32..32; on the colour, before light
+    float contrast;               // 0..16: slope in stops around mid grey (0.18), after exposure; 0 = 1
+    uint32_t hidden_classes[8];   // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
+    uint32_t clip_off;            // 1 = clips leave this cloud whole
 } patina_cloud_style;
 
 typedef struct patina_mesh_style {
@@ -295,6 +331,21 @@ typedef struct patina_mesh_style {
     float color[3];               // linear, of meshes without colours; all zero = 0.8 grey (for black use 1e-20)
     uint32_t shadow_off;          // bits of patina_shadow_off: NO_CAST, NO_RECEIVE
 } patina_mesh_style;
+
+enum patina_clip_shape { PATINA_CLIP_BOX = 0, PATINA_CLIP_PLANE = 1 };
+
+// A box (-1..1 along each of its axes) or a plane that cuts clouds. A point is kept when it lies in one of the boxes that
+// keep, if there are any, in no box that cuts, and on the right side of every plane.
+typedef struct patina_clip {
+    size_t struct_size;
+    double world_from_clip[16]; // all zero = identity. Mirrored, non-uniform: allowed. A flat box holds no points; a plane
+                                // needs its x and y axes, or it cuts nothing
+    uint32_t shape;             // patina_clip_shape
+    uint32_t cut;               // 0 = keeps what is inside, of a plane its z <= 0; 1 = cuts that out
+    float tint[3];              // linear; colour of the surface near the cut
+    float tint_strength;        // 0..1; 0 = not tinted
+    float tint_width;           // how far from the cut, world units
+} patina_clip;
 
 enum patina_light_type { PATINA_LIGHT_SUN = 1, PATINA_LIGHT_POINT = 2, PATINA_LIGHT_SPOT = 3, PATINA_LIGHT_AREA = 4 };
 enum patina_area_shape { PATINA_AREA_RECTANGLE = 0, PATINA_AREA_ELLIPSE = 1 };
@@ -368,6 +419,7 @@ typedef struct patina_settings {
     uint32_t own_background;   // 1 = background lies behind the points, and world_color only lights them
     float background[3];       // linear, with own_background; not where the film is transparent
     uint32_t surface;            // patina_surface
+    uint32_t shadow_uncut;       // 1 = what clips cut away still casts shadows
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -408,7 +460,7 @@ typedef struct patina_effects {
 
 PATINA_API int patina_scene_create(patina_scene **out);
 PATINA_API void patina_scene_destroy(patina_scene *scene); // clouds stay
-PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds, meshes and lights
+PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds, meshes, lights and clips
 // The cloud must outlive the scene or the next patina_scene_clear. Instances get ids in order of adding: the base
 // of instance i is the sum of the counts before it.
 PATINA_API int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style);
@@ -416,14 +468,16 @@ PATINA_API int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *c
 // shadows points, as points hide and shadow it. It is drawn exactly: neither filled nor grown. In keys, ids of triangles follow
 // those of all clouds' points, meshes in order of adding. The mesh must outlive the scene or the next patina_scene_clear.
 PATINA_API int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const patina_mesh_style *style);
+// Any number of clips.
+PATINA_API int patina_scene_add_clip(patina_scene *scene, const patina_clip *clip);
 // At most 32 lights.
 PATINA_API int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light);
 PATINA_API int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera);
 PATINA_API int patina_scene_set_settings(patina_scene *scene, const patina_settings *settings);
 // NULL: no effects, as at first.
 PATINA_API int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects);
-// A camera that frames the scene's clouds, seen from `azimuth` degrees around z (0 = from -y) and `elevation`
-// degrees above the horizon, vertical field of view fov_degrees (0 = 45.8).
+// A camera that frames the scene's clouds, as far as clips leave them, seen from `azimuth` degrees around z (0 = from -y) and
+// `elevation` degrees above the horizon, vertical field of view fov_degrees (0 = 45.8).
 PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation,
                                          double fov_degrees, patina_camera *camera);
 
@@ -472,6 +526,8 @@ typedef struct patina_frame_stats {
     uint32_t shadow_pending;    // progressive: lights that further renders still refine
     uint32_t shadow_samples;    // of the light that took most
     float shadow_error;         // the largest of the lights' expected errors, with settings.shadow_error
+    uint64_t chunks_clipped;    // of the culled: those that clips and hidden classes took whole
+    uint64_t chunks_cut;        // in view, whose points were tested one by one
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
@@ -560,7 +616,8 @@ PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress 
                                  patina_task **out); // patina_cloud_create
 PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
                                       patina_task **out); // patina_cloud_set_colors
-// Two numbers that tell whether points changed: of count, positions, normals, opacities and radii; of count and colours. Not
+// Two numbers that tell whether points changed: of count, positions, normals, opacities, radii and classes; of count, colours
+// and scalars. Not
 // against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
 // written once the task is done. About as fast as memory is read.
 PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects that cut clouds → the library's clips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+from mathutils import Matrix, Vector
+
+from ..properties import enum_number
+from .camera import row_major
+
+
+@dataclass(frozen=True)
+class Clip:
+    """patina_clip."""
+
+    world_from_clip: tuple[float, ...]
+    shape: int
+    cut: int
+    tint: tuple[float, float, float]
+    tint_strength: float
+    tint_width: float
+
+
+def cuts(obj: bpy.types.Object) -> bool:
+    """Whether the object is a clip, and so is not drawn itself."""
+    return obj.patina.clip.shape != 'NONE'
+
+
+def collect(depsgraph: bpy.types.Depsgraph) -> list[Clip]:
+    clips = []
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        if not cuts(obj):
+            continue
+        group = obj.patina.clip
+        matrix = instance.matrix_world @ _box(obj) if group.shape == 'BOX' else instance.matrix_world
+        clips.append(Clip(
+            world_from_clip=row_major(matrix), shape=enum_number(group, "shape") - 1, cut=int(group.cut),
+            tint=tuple(group.tint), tint_strength=group.tint_strength, tint_width=group.tint_width))
+    return clips
+
+
+def _box(obj: bpy.types.Object) -> Matrix:
+    """The object's box from -1 to 1, in its own coordinates."""
+    if obj.type == 'EMPTY':
+        return Matrix.Scale(obj.empty_display_size, 4)
+    corners = [Vector(corner) for corner in obj.bound_box]
+    lower, upper = (Vector(edge(corner[k] for corner in corners) for k in range(3)) for edge in (min, max))
+    return Matrix.Translation((lower + upper) / 2) @ Matrix.Diagonal((*((upper - lower) / 2), 1.0))

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels of the points' colours, of hidden classes, and of objects that cut."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.types import Context, Panel
+
+from ..properties.colors import CLASS_NAMES, class_name
+from .panels import PatinaPanel
+
+_POINTS = {'MESH', 'POINTCLOUD'}
+
+
+class _ColorPanel(PatinaPanel):
+    bl_context = "data"
+    bl_parent_id = "PATINA_PT_points"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and context.object and context.object.type in _POINTS
+
+
+class PATINA_PT_color(_ColorPanel, Panel):
+    bl_label = "Color"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        obj = context.object
+        group = obj.patina.colors
+        layout.prop(group, "source")
+        if group.source == 'SCALAR':
+            if obj.patina.linked_file:
+                layout.prop(group, "scalar")
+            else:
+                layout.prop_search(group, "scalar", obj.data, "attributes")
+        if group.source not in {'OWN', 'FIXED'}:
+            self._draw_ramp(group)
+        layout.prop(group, "exposure")
+        layout.prop(group, "contrast")
+
+    def _draw_ramp(self, group: bpy.types.PropertyGroup) -> None:
+        layout = self.layout
+        row = layout.row(align=True)
+        row.prop(group, "ramp")
+        row.operator("object.patina_new_ramp", text="", icon='ADD')
+        if group.ramp == 'CUSTOM':
+            layout.prop(group, "texture")
+            if group.texture and group.texture.color_ramp:
+                layout.template_color_ramp(group.texture, "color_ramp", expand=True)
+        column = layout.column(align=True)
+        row = column.row(align=True)
+        row.prop(group, "use_range")
+        if group.source != 'DISTANCE':
+            row.operator("object.patina_robust_range", text="Robust")
+        if group.use_range:
+            column.prop(group, "range_min")
+            column.prop(group, "range_max")
+
+
+class PATINA_PT_classes(_ColorPanel, Panel):
+    bl_label = "Hidden Classes"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        obj = context.object
+        group = obj.patina.colors
+        flow = layout.grid_flow(columns=2, even_columns=True, align=True)
+        for number in range(len(CLASS_NAMES)):
+            flow.prop(group, "hidden", index=number, text=class_name(number))
+        layout.use_property_split = True
+        layout.prop(group, "hidden_more")
+        if not obj.patina.linked_file:
+            layout.prop_search(group, "class_attribute", obj.data, "attributes")
+
+
+class PATINA_PT_cuts(_ColorPanel, Panel):
+    bl_label = "Clip"
+
+    def draw_header(self, context: Context) -> None:
+        self.layout.prop(context.object.patina.colors, "use_clips", text="")
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.active = context.object.patina.colors.use_clips
+        row = layout.row(align=True)
+        row.operator("object.patina_add_clip_box")
+        row.operator("object.patina_add_clip_plane")
+        layout.prop(context.scene.patina, "shadow_uncut")
+
+
+class PATINA_PT_clip(PatinaPanel, Panel):
+    bl_label = "Patina Clip"
+    bl_context = "object"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and context.object and context.object.type in {'MESH', 'EMPTY'}
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        group = context.object.patina.clip
+        layout.prop(group, "shape")
+        column = layout.column()
+        column.active = group.shape != 'NONE'
+        column.prop(group, "cut")
+        column.prop(group, "tint_strength", text="Tint", slider=True)
+        inner = column.column()
+        inner.active = group.tint_strength > 0.0
+        inner.prop(group, "tint", text="Color")
+        inner.prop(group, "tint_width")
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (PATINA_PT_color, PATINA_PT_classes, PATINA_PT_cuts, PATINA_PT_clip))

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// sift: which points of divided chunks are drawn: those that clips and hidden classes leave; twin of
+// shaders/kernels/sift.comp
+//
+// Distances to a clip are sums of products in one written order, as scatter's: what is cut is cut on every device.
+#include "device_cpu/cpu.h"
+#include "device_cpu/simd.h"
+
+struct sift {
+    const struct pt_cpu_call *call;
+    uint32_t hides[256]; // by class
+};
+
+// (lo + R p) + hi, row k.
+static inline vf clip_row(const struct clip_view *clip, int k, const vf p[3])
+{
+    const float *row = clip->row + 3 * k;
+    vf sum = ((vf_set(clip->lo[k]) + vf_set(row[0]) * p[0]) + vf_set(row[1]) * p[1]) + vf_set(row[2]) * p[2];
+    return sum + vf_set(clip->hi[k]);
+}
+
+// Of a plane: cut.
+static inline vm inside(const struct clip_view *clip, const vf p[3])
+{
+    const vf one = vf_set(1.0f);
+    if (clip->shape == PT_CLIP_PLANE)
+        return vf_lt(vf_zero(), clip_row(clip, 2, p));
+    vm in = vf_le(vf_abs(clip_row(clip, 0, p)), one);
+    in = vm_and(in, vf_le(vf_abs(clip_row(clip, 1, p)), one));
+    return vm_and(in, vf_le(vf_abs(clip_row(clip, 2, p)), one));
+}
+
+// Which of PT_LANES points from slot i of the chunk on.
+static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, const float *positions, uint32_t i)
+{
+    const struct sift_args *args = sift->call->arguments;
+    const struct clip_view *clips = (const struct clip_view *)pt_cpu_data(sift->call, 3) + chunk->clip_first;
+    const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                      vf_load(positions + 2 * (size_t)chunk->padded + i) };
+    vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
+    for (uint32_t k = 0; k < chunk->clip_keeps; k++)
+        keep = vm_or(keep, inside(&clips[k], p));
+    for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
+        cut = vm_or(cut, inside(&clips[k], p));
+    if (args->by_class) {
+        const vm all = vm_first(PT_LANES);
+        vi slot = vi_add(vi_set(chunk->first + i), vi_lanes());
+        vi class = vi_and(vi_gather_bytes(pt_cpu_data(sift->call, 2), slot, all), vi_set(255));
+        cut = vm_or(cut, vi_lt_unsigned(vi_set(0), vi_gather(sift->hides, class, all)));
+    }
+    return vm_bits(vm_and(keep, vm_not(cut))) & ((1u << PT_LANES) - 1u);
+}
+
+static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct sift *sift = context;
+    const struct chunk_view *chunks = pt_cpu_data(sift->call, 0);
+    (void)thread;
+    for (uint32_t c = begin; c < end && !pt_cpu_cancelled(sift->call); c++) {
+        const struct chunk_view *chunk = &chunks[c];
+        const float *positions = (const float *)pt_cpu_data(sift->call, 1) + 3 * (size_t)chunk->first;
+        uint32_t *words = (uint32_t *)pt_cpu_data(sift->call, 4) + chunk->sifted - 1;
+        for (uint32_t first = 0; first < chunk->count && chunk->sifted; first += PT_SLOTS_A_WORD) {
+            uint32_t word = 0;
+            for (uint32_t i = 0; i < PT_SLOTS_A_WORD; i += PT_LANES)
+                word |= drawn(sift, chunk, positions, first + i) << i;
+            words[first / PT_SLOTS_A_WORD] = word;
+        }
+    }
+}
+
+int PT_KERNEL_ENTRY(sift)(const struct pt_cpu_call *call)
+{
+    const struct sift_args *args = call->arguments;
+    struct sift sift = { .call = call };
+    for (uint32_t class = 0; class < 256; class++)
+        sift.hides[class] = args->hidden[class / 32] >> class % 32 & 1u;
+    pt_parallel(call->pool, (uint32_t)(call->buffers[0]->size / sizeof(struct chunk_view)), 4, sift_chunks, &sift);
+    return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
+}

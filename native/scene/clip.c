@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "clip.h"
+
+#include <math.h>
+#include <string.h>
+
+// ---- inverses ------------------------------------------------------------------------------------------------------------
+
+// The last row of a plane's: unit, towards its z; 0 without x and y axes. A plane flat along its z has one all the same.
+static int invert_plane(const double linear[9], uint32_t cut, double inverse[9])
+{
+    double cofactors[9], *n = inverse + 6;
+    pt_cofactors(linear, cofactors);
+    double sign = (pt_determinant(linear) < 0.0 ? -1.0 : 1.0) * (cut ? -1.0 : 1.0);
+    memset(inverse, 0, 9 * sizeof *inverse);
+    for (int k = 0; k < 3; k++) // the cross product of the x and y columns
+        n[k] = cofactors[3 * k + 2];
+    double length = sqrt(pt_dot(n, n));
+    for (int k = 0; k < 3; k++)
+        n[k] = length > 0.0 ? sign * n[k] / length : 0.0;
+    return length > 0.0 && isfinite(length);
+}
+
+// 0: flat, there is nothing in it.
+static int invert_box(const double linear[9], double inverse[9])
+{
+    double cofactors[9], sizes = 1.0;
+    pt_cofactors(linear, cofactors);
+    double determinant = pt_determinant(linear);
+    for (int c = 0; c < 3; c++)
+        sizes *= sqrt(linear[c] * linear[c] + linear[3 + c] * linear[3 + c] + linear[6 + c] * linear[6 + c]);
+    if (!(fabs(determinant) > 1e-12 * sizes) || !isfinite(sizes))
+        return 0;
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            inverse[3 * r + c] = cofactors[3 * c + r] / determinant;
+    return 1;
+}
+
+static int invert_clip(const patina_clip *clip, struct pt_inverse_clip *out)
+{
+    double linear[9];
+    out->clip = clip;
+    out->shape = clip->shape == PATINA_CLIP_PLANE ? PT_CLIP_PLANE : clip->cut ? PT_CLIP_CUT : PT_CLIP_KEEP;
+    pt_split_matrix(clip->world_from_clip, linear, out->center);
+    return out->shape == PT_CLIP_PLANE ? invert_plane(linear, clip->cut, out->inverse) : invert_box(linear, out->inverse);
+}
+
+// ---- the sieve -----------------------------------------------------------------------------------------------------------
+
+struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance,
+                              struct pt_inverse_clip *room)
+{
+    const patina_cloud_info *info = &instance->cloud->info;
+    struct pt_sieve sieve = { .instance = instance, .clips = room };
+    for (int k = 0; k < 8; k++)
+        sieve.hiding |= info->has_classes && (instance->style.hidden_classes[k] & info->class_bits[k]);
+    for (int keeps = 1; keeps >= 0 && !instance->style.clip_off; keeps--) {
+        for (uint32_t i = 0; i < scene->clip_count; i++) {
+            struct pt_inverse_clip *clip = &room[sieve.count];
+            int good = invert_clip(&scene->clips[i], clip);
+            if ((clip->shape == PT_CLIP_KEEP) != keeps)
+                continue;
+            sieve.keeping |= keeps;
+            sieve.count += (uint32_t)good;
+        }
+        sieve.keeps = keeps ? sieve.count : sieve.keeps;
+    }
+    return sieve;
+}
+
+// The frame of a chunk: row from its coordinates, translation of its origin.
+static void chunk_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3], double row[9],
+                        double translation[3])
+{
+    double from[3];
+    for (int k = 0; k < 3; k++)
+        from[k] = origin[k] - clip->center[k];
+    pt_multiply(clip->inverse, linear, row);
+    pt_apply(clip->inverse, from, translation);
+}
+
+// Where a box of points lies to the clip: 1 inside, 0 outside, -1 both or too close for float32 to tell. Inside of a plane
+// is what it cuts.
+static int inside(const struct pt_inverse_clip *clip, const double row[9], const double translation[3],
+                  const struct pt_chunk *chunk)
+{
+    int whole = 1;
+    for (int r = clip->shape == PT_CLIP_PLANE ? 2 : 0; r < 3; r++) {
+        double middle = translation[r], reach = 0.0, error = fabs(translation[r]);
+        for (int k = 0; k < 3; k++) {
+            double low = (double)chunk->box_min[k], high = (double)chunk->box_max[k];
+            middle += row[3 * r + k] * 0.5 * (low + high);
+            reach += fabs(row[3 * r + k]) * 0.5 * (high - low);
+            error += fabs(row[3 * r + k]) * fmax(fabs(low), fabs(high));
+        }
+        error *= 0x1p-20;
+        double least = middle - reach - error, most = middle + reach + error;
+        if (clip->shape == PT_CLIP_PLANE)
+            return least > 0.0 ? 1 : most < 0.0 ? 0 : -1;
+        if (least > 1.0 || most < -1.0)
+            return 0;
+        whole &= most < 1.0 && least > -1.0;
+    }
+    return whole ? 1 : -1;
+}
+
+// By class: 1 hidden, 0 drawn, -1 some of each.
+static int hidden(const struct pt_sieve *sieve, const struct pt_chunk *chunk)
+{
+    uint32_t out = 0, in = 0;
+    for (int k = 0; k < 8 && sieve->hiding; k++) {
+        out |= chunk->classes[k] & sieve->instance->style.hidden_classes[k];
+        in |= chunk->classes[k] & ~sieve->instance->style.hidden_classes[k];
+    }
+    return !out ? 0 : in ? -1 : 1;
+}
+
+// Where the chunk lies to clip i; what is divided becomes an entry.
+static int meet(const struct pt_sieve *sieve, uint32_t i, const struct pt_chunk *chunk, const double linear[9],
+                const double origin[3], struct clip_view *entries, struct pt_division *division)
+{
+    double row[9], translation[3];
+    chunk_frame(&sieve->clips[i], linear, origin, row, translation);
+    int where = inside(&sieve->clips[i], row, translation, chunk);
+    if (where == -1 && entries)
+        pt_clip_in_frame(&sieve->clips[i], linear, origin, &entries[division->count]);
+    division->count += where == -1;
+    return where;
+}
+
+enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
+                            struct pt_division *division)
+{
+    struct pt_division found = { 0 };
+    double linear[9], object[3], origin[3];
+    int by_class = hidden(sieve, chunk), kept = !sieve->keeping;
+    if (by_class == 1)
+        return PT_CUT_AWAY;
+    found.by_class = by_class != 0;
+    pt_split_matrix(sieve->instance->style.world_from_object, linear, object);
+    pt_apply(linear, chunk->origin, origin);
+    for (int k = 0; k < 3; k++)
+        origin[k] += object[k];
+    for (uint32_t i = 0; i < sieve->keeps && !kept; i++)
+        kept = meet(sieve, i, chunk, linear, origin, entries, &found) == 1;
+    found.keeps = found.count = kept ? 0 : found.count;
+    if (!kept && !found.keeps)
+        return PT_CUT_AWAY;
+    for (uint32_t i = sieve->keeps; i < sieve->count; i++)
+        if (meet(sieve, i, chunk, linear, origin, entries, &found) == 1)
+            return PT_CUT_AWAY;
+    if (division)
+        *division = found;
+    return found.count || found.by_class ? PT_DIVIDED : PT_WHOLE;
+}
+
+void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3],
+                      struct clip_view *out)
+{
+    double row[9], translation[3];
+    chunk_frame(clip, linear, origin, row, translation);
+    *out = (struct clip_view){ .shape = clip->shape,
+                               .strength = clip->clip->tint_strength,
+                               .width = clip->clip->tint_width };
+    for (int k = 0; k < 9; k++)
+        out->row[k] = (float)row[k];
+    for (int k = 0; k < 3; k++) {
+        const double *m = clip->clip->world_from_clip;
+        out->hi[k] = (float)translation[k];
+        out->lo[k] = (float)(translation[k] - (double)out->hi[k]);
+        out->half_size[k] = (float)sqrt(m[k] * m[k] + m[4 + k] * m[4 + k] + m[8 + k] * m[8 + k]);
+        out->tint[k] = clip->clip->tint[k];
+    }
+}

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What clips and hidden classes leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
+#ifndef PT_CLIP_H
+#define PT_CLIP_H
+
+#include "kernel_args.h"
+#include "scene.h"
+
+// A clip with its inverse: q = inverse (world - center). Of planes only the last row counts, in world units.
+struct pt_inverse_clip {
+    const patina_clip *clip;
+    uint32_t shape; // PT_CLIP_*
+    double inverse[9], center[3];
+};
+
+struct pt_sieve {
+    const struct pt_instance *instance;
+    struct pt_inverse_clip *clips; // those that keep come first
+    uint32_t count, keeps;
+    int keeping; // some box keeps, if only a flat one
+    int hiding;  // some class that the cloud has is hidden
+};
+
+enum pt_side { PT_CUT_AWAY, PT_DIVIDED, PT_WHOLE };
+
+// How a divided chunk is divided: by which of the sieve's clips, and whether by class.
+struct pt_division {
+    uint32_t count, keeps;
+    int by_class;
+};
+
+// The sieve of an instance. room: for the scene's clips, kept by the sieve.
+struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance,
+                              struct pt_inverse_clip *room);
+// entries: room for the sieve's clips; may be NULL, as may division. Written where the chunk is divided.
+enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
+                            struct pt_division *division);
+
+// The clip in a frame: world = linear p + origin.
+void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3],
+                      struct clip_view *out);
+
+#endif

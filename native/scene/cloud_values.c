@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Values of points beside their surface and colour: scalars, which ramps colour, and classes, which can be hidden.
+#include "cloud.h"
+#include "fingerprint.h"
+#include "memory.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const uint8_t type_sizes[] = {
+    [PATINA_FLOAT32] = 4, [PATINA_FLOAT64] = 8, [PATINA_UINT8] = 1, [PATINA_UINT16] = 2, [PATINA_UINT32] = 4,
+    [PATINA_INT8] = 1,    [PATINA_INT16] = 2,   [PATINA_INT32] = 4,
+};
+
+enum { NUMBERS = (1 << (PATINA_INT32 + 1)) - 2 }; // every patina_type
+
+static int check_values(patina_array *array, const char *what, uint32_t types)
+{
+    if (array->data && !array->stride && array->type <= PATINA_INT32)
+        array->stride = type_sizes[array->type];
+    return pt_check_array(array, what, types, 1, 1);
+}
+
+int pt_check_values(patina_array *scalar, patina_array *classes)
+{
+    int error = check_values(scalar, "scalar", NUMBERS);
+    return error ? error : check_values(classes, "classes", 1u << PATINA_UINT8);
+}
+
+static float read_value(const patina_array *array, uint64_t index)
+{
+    const char *at = (const char *)array->data + index * array->stride;
+    union {
+        float f;
+        double d;
+        uint8_t u8;
+        uint16_t u16;
+        uint32_t u32;
+        int8_t i8;
+        int16_t i16;
+        int32_t i32;
+    } v;
+    memcpy(&v, at, type_sizes[array->type]);
+    switch (array->type) {
+    case PATINA_FLOAT32: return v.f;
+    case PATINA_FLOAT64: return (float)v.d;
+    case PATINA_UINT8: return v.u8;
+    case PATINA_UINT16: return v.u16;
+    case PATINA_UINT32: return (float)v.u32;
+    case PATINA_INT8: return v.i8;
+    case PATINA_INT16: return v.i16;
+    default: return (float)v.i32;
+    }
+}
+
+// ---- scalars -------------------------------------------------------------------------------------------------------------
+
+size_t pt_scalar_bytes(const struct patina_cloud *cloud) { return cloud->info.count * sizeof *cloud->scalars; }
+
+static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
+{
+    size_t size = pt_scalar_bytes(cloud);
+    float *values = scalar->data && size ? pt_pages_alloc(size) : NULL;
+    if (scalar->data && size && !values)
+        return PATINA_ERROR_MEMORY;
+    float least = INFINITY, most = -INFINITY;
+    for (uint64_t i = 0; values && i < cloud->info.count; i++) {
+        values[i] = read_value(scalar, i);
+        least = isfinite(values[i]) ? fminf(least, values[i]) : least;
+        most = isfinite(values[i]) ? fmaxf(most, values[i]) : most;
+    }
+    cloud->info.scalar_range[0] = least <= most ? least : 0.0f;
+    cloud->info.scalar_range[1] = least <= most ? most : 0.0f;
+    cloud->info.bytes += (values ? size : 0) - (cloud->scalars ? size : 0);
+    pt_pages_free(cloud->scalars, size);
+    cloud->scalars = values;
+    cloud->info.has_scalars = scalar->data != NULL;
+    return PATINA_OK;
+}
+
+int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar)
+{
+    if (!cloud || !scalar)
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_scalars: bad arguments");
+    patina_array checked = *scalar;
+    int error = check_values(&checked, "scalar", NUMBERS);
+    if (error)
+        return pt_fail_again(&cloud->handle, error);
+    if (take_scalars(cloud, &checked))
+        return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "scalars of %llu points: out of memory",
+                       (unsigned long long)cloud->info.count);
+    atomic_fetch_add(&cloud->alive->colors, 1);
+    return PATINA_OK;
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2])
+{
+    if (!cloud || !range || !(share >= 0.0 && share < 0.5))
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_scalar_range: bad arguments");
+    size_t count = 0;
+    for (uint64_t i = 0; cloud->scalars && i < cloud->info.count; i++)
+        count += isfinite(cloud->scalars[i]) != 0;
+    if (!count)
+        return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "patina_cloud_scalar_range: no point has a finite scalar");
+    memcpy(range, cloud->info.scalar_range, sizeof cloud->info.scalar_range);
+    if (share == 0.0)
+        return PATINA_OK;
+    enum { MOST = 1 << 20 }; // looked at: their order statistics are those of all within a thousandth of the points
+    size_t step = (count + MOST - 1) / MOST, taken = 0, seen = 0;
+    float *values = malloc((count / step + 1) * sizeof *values);
+    if (!values)
+        return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "patina_cloud_scalar_range: out of memory");
+    for (uint64_t i = 0; i < cloud->info.count; i++)
+        if (isfinite(cloud->scalars[i]) && seen++ % step == 0)
+            values[taken++] = cloud->scalars[i];
+    qsort(values, taken, sizeof *values, compare_floats);
+    size_t below = (size_t)(share * (double)(taken - 1));
+    range[0] = values[below];
+    range[1] = values[taken - 1 - below];
+    free(values);
+    return PATINA_OK;
+}
+
+// ---- classes -------------------------------------------------------------------------------------------------------------
+
+size_t pt_class_bytes(const struct patina_cloud *cloud) { return cloud->slots + 4; } // kernels read bytes as words
+
+static int take_classes(struct patina_cloud *cloud, const patina_array *classes)
+{
+    cloud->classes = pt_pages_alloc(pt_class_bytes(cloud));
+    if (!cloud->classes)
+        return PATINA_ERROR_MEMORY;
+    cloud->info.bytes += pt_class_bytes(cloud);
+    cloud->info.has_classes = 1;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        struct pt_chunk *chunk = &cloud->chunks[c];
+        for (uint32_t i = 0; i < chunk->padded; i++) {
+            const uint32_t slot = chunk->first + i;
+            uint8_t class = *((const uint8_t *)classes->data + cloud->ids[slot] * classes->stride);
+            cloud->classes[slot] = class;
+            chunk->classes[class / 32] |= 1u << class % 32;
+        }
+        for (int k = 0; k < 8; k++)
+            cloud->info.class_bits[k] |= chunk->classes[k];
+    }
+    cloud->class_hash = pt_fingerprint(1, cloud->classes, cloud->slots);
+    return PATINA_OK;
+}
+
+int pt_cloud_take_values(struct patina_cloud *cloud, const patina_cloud_desc *desc)
+{
+    int error = take_scalars(cloud, &desc->scalar);
+    return error || !desc->classes.data ? error : take_classes(cloud, &desc->classes);
+}

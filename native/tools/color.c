@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `patina render`: colours of points, hidden classes, clips.
+#include "tool.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { CLASSES = 256 };
+
+// NAME[,MIN,MAX]
+static int parse_ramp(const char *text, struct tool_color *color)
+{
+    const char *comma = strchr(text, ',');
+    const size_t length = comma ? (size_t)(comma - text) : strlen(text);
+    if (!length || length >= sizeof color->attribute)
+        return -1;
+    memcpy(color->attribute, text, length);
+    color->attribute[length] = 0;
+    color->source = !strcmp(color->attribute, "height")     ? PATINA_COLOR_HEIGHT
+                    : !strcmp(color->attribute, "distance") ? PATINA_COLOR_DISTANCE
+                                                            : PATINA_COLOR_SCALAR;
+    color->has_range = comma != NULL;
+    return comma && (parse_numbers(comma + 1, color->range, 2, 2) < 0 || color->range[0] == color->range[1]) ? -1 : 0;
+}
+
+static int parse_between(const char *text, double least, double most, float *value)
+{
+    double n;
+    if (parse_numbers(text, &n, 1, 1) < 0 || !(n >= least && n <= most))
+        return -1;
+    *value = (float)n;
+    return 0;
+}
+
+static int parse_classes(const char *text, uint32_t hidden[8])
+{
+    double n[CLASSES];
+    const int count = parse_numbers(text, n, 1, CLASSES);
+    for (int i = 0; i < count; i++) {
+        if (n[i] < 0 || n[i] > 255 || n[i] != floor(n[i]))
+            return -1;
+        hidden[(uint32_t)n[i] / 32] |= 1u << (uint32_t)n[i] % 32;
+    }
+    return count < 0 ? -1 : 0;
+}
+
+// A box by two corners, world units.
+static int parse_box(const char *text, uint32_t cut, struct tool_color *color)
+{
+    double n[6];
+    if (color->clip_count == TOOL_CLIPS || parse_numbers(text, n, 6, 6) < 0)
+        return -1;
+    patina_clip *clip = &color->clips[color->clip_count++];
+    *clip = (patina_clip){.struct_size = sizeof *clip, .cut = cut};
+    for (int k = 0; k < 3; k++) {
+        clip->world_from_clip[5 * k] = 0.5 * fabs(n[3 + k] - n[k]);
+        clip->world_from_clip[4 * k + 3] = 0.5 * (n[k] + n[3 + k]);
+    }
+    clip->world_from_clip[15] = 1;
+    return 0;
+}
+
+static int parse_tint(const char *text, struct tool_color *color)
+{
+    double n[4];
+    if (parse_numbers(text, n, 4, 4) < 0 || n[0] < 0 || n[1] < 0 || n[2] < 0 || n[3] <= 0)
+        return -1;
+    for (int k = 0; k < 4; k++)
+        color->tint[k] = (float)n[k];
+    return 0;
+}
+
+int tool_parse_color(const char *name, const char *value, struct tool_color *color)
+{
+    double n[3];
+    if (!strcmp(name, "--ramp"))
+        return parse_ramp(value, color) ? -1 : 0;
+    if (!strcmp(name, "--ramp-colors"))
+        return *(color->ramp = value) ? 0 : -1;
+    if (!strcmp(name, "--color")) {
+        color->source = PATINA_COLOR_FIXED;
+        const int count = parse_numbers(value, n, 3, 3);
+        for (int k = 0; k < count; k++)
+            color->fixed[k] = n[k] > 0 ? (float)n[k] : 1e-20f;
+        return count < 0 ? -1 : 0;
+    }
+    if (!strcmp(name, "--exposure"))
+        return parse_between(value, -32, 32, &color->exposure);
+    if (!strcmp(name, "--contrast"))
+        return parse_between(value, 0.01, 16, &color->contrast);
+    if (!strcmp(name, "--hide-classes"))
+        return parse_classes(value, color->hidden);
+    if (!strcmp(name, "--clip-box"))
+        return parse_box(value, 0, color);
+    if (!strcmp(name, "--cut-box"))
+        return parse_box(value, 1, color);
+    if (!strcmp(name, "--clip-tint"))
+        return parse_tint(value, color);
+    return 1;
+}
+
+// ---- what they do --------------------------------------------------------------------------------------------------
+
+// Scalars of the attribute by this name.
+static int take_scalars(const patina_file *file, const char *name, patina_cloud *cloud)
+{
+    patina_file_info info = {.struct_size = sizeof info};
+    patina_file_attribute attribute = {.struct_size = sizeof attribute};
+    int code = patina_file_get_info(file, &info);
+    uint32_t index = 0;
+    for (; index < info.attributes && !code; index++) {
+        code = patina_file_get_attribute(file, index, &attribute);
+        if (!code && !strcmp(attribute.name, name))
+            break;
+    }
+    if (code || index == info.attributes) {
+        tool_say("there is no attribute '%s' to make a ramp of", name);
+        return PATINA_ERROR_ARGUMENT;
+    }
+    float *values = malloc(info.count * sizeof *values + 1);
+    if (!values)
+        return PATINA_ERROR_MEMORY;
+    code = patina_file_read_attribute(file, index, values, info.count * sizeof *values);
+    const patina_array scalars = {.data = values, .type = PATINA_FLOAT32, .components = 1};
+    if (!code)
+        code = patina_cloud_set_scalars(cloud, &scalars);
+    free(values);
+    return code;
+}
+
+int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out)
+{
+    patina_file *file = NULL;
+    int code = patina_file_open(path, progress, &file);
+    if (!code)
+        code = patina_file_cloud(file, 0, progress, out);
+    if (!code && color->source == PATINA_COLOR_SCALAR)
+        code = take_scalars(file, color->attribute, *out);
+    patina_file_destroy(file);
+    return code;
+}
+
+int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, float table[PATINA_MAX_RAMP][3],
+                   patina_cloud_style *style)
+{
+    const int classes = color->ramp && !strcmp(color->ramp, "classes");
+    style->color_source = color->source;
+    memcpy(style->color, color->fixed, sizeof style->color);
+    style->exposure = color->exposure;
+    style->contrast = color->contrast;
+    memcpy(style->hidden_classes, color->hidden, sizeof style->hidden_classes);
+    for (int k = 0; k < 2; k++)
+        style->ramp_range[k] = color->has_range ? (float)color->range[k] : classes ? 255.0f * (float)k : 0.0f;
+    if (color->source == PATINA_COLOR_SCALAR && !color->has_range && !classes)
+        patina_cloud_scalar_range(cloud, 0.01, style->ramp_range); // strays would leave the rest one colour
+    style->ramp = &table[0][0];
+    style->ramp_count = PATINA_MAX_RAMP;
+    return patina_ramp(color->ramp ? color->ramp : "viridis", table);
+}
+
+int tool_add_clips(const struct tool_color *color, patina_scene *scene)
+{
+    int code = PATINA_OK;
+    for (int i = 0; i < color->clip_count && !code; i++) {
+        patina_clip clip = color->clips[i];
+        memcpy(clip.tint, color->tint, sizeof clip.tint);
+        clip.tint_width = color->tint[3];
+        clip.tint_strength = color->tint[3] > 0 ? 1 : 0;
+        code = patina_scene_add_clip(scene, &clip);
+    }
+    return code;
+}

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// sift: which points of divided chunks are drawn: those that clips and hidden classes leave; twin of
+// native/device_cpu/kernels/sift.c
+//
+// A workgroup takes a chunk, an invocation PT_SLOTS_A_WORD of its points at a time.
+#version 430 core
+#include "lib/math.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer arguments_block { sift_args args; };
+layout(std430, binding = 1) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = 2) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = 3) readonly buffer classes_block { uint classes[]; }; // four bytes a word
+layout(std430, binding = 4) readonly buffer clips_block { clip_view clips[]; };
+layout(std430, binding = 5) writeonly buffer drawn_block { uint drawn[]; };
+
+layout(location = 0) uniform uint first_chunk; // of this dispatch
+layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
+
+// (lo + R p) + hi, row k.
+float clip_row(uint clip, uint k, vec3 p)
+{
+    precise float sum = ((clips[clip].lo[k] + clips[clip].row[3u * k] * p.x) + clips[clip].row[3u * k + 1u] * p.y) +
+                        clips[clip].row[3u * k + 2u] * p.z;
+    precise float total = sum + clips[clip].hi[k];
+    return total;
+}
+
+// Of a plane: cut.
+bool inside(uint clip, vec3 p)
+{
+    if (clips[clip].shape == PT_CLIP_PLANE)
+        return 0.0 < clip_row(clip, 2u, p);
+    return pt_abs(clip_row(clip, 0u, p)) <= 1.0 && pt_abs(clip_row(clip, 1u, p)) <= 1.0 &&
+           pt_abs(clip_row(clip, 2u, p)) <= 1.0;
+}
+
+bool hidden(uint slot)
+{
+    uint class_of = (classes[slot >> 2] >> (8u * (slot & 3u))) & 255u;
+    return (args.hidden[class_of >> 5] >> (class_of & 31u) & 1u) != 0u;
+}
+
+void main()
+{
+    chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
+    uint base = chunk.first - first_slot;
+    uint end = chunk.sifted != 0u ? (chunk.count + PT_SLOTS_A_WORD - 1u) / PT_SLOTS_A_WORD : 0u;
+    uint keeps = chunk.clip_first + chunk.clip_keeps, cuts = chunk.clip_first + chunk.clip_count;
+    uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
+    for (uint w = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; w < end; w += stride) {
+        uint bits = 0u;
+        for (uint i = 0u; i < PT_SLOTS_A_WORD; i++) {
+            uint slot = PT_SLOTS_A_WORD * w + i, at = 3u * base + slot;
+            vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
+            bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden(chunk.first + slot);
+            for (uint k = chunk.clip_first; k < keeps; k++)
+                keep = keep || inside(k, p);
+            for (uint k = keeps; k < cuts; k++)
+                cut = cut || inside(k, p);
+            bits |= keep && !cut ? 1u << i : 0u;
+        }
+        drawn[chunk.sifted - 1u + w] = bits;
+    }
+}

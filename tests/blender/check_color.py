@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colours of points: ramps over attributes, heights and distances, custom ramps, exposure, contrast, hidden classes."""
+
+import os
+import struct
+
+import bpy
+import numpy as np
+from check_points import grid, pixel
+from harness import SCRATCH, add_points, check, check_close, drawn, linear, new_scene, patina, render, reports
+from mathutils import Matrix, Vector
+
+from patina import native
+
+GREEN = (30, 180, 90, 255)
+
+
+def scene_of_numbers(values, kind='FLOAT', name="intensity"):
+    """(scene, points, object): green points with an attribute; the object's ramp is over it, unlit."""
+    scene = new_scene()
+    points = grid()
+    obj = add_points(points, np.tile(np.array(GREEN, np.uint8), (len(points), 1)))
+    attribute = obj.data.attributes.new(name, kind, 'POINT')
+    attribute.data.foreach_set("value", np.asarray(values, np.float32 if kind == 'FLOAT' else np.int32))
+    obj.patina.lighting = 'UNLIT'
+    obj.patina.colors.source = 'SCALAR'
+    obj.patina.colors.scalar = name
+    obj.patina.colors.ramp = 'GREY'
+    return scene, points, obj
+
+
+def test_attribute_ramp():
+    values = np.linspace(0, 1000, 12)
+    for kind in ('FLOAT', 'INT'):
+        scene, points, obj = scene_of_numbers(values, kind)
+        picture = render()["Combined"]
+        grey = native.ramp("grey")
+        for point, value in zip(points, np.float32(values) if kind == 'FLOAT' else values.astype(int)):
+            place = value / 1000 * 255
+            low = min(int(place), 254)
+            wanted = grey[low] + (place - low) * (grey[low + 1] - grey[low])
+            check_close(picture[pixel(scene, point)][:3], wanted, 2e-5, f"{kind} {value}")
+        obj.patina.colors.use_range = True
+        obj.patina.colors.range_min, obj.patina.colors.range_max = 500, 501
+        picture = render()["Combined"]
+        check_close(picture[pixel(scene, points[0])][:3], (0, 0, 0), 1e-6, "below the range")
+        check_close(picture[pixel(scene, points[-1])][:3], (1, 1, 1), 1e-6, "beyond the range")
+
+
+def test_missing_attribute():
+    scene, points, obj = scene_of_numbers(np.zeros(12))
+    obj.patina.colors.scalar = "nowhere"
+    picture = render()["Combined"]
+    check(any("no point attribute 'nowhere'" in text for _, text in reports), f"reports {reports}")
+    check_close(picture[pixel(scene, points[0])][:3], linear(GREEN[:3]), 2e-6, "its own colours instead")
+
+
+def test_fixed_and_grade():
+    scene, points, obj = scene_of_numbers(np.zeros(12))
+    obj.patina.colors.source = 'FIXED'
+    obj.patina.color = (0.2, 0.3, 0.05)
+    place = pixel(scene, points[3])
+    check_close(render()["Combined"][place][:3], (0.2, 0.3, 0.05), 1e-6, "fixed")
+    obj.patina.colors.exposure = 1.0
+    check_close(render()["Combined"][place][:3], (0.4, 0.6, 0.1), 2e-6, "a stop more")
+    obj.patina.colors.contrast = 2.0
+    wanted = 0.18 * (np.array((0.4, 0.6, 0.1)) / 0.18) ** 2
+    check_close(render()["Combined"][place][:3], wanted, 5e-6, "contrast around mid grey")
+    obj.patina.colors.source = 'OWN'
+    wanted = 0.18 * (2 * linear(GREEN[:3]) / 0.18) ** 2
+    check_close(render()["Combined"][place][:3], wanted, 1e-5, "of their own colours")
+
+
+def test_height_and_distance():
+    scene = new_scene()
+    world = np.array([(x, y, -3.0 + 0.6 * x + y) for x in (-0.47, 0.02, 0.51) for y in (-0.41, 0.03, 0.38)])
+    matrix = Matrix.Translation((0.3, -1, 2)) @ Matrix.Rotation(0.7, 4, 'X') @ Matrix.Diagonal((1, -2, 0.5, 1))
+    local = np.array([matrix.inverted() @ Vector(point) for point in world])
+    obj = add_points(local, matrix=matrix)
+    colors = obj.patina.colors
+    obj.patina.lighting = 'UNLIT'
+    colors.ramp, colors.use_range = 'GREY', True
+    grey = native.ramp("grey")
+    for source, values, ends in (('HEIGHT', world[:, 2], (-5.0, -1.0)), ('OBJECT_HEIGHT', local[:, 2], (-12.0, -3.0)),
+                                 ('DISTANCE', np.linalg.norm(world, axis=1), (2.0, 4.5))):
+        colors.source = source
+        colors.range_min, colors.range_max = ends
+        picture = render()["Combined"]
+        for point, value in zip(world, values):
+            share = (value - ends[0]) / (ends[1] - ends[0])
+            check(0 < share < 1, f"{source}: {value} lies on the ramp")
+            wanted = np.interp(share, np.linspace(0, 1, 256), grey[:, 0])
+            check_close(picture[pixel(scene, point)][0], wanted, 0.03, f"{source} at {value}")  # of the pixel's middle
+
+
+def test_custom_ramp():
+    scene, points, obj = scene_of_numbers(np.linspace(0, 1, 12))
+    bpy.context.view_layer.objects.active = obj
+    obj.patina.colors.ramp = 'HEAT'
+    check(bpy.ops.object.patina_new_ramp() == {'FINISHED'}, "a ramp was made")
+    colors = obj.patina.colors
+    check(colors.ramp == 'CUSTOM' and len(colors.texture.color_ramp.elements) > 2, "with stops")
+    ramp = colors.texture.color_ramp
+    picture = render()["Combined"]
+    for point, share in zip(points, np.linspace(0, 1, 12)):
+        check_close(picture[pixel(scene, point)][:3], ramp.evaluate(float(share))[:3], 2e-3, f"heat at {share}")
+    ramp.interpolation = 'CONSTANT'
+    for element, color in zip(ramp.elements, ((1, 0, 0, 1), (0, 0, 1, 1))):
+        element.color = color
+    place = pixel(scene, points[0])
+    check_close(render()["Combined"][place][:3], (1, 0, 0), 1e-6, "a stop that was painted")
+    colors.texture = None
+    check_close(render()["Combined"][place][:3], (0, 0, 0), 1e-6, "no texture: black to white")
+
+
+def test_robust_range():
+    values = np.append(np.linspace(0, 10, 11), 1e6)
+    scene, points, obj = scene_of_numbers(values)
+    bpy.context.view_layer.objects.active = obj
+    check(bpy.ops.object.patina_robust_range() == {'FINISHED'}, "a range was found")
+    colors = obj.patina.colors
+    check(colors.use_range and colors.range_min < 1.0, f"range {colors.range_min} {colors.range_max}")
+    check_close(colors.range_min, np.quantile(values, 0.02), 1e-4, "2 % below")
+
+
+def test_hidden_classes():
+    classes = np.arange(12) % 4 + 2
+    scene, points, obj = scene_of_numbers(classes, 'INT', "classification")
+    obj.patina.colors.ramp = 'CLASSES'
+    obj.patina.colors.scalar = "classification"
+    picture = render()
+    table = native.ramp("classes")
+    for point, number in zip(points, classes):
+        check_close(picture["Combined"][pixel(scene, point)][:3], table[number], 1e-4, f"class {number}")
+    obj.patina.colors.hidden[2] = True
+    obj.patina.colors.hidden_more = "5, 70-300, nonsense"
+    picture = render()
+    shown = {tuple(pixel(scene, point)) for point, number in zip(points, classes) if number in (3, 4)}
+    check(drawn(picture) == shown, f"{len(drawn(picture))} pixels, {len(shown)} expected")
+
+
+def write_las(path):
+    """Nine points with intensity 0, 100 .. 800; the last three are vegetation."""
+    points = [(x, y, -30) for y in (-6, 0, 6) for x in (-6, 0, 6)]
+    head = bytearray(227)
+    head[:4], head[24], head[25] = b"LASF", 1, 2
+    struct.pack_into("<HIIBHI", head, 94, 227, 227, 0, 0, 20, len(points))
+    struct.pack_into("<12d", head, 131, 0.1, 0.1, 0.1, 0, 0, 0, 0.6, -0.6, 0.6, -0.6, -3, -3)
+    body = b"".join(struct.pack("<iiiHBBbBH", *point, 100 * i, 9, 5 if i > 5 else 2, 0, 0, 0)
+                    for i, point in enumerate(points))
+    path.write_bytes(bytes(head) + body)
+    return np.array(points) * 0.1
+
+
+def test_after_import():
+    """Intensity and class of a LAS file, at once and as a linked cloud."""
+    for link in (False, True):
+        scene = new_scene()
+        path = SCRATCH / f"flight{int(link)}.las"
+        points = write_las(path)
+        bpy.ops.import_scene.patina_points(filepath=str(path), files=[{"name": path.name}], directory=str(SCRATCH), link=link)
+        obj = bpy.context.view_layer.objects.active
+        check(bool(obj.patina.linked_file) == link, "linked as asked")
+        obj.patina.lighting = 'UNLIT'
+        colors = obj.patina.colors
+        colors.source, colors.scalar, colors.ramp = 'SCALAR', "intensity", 'GREY'
+        picture = render()
+        grey = native.ramp("grey")
+        for i, point in enumerate(points):
+            wanted = np.interp(i / 8, np.linspace(0, 1, 256), grey[:, 0])
+            check_close(picture["Combined"][pixel(scene, point)][0], wanted, 2e-3, f"point {i}, link {link}")
+        colors.hidden[5] = True
+        check(len(drawn(render())) == 6, f"vegetation is hidden, link {link}")
+        bpy.context.view_layer.objects.active = obj
+        check(bpy.ops.object.patina_robust_range() == {'FINISHED'}, f"a range, link {link}")
+        check(colors.range_max > colors.range_min, f"range {colors.range_min} {colors.range_max}")
+        colors.scalar = "nowhere"
+        render()
+        check(any("'nowhere'" in text for _, text in reports), f"reports {reports}, link {link}")
+        os.unlink(path)

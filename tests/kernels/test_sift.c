@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// sift: boxes that keep and cut, planes, hidden classes; degenerate and huge ones. Bits are equal on every device.
+#include "harness.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { CHUNKS = 9, MOST_CLIPS = 40 };
+
+struct setup {
+    struct sift_args args;
+    struct chunk_view chunks[CHUNKS];
+    struct clip_view clips[MOST_CLIPS];
+    uint32_t clip_count, slots, words;
+    float *positions;
+    uint8_t *classes;
+};
+
+static struct setup make(struct harness *h, struct rng *rng)
+{
+    static const uint32_t sizes[CHUNKS] = {1, 15, 16, 17, 300, 1000, 31, 2, 4096};
+    struct setup s = {0};
+    for (uint32_t c = 0; c < CHUNKS; c++) {
+        struct chunk_view *chunk = &s.chunks[c];
+        chunk->first = s.slots;
+        chunk->count = sizes[c];
+        chunk->padded = (sizes[c] + 15) / 16 * 16;
+        s.slots += chunk->padded;
+        if (c == 3)
+            continue; // whole: nothing is written for it
+        chunk->sifted = 1 + s.words;
+        s.words += chunk->padded / PT_SLOTS_A_WORD;
+    }
+    s.positions = harness_alloc(h, 12 * (size_t)s.slots);
+    s.classes = harness_alloc(h, (size_t)s.slots + 4);
+    for (uint32_t i = 0; i < 3 * s.slots; i++)
+        s.positions[i] = (float)rng_range(rng, -2.0, 2.0);
+    for (uint32_t i = 0; i < s.slots; i++)
+        s.classes[i] = (uint8_t)(rng_below(rng, 4) ? rng_below(rng, 8) : rng_below(rng, 256));
+    return s;
+}
+
+static struct clip_view random_clip(struct rng *rng, uint32_t shape, double size)
+{
+    struct clip_view clip = {.shape = shape};
+    for (int k = shape == PT_CLIP_PLANE ? 2 : 0; k < 3; k++) {
+        float direction[3];
+        rng_direction(rng, direction);
+        for (int i = 0; i < 3; i++)
+            clip.row[3 * k + i] = (float)(direction[i] * size);
+        double shift = rng_range(rng, -1.0, 1.0);
+        clip.hi[k] = (float)shift;
+        clip.lo[k] = (float)(shift - clip.hi[k]);
+    }
+    return clip;
+}
+
+// Every divided chunk gets `keeps` boxes that keep, then `cuts` boxes and planes.
+static void add_clips(struct setup *s, struct rng *rng, uint32_t keeps, uint32_t cuts, double size)
+{
+    s->clip_count = keeps + cuts;
+    for (uint32_t i = 0; i < s->clip_count; i++)
+        s->clips[i] = random_clip(rng, i < keeps ? PT_CLIP_KEEP : i % 2 ? PT_CLIP_CUT : PT_CLIP_PLANE, size);
+    for (uint32_t c = 0; c < CHUNKS; c++) {
+        s->chunks[c].clip_count = s->clip_count;
+        s->chunks[c].clip_keeps = keeps;
+    }
+}
+
+static void check(struct harness *h, const struct setup *s)
+{
+    uint32_t *before = harness_alloc(h, 4 * (size_t)(s->words + 1));
+    memset(before, 0xAA, 4 * (size_t)(s->words + 1));
+    struct pt_buffer *chunks = harness_buffer(h, s->chunks, sizeof s->chunks);
+    struct pt_buffer *positions = harness_buffer(h, s->positions, 12 * (size_t)s->slots);
+    struct pt_buffer *classes = harness_buffer(h, s->classes, (s->slots + 3) / 4 * 4);
+    struct pt_buffer *clips = harness_buffer(h, s->clips, (s->clip_count ? s->clip_count : 1) * sizeof *s->clips);
+    struct pt_buffer *drawn = harness_buffer(h, before, 4 * (size_t)(s->words + 1));
+    HARNESS_RUN(h, sift, &s->args, chunks, positions, classes, clips, drawn);
+    uint32_t *got = harness_read(h, drawn);
+    size_t open = 0, points = 0, kept = 0;
+    for (uint32_t c = 0; c < CHUNKS; c++) {
+        const struct chunk_view *chunk = &s->chunks[c];
+        for (uint32_t i = 0; i < chunk->count && chunk->sifted; i++, points++) {
+            int bit = got[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u;
+            enum ref_truth expected = ref_sift(&s->args, chunk, s->positions, s->classes, s->clips, i);
+            open += expected == REF_UNSURE;
+            kept += (size_t)bit;
+            if (expected != REF_UNSURE && bit != (expected == REF_YES))
+                harness_fail(h, "drawn", (int)i, (int)c, "got %d, expected %d", bit, expected == REF_YES);
+        }
+    }
+    HARNESS_CHECK(h, got[s->words] == 0xAAAAAAAAu); // beyond the last word
+    harness_same(h, "drawn", got, s->words, 4, 1, s->words);
+    harness_unsure(h, open, points, TOL_UNSURE_SHARE);
+    harness_note(h, "%zu of %zu points are drawn", kept, points);
+}
+
+static void shapes(struct harness *h)
+{
+    static const uint32_t counts[][2] = {{1, 0}, {0, 1}, {0, 2}, {3, 0}, {2, 5}, {8, 8}, {20, 20}};
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+        struct rng rng = {i};
+        struct setup s = make(h, &rng);
+        add_clips(&s, &rng, counts[i][0], counts[i][1], 0.7);
+        check(h, &s);
+    }
+}
+
+static void classes(struct harness *h)
+{
+    for (uint64_t seed = 0; seed < 4; seed++) {
+        struct rng rng = {seed};
+        struct setup s = make(h, &rng);
+        s.args.by_class = 1;
+        for (int k = 0; k < 8; k++)
+            s.args.hidden[k] = seed == 3 ? ~0u : (uint32_t)rng_next(&rng); // all of them at last
+        if (seed == 1)
+            add_clips(&s, &rng, 1, 2, 0.7);
+        check(h, &s);
+        s.args.by_class = 0; // then they do not count
+        check(h, &s);
+    }
+}
+
+// Boxes as small and as large as float32 has them, around points far from the chunk's origin; NaN where infinities meet.
+static void extremes(struct harness *h)
+{
+    static const double sizes[] = {1e-30, 1e-6, 1e6, 1e30, 3e38};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        struct rng rng = {i + 20};
+        struct setup s = make(h, &rng);
+        add_clips(&s, &rng, 1, 3, sizes[i]);
+        for (uint32_t k = 0; k < s.slots && i < 4; k++)
+            s.positions[k] *= (float)(1.0 / sizes[i]);
+        if (i < 4) {
+            check(h, &s);
+            continue;
+        }
+        for (uint32_t k = 0; k < s.clip_count; k++) // sums overflow: no float64 says what; devices agree
+            s.clips[k].row[0] = s.clips[k].row[4] = s.clips[k].row[8] = INFINITY;
+        struct pt_buffer *buffers[5] = {harness_buffer(h, s.chunks, sizeof s.chunks),
+                                        harness_buffer(h, s.positions, 12 * (size_t)s.slots),
+                                        harness_buffer(h, s.classes, (s.slots + 3) / 4 * 4),
+                                        harness_buffer(h, s.clips, sizeof s.clips), harness_buffer(h, NULL, 0)};
+        uint32_t *zero = harness_alloc(h, 4 * (size_t)s.words);
+        buffers[4] = harness_buffer(h, zero, 4 * (size_t)s.words);
+        harness_run(h, PT_KERNEL_sift, &s.args, sizeof s.args, buffers, 5);
+        harness_same(h, "infinite", harness_read(h, buffers[4]), s.words, 4, 1, s.words);
+    }
+}
+
+// Reference alone: a box of half size 2 around (1, 0, 0), and a plane through it.
+static void sanity(struct harness *h)
+{
+    struct clip_view clips[2] = {{.row = {0.5f, 0, 0, 0, 0.5f, 0, 0, 0, 0.5f}, .hi = {-0.5f, 0, 0}, .shape = PT_CLIP_KEEP},
+                                 {.row = {0, 0, 0, 0, 0, 0, 0, 0, 1}, .hi = {0, 0, -1}, .shape = PT_CLIP_PLANE}};
+    const float points[3 * 16] = {[0] = 2.9f, [1] = 3.1f, [2] = 0.0f, [32 + 2] = 1.5f};
+    struct chunk_view chunk = {.count = 3, .padded = 16, .clip_count = 1, .clip_keeps = 1};
+    struct sift_args args = {0};
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, clips, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, clips, 1) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, clips, 2) == REF_YES);
+    chunk.clip_count = 2; // cuts what lies above z = 1
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, clips, 2) == REF_NO);
+    clips[0].shape = PT_CLIP_CUT;
+    chunk.clip_keeps = 0;
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, clips, 1) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, clips, 0) == REF_NO);
+}
+
+int main(int argc, char **argv)
+{
+    static const struct harness_case cases[] = {
+        {"sanity", sanity, 1}, {"boxes and planes", shapes, 0}, {"hidden classes", classes, 0}, {"extreme sizes", extremes, 0}};
+    return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
+}
