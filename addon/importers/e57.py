@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import native
-from .reading import Filter, PointFile, Progress, colors_of, origin_of
+from .reading import Filter, PointFile, Progress, colors_of, origin_of, scanners_of
 
 MISSING = ("E57 files need the Python package pye57: Patina's extension for Blender 4.2 and later brings it; elsewhere "
            "run \"{python}\" -m pip install --user pye57")
@@ -44,11 +44,15 @@ def preview(path: Path) -> list[str]:
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     file = _open(path)
     parts: list[dict[str, np.ndarray]] = []
+    scanners: list[np.ndarray] = []
     done, crs = 0, ""
     try:
         crs = _crs(file)
         for index in range(file.scan_count):
             progress.step(index / max(file.scan_count, 1))
+            header = file.get_header(index)
+            if header.has_pose():
+                scanners.append(header.translation)
             data = file.read_scan(index, intensity=True, colors=True, ignore_missing_fields=True)
             positions = np.stack([data[f"cartesian{axis}"] for axis in "XYZ"], 1)
             keep = wanted.mask(done, positions)
@@ -65,7 +69,9 @@ def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
         raise native.PatinaError(f"{path.name}: scan {len(parts)}: {_first_line(error)}", -4) from None
     finally:
         file.close()
-    return merge(path.stem, parts, {"crs": crs} if crs else {})
+    points = merge(path.stem, parts, {"crs": crs} if crs else {})
+    points.notes |= scanners_of(scanners, points.origin)
+    return points
 
 
 def _crs(file: Any) -> str:

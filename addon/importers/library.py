@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+from collections import deque
+from itertools import islice
 from pathlib import Path
 
 from .. import native
-from .reading import Filter, PointFile, Progress
+from .reading import Filter, PointFile, Progress, scanners_of
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     """Reads a file whole, then filters. PatinaError when it cannot be read."""
     with progress.inner() as inner, native.File(str(path), inner) as file:
+        scanners = _scanners(path) if file.format == "PTX" else []
         return PointFile(
             name=path.stem,
             positions=file.positions(),
@@ -19,7 +22,19 @@ def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
             colors=file.colors(),
             scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
             origin=file.origin,
-            invalid=file.invalid_positions).filtered(wanted)
+            invalid=file.invalid_positions,
+            notes=scanners_of(scanners, file.origin)).filtered(wanted)
+
+
+def _scanners(path: Path) -> list[list[float]]:
+    """Where the scans of a PTX were taken: the last row of each one's matrix. The library has found the file good."""
+    places = []
+    with open(path, "rb") as file:
+        lines = (line for line in file if line.strip())
+        while head := list(islice(lines, 10)):
+            places.append([float(word) for word in head[9].split()[:3]])
+            deque(islice(lines, int(head[0]) * int(head[1])), maxlen=0)  # its points
+    return places
 
 
 def preview(path: Path) -> list[str]:

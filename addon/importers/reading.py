@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -47,7 +47,8 @@ class PointFile:
     scalars: dict[str, np.ndarray]  # (n,) float32 by name
     origin: tuple[float, float, float]  # float64
     invalid: int  # positions that are not finite
-    notes: dict[str, str | float] = field(default_factory=dict)  # kept with the mesh: "crs", "gps_time_start"
+    # kept with the mesh: "crs", "gps_time_start", "scanners" (x, y, z of each, relative to origin)
+    notes: dict[str, str | float | list[float]] = field(default_factory=dict)
 
     def filtered(self, wanted: Filter) -> PointFile:
         if wanted.keeps_all():
@@ -115,6 +116,11 @@ def _opaque(rgb: np.ndarray, pieces: list[slice], kind: type, one: float,
     for piece in pieces:
         rgba[piece, :3] = convert(rgb[piece])
     return rgba
+
+
+def scanners_of(places: Sequence[Sequence[float]], origin: tuple[float, float, float]) -> dict[str, list[float]]:
+    """The note of where scanners stood, in the file's coordinates; none when that is not known."""
+    return {"scanners": (np.asarray(places, np.float64) - origin).ravel().tolist()} if len(places) else {}
 
 
 def origin_of(lower: np.ndarray, upper: np.ndarray, detail: float) -> tuple[float, float, float]:

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-from . import clips, colors, combine, export_points, import_points, linked_points, plan, shadows, styles, view_transform
+from . import (clips, colors, combine, export_points, import_points, linked_points, plan, scanner, shadows, styles,
+               view_transform)
 
-_MODULES = (clips, colors, import_points, export_points, combine, linked_points, plan, shadows, styles, view_transform)
+_MODULES = (clips, colors, import_points, export_points, combine, linked_points, plan, scanner, shadows, styles,
+            view_transform)
 
 
 def register() -> None:

@@ -13,6 +13,7 @@ from bpy_extras.io_utils import ImportHelper
 from .. import importers, jobs, native, styles
 from ..importers import PointFile, origin
 from ..sync import linked, sequence
+from . import scanner
 
 _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked at last
 
@@ -118,6 +119,8 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         for path, item in found.items():
             name = path.stem.replace("#", "").rstrip("_-. ") or path.stem if self.sequence else path.stem
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
+            if item.scanners:
+                obj.data[scanner.PROPERTY] = item.scanners
             obj.patina.linked_file = str(path)
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, shared)

@@ -43,6 +43,7 @@ class Linked:
     cloud: native.Cloud
     origin: Corner  # float64; the cloud is relative to it
     box: tuple[Corner, Corner]
+    scanners: list[float]  # x, y, z of each, relative to origin
 
 
 def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
@@ -80,8 +81,8 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
     """Maps the kept cloud, or builds and keeps it. Any thread. PatinaError when the file cannot be read."""
     notes = source.kept.with_suffix(".json")
     try:
-        origin = tuple(json.loads(notes.read_text("utf-8"))["origin"])
-        found = _linked(native.Cloud.open(source.kept), origin)
+        kept = json.loads(notes.read_text("utf-8"))
+        found = _linked(native.Cloud.open(source.kept), tuple(kept["origin"]), kept.get("scanners"))
         os.utime(source.kept)  # used just now
         return found
     except (native.PatinaError, OSError, ValueError, KeyError):
@@ -92,6 +93,7 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
+    scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
     with progress.inner() as inner:
         cloud = native.Cloud(points.positions, points.normals, points.colors, inner, origin=offset,
                              scalars=_column(points, source.scalar), classes=_classes(points))
@@ -99,12 +101,12 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
         for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
             old.unlink()
         cloud.save(source.kept)
-        notes.write_text(json.dumps({"origin": origin}), "utf-8")
+        notes.write_text(json.dumps({"origin": origin, "scanners": scanners}), "utf-8")
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
-    return _linked(cloud, origin)
+    return _linked(cloud, origin, scanners)
 
 
 def _tidy(newest: Path) -> None:
@@ -129,8 +131,8 @@ def _classes(points: importers.PointFile) -> np.ndarray | None:
     return None if values is None else attributes.as_classes(values)
 
 
-def _linked(cloud: native.Cloud, origin: Corner) -> Linked:
-    return Linked(cloud, origin, cloud.box)
+def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None) -> Linked:
+    return Linked(cloud, origin, cloud.box, scanners or [])
 
 
 def box_mesh(name: str, box: tuple[Corner, Corner]) -> bpy.types.Mesh:

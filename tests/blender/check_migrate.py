@@ -35,6 +35,7 @@ def load(path):
 def test_an_old_file_keeps_its_picture():
     """A scene of before version 1 that said nothing of meshes left them out; it still does, and one that asked keeps that."""
     scene = new_scene()
+    mine = scene.name
     check(scene.patina.version == 0, "a new scene has no stamp yet")
     asked = bpy.data.scenes.new("asked")
     asked.render.engine, asked.patina.meshes = 'PATINA', 'POINTS'
@@ -44,8 +45,8 @@ def test_an_old_file_keeps_its_picture():
         path = saved("old.blend")
     load(path)
     scenes = bpy.data.scenes
-    check([scenes[name].patina.meshes for name in ("test", "asked")] == ['OFF', 'POINTS'], "meshes")
-    check(scenes["test"].patina.is_property_set("meshes"), "what was meant is written down")
+    check([scenes[name].patina.meshes for name in (mine, "asked")] == ['OFF', 'POINTS'], "meshes")
+    check(scenes[mine].patina.is_property_set("meshes"), "what was meant is written down")
     check(not scenes["other"].patina.is_property_set("meshes"), "another engine's scene is left alone")
     check({scene.patina.version for scene in scenes} == {CURRENT}, "stamps")
     for name in ("asked", "other"):

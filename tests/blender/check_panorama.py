@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panoramic cameras, and cameras where a scanner stood."""
 
+import importlib.util
 import math
 
 import bpy
+import check_linked  # noqa: F401  no test leaves files with the user
 import numpy as np
+from check_import import import_ply as import_points
 from check_motion import make_linear
-from harness import add_points, check, check_close, new_scene, render, sphere
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, new_scene, render, sphere
 from mathutils import Euler
+
+from patina import importers
+from patina.operators import scanner
 
 EYE = (3.0, -2.0, 1.0)
 
@@ -89,3 +95,56 @@ def test_samples_and_motion():
     wide = columns.max() - columns.min() + 1
     wanted = 20 / 360 * 128 * 3 / 4
     check(abs(wide - wanted) < 3.5, f"smeared over {wide} columns, not {wanted:.1f}")
+
+
+def two_scans(origin):
+    """A PTX of two scans, each a patch of points 2 north of its scanner."""
+    lines = []
+    for x in (0.0, 5.0):
+        lines += ["4", "4", f"{x + origin[0]:.3f} {origin[1]:.3f} {origin[2]:.3f}", "1 0 0", "0 1 0", "0 0 1", "1 0 0 0",
+                  "0 1 0 0", "0 0 1 0", f"{x + origin[0]:.3f} {origin[1]:.3f} {origin[2]:.3f} 1"]
+        lines += [f"{0.05 * (i % 4) - 0.075:.4f} 2 {0.05 * (i // 4) - 0.075:.4f} 0.5" for i in range(16)]
+    path = SCRATCH / "two.ptx"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def check_scanner_cameras(origin, link):
+    """Through the camera of each scan its points are straight ahead, 2 away."""
+    scene = new_scene(128, 64)
+    obj, = import_points(two_scans(origin), link=link)
+    check(len(scanner.positions(obj)) == 2, f"{obj.data.get(scanner.PROPERTY)}")
+    for scan in (0, 1):
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.object.patina_camera_at_scanner(scan=scan)
+        check(scene.camera.data.type == 'PANO', "a panoramic camera")
+        depth = render()["Depth"][..., 0]
+        seen = np.argwhere(np.abs(depth - 2.0) < 0.06)
+        check(len(seen) and np.abs(seen.mean(axis=0) + 0.5 - (32, 64)).max() < 0.8, f"scan {scan} is seen at {seen}")
+    bpy.context.view_layer.objects.active = obj
+    try:
+        bpy.ops.object.patina_camera_at_scanner(scan=2)
+    except RuntimeError as error:
+        check("scans 0 to 1, there is no 2" in str(error), str(error))
+    else:
+        check(False, "a third scan")
+
+
+def test_camera_at_scanner():
+    for link in (False, True):
+        check_scanner_cameras((10.0, 20.0, 1.5), link)
+        check_scanner_cameras((485432.125, 5428765.25, 312.5), link)
+
+
+def test_scanner_of_e57():
+    """The pose that an E57 tells is kept, relative to the origin of the points."""
+    if importlib.util.find_spec("pye57") is None:
+        raise Skip("pye57 is not installed here")
+    path = REPOSITORY.parent / "shared/data/formats/e57/pye57/translationWithoutRotation.e57"
+    if not path.exists():
+        raise Skip("there is no ../shared/data/formats/e57/pye57/translationWithoutRotation.e57")
+    import pye57
+    file = pye57.E57(str(path))
+    wanted = np.array(file.get_header(0).translation)
+    points = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+    check_close(np.array(points.notes["scanners"]) + points.origin, wanted, 1e-6, "the scanner")

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A camera where a scanner stood, for clouds whose file says where that was (E57, PTX)."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, IntProperty
+from bpy.types import Context, Operator
+from mathutils import Matrix, Vector
+
+PROPERTY = "patina_scanners"  # of the data: x, y, z of each, as the points' own coordinates
+
+
+def positions(obj: bpy.types.Object | None) -> np.ndarray:
+    """(n, 3) in the object's coordinates; n is 0 where nothing is known."""
+    known = obj.data.get(PROPERTY) if obj and obj.data else None
+    return np.empty((0, 3)) if known is None else np.array(known, np.float64).reshape(-1, 3)
+
+
+class PATINA_OT_camera_at_scanner(Operator):
+    """Add a camera at the place of a scan, which sees what the scanner saw: level, north in the middle"""
+
+    bl_idname = "object.patina_camera_at_scanner"
+    bl_label = "Camera at Scanner Position"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    scan: IntProperty(name="Scan", default=0, min=0, description="Which scan of the file, from 0")
+    panoramic: BoolProperty(name="Panoramic", default=True, description="All around, as an equirectangular picture")
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return len(positions(context.object)) > 0
+
+    def execute(self, context: Context) -> set[str]:
+        obj = context.object
+        known = positions(obj)
+        if self.scan >= len(known):
+            self.report({'ERROR'}, f"Patina: '{obj.name}' has scans 0 to {len(known) - 1}, there is no {self.scan}")
+            return {'CANCELLED'}
+        data = bpy.data.cameras.new(f"{obj.name} scan {self.scan}")
+        data.type = 'PANO' if self.panoramic else 'PERSP'
+        data.clip_start, data.clip_end = 0.05, 10000.0
+        camera = bpy.data.objects.new(data.name, data)
+        place = obj.matrix_world @ Vector(known[self.scan])
+        camera.matrix_world = Matrix.Translation(place) @ Matrix.Rotation(math.pi / 2, 4, 'X')
+        context.collection.objects.link(camera)
+        context.scene.camera = camera
+        return {'FINISHED'}
+
+
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_camera_at_scanner,))
