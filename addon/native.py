@@ -29,7 +29,7 @@ CANCELLED = -7  # PATINA_ERROR_CANCELLED
 INTERNAL = -10  # PATINA_ERROR_INTERNAL
 
 # patina_pass: plane name → (number, channels)
-PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1)}
+PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1), "LINE": (5, 1)}
 
 MOST_LAYERS = 16  # PATINA_MAX_LAYERS
 MOST_RAMP = 256  # PATINA_MAX_RAMP
@@ -176,6 +176,12 @@ class _Effects(_Descriptor):
                 ("paper_color", c_float * 3), ("paper_grain", c_float)]
 
 
+class _Lines(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_float), ("world", c_uint32), ("offset", c_float),
+                ("source", c_uint32), ("color", c_float * 3), ("far_color", c_float * 3), ("range", c_float * 2),
+                ("transparency", c_float), ("soft", c_float), ("surface", c_uint32), ("paper", c_float * 3)]
+
+
 class _ExpectedError(Structure):
     _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float)]
 
@@ -233,6 +239,7 @@ _CALLS = {
     "patina_cloud_set_scalars": (c_void_p, POINTER(_Array)),
     "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
+    "patina_scene_set_lines": (c_void_p, POINTER(_Lines)),
     "patina_scene_set_settings": (c_void_p, POINTER(_Settings)),
     "patina_scene_set_effects": (c_void_p, POINTER(_Effects)),
     "patina_frame_create": (c_void_p, _OUT),
@@ -618,6 +625,9 @@ class Scene(_Handle):
 
     def set_effects(self, **effects: Any) -> None:
         self._call("set_effects", byref(_Effects(**effects)))
+
+    def set_lines(self, **lines: Any) -> None:
+        self._call("set_lines", byref(_Lines(**lines)))
 
 
 class Frame(_Handle):

@@ -117,6 +117,7 @@ PASSES = (
     RenderPass("IndexOB" if bpy.app.version < (5, 0, 0) else "Object Index", 1, "X", 'VALUE', "KEYS",
                lambda layer: layer.use_pass_object_index, _object_index),
     RenderPass("Source", 1, "X", 'VALUE', "SOURCE", lambda layer: layer.patina.use_pass_source),
+    RenderPass("Line", 1, "X", 'VALUE', "LINE", lambda layer: layer.patina.use_pass_line),
     *(item for number in range(1, MOST_LAYERS + 1) for item in _of_layer(number)),
 )
 

@@ -216,6 +216,8 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
     scene.set_settings(**settings)
     scene.set_effects(**asdict(description.effects))
     scene.set_camera(**asdict(description.camera))
+    if description.lines:
+        scene.set_lines(**asdict(description.lines))
     for light in description.lights:
         scene.add_light(**asdict(light))
     for clip in description.clips:

@@ -43,7 +43,7 @@ SHIPPED = Path(__file__).resolve().parent / "presets/styles"
 LARGEST = 1 << 20  # bytes of a file
 
 # What makes up a look; a group stands for all its properties.
-SCENE = ("smooth", "use_shadows", "shadow_samples", "studio", "effects")
+SCENE = ("smooth", "use_shadows", "shadow_samples", "studio", "effects", "lines")
 POINTS = ("lighting", "opacity", "color", "ambient", "diffuse", "specular", "shininess")
 
 

@@ -45,7 +45,10 @@ class Wish:
             region=(x0 // shrink, y0 // shrink, -(-x1 // shrink), -(-y1 // shrink)),
             strata=pace.WHOLE if self.level.strata == pace.STRATA else self.level.strata,
             shadow_lazy=0, shadow_progressive=1)  # one sample after a change of lights, refined at rest
-        return replace(self.scene, clouds=clouds, camera=self.view.camera, settings=settings)
+        lines = self.scene.lines
+        if lines and not lines.world:
+            lines = replace(lines, width=lines.width / shrink)
+        return replace(self.scene, clouds=clouds, camera=self.view.camera, settings=settings, lines=lines)
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,8 @@ static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan
     int error = PATINA_OK;
     for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED && !error; p++) {
         size_t bytes = size_of(plan, (enum pt_plane)p, 0);
-        if (frame->planes[p][0].size == bytes || (p == PT_PLANE_SHADOW && !plan->light_count))
+        int unused = (p == PT_PLANE_SHADOW && !plan->light_count) || (p == PT_PLANE_LINES && !(plan->line_radius > 0.0f));
+        if (frame->planes[p][0].size == bytes || unused)
             continue;
         total += bytes - frame->planes[p][0].size;
         error = check_cap(frame, plan, total);
@@ -193,12 +194,16 @@ static int clear_keys(struct patina_frame *frame, const struct pt_plan *plan, en
 
 // ---- layers --------------------------------------------------------------------------------------------------------------
 
-// Before the first layer: all light comes through, outside the points' rectangle too.
+// Before the first layer: all light comes through, outside the points' rectangle too, and lines find nothing before them.
 static int begin_peeling(struct render *render)
 {
     struct patina_frame *frame = render->frame;
     const size_t tiles = size_of(render->plan, PT_PLANE_TILES, PT_TILE_LEVEL);
     int error = pt_frame_ensure_plane(frame, frame->planes, render->plan, PT_PLANE_THROUGH, 0);
+    if (!error && render->plan->line_radius > 0.0f)
+        error = pt_frame_ensure_plane(frame, frame->planes, render->plan, PT_PLANE_OVER, 0);
+    if (!error && render->plan->line_radius > 0.0f)
+        error = frame->device->ops->buffer_fill(frame->device, &frame->planes[PT_PLANE_OVER][0], 0, 4);
     render->tiles = malloc(tiles);
     if (!error && !render->tiles)
         error = pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
@@ -412,6 +417,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     frame->skipped_count = plan->skipped_count;
     frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
     frame->all_lit = !plan->light_count;
+    frame->has_lines = plan->line_radius > 0.0f;
     memcpy(frame->crop, plan->crop, sizeof frame->crop);
     frame->plane_width = plan->view.width;
     frame->keys_valid = 1;
@@ -468,6 +474,7 @@ static const struct {
     [PATINA_PASS_NORMAL] = { PT_PLANE_NORMALS, 3, "NORMAL" },
     [PATINA_PASS_SOURCE] = { PT_PLANE_SOURCE, 1, "SOURCE" },
     [PATINA_PASS_SHADOW] = { PT_PLANE_SHADOW, 1, "SHADOW" },
+    [PATINA_PASS_LINE] = { PT_PLANE_LINES, 1, "LINE" },
 };
 
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
@@ -486,6 +493,10 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
         pixels[i] = 1.0f;
     if (pass == PATINA_PASS_SHADOW && frame->all_lit)
         return PATINA_OK;
+    if (pass == PATINA_PASS_LINE && !frame->has_lines) {
+        memset(pixels, 0, size);
+        return PATINA_OK;
+    }
     int error = frame->device->ops->buffer_read(frame->device, &frame->planes[pass_table[pass].plane][0], 0, pixels, size);
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }

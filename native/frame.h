@@ -39,6 +39,7 @@ struct patina_frame {
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     uint32_t passes;          // bits of what was rendered
+    int has_lines;
     struct pt_layer layers[PATINA_MAX_LAYERS];
     uint32_t layer_count;     // scattered
     uint32_t layer_most;      // that the settings allowed

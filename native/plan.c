@@ -3,6 +3,7 @@
 #include "plan_passes.h"
 
 #include "expected.h"
+#include "plan_lines.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -221,20 +222,22 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     pt_shade_lights(builder, pt_receives(instance->instance), &args);
     args.view = pt_view_of(plan, instance, margin);
     args.instance = instance->args;
-    args.light_count = instance->args.lit ? args.light_count : 0;
+    const int shown = pt_line_surface(builder, &args.instance);
+    args.light_count = args.instance.lit ? args.light_count : 0;
     // filled pixels show their source's surface: half a spacing around, they border on the next source's
     double blend = floor(0.5 * plan->spacing_px + 0.5);
-    uint32_t wants_normals = instance->args.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) |
+    uint32_t wants_normals = args.instance.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) |
                              (uint32_t)pt_effects_want_normals(builder->scene);
     const int discs = plan->surface == PATINA_SURFACE_SPLATS; // blended already
-    if (discs) {
+    if (discs && shown) {
         args.instance.color_format = PT_COLOR_OF_PLANE;
         args.instance.has_opacities = plan->transparent != 0;
     }
     if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && !discs)
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     pt_own_colors(color, &args);
-    pt_plan_recolor(builder, instance, &args);
+    if (shown)
+        pt_plan_recolor(builder, instance, &args);
     int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE;
     enum pt_instance_buffer colors = args.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     PT_REASON(PT_ADD(builder, shade, args,
@@ -273,13 +276,16 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
         pt_skip(builder, "antialias", "switched off in the settings");
         return color;
     }
-    struct antialias_args args = {
-        .view = plan->view, .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS, .behind = builder->layer > 1};
-    args.mesh_base = (uint32_t)builder->scene->points;
-    args.mesh_count = (uint32_t)builder->scene->triangles;
+    struct antialias_args args = {.view = plan->view,
+                                  .layers = settings->antialias == PATINA_ANTIALIAS_LAYERS,
+                                  .behind = builder->layer > 1,
+                                  .mesh_base = (uint32_t)builder->scene->points,
+                                  .mesh_count = (uint32_t)builder->scene->triangles,
+                                  .inked = plan->line_radius > 0.0f};
+    const struct pt_ref line = pt_line_of(builder); // stands in for what only layers behind have
     const struct pt_ref refs[] = {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0),
-                                  pt_plane_at(color, 0), pt_plane_at(PT_PLANE_THROUGH, 0)};
-    PT_REASON(pt_add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.behind ? 5 : 4),
+                                  pt_plane_at(color, 0), args.behind ? pt_plane_at(PT_PLANE_THROUGH, 0) : line, line};
+    PT_REASON(pt_add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.inked ? 6 : args.behind ? 5 : 4),
               args.layers ? "edges of background and layers" : "edges of background");
     return color;
 }
@@ -290,7 +296,8 @@ static void plan_peel(struct pt_builder *builder, enum pt_plane color)
 {
     const struct pt_plan *plan = builder->plan;
     struct peel_args args = {
-        .view = plan->view, .first = builder->layer == 1, .stop = !builder->scene->settings.layer_passes};
+        .view = plan->view, .first = builder->layer == 1, .stop = !builder->scene->settings.layer_passes,
+        .inked = plan->line_radius > 0.0f};
     PT_REASON(
         PT_ADD(builder, peel, args,
                {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_shading_of(builder),
@@ -348,17 +355,25 @@ static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
                           pt_plane_at(depth, slot), pt_plane_at(depth, slot)}),
                   "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "",
                   extract.normal ? " normal" : "");
+    pt_plan_ink_layer(builder, passes >> PATINA_PASS_COMBINED & 1u ? PT_PLANE_LAYER_COMBINED : PT_PLANE_COUNT,
+                      extract.depth ? PT_PLANE_LAYER_DEPTH : PT_PLANE_COUNT);
 }
 
 // ---- the picture -------------------------------------------------------------------------------------------------------
+
+static void set_background(const patina_settings *settings, float background[4])
+{
+    for (int k = 0; k < 3; k++)
+        background[k] = settings->film_transparent ? 0.0f : pt_background(settings)[k];
+    background[3] = settings->film_transparent ? 0.0f : 1.0f;
+}
 
 static void plan_output(struct pt_builder *builder, enum pt_plane color)
 {
     const patina_settings *settings = &builder->scene->settings;
     struct compose_args compose = compose_args(builder->plan);
-    for (int k = 0; k < 3 && !settings->film_transparent; k++)
-        compose.background[k] = pt_background(settings)[k];
-    compose.background[3] = settings->film_transparent ? 0.0f : 1.0f;
+    set_background(settings, compose.background);
+    compose.everywhere = builder->plan->layers > 1 && builder->plan->line_radius > 0.0f;
     if (!pt_plan_focus(builder, color, &compose))
         PT_REASON(PT_ADD(builder, compose, compose,
                          {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
@@ -470,6 +485,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     pt_plan_meshes(builder, 1);
     if (builder->layer == 1)
         plan_marks(builder);
+    pt_plan_lines(builder);
     uint32_t finish = plan->pass_count;
     for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
         enum pt_plane shaded = own ? PT_PLANE_UNLIT : PT_PLANE_COLOR_A;
@@ -512,6 +528,7 @@ static void plan_points(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     enum pt_plane color = PT_PLANE_COLOR_A;
+    float background[4];
     for (builder->layer = 1; builder->layer <= plan->layers; builder->layer++) {
         color = plan_layer(builder);
         if (plan->layers > 1)
@@ -525,14 +542,18 @@ static void plan_points(struct pt_builder *builder)
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
     if (plan->layers == 1)
         put_together(builder);
+    set_background(&builder->scene->settings, background);
+    pt_plan_ink(builder, background);
     pt_plan_paper(builder);
 }
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
     static const char *const others[] = {"raster", "cover",  "mark",  "lit", "shade",     "obscure", "edl",
-                                         "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel"};
+                                         "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel",
+                                         "lines",  "ink"};
     builder->plan->light_count = 0;
+    builder->plan->line_radius = 0.0f;
     skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
     skip_all(builder, reason, others, sizeof others / sizeof *others);
     plan_output(builder, PT_PLANE_COLOR_A);

@@ -35,11 +35,16 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(MESH_SHOWN, 8, 0)     \
     X(MESH_NORMAL, 16, 0)   \
     X(MESH_ALBEDO, 12, 0)   \
+    X(LINE, 4, 0)           \
+    X(NEAREST, 4, 0)        \
+    X(LINE_BEHIND, 4, 0)    \
+    X(NEAREST_BEHIND, 4, 0) \
     X(COMBINED, 16, 0)      \
     X(DEPTH, 4, 0)          \
     X(NORMALS, 12, 0)       \
     X(SOURCE, 4, 0)         \
     X(SHADOW, 4, 0)         \
+    X(LINES, 4, 0)          \
     X(LAYER_COMBINED, 16, 0) \
     X(LAYER_DEPTH, 4, 0)    \
     X(LAYER_NORMALS, 12, 0)
@@ -154,6 +159,7 @@ struct pt_plan {
     patina_expected_error expected;
     uint32_t layers;        // at most so many are peeled; 1: no peeling
     int transparent;        // something in view lets light through
+    float line_radius;      // of the widest line, pixels; 0: none
     struct pt_arena *arena;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes in a picture or a light's map. They are drawn into keys of their own and laid over the points after filling: so no
 // hole is filled from a mesh, none is closed where a mesh stands behind it, and what it hides fills as if it were not there.
-#include "plan_passes.h"
+#include "plan_lines.h"
 
 #include <string.h>
 
@@ -72,6 +72,7 @@ void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)
                                            .diffuse = 1.0f,
                                            .opacity = 1.0f};
     pt_own_colors(color, &args);
+    pt_line_surface(builder, &args.instance);
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),

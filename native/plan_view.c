@@ -8,6 +8,7 @@
 #include "plan.h"
 
 #include "expected.h"
+#include "plan_lines.h"
 #include "scene/clip.h"
 
 #include <math.h>
@@ -439,14 +440,14 @@ static void choose_layers(const patina_settings *settings, struct pt_plan *plan)
 static uint32_t round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
 
 // How far, in pixels, anything can carry influence: fills and un-fills of both phases and the push at every level, the
-// window of estimated normals (16), the blend of normals (9), smoothing and anti-aliasing. Every layer starts from the filled
+// window of estimated normals (16), the blend of normals (9), smoothing, anti-aliasing and lines. Every layer starts from the filled
 // depth of the one before.
 static uint32_t reach_of(const struct pt_plan *plan)
 {
     uint32_t layer = 16;
     for (uint32_t level = 0; level <= plan->levels; level++)
         layer += (4 * plan->iterations + 3) << level;
-    return plan->layers * layer + 9 + 1 + 1;
+    return plan->layers * layer + 9 + 1 + 1 + pt_line_reach(plan);
 }
 
 static void choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard)
@@ -653,9 +654,11 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         return error;
     choose_filling(&scene->settings, plan);
     choose_layers(&scene->settings, plan);
+    plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;
-    // Effects see no farther beyond the picture: a wider guard would fill holes at its border otherwise than without them.
-    uint32_t guard = round_up(8 + 4 * cell, cell > 16 ? cell : 16);
+    // Effects see no farther beyond the picture: a wider guard would fill holes at its border otherwise than without them. Lines
+    // would break off there.
+    uint32_t guard = round_up(8 + 4 * cell + pt_line_reach(plan), cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
     survey.camera = bare;

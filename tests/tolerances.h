@@ -62,6 +62,11 @@
 #define TOL_GAUSSIAN 2.5e-4
 // World-space normal pass: three products, two sums; share of the terms.
 #define TOL_ROTATE (4.0 * TOL_UNIT)
+// v (n.r - slope) and z n.r: ray (its own error beside), product, two sums, slope (4), product; share of the terms.
+#define TOL_FRONT (10.0 * TOL_UNIT)
+// A line's share: distance of an integer's root (5), radius by a reciprocal (6), sum, fade (3), reciprocal (4), product; share of
+// the greatest distance, divided by the fade.
+#define TOL_SHARE (20.0 * TOL_UNIT)
 // Euclidean distance of the source pass: the root of an exact integer, drivers' sqrt() within 3 ulp; share.
 #define TOL_DISTANCE (8.0 * TOL_UNIT)
 

@@ -16,6 +16,7 @@ from ..native import MOST_LAYERS
 from .clips import PatinaClipProperties
 from .colors import PatinaColorProperties
 from .effects import PatinaEffectsProperties
+from .lines import PatinaLinesProperties
 from .sequence import PatinaSequenceProperties
 from .studio import PatinaStudioProperties
 from .style import PatinaStyleProperties
@@ -34,6 +35,7 @@ class PatinaSceneProperties(PropertyGroup):
     style: PointerProperty(type=PatinaStyleProperties)
     studio: PointerProperty(type=PatinaStudioProperties, override=_OVERRIDE)
     effects: PointerProperty(type=PatinaEffectsProperties, override=_OVERRIDE)
+    lines: PointerProperty(type=PatinaLinesProperties, override=_OVERRIDE)
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
@@ -207,6 +209,9 @@ class PatinaViewLayerProperties(PropertyGroup):
         name="Source", default=False, update=_update_passes, override=_OVERRIDE,
         description="What is scan and what is invention: 0 nothing, 1 measured, 1 + distance filled from a "
                     "neighbour that many pixels away, negative where anti-aliasing mixed")
+    use_pass_line: BoolProperty(
+        name="Line", default=False, update=_update_passes, override=_OVERRIDE,
+        description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
         description="Colour, depth and normal of so many layers of surface, the nearest first, as passes of their own; "
@@ -214,7 +219,7 @@ class PatinaViewLayerProperties(PropertyGroup):
 
 
 _CLASSES = (PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
-            PatinaColorProperties, PatinaClipProperties, PatinaSceneProperties,
+            PatinaLinesProperties, PatinaColorProperties, PatinaClipProperties, PatinaSceneProperties,
             PatinaObjectProperties, PatinaViewLayerProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties))
 

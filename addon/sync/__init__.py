@@ -13,17 +13,18 @@ from dataclasses import dataclass
 import bpy
 
 from .. import migrate
-from . import clips, clouds, effects, lights, settings, world
+from . import clips, clouds, effects, lights, lines, settings, world
 from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
 from .clips import Clip
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
 from .effects import Effects
 from .lights import Light
+from .lines import Lines
 from .meshes import MeshItem
 from .settings import DeviceChoice, Settings
 from .world import Mist
 
-__all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "MeshItem", "Mist",
+__all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Lines", "MeshItem", "Mist",
            "Panorama", "Pending", "Effects", "Focus",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "viewport_view"]
@@ -35,6 +36,7 @@ class SceneDescription:
     meshes: list[MeshItem]
     clips: list[Clip]
     lights: list[Light]
+    lines: Lines | None
     camera: Camera
     panorama: Panorama | None  # all around from where the camera stands
     settings: Settings
@@ -81,6 +83,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         meshes=[item for item in items if isinstance(item, MeshItem)],
         clips=clips.collect(depsgraph),
         lights=lights.collect(depsgraph, notices),
+        lines=lines.read(scene, view.camera),
         camera=view.camera,
         panorama=view.panorama,
         settings=settings.read(scene, view, background),

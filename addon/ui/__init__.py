@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from . import colors, effects, motion, panels, panorama, presets, sequence, standard, statistics, styles
+from . import colors, effects, lines, motion, panels, panorama, presets, sequence, standard, statistics, styles
 
-_MODULES = (presets, styles, panels, colors, effects, motion, panorama, sequence, statistics, standard)
+_MODULES = (presets, styles, panels, colors, lines, effects, motion, panorama, sequence, statistics, standard)
 
 
 def register() -> None:

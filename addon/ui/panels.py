@@ -157,6 +157,7 @@ class PATINA_PT_passes(PatinaPanel, Panel):
         column.prop(layer.patina, "use_pass_shadow")
         column.prop(layer, "use_pass_object_index")
         column.prop(layer.patina, "use_pass_source")
+        column.prop(layer.patina, "use_pass_line")
         layout.prop(layer.patina, "pass_layers")
 
 

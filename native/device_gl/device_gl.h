@@ -23,8 +23,8 @@ struct pt_gl_scratch {
 
 enum pt_gl_scratch_use {
     PT_GL_SCRATCH_COUNTERS,
-    PT_GL_SCRATCH_PIXELS, // fill: this step's changes; shade: filled pixels; antialias: edges
-    PT_GL_SCRATCH_COLORS, // antialias: of edges
+    PT_GL_SCRATCH_PIXELS, // fill: this step's changes; shade: filled pixels; antialias: edges; lines: steps
+    PT_GL_SCRATCH_COLORS, // antialias: of edges; lines: discs
     PT_GL_SCRATCH_SAVED,  // fill: pixels as they were before the phase
     PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
     PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
@@ -133,6 +133,7 @@ int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomi
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
 int pt_gl_antialias(struct pt_gl_device *d);
 int pt_gl_push(struct pt_gl_device *d);
+int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args);
 // The coarse cells over the rectangle of a push.
 struct view_args pt_gl_coarse_view(const struct push_args *args);
 

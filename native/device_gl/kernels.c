@@ -72,6 +72,7 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_lit] = {1, 2, 3},        [PT_KERNEL_edl] = {1},
     [PT_KERNEL_obscure] = {1, 2, 3, 4}, [PT_KERNEL_toon] = {1, 0, 0, 2},      [PT_KERNEL_hatch] = {1, 0, 0, 2},
     [PT_KERNEL_fog] = {1},              [PT_KERNEL_focus] = {1, 0, 0, 2},             [PT_KERNEL_tint] = {1},
+    [PT_KERNEL_lines] = {1, 2, 4, 3},   [PT_KERNEL_ink] = {1},
 };
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
@@ -133,6 +134,13 @@ static int run_obscure(struct pt_gl_device *d)
             result = pt_gl_dispatch_tiles(d, PT_KERNEL_obscure, step, PT_GL_TILES_POINTS);
     }
     return result;
+}
+
+static int run_ink(struct pt_gl_device *d, const struct ink_args *args)
+{
+    static const char *const definitions[] = {"#define COLOR_FORMAT 0\n", "#define COLOR_FORMAT 1\n", "#define COLOR_FORMAT 2\n"};
+    const uint32_t format = args->instance.color_format % 3;
+    return run_over(d, PT_KERNEL_ink, format, definitions[format], args->crop_width, args->crop_height);
 }
 
 // Only tiles with points in them.
@@ -202,6 +210,10 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     }
     case PT_KERNEL_extract:
         return run_extract(d, arguments);
+    case PT_KERNEL_lines:
+        return pt_gl_lines(d, arguments);
+    case PT_KERNEL_ink:
+        return run_ink(d, arguments);
     case PT_KERNEL_peel: // whole tiles, counted from the plane's corner
         pt_gl_tiles_forget(d);
         return run_over(d, kernel, 0, "", view->rect[2] - (view->rect[0] >> PT_TILE_LEVEL << PT_TILE_LEVEL),
@@ -236,7 +248,8 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
         return pt_gl_lit(d, argument_size, buffers, count, cancel);
     if (kernel == PT_KERNEL_sift)
         return pt_gl_sift(d, argument_size, buffers, count, cancel);
-    int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_focus || kernel == PT_KERNEL_paper || kernel == PT_KERNEL_extract;
+    int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_focus || kernel == PT_KERNEL_paper ||
+                kernel == PT_KERNEL_extract || kernel == PT_KERNEL_ink;
     if (!crops && (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1]))
         return PATINA_OK;
     struct view_args tiles = kernel == PT_KERNEL_push ? pt_gl_coarse_view(arguments) : *view;

@@ -122,7 +122,7 @@ int pt_gl_antialias(struct pt_gl_device *d)
     for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++)
         result = pt_gl_kernel_program(d, PT_KERNEL_antialias, step, definitions[step]);
     if (result == PATINA_OK)
-        result = prepare_list(d, 6, 7, TILE_PIXELS);
+        result = prepare_list(d, 7, 8, TILE_PIXELS);
     if (result == PATINA_OK)
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, FIND, PT_GL_TILES_POINTS);
     if (result != PATINA_OK)
@@ -130,7 +130,7 @@ int pt_gl_antialias(struct pt_gl_device *d)
     uint32_t count = list_length(d);
     result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, (size_t)count * 16, 0);
     if (result == PATINA_OK && count)
-        result = pt_gl_bind(d, 8, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
+        result = pt_gl_bind(d, 9, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
     if (result == PATINA_OK)
         result = dispatch_list(d, PT_KERNEL_antialias, MIX, count);
     if (result == PATINA_OK)
@@ -166,4 +166,29 @@ int pt_gl_push(struct pt_gl_device *d)
     if (result == PATINA_OK) // a tile has twice the columns of a tile of its own level
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_push, COVERED, PT_GL_TILES_POINTS);
     return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_push, TAKE, list_length(d)) : result;
+}
+
+// ---- lines -----------------------------------------------------------------------------------------------------
+
+int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args)
+{
+    enum { STEPS = 3, SIDE = 16 };
+    static const char *const definitions[STEPS] = {"#define STEP 0\n", "#define STEP 1\n", "#define STEP 2\n"};
+    const struct view_args *view = &args->view;
+    const size_t size = (size_t)view->width * view->height * 4;
+    const uint32_t columns = (view->rect[2] - view->rect[0] + SIDE - 1) / SIDE;
+    const uint32_t rows = (view->rect[3] - view->rect[1] + SIDE - 1) / SIDE;
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_PIXELS, size, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, size, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 9, d->scratch[PT_GL_SCRATCH_PIXELS].name, 0, size, "lines");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 10, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, size, "lines");
+    for (uint32_t step = 0; step < STEPS && result == PATINA_OK; step++) {
+        result = pt_gl_kernel_program(d, PT_KERNEL_lines, step, definitions[step]);
+        if (result == PATINA_OK)
+            result = pt_gl_dispatch(d, PT_KERNEL_lines, step, columns, rows);
+    }
+    return result;
 }

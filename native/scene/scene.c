@@ -358,13 +358,43 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
     return PATINA_OK;
 }
 
+int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines)
+{
+    if (!scene || (lines && lines->struct_size != sizeof *lines))
+        return fail(scene, "patina_scene_set_lines: bad arguments");
+    scene->has_lines = lines != NULL;
+    if (!lines)
+        return PATINA_OK;
+    scene->has_lines = 0;
+    patina_lines l = *lines;
+    if (!(l.width >= 0.0f) || !isfinite(l.width) || !(l.offset >= 0.0f) || !isfinite(l.offset))
+        return fail(scene, "lines: width and offset must be finite and 0 or more");
+    if (l.world && l.width == 0.0f)
+        return fail(scene, "lines: a width in world units must be above 0");
+    if (!l.world && l.width > PT_LINE_MOST)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "lines: %g pixels wide; the most is %d", (double)l.width, PT_LINE_MOST);
+    if (!(l.transparency >= 0.0f && l.transparency <= 1.0f) || !(l.soft >= 0.0f && l.soft <= 1.0f))
+        return fail(scene, "lines: transparency and soft must be between 0 and 1");
+    if (l.source > PATINA_LINE_DEPTH || l.surface > PATINA_LINE_SURFACE_NONE)
+        return fail(scene, "lines: no such source or surface");
+    if (!isfinite(l.color[0] + l.color[1] + l.color[2] + l.far_color[0] + l.far_color[1] + l.far_color[2]) ||
+        !isfinite(l.paper[0] + l.paper[1] + l.paper[2] + l.range[0] + l.range[1]))
+        return fail(scene, "lines: colours and range must be finite");
+    l.width = l.width == 0.0f ? 2.0f : l.width;
+    for (int k = 0; k < 3; k++) {
+        int black = lines->color[0] == 0.0f && lines->color[1] == 0.0f && lines->color[2] == 0.0f;
+        int no_paper = lines->paper[0] == 0.0f && lines->paper[1] == 0.0f && lines->paper[2] == 0.0f;
+        l.color[k] = black && l.source == PATINA_LINE_POINT ? 0.25f : l.color[k];
+        l.paper[k] = no_paper ? 1.0f : l.paper[k];
+    }
+    scene->lines = l;
+    scene->has_lines = 1;
+    return PATINA_OK;
+}
+
 // ---- a camera that frames the scene -----------------------------------------------------------------------------------
 
-// Calls back with the eight world-space corners of every chunk's box, closer to the points than the cloud's own, and of every
-// mesh's box.
-typedef void corner_work(void *context, const double corner[3]);
-
-static void box_corners(const struct pt_chunk *box, const double matrix[16], corner_work *work, void *context)
+static void box_corners(const struct pt_chunk *box, const double matrix[16], pt_corner_work *work, void *context)
 {
     double linear[9], translation[3], p[3], q[3];
     pt_split_matrix(matrix, linear, translation);
@@ -379,7 +409,7 @@ static void box_corners(const struct pt_chunk *box, const double matrix[16], cor
 }
 
 // PATINA_ERROR_MEMORY when there is none; without points, nothing is called back.
-static int each_corner(const patina_scene *scene, corner_work *work, void *context)
+int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *context)
 {
     struct pt_inverse_clip *room = malloc((scene->clip_count + 1) * sizeof *room);
     if (!room)
@@ -439,11 +469,11 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
     double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
     struct framing framing = { .x = x, .y = y, .z = z, .half_y = tan(0.5 * fov * degree) };
     framing.half_x = framing.half_y * scene->settings.width / scene->settings.height;
-    if (each_corner(scene, grow_box, &framing))
+    if (pt_each_corner(scene, grow_box, &framing))
         return PATINA_ERROR_MEMORY;
     for (int k = 0; k < 3; k++)
         framing.center[k] = 0.5 * (framing.lower[k] + framing.upper[k]);
-    if (each_corner(scene, step_back, &framing))
+    if (pt_each_corner(scene, step_back, &framing))
         return PATINA_ERROR_MEMORY;
     double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
     double reach = framing.radius > 0.0 ? 1.01 * framing.radius : distance;

@@ -33,6 +33,8 @@ struct patina_scene {
     int has_camera;
     patina_settings settings; // defaults made explicit
     patina_effects effects;   // likewise
+    patina_lines lines;       // defaults made explicit
+    int has_lines;
 };
 
 // Small 3 x 3 algebra in float64, row-major.
@@ -46,5 +48,11 @@ double pt_dot(const double a[3], const double b[3]);
 int pt_camera_axes(const patina_camera *camera, double axes[9], double position[3]);
 // The linear part (row-major 3 x 3) and translation of a 4 x 4 matrix.
 void pt_split_matrix(const double matrix[16], double linear[9], double translation[3]);
+
+// Calls back with the eight world-space corners of every chunk's box, closer to the points than the cloud's own, and of every
+// mesh's box; of chunks that clips cut away, nothing. PATINA_ERROR_MEMORY when there is none; without points, nothing is
+// called back.
+typedef void pt_corner_work(void *context, const double corner[3]);
+int pt_each_corner(const struct patina_scene *scene, pt_corner_work *work, void *context);
 
 #endif

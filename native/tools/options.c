@@ -180,6 +180,42 @@ static int parse_switch(const char *name, struct tool_options *options)
 
 enum outcome { GOOD, BAD_VALUE, UNKNOWN };
 
+// Of silhouettes. All but --lines itself shape those that it asks for.
+static enum outcome parse_line_option(const char *name, const char *value, struct tool_options *o)
+{
+    patina_lines *lines = &o->lines;
+    double n[3] = {0};
+    int count, bad = 0;
+    if (!strcmp(name, "--lines")) {
+        count = parse_numbers(value, n, 1, 3);
+        bad = count < 1 || n[0] <= 0 || n[1] < 0 || n[1] > 1 || n[2] < 0 || n[2] > 1;
+        o->has_lines = 1;
+        lines->width = (float)n[0];
+        lines->soft = (float)n[1];
+        lines->transparency = (float)(count > 2 ? 1 - n[2] : 0);
+    } else if (!strcmp(name, "--line-units"))
+        bad = parse_word(value, "pixels|world", &lines->world);
+    else if (!strcmp(name, "--line-color"))
+        bad = parse_color(value, lines->color);
+    else if (!strcmp(name, "--line-source"))
+        bad = parse_word(value, "fixed|point|depth", &lines->source);
+    else if (!strcmp(name, "--line-far"))
+        bad = parse_color(value, lines->far_color);
+    else if (!strcmp(name, "--line-surface"))
+        bad = parse_word(value, "shown|paper|none", &lines->surface);
+    else if (!strcmp(name, "--line-offset")) {
+        bad = parse_numbers(value, n, 1, 1) < 0 || n[0] < 0;
+        lines->offset = (float)n[0];
+    } else if (!strcmp(name, "--line-range")) {
+        bad = parse_numbers(value, n, 2, 2) < 0 || n[0] >= n[1];
+        lines->range[0] = (float)n[0];
+        lines->range[1] = (float)n[1];
+    } else
+        return UNKNOWN;
+    o->line_options |= strcmp(name, "--lines") != 0;
+    return bad ? BAD_VALUE : GOOD;
+}
+
 static enum outcome parse_valued(const char *name, const char *value, struct tool_options *o)
 {
     patina_settings *s = &o->settings;
@@ -257,7 +293,7 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         if (bad > 0)
             bad = tool_parse_color(name, value, &o->color);
         if (bad > 0)
-            return UNKNOWN;
+            return parse_line_option(name, value, o);
     }
     return bad ? BAD_VALUE : GOOD;
 }
@@ -269,6 +305,7 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         .effects = {.struct_size = sizeof options->effects},
         .azimuth = 30, // three-quarter view
         .elevation = 40,
+        .lines = {.struct_size = sizeof options->lines},
         .settings = {.struct_size = sizeof options->settings,
                      .width = 1024,
                      .height = 1024,
@@ -307,6 +344,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     options->settings.shadow_lazy = 1; // a picture has no use for whole textures, and measured frames are to compute theirs
     if ((options->save_shadows || options->load_shadows) && !options->shadows)
         return tool_misuse("--save-shadows and --load-shadows need --shadows");
+    if (options->line_options && !options->has_lines)
+        return tool_misuse("--line-... options need --lines");
     if (!options->file_count && !options->mesh_count)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)

@@ -139,6 +139,8 @@ static int set_scene(struct job *job)
     if (!code)
         code = patina_scene_set_effects(job->scene, &job->options.effects);
     if (!code)
+        code = patina_scene_set_lines(job->scene, job->options.has_lines ? &job->options.lines : NULL);
+    if (!code)
         code = set_view(job, 0, &camera);
     if (!code)
         code = tool_lights(job->scene, &job->options, &camera);

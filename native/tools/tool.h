@@ -74,6 +74,8 @@ struct tool_options {
     patina_settings settings;
     patina_effects effects;
     struct tool_color color;
+    int has_lines, line_options; // asked for; shaped
+    patina_lines lines;
 };
 
 // Reads between `least` and `most` numbers separated by commas. Returns how many, or -1.

@@ -21,9 +21,10 @@ layout(std430, binding = 0) readonly buffer arguments_block { antialias_args arg
 layout(std430, binding = 2) buffer from_block { uint from[]; };
 layout(std430, binding = 4) writeonly buffer color_block { vec4 color[]; };
 layout(std430, binding = 5) readonly buffer through_block { float through[]; };
-layout(std430, binding = 6) buffer counters_block { uint edge_count; };
-layout(std430, binding = 7) buffer edges_block { uint edges[]; };
-layout(std430, binding = 8) buffer mixed_block { vec4 mixed[]; };
+layout(std430, binding = 6) readonly buffer line_block { float line[]; };
+layout(std430, binding = 7) buffer counters_block { uint edge_count; };
+layout(std430, binding = 8) buffer edges_block { uint edges[]; };
+layout(std430, binding = 9) buffer mixed_block { vec4 mixed[]; };
 
 const ivec2 cross_offsets[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
 
@@ -54,7 +55,7 @@ bool is_far(bool behind, uint q, float z, float limit)
 bool is_edge(ivec2 size, bool layers, bool behind, int x, int y)
 {
     uint at = uint(y * size.x + x), z_bits = read_z_bits(at);
-    if (z_bits == PT_KEY_EMPTY_Z)
+    if (z_bits == PT_KEY_EMPTY_Z || (args.inked != 0u && line[at] > 0.0))
         return false;
     float limit = step_limit(layers, at, z_bits);
     bool edge = false;

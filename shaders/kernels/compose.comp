@@ -20,5 +20,6 @@ void main()
     uint at = (crop_y + y) * width + crop_x + x;
     vec4 c = read_float4(at);
     precise vec4 over = c + (1.0 - c.w) * background;
-    combined[y * crop_width + x] = read_z_bits(at) == PT_KEY_EMPTY_Z ? background : over;
+    bool empty = args.everywhere == 0u && read_z_bits(at) == PT_KEY_EMPTY_Z;
+    combined[y * crop_width + x] = empty ? background : over;
 }

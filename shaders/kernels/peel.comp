@@ -27,7 +27,7 @@ void peel_pixel(uint at, bool first, bool stop)
     if (some && !behind)
         keys[at] = uvec2(PT_KEY_EMPTY_ID, PT_KEY_EMPTY_Z);
     // 2. behind what was blended before
-    vec4 sum = first ? vec4(0.0) : over[at];
+    vec4 sum = first && args.inked == 0u ? vec4(0.0) : over[at];
     if (behind) {
         precise vec4 more = sum + (1.0 - sum.w) * texelFetch(other_float4_plane, int(at));
         sum = more;

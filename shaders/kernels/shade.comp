@@ -137,25 +137,7 @@ struct pixel {
 
 layout(location = 16) uniform vec4 lights[3 * PT_MAX_LIGHTS]; // colour and type; vector; cone, shadow and its scale
 
-vec3 gather_albedo(vec3 style, uint id, uint at)
-{
-#if COLOR_FORMAT == 0
-    return style;
-#elif COLOR_FORMAT == 4
-    return vec3(uintBitsToFloat(point_colors[id]));
-#elif COLOR_FORMAT == 2
-    return vec3(uintBitsToFloat(point_colors[3u * id]), uintBitsToFloat(point_colors[3u * id + 1u]),
-                uintBitsToFloat(point_colors[3u * id + 2u]));
-#elif COLOR_FORMAT == 3 // blended discs
-    return vec3(uintBitsToFloat(point_colors[4u * at]), uintBitsToFloat(point_colors[4u * at + 1u]),
-                uintBitsToFloat(point_colors[4u * at + 2u]));
-#else // three bytes from byte 3 id on: they lie in one word or two
-    uint first = 3u * id, shift = 8u * (first & 3u);
-    uint low = point_colors[first >> 2], high = point_colors[(first + 2u) >> 2];
-    uint bytes = low >> shift | (shift > 8u ? high << (32u - shift) : 0u);
-    return vec3(pt_srgb(bytes & 255u), pt_srgb((bytes >> 8) & 255u), pt_srgb((bytes >> 16) & 255u));
-#endif
-}
+#include "lib/albedo.glsl"
 
 float power(float x, uint exponent)
 {
@@ -281,7 +263,7 @@ void main()
         pixel p;
         p.z = pt_float(key.y);
         p.ray = pt_ray(view, int(column.x), int(y));
-        p.albedo = gather_albedo(style, id, at);
+        p.albedo = pt_gather_albedo(style, id, at);
 #if RECOLOR
         p.albedo = recolor(view, eye_z, p.ray, p.z, style, p.albedo);
 #endif

@@ -67,6 +67,12 @@
 #define PT_MID_GREY 0.18f   // contrast turns around it
 #define PT_BRIGHTEST 65504.0f // half floats end there
 
+// Lines are at most so many pixels wide; pixels nearer than that and a half.
+#define PT_LINE_MOST 16
+#define PT_LINE_TAPS 864
+#define PT_LINE_SUPPORT 2
+#define PT_LINE_WITHIN 0.484375f // without anti-aliasing: a pixel whose middle lies within r + 1/64 takes a line
+
 #define PT_SPACINGS 64
 #define PT_MAX_LIGHTS 32
 #define PT_AREA_POINTS 16 // of an area light, where shading gathers its light
@@ -331,6 +337,52 @@ struct smooth_args {
     uint32_t translucent;       // 0: alpha is 1 wherever there is something
 };
 
+// lines: what enlarged discs would leave uncovered. [X 3], SPEC 7: dilated depth + offset < own depth.
+//   1. A pixel's disc has the radius r = width (world: min(width / footprint(z), most)) and lies the offset behind its pixel,
+//      along the ray: at v = z + (offset / max(|n.v|, C), or d_eff where offset is 0).
+//   2. It shows at the pixel p, d pixels from its middle, where v < z_p and v lies before the tangent plane of p's surface.
+//      Only pixels whose discs show at k > 0 of their own four cross neighbours have one: a step in depth, and not a slope that
+//      a wide disc crosses. So a smooth surface shows no lines, however oblique or bent. Strays do not count: of the 8 pixels
+//      around the far neighbour PT_LINE_SUPPORT lie beyond v as well, and of those around the pixel as many have steps, too.
+//   3. A pixel takes the disc whose edge is farthest beyond it, r + 1/2 - d at the greatest; of equal ones the first in `taps`.
+//      Its share: r + 1/2 - d over max(1, soft (r + 1/2)), at most 1. Without anti-aliasing, before that, r + 1/2 - d
+//      >= PT_LINE_WITHIN gives as much as makes that 1, and others nothing.
+//   4. With anti-aliasing, a pixel with a disc is covered by its own surface as far as antialias says of k; the rest of it, at most
+//      r, is the line's, unless 3. gives more.
+// Behind a layer, what lies before its limit is nothing, and empty pixels take lines only where the layers before cover them
+// and let light through: else the first layer's line is there already, or nobody sees it. And lines belong to surfaces farther than
+// the offset behind the limit of the pixel, z - (v - z) > limit: nearer ones end there because they touch the layer before.
+struct lines_args {
+    struct view_args view; // rect: the points', wider by the line's reach. Beyond it nothing is known: no discs, no edges
+    float width;           // pixels, or world units
+    uint32_t world;        // 1: width is in world units
+    float most;            // radius of the widest disc, pixels
+    float offset;          // world units; 0: d_eff
+    float soft;            // share of the width over which a line fades, 0..1
+    uint32_t antialias;
+    uint32_t behind;       // 1: the limit and through planes hold
+    uint32_t reach;        // of the taps, whole pixels
+    uint32_t tap_count;
+    uint32_t taps[PT_LINE_TAPS]; // pixels with d < most + 1/2, by d, then y, then x: x + 128 | y + 128 << 8 | d^2 << 16
+};
+
+// ink: lines get their colour, over a picture or behind what a sum of layers holds; where a line covers half a pixel or more, z
+// becomes that of its surface.
+struct ink_args {
+    struct view_args view; // rect: of the line plane
+    struct instance_args instance; // whose points' lines; with a colour of the points' own, its colours
+    uint32_t crop_x, crop_y, crop_width, crop_height; // of the pictures in the planes
+    uint32_t source;       // patina_line_source
+    float color[3];        // POINT: times the point's own
+    float far_color[3];    // DEPTH: at start + 1 / scale and beyond
+    float start, scale;    // DEPTH
+    float opacity;
+    uint32_t behind;       // 1: colours go behind what the target holds
+    uint32_t blank;        // 1: surfaces are not shown: the background takes their place first
+    uint32_t color_target, depth, mask; // which of the three are written
+    float background[4];   // premultiplied
+};
+
 // antialias: Laplace on depth as steps. [D 3.5]. Behind a layer, a neighbour through which no light comes any more is no edge:
 // what this surface borders on there lies before it, and took its share of the pixel already.
 struct antialias_args {
@@ -338,6 +390,7 @@ struct antialias_args {
     uint32_t layers; // 1: edges between layers too, 0: background edges only
     uint32_t behind; // 1: the through plane holds
     uint32_t mesh_base, mesh_count; // ids of triangles: an edge pixel's centre lies on them, so they cover more of it
+    uint32_t inked;  // 1: the line plane holds; pixels with a line stay as they are, ink mixes them
 };
 
 // peel: a finished layer is blended behind those before it, and says what may show behind it. [D 4, 5], SPEC 3
@@ -351,6 +404,7 @@ struct peel_args {
     struct view_args view;
     uint32_t first; // 1: the first layer: through is 1, nothing is limited, nothing was blended
     uint32_t stop;  // 0: what lies behind an opaque pixel is wanted too (passes of the layers)
+    uint32_t inked; // 1: the over plane holds this layer's lines already, on the first layer too
 };
 
 // compose: over the background, into the crop.
@@ -358,6 +412,7 @@ struct compose_args {
     struct view_args view;
     uint32_t crop_x, crop_y, crop_width, crop_height; // in the planes
     float background[4]; // premultiplied
+    uint32_t everywhere; // 1: the colour holds where the key is empty, too
 };
 
 // ---- effects: on the colour of a layer, premultiplied, where it has something --------------------------------------------

@@ -44,7 +44,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
 GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
-          "effects", "styles", "peers", "hard", "import", "meshes", "cues")
+          "effects", "lines", "styles", "peers", "hard", "import", "meshes", "cues")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -71,6 +71,8 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
         found += [case_of("effects", device=main, points=1_000_000, quality=quality, mode=mode, frames=n)
                   for mode in peers.EFFECTS.values() for quality in ("refined", "paper")]
     found += [case_of("cues", device=main, points=1_000_000, mode=mode, frames=n) for mode in ("surface", *cases.CUES)]
+    found += [case_of("lines", device=main, points=1_000_000, mode=mode, frames=n, scene=f"torus, {mode}")
+              for mode in ("surface", "lines 2", "lines 8", "lines 16")]
     counts = [100_000] if quick else [10_000, 100_000, 10_000_000] + [100_000_000] * full
     found += [case_of("points", device=main, points=count, frames=n, uploads=1) for count in counts]
     if not quick:

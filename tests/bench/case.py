@@ -35,19 +35,21 @@ FIELDS = ("scene", "mode", "device", "width", "height", "points", "quality", "th
 
 @dataclass(frozen=True)
 class Mode:
-    """What a mode asks for beyond lit surfaces: fields of patina_settings, patina_cloud_style, patina_light_desc and
-    patina_effects."""
+    """What a mode asks for beyond lit surfaces: fields of patina_settings, patina_cloud_style, patina_light_desc,
+    patina_effects and patina_lines."""
 
     settings: dict[str, Any] = field(default_factory=dict)
     style: dict[str, Any] = field(default_factory=dict)
     light: dict[str, Any] = field(default_factory=dict)
     effects: dict[str, Any] = field(default_factory=dict)
     still: bool = False  # lights that cast stay where they are, and their shadow textures are kept
+    lines: dict[str, Any] = field(default_factory=dict)
 
     def missing(self) -> str:
         """The first field that the binding does not have yet, or ""."""
         for wanted, known in ((self.settings, native._Settings), (self.style, native._CloudStyle),
-                              (self.light, native._LightDesc), (self.effects, native._Effects)):
+                              (self.light, native._LightDesc), (self.effects, native._Effects),
+                              (self.lines, native._Lines)):
             names = {name for name, *_ in known._fields_}
             for name in wanted:
                 if name not in names:
@@ -65,6 +67,9 @@ MODES = {
     "shadows 1": Mode(settings={"shadow_samples": 1, "shadow_lazy": 1}, light={"shadows": 1}),
     "shadows 5": Mode(settings={"shadow_samples": 5, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
     "shadows 10": Mode(settings={"shadow_samples": 10, "shadow_lazy": 1}, light={"shadows": 1, "angle": 0.1}),
+    "lines 2": Mode(lines={"width": 2.0}),
+    "lines 8": Mode(lines={"width": 8.0}),
+    "lines 16": Mode(lines={"width": 16.0}),
 }
 
 # Depth cues and means of drawing, by themselves; the torus lies 3.6 from the camera.
@@ -81,8 +86,10 @@ MODES |= {name: Mode(effects=effects) for name, effects in CUES.items()}
 
 
 def fill_scene(scene: native.Scene, cloud: native.Cloud, shown: stages.Stage, mode: Mode, turn: float) -> None:
-    """Adds cloud and lights. Lights that cast shadows turn too, unless the mode lets them be."""
+    """Adds cloud, lights and lines. Lights that cast shadows turn too, unless the mode lets them be."""
     scene.add_cloud(cloud, **{**shown.style, **mode.style})
+    if mode.lines:
+        scene.set_lines(**mode.lines)
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     for light in shown.lights:
         light = {**light, **mode.light}
@@ -175,7 +182,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
     stats = frame.stats()
     frame.render(make(0.0))
     error, read_ms = {}, 0.0
-    if scene_known:
+    if scene_known and not mode.lines:  # the truth has none
         start = time.perf_counter()
         planes = picture(frame)
         read_ms = 1e3 * (time.perf_counter() - start)

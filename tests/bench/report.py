@@ -103,6 +103,7 @@ def markdown(result: dict[str, Any]) -> str:
                  *notes(joined(result, "peers")), ""]
     for group, title in (("effects", "Layers and shadows of the torus"),
                          ("cues", "Depth cues and means of drawing on the torus, one by one"),
+                         ("lines", "Lines around the torus"),
                          ("styles", "Styles, one row each"),
                          ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
                          ("shadows", "A ball's shadow on a plane"), ("patterns", "Patterns and noise"),

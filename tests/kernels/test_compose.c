@@ -4,14 +4,16 @@
 
 #include <math.h>
 
-static void check(struct harness *h, const struct picture *picture, const uint32_t crop[4], const float background[4])
+static void check(struct harness *h, const struct picture *picture, const uint32_t crop[4], const float background[4],
+                  uint32_t everywhere)
 {
     struct compose_args args = {.view = picture->view,
                                 .crop_x = crop[0],
                                 .crop_y = crop[1],
                                 .crop_width = crop[2],
                                 .crop_height = crop[3],
-                                .background = {background[0], background[1], background[2], background[3]}};
+                                .background = {background[0], background[1], background[2], background[3]},
+                                .everywhere = everywhere};
     size_t count = picture->count, inside = (size_t)crop[2] * crop[3];
     struct pt_buffer *keys = harness_buffer(h, picture->keys, count * 8);
     struct pt_buffer *color = harness_buffer(h, picture->color, count * 16);
@@ -43,7 +45,10 @@ static void backgrounds(struct harness *h)
                     picture.color[4 * i + k] = picture.keys[i] == REF_EMPTY_KEY ? NAN
                                                                                 : picture.color[4 * i + k] * alpha;
             }
-            check(h, &picture, crops[c], colors[b]);
+            check(h, &picture, crops[c], colors[b], 0);
+            for (size_t i = 0; i < 4 * picture.count; i++)
+                picture.color[i] = picture.color[i] >= 0.0f ? picture.color[i] : 0.25f;
+            check(h, &picture, crops[c], colors[b], 1);
         }
 }
 
@@ -55,7 +60,7 @@ static void shapes(struct harness *h)
         struct rng rng = {s};
         struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_FLAT, 0.5);
         const uint32_t crop[4] = {0, 0, sizes[s][0], sizes[s][1]};
-        check(h, &picture, crop, background);
+        check(h, &picture, crop, background, 0);
     }
 }
 

@@ -8,7 +8,7 @@
 struct ref_color ref_compose(const struct compose_args *args, const struct ref_planes *planes, int x, int y)
 {
     size_t pixel = (size_t)(y + (int)args->crop_y) * args->view.width + (size_t)(x + (int)args->crop_x);
-    int empty = planes->keys[pixel] == REF_EMPTY_KEY;
+    int empty = !args->everywhere && planes->keys[pixel] == REF_EMPTY_KEY;
     double through = empty ? 1.0 : 1.0 - planes->color[4 * pixel + 3];
     struct ref_color out = {0};
     for (int c = 0; c < 4; c++) {

@@ -238,6 +238,14 @@ struct ref_color ref_tint(const struct tint_args *args, const struct ref_planes 
                           int y);
 struct ref_color ref_smooth(const struct smooth_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_color ref_antialias(const struct antialias_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_line {
+    double share, error; // of the pixel that a line covers
+    uint32_t nearest;    // index of the pixel whose surface the line belongs to; open where `shared`
+    int shared;          // several pixels' lines are equally near
+    int unsure;
+};
+// limit, through: behind the first layer only.
+struct ref_line ref_lines(const struct lines_args *args, const struct ref_planes *planes, const float *limit, int x, int y);
 struct ref_peel {
     uint64_t key;         // empty: was none, or was filled across a layer taken before
     float limit, through; // exact
@@ -256,6 +264,12 @@ double ref_obscured(const struct obscure_args *args, const struct ref_planes *pl
 // planes->obscured: of every pixel, before the mean.
 struct ref_color ref_obscure(const struct obscure_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_color ref_edl(const struct edl_args *args, const struct ref_planes *planes, int x, int y);
+struct ref_ink {
+    double color[4], error[4], depth, mask;
+};
+// x, y: in the crop; color, depth: of that pixel before.
+struct ref_ink ref_ink(const struct ink_args *args, const struct ref_planes *planes, const float *line, const uint32_t *nearest,
+                       const float color[4], float depth, int x, int y);
 
 struct ref_color ref_toon(const struct toon_args *args, const struct ref_planes *planes, int x, int y);
 struct ref_color ref_hatch(const struct hatch_args *args, const struct ref_planes *planes, int x, int y);

@@ -123,6 +123,10 @@ def test_wrong_use_is_told():
                       ["render", "use.ply", "-o", "x.png", "--opacity", "1.5"],
                       ["render", "use.ply", "-o", "x.png", "--opacity", "0.5,-1"],
                       ["render", "use.ply", "-o", "x.png", "--layers", "17"],
+                      ["render", "use.ply", "-o", "x.png", "--lines", "0"],
+                      ["render", "use.ply", "-o", "x.png", "--lines", "2,1.5"],
+                      ["render", "use.ply", "-o", "x.png", "--line-color", "1,0,0"],
+                      ["render", "use.ply", "-o", "x.png", "--lines", "2", "--line-source", "ink"],
                       ["render", "use.ply", "-o", "x.png", "--background", "1,1"]):
         done = run(*arguments, code=2)
         assert done.stderr.startswith("patina: ") and not done.stdout, arguments
@@ -236,6 +240,24 @@ def test_opacity_of_each_file():
     assert abs(read_png("glass.png")[3][32][32][3] - 128) <= 1
     stats = json.loads(run("render", "glass.ply", "behind.ply", *view, "--opacity", "0.5,1", "--stats", "json").stdout)
     assert stats["layers"] == 2, stats
+
+
+def test_lines():
+    wall("red.ply", lambda x, z: (255, 0, 0))
+    shown = {}
+    for name, options in (("plain", []), ("black", ["--lines", "4"]), ("half", ["--lines", "4,0,0.5"]),
+                          ("alone", ["--lines", "4", "--line-surface", "none"]),
+                          ("blue", ["--lines", "4,0,1", "--line-color", "0,0,1", "--line-surface", "paper"])):
+        run("render", "red.ply", "-o", "lines.png", *FRONT, "--ortho", "4", "--transparent", *options)
+        shown[name] = read_png("lines.png")[3]
+    row = len(shown["plain"]) // 2
+    edge = next(x for x, pixel in enumerate(shown["plain"][row]) if pixel[3] == 255)  # the wall's left side
+    at = {name: (rows[row][edge - 3], rows[row][row]) for name, rows in shown.items()}
+    assert at["plain"][0][3] == 0 and at["plain"][1] == (255, 0, 0, 255), at
+    assert at["black"] == ((0, 0, 0, 255), (255, 0, 0, 255)), at
+    assert abs(at["half"][0][3] - 128) <= 1 and at["half"][1] == (255, 0, 0, 255), at
+    assert at["alone"][0] == (0, 0, 0, 255) and at["alone"][1][3] == 0, at
+    assert at["blue"] == ((0, 0, 255, 255), (255, 255, 255, 255)), at
 
 
 def test_a_mesh_hides_and_is_hidden():

@@ -283,9 +283,40 @@ static void test_no_camera_is_an_error(void **state)
     patina_scene_destroy(scene);
 }
 
+static void test_lines_are_planned_where_asked_for(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_lines lines = { .struct_size = sizeof lines, .width = 3 };
+    struct pt_plan without = plan_of(scene);
+    assert_non_null(skipped(&without, "lines"));
+    assert_int_equal(patina_scene_set_lines(scene, &lines), PATINA_OK);
+    struct pt_plan plan = plan_of(scene);
+    assert_int_equal(passes_of(&plan, PT_KERNEL_lines), 1);
+    assert_int_equal(passes_of(&plan, PT_KERNEL_ink), 1);
+    assert_true(plan.line_radius == 3.0f && plan.guard >= without.guard);
+    assert_int_equal(plan.passes[plan.pass_count - 1].kernel, PT_KERNEL_ink); // behind what runs as one
+    uint32_t together = 0;
+    for (uint32_t i = 0; i < plan.pass_count; i++)
+        together = plan.passes[i].together ? i + plan.passes[i].together : together;
+    assert_int_equal(together, plan.pass_count - 1);
+    pt_plan_destroy(&plan);
+    pt_plan_destroy(&without);
+    lines.world = 1; // orthographic: as wide everywhere
+    lines.width = 0.025f;
+    assert_int_equal(patina_scene_set_lines(scene, &lines), PATINA_OK);
+    plan = plan_of(scene);
+    assert_true(fabsf(plan.line_radius - 0.025f * 1024 / 2.5f) < 1e-3f);
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_lines_are_planned_where_asked_for),
         cmocka_unit_test(test_every_pass_runs_or_has_a_reason), cmocka_unit_test(test_missing_normals_are_estimated),
         cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),

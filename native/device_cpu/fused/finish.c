@@ -24,6 +24,7 @@ struct finish {
     float *combined, *depth, *normals, *source, *shadow;
     const struct peel_args *peel;             // NULL: the picture is composed
     const float *through;                     // of the layers before; NULL before the first
+    const float *line;                        // lines, which anti-aliasing leaves to ink; NULL: none
     struct pt_peeled peeled;
     struct pt_tile_value *tiles;
     int channels;                             // of colours: 3, or 4 with alpha
@@ -238,6 +239,8 @@ static vm mix_edges(const struct finish *finish, const struct around *around, co
     const struct view_args *view = finish->planes.view;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
     vf limit = empty, sum[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() }, count = vf_zero();
+    if (finish->line)
+        some = vm_and(some, vm_not(vf_lt(vf_zero(), vf_load(finish->line + (size_t)y * view->width + x))));
     if (finish->antialias->layers)
         limit = vf_load(around->row[1]->z + x) + vf_load(limits + x);
     for (int d = 0; d < 4; d++) {
@@ -410,6 +413,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
         case PT_KERNEL_antialias:
             finish.antialias = call->arguments;
             finish.through = finish.antialias->behind ? pt_cpu_data(call, 4) : NULL;
+            finish.line = finish.antialias->inked ? pt_cpu_data(call, 5) : NULL;
             break;
         case PT_KERNEL_peel:
             finish.peel = call->arguments;

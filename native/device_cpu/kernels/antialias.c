@@ -61,6 +61,8 @@ static uint32_t look(const struct antialias *job, uint32_t x, uint32_t y, uint32
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(job->call, 0) + at;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), z = vi_float(vi_load_z(keys));
     vm some = vm_and(vm_first(lanes), vf_lt(z, empty));
+    if (job->args->inked)
+        some = vm_and(some, vm_not(vf_lt(vf_zero(), vf_load((const float *)pt_cpu_data(job->call, 5) + at))));
     if (!vm_bits(some))
         return 0;
     vf limit = empty;

@@ -16,7 +16,9 @@ static void compose_row(void *context, uint32_t y)
         background[k] = vf_set(args->background[k]);
     for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
         uint32_t count = pt_lanes_left(x, args->crop_width);
-        vm some = vm_and(vm_first(count), vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
+        vm some = vm_first(count);
+        if (!args->everywhere)
+            some = vm_and(some, vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
         vf color[4], over[4];
         if (vm_bits(some))
             vf_load4(colors + 4 * (size_t)x, color);

@@ -34,7 +34,7 @@ static inline vm pt_peel_pixels(const struct peel_args *args, const struct pt_pe
     // 2. behind what was blended before
     if (first || vm_bits(behind)) {
         vf sum[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
-        if (!first)
+        if (!first || args->inked)
             vf_load4(planes->over + 4 * at, sum);
         vf through = one - sum[3];
         for (int k = 0; k < 4; k++)

@@ -458,6 +458,29 @@ typedef struct patina_effects {
     float paper_grain;    // 0..1; 0 = none
 } patina_effects;
 
+enum patina_line_source { PATINA_LINE_FIXED = 0, PATINA_LINE_POINT = 1, PATINA_LINE_DEPTH = 2 };
+enum patina_line_surface { PATINA_LINE_SURFACE_SHOWN = 0, PATINA_LINE_SURFACE_PAPER = 1, PATINA_LINE_SURFACE_NONE = 2 };
+
+// Silhouettes [Xu 2004]: a line outside every outline, on whatever lies behind it, as if each point were drawn first as an opaque
+// disc, larger by the width and pushed back by the offset. A line pixel has the depth of the outline. It needs no normals; with
+// them smooth surfaces show none, however oblique. Where layers are peeled each has its lines.
+typedef struct patina_lines {
+    size_t struct_size;
+    float width;          // pixels, 0..16; 0 = 2. In world units with `world`: as wide on screen as that is there, at most 16
+    uint32_t world;       // 1 = width in world units, above 0
+    float offset;         // world units: least step in depth that makes a line, more by 1 / |n.v| on oblique surfaces. Small ones
+                          // draw creases too. 0 = automatic: that which makes two layers (d_min, twice the local spacing, ..)
+    uint32_t source;      // patina_line_source: `color`; that of the outline's own points (of meshes white), times `color`; from
+                          // `color` near to `far_color` far
+    float color[3];       // linear; all zero = black, of POINT a quarter
+    float far_color[3];   // DEPTH
+    float range[2];       // DEPTH: z of near and far; far not beyond near = those of everything's boxes
+    float transparency;   // 0 = opaque, 1 = not drawn
+    float soft;           // share of the width over which a line fades outwards, 0..1; 0 = hard, anti-aliased where the picture is
+    uint32_t surface;     // patina_line_surface: what lies under the lines. NONE hides what is behind it still, where opaque
+    float paper[3];       // PAPER: linear; all zero = white
+} patina_lines;
+
 PATINA_API int patina_scene_create(patina_scene **out);
 PATINA_API void patina_scene_destroy(patina_scene *scene); // clouds stay
 PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds, meshes, lights and clips
@@ -476,6 +499,8 @@ PATINA_API int patina_scene_set_camera(patina_scene *scene, const patina_camera 
 PATINA_API int patina_scene_set_settings(patina_scene *scene, const patina_settings *settings);
 // NULL: no effects, as at first.
 PATINA_API int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects);
+// NULL: no lines, as after patina_scene_create. patina_scene_clear leaves them. On an error there are none.
+PATINA_API int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines);
 // A camera that frames the scene's clouds, as far as clips leave them, seen from `azimuth` degrees around z (0 = from -y) and
 // `elevation` degrees above the horizon, vertical field of view fov_degrees (0 = 45.8).
 PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation,
@@ -489,7 +514,8 @@ PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimu
     X(DEPTH, 1, "linear z, +inf where nothing is")                                                             \
     X(NORMAL, 3, "world-space unit normal, 0 where nothing is")                                                \
     X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")   \
-    X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")
+    X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")               \
+    X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")
 
 enum patina_pass {
 #define PATINA_X(name, channels, text) PATINA_PASS_##name,

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scene properties → the library's lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ..properties import enum_number
+from .camera import Camera
+
+NOT_BLACK = 1e-20  # the library takes three zeros of these two for "default"
+
+
+@dataclass(frozen=True)
+class Lines:
+    """patina_lines."""
+
+    width: float
+    world: int
+    offset: float
+    source: int
+    color: tuple[float, float, float]
+    far_color: tuple[float, float, float]
+    range: tuple[float, float]
+    transparency: float
+    soft: float
+    surface: int
+    paper: tuple[float, float, float]
+
+
+def read(scene: bpy.types.Scene, camera: Camera) -> Lines | None:
+    """None: no lines."""
+    lines = scene.patina.lines
+    if not lines.use:
+        return None
+    start = camera.near_clip if camera.orthographic else 0.0  # where the library counts depth from
+    world = lines.units == 'WORLD'
+    color = (max(lines.tint, NOT_BLACK),) * 3 if lines.source == 'POINT' else tuple(lines.color)
+    return Lines(
+        width=lines.width_world if world else lines.width,
+        world=int(world),
+        offset=lines.offset,
+        source=enum_number(lines, "source"),
+        color=color,
+        far_color=tuple(lines.far_color),
+        range=(lines.near - start, lines.far - start) if lines.far > lines.near else (0.0, 0.0),
+        transparency=1.0 - lines.opacity,
+        soft=lines.soft,
+        surface=enum_number(lines, "surface"),
+        paper=tuple(max(value, NOT_BLACK) for value in lines.paper))
