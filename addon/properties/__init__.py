@@ -36,6 +36,13 @@ class PatinaSceneProperties(PropertyGroup):
     studio: PointerProperty(type=PatinaStudioProperties, override=_OVERRIDE)
     effects: PointerProperty(type=PatinaEffectsProperties, override=_OVERRIDE)
     lines: PointerProperty(type=PatinaLinesProperties, override=_OVERRIDE)
+    surface: EnumProperty(
+        name="Surface", override=_OVERRIDE, default='FILL',
+        description="How points become a surface",
+        items=(
+            ('FILL', "Filled", "Gaps between the points are filled in the picture: fast, whatever the spacing", 0),
+            ('SPLATS', "Discs", "Every point is a small disc across its normal, discs that overlap are blended: smoother, "
+                                "slower, gaps wider than the discs stay open", 1)))
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
@@ -156,6 +163,14 @@ class PatinaObjectProperties(PropertyGroup):
         name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
         unit='LENGTH', precision=4,
         description="Least distance between two surfaces that are told apart; 0 follows the spacing of the points")
+    radius: FloatProperty(
+        name="Disc Radius", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH',
+        precision=4,
+        description="Of the discs that points are drawn as, see Render Properties > Surface. 0: each point's own where an "
+                    "attribute says so, else 1.75 times the spacing of the points")
+    radius_attribute: StringProperty(
+        name="Disc Radii", override=_OVERRIDE,
+        description="Point attribute of numbers: the radius of each point's disc")
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much the surface hides of what lies behind it")

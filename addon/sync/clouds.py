@@ -36,11 +36,12 @@ class PointArrays:
     opacities: np.ndarray | None  # (n, 1) float32
     scalars: np.ndarray | None = None  # (n, 1) float32
     classes: np.ndarray | None = None  # (n, 1) uint8
+    radii: np.ndarray | None = None  # (n, 1) float32
 
     def fingerprint(self) -> Steps[tuple[int, int]]:
-        """Of the places, normals, opacities and classes, and of the colours and scalars: what Blender's update tags miss (undo, geometry
-        nodes, scripts) still shows."""
-        task = native.start_fingerprint(self.positions, self.normals, self.colors, self.opacities, None, self.scalars,
+        """Of the places, normals, opacities, radii and classes, and of the colours and scalars: what Blender's update tags miss
+        (undo, geometry nodes, scripts) still shows."""
+        task = native.start_fingerprint(self.positions, self.normals, self.colors, self.opacities, self.radii, self.scalars,
                                         self.classes)
         yield task
         return task.result()
@@ -68,6 +69,7 @@ class CloudStyle:
     contrast: float = 1.0
     hidden_classes: tuple[int, ...] = (0,) * 8
     clip_off: int = 0
+    radius: float = 0.0
 
 
 class Pending:
@@ -147,7 +149,7 @@ class CloudCache:
         else:
             cloud = None  # frees the old one before the new one is built
             task = native.Cloud.start(arrays.positions, arrays.normals, arrays.colors, arrays.opacities, progress,
-                                      scalars=arrays.scalars, classes=arrays.classes)
+                                      scalars=arrays.scalars, classes=arrays.classes, radii=arrays.radii)
         yield task
         cloud = task.result() or cloud
         if recolor:
@@ -358,7 +360,7 @@ def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:
 
 def _attribute_names(obj: bpy.types.Object) -> tuple[str, ...]:
     return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute, colors.scalar_name(obj),
-            obj.patina.colors.class_attribute)
+            obj.patina.colors.class_attribute, obj.patina.radius_attribute)
 
 
 def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
@@ -385,13 +387,15 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
     classes = attributes.classes(data, count, class_name)
     pause()
     opacities = attributes.opacities(data, count, obj.patina.opacity_attribute)
+    radii = attributes.scalars(data, count, obj.patina.radius_attribute)
     for kind, name, found in (("colour", obj.patina.color_attribute, rgb),
                               ("normal", obj.patina.normal_attribute, normals),
                               ("opacity", obj.patina.opacity_attribute, opacities),
+                              ("radius", obj.patina.radius_attribute, radii),
                               ("scalar", scalar, scalars), ("class", class_name, classes)):
         if name and found is None:
             notices.append(f"'{obj.name}' has no point attribute '{name}' to take as {kind}")
-    return PointArrays(positions, normals, rgb, opacities, scalars, classes)
+    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii)
 
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
@@ -409,6 +413,7 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         shininess=patina.shininess,
         transparency=1.0 - patina.opacity,
         shadow_off=_shadow_off(obj),
+        radius=patina.radius,
         **colors.style_fields(obj))
 
 

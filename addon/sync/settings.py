@@ -39,6 +39,7 @@ class Settings:
     shadow_samples: int
     shadow_resolution: int
     shadow_lazy: int
+    surface: int = 0
     error_target: float = 0.0
     shadow_error: float = 0.0
     strata: int = 0  # of 6 that are drawn; 0: all
@@ -65,6 +66,7 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         background=tuple(studio.background) if studio.use_background else world_color,
         shadow_uncut=int(patina.shadow_uncut),
         layers=patina.layers,
+        surface=enum_number(patina, "surface"),
         error_target=0.0 if quality else 0.01 * patina.error_target,
         shadow_samples=0 if patina.shadow_error else patina.shadow_samples,
         shadow_error=0.01 * patina.shadow_error,

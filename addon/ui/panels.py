@@ -50,9 +50,13 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         patina = context.scene.patina
-        layout.prop(patina, "error_target")
+        layout.prop(patina, "surface")
+        filled = patina.surface == 'FILL'
+        row = layout.row()
+        row.active = filled
+        row.prop(patina, "error_target")
         column = layout.column()
-        column.active = not patina.error_target
+        column.active = filled and not patina.error_target
         column.prop(patina, "quality")
         column.prop(patina, "fill")
         row = column.row()
@@ -177,6 +181,9 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
             row = column.row()
             row.alignment = 'RIGHT'
             row.label(text=f"automatic: {_length(context.scene, estimate)}")
+        row = layout.row()
+        row.active = context.scene.patina.surface == 'SPLATS'
+        row.prop(patina, "radius")
         layout.prop(patina, "opacity")
         column = layout.column()
         if patina.linked_file:
@@ -187,6 +194,7 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         column.prop_search(patina, "color_attribute", data, "attributes")
         column.prop_search(patina, "normal_attribute", data, "attributes")
         column.prop_search(patina, "opacity_attribute", data, "attributes")
+        column.prop_search(patina, "radius_attribute", data, "attributes")
         column.prop(patina, "color")
         column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
 

@@ -21,8 +21,8 @@ class PATINA_OT_preset_add(AddPresetBase, Operator):
     bl_label = "Patina Preset"
     preset_menu = "PATINA_PT_presets"
     preset_defines = ["patina = bpy.context.scene.patina"]
-    preset_values = [f"patina.{name}" for name in ("error_target", "quality", "fill", "fill_iterations", "antialias",
-                                                  "samples")]
+    preset_values = [f"patina.{name}" for name in ("surface", "error_target", "quality", "fill", "fill_iterations",
+                                                  "antialias", "samples")]
     preset_subdir = FOLDER
 
 

@@ -446,6 +446,8 @@ static inline vi vi_load_id(const uint64_t *keys) { return vi_evens(vi_load(keys
 #if PT_LANES == 1
 static inline vi vi_pairs(vi a) { return a; }
 static inline vi vi_sides(vi a) { return a; } // of an even pixel
+static inline vi vi_evens(vi a, vi b) { return ((void)b, a); }
+static inline vi vi_odds(vi a, vi b) { return ((void)a, b); }
 static inline void vi_zip(vi a, vi b, vi out[2])
 {
     out[0] = a;

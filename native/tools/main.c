@@ -24,7 +24,7 @@ static const char usage[] =
     "  --quality refined|paper            depth of filled pixels: tangent plane, or as in the paper\n"
     "  --fill closed|paper|off            hole filling; --iterations N (0: automatic)\n"
     "  --surface fill|splats              filling in the picture, or points as discs\n"
-    "  --radius R                         of the discs, world units (default: the points' own, else 1.5 spacings)\n"
+    "  --radius R                         of the discs, world units (default: the points' own, else 1.75 spacings)\n"
     "  --smooth alleviated|gaussian|box|off\n"
     "  --antialias layers|background|off\n"
     "  --lit, --unlit                     default: clouds with colours are shown unlit\n"

@@ -66,7 +66,8 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
         if not (quick and device in gl):
             found.append(case_of("headline", device=device, points=1_000_000, quality="paper", frames=n))
     main = options.device[0]
-    found.append(case_of("headline", device=main, points=1_000_000, quality="unfilled", frames=n))
+    for quality in ("unfilled", "splats"):
+        found.append(case_of("headline", device=main, points=1_000_000, quality=quality, frames=n))
     if not quick:
         found += [case_of("effects", device=main, points=1_000_000, quality=quality, mode=mode, frames=n)
                   for mode in peers.EFFECTS.values() for quality in ("refined", "paper")]
@@ -87,7 +88,7 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
     for surface in SURFACES:
         for size in sizes:
             for density in densities:
-                for quality in ["refined"] if quick else ["refined", "paper"]:
+                for quality in ["refined"] if quick else ["refined", "paper", "splats"]:
                     found += [case_of("scenes", surface, device, size, density=density, quality=quality, frames=frames)
                               for device in options.device
                               if device == main or full or (density == 1.0 and not quick)]

@@ -18,7 +18,7 @@ import native  # noqa: E402
 import stage as stages  # noqa: E402
 
 MEANS = {"UNFILLED": {"quality": 1, "fill": 2}, "PAPER": {"quality": 1, "fill": 1}, "CLOSED": {"quality": 1, "fill": 0},
-         "REFINED": {"quality": 0, "fill": 0}}  # as enum pt_means
+         "REFINED": {"quality": 0, "fill": 0}, "SPLATS": {"surface": 1}}  # as enum pt_means
 SURFACES = ("sphere", "torus")
 DENSITIES = (30.0, 15.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.1)  # points a pixel where the surface faces the camera
 SIZE = 512
@@ -28,9 +28,9 @@ HEAD = """// SPDX-License-Identifier: GPL-3.0-or-later
 """
 
 
-def rendered(frame: native.Frame, surface: str, density: float, **settings: Any) -> tuple[dict[str, Any], dict[str, float]]:
+def rendered(frame: native.Frame, shape: str, density: float, **settings: Any) -> tuple[dict[str, Any], dict[str, float]]:
     """Statistics of a picture and its errors, in the units of patina_expected_error."""
-    shown = stages.stage_of({"surface": surface, "points": stages.density_count(surface, density, SIZE)})
+    shown = stages.stage_of({"surface": shape, "points": stages.density_count(shape, density, SIZE)})
     scene = native.Scene()
     cloud = native.Cloud(shown.position, shown.normal, shown.color)
     cases.fill_scene(scene, cloud, shown, cases.MODES["surface"], 0.0)
@@ -46,7 +46,7 @@ def curve(frame: native.Frame, means: str) -> list[tuple[float, dict[str, float]
     """(spacing on screen, errors), spacing rising."""
     points = []
     for density in DENSITIES:
-        pictures = [rendered(frame, surface, density, **MEANS[means]) for surface in SURFACES]
+        pictures = [rendered(frame, shape, density, **MEANS[means]) for shape in SURFACES]
         worst = {name: max(errors[name] for _, errors in pictures) for name in pictures[0][1]}
         points.append((sum(stats["spacing_px"] for stats, _ in pictures) / len(pictures), worst))
     return sorted(points, key=lambda point: point[0])

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 
 enum { REFINED = PATINA_QUALITY_REFINED, PAPERLY = PATINA_QUALITY_PAPER };
-enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF };
+enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF, DISCS };
+// DISCS: nothing is filled, points are PATINA_SURFACE_SPLATS
 enum { LAYER_PASSES = 1 << PATINA_PASS_COMBINED | 1 << PATINA_PASS_DEPTH | 1 << PATINA_PASS_NORMAL };
 enum { LIT = PATINA_LIGHTING_LIT, UNLIT = PATINA_LIGHTING_UNLIT, AUTO = PATINA_LIGHTING_AUTO };
 
@@ -59,6 +60,15 @@ const struct staging stagings[] = {
      0, OPAQUE},
     {"meshes and transparent points", 203, 151, 20000, POINTS_ALL, STAGE_MESHES, 0, 0, LIT, REFINED, CLOSED, 0, 0, 0, 0,
      {0.5f, 0, 6, LAYER_PASSES}},
+    {"discs, one pixel", 1, 1, 5000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, DISCS, 0, 0, 0, 0, OPAQUE},
+    {"discs, 30 points a pixel", 67, 45, 54000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, DISCS, 0, 0, 0, 0, OPAQUE},
+    {"discs, density 0.1 to 30", 203, 151, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, DISCS, 0, 0, 0, 1, OPAQUE},
+    {"discs, many instances, orthographic", 203, 151, 9000, POINTS_ALL, STAGE_MANY, 1, 1, LIT, REFINED, DISCS, 0, 0, 1, 0,
+     OPAQUE},
+    {"discs without normals", 203, 151, 9000, POINTS_COLORS, STAGE_MANY, 0, 0, LIT, REFINED, DISCS, 3, 2, 0, 0, OPAQUE},
+    {"discs with opacities", 203, 151, 20000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, DISCS, 0, 0, 1, 0,
+     {0.6f, 1, 5, LAYER_PASSES}},
+    {"discs among meshes", 203, 151, 9000, POINTS_ALL, STAGE_MESHES, 0, 1, LIT, REFINED, DISCS, 0, 0, 0, 0, OPAQUE},
 };
 const uint32_t staging_count = sizeof stagings / sizeof stagings[0];
 
@@ -173,7 +183,8 @@ struct stage stage_build(const struct staging *staging)
                        : camera_perspective(eye, target, 45.8, staging->width, staging->height, 0.1, 100.0);
     stage.settings = settings_default(staging->width, staging->height);
     stage.settings.quality = staging->quality;
-    stage.settings.fill = staging->fill;
+    stage.settings.fill = staging->fill == DISCS ? OPEN : staging->fill;
+    stage.settings.surface = staging->fill == DISCS ? PATINA_SURFACE_SPLATS : PATINA_SURFACE_FILL;
     stage.settings.smooth = staging->smooth;
     stage.settings.antialias = staging->antialias;
     stage.settings.film_transparent = staging->film_transparent;

@@ -126,7 +126,7 @@ static void test_reused_frames(void **state)
             continue;
         patina_frame *frame = NULL;
         CHECK(patina_frame_create(device, &frame), device);
-        const uint32_t order[] = {11, 1, 7, 20, 4, 21, 9, 25, 1, 22, 7, 17, 27, 12, 0, 11, 19};
+        const uint32_t order[] = {11, 1, 7, 20, 4, 21, 9, 25, 1, 22, 7, 33, 17, 30, 27, 12, 0, 11, 19};
         for (uint32_t k = 0; k < sizeof order / sizeof order[0]; k++) {
             struct stage stage = stage_build(&stagings[order[k]]);
             struct picture fresh = picture_render(device, stage.scene, &stage.camera, &stage.settings);

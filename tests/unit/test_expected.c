@@ -30,7 +30,7 @@ static void test_every_means_is_measured(void **state)
 static void test_between_points(void **state)
 {
     (void)state;
-    for (int means = 0; means < PT_MEANS_COUNT; means++)
+    for (int means = 0; means <= PT_MEANS_SPLATS; means++)
         for (double s = 0.1; s < 10.0; s *= 1.01) {
             patina_expected_error a = pt_expected_error(means, s), b = pt_expected_error(means, s * 1.01);
             assert_true(fabsf(b.color - a.color) < 0.01f);

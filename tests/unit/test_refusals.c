@@ -210,7 +210,7 @@ static void test_statistics_in_any_locale(void **state)
     clear_stage(&stage);
 }
 
-static void test_opacities(void **state)
+static void test_opacities_and_discs(void **state)
 {
     (void)state;
     static const float wrong[] = { -0.1f, 1.5f, NAN, INFINITY };
@@ -222,6 +222,12 @@ static void test_opacities(void **state)
         assert_int_equal(patina_scene_add_cloud(stage.scene, stage.cloud, &style), PATINA_ERROR_ARGUMENT);
         assert_message(stage.scene, "transparency");
     }
+    patina_cloud_style style = { .struct_size = sizeof style, .radius = -1.0f };
+    assert_int_equal(patina_scene_add_cloud(stage.scene, stage.cloud, &style), PATINA_ERROR_ARGUMENT);
+    assert_message(stage.scene, "radius");
+    patina_settings settings = { .struct_size = sizeof settings, .surface = 2 };
+    assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
+    assert_message(stage.scene, "surface");
     patina_cloud_desc desc = { .struct_size = sizeof desc,
                                .count = 4,
                                .position = { points, PATINA_FLOAT32, 3, 0 },
@@ -233,9 +239,15 @@ static void test_opacities(void **state)
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
     assert_message(NULL, "opacity: element type 8");
     desc.opacity.type = PATINA_FLOAT32;
+    desc.radius = (patina_array){ opacities, PATINA_UINT8, 1, 0 };
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
+    assert_message(NULL, "radius: element type 3");
+    const float radii[4] = { 0.5f, -1.0f, NAN, 2.0f };
+    desc.radius = (patina_array){ radii, PATINA_FLOAT32, 1, 0 };
     patina_cloud_info info = { .struct_size = sizeof info };
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
     assert_int_equal(patina_cloud_get_info(cloud, &info), PATINA_OK);
+    assert_true(info.has_radii && info.radius_most == 2.0f);
     assert_true(info.has_opacities && info.layer_distance >= 2.0 * info.spacing && info.spacing > 0.0);
     patina_cloud_destroy(cloud);
     clear_stage(&stage);
@@ -247,7 +259,7 @@ int main(void)
         cmocka_unit_test(test_picture_survives_memory_cap), cmocka_unit_test(test_cancel_ends_with_its_render),
         cmocka_unit_test(test_bad_lights_and_shadows),
         cmocka_unit_test(test_lights_end_at_32),            cmocka_unit_test(test_planes_too_large),
-        cmocka_unit_test(test_opacities),
+        cmocka_unit_test(test_opacities_and_discs),
         cmocka_unit_test(test_cameras),                     cmocka_unit_test(test_statistics_in_any_locale),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

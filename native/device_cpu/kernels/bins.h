@@ -9,16 +9,14 @@
 #include <stdatomic.h>
 
 enum {
-    PT_DISC_TILE = 32,       // pixels
-    PT_DISC_STRIDE = 32 + PT_LANES, // of a tile's rows: vectors may run over
     PT_DISC_LARGE = 16,      // a disc over more tiles than this goes to a bin that every tile looks through
-    PT_BIN_ENTRIES = 62,
+    PT_BIN_ENTRIES = 63,
     PT_BIN_CHUNK_SHIFT = 12, // an entry: chunk of the list of all chunks, slot in the chunk
 };
 #define PT_BIN_NONE 0xFFFFFFFFu
 
 struct pt_bin_block {
-    uint32_t before, count, entries[PT_BIN_ENTRIES];
+    uint32_t before, count, entries[PT_BIN_ENTRIES], words[PT_BIN_ENTRIES]; // and their surface words
 };
 
 struct pt_bins {
@@ -54,7 +52,7 @@ static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, ui
                                     pt_cpu_data(bins->call, at + 4) };
 }
 
-static inline void pt_bin_put(struct pt_bins *bins, uint32_t *heads, uint32_t bin, uint32_t entry)
+static inline void pt_bin_put(struct pt_bins *bins, uint32_t *heads, uint32_t bin, uint32_t entry, uint32_t word)
 {
     uint32_t head = heads[bin];
     if (head == PT_BIN_NONE || bins->blocks[head].count == PT_BIN_ENTRIES) {
@@ -66,20 +64,55 @@ static inline void pt_bin_put(struct pt_bins *bins, uint32_t *heads, uint32_t bi
         heads[bin] = head = block;
     }
     struct pt_bin_block *block = &bins->blocks[head];
+    block->words[block->count] = word;
     block->entries[block->count++] = entry;
 }
 
-static inline void pt_bin_disc(struct pt_bins *bins, uint32_t *heads, const int32_t box[4], uint32_t entry)
+static inline void pt_bin_disc(struct pt_bins *bins, uint32_t *heads, const int32_t box[4], uint32_t entry, uint32_t word)
 {
     uint32_t x0 = (uint32_t)box[0] / PT_DISC_TILE, y0 = (uint32_t)box[1] / PT_DISC_TILE;
     uint32_t x1 = (uint32_t)box[2] / PT_DISC_TILE, y1 = (uint32_t)box[3] / PT_DISC_TILE;
     if ((uint64_t)(x1 - x0 + 1) * (y1 - y0 + 1) > PT_DISC_LARGE) {
-        pt_bin_put(bins, heads, bins->bins - 1, entry);
+        pt_bin_put(bins, heads, bins->bins - 1, entry, word);
         return;
     }
     for (uint32_t y = y0; y <= y1; y++)
         for (uint32_t x = x0; x <= x1; x++)
-            pt_bin_put(bins, heads, y * bins->columns + x, entry);
+            pt_bin_put(bins, heads, y * bins->columns + x, entry, word);
+}
+
+static void pt_bin_chunk(struct pt_bins *bins, uint32_t *heads, const struct pt_disc_source *source, uint32_t c)
+{
+    const uint32_t count = source->chunk->count;
+    for (uint32_t i = 0; i < count; i += PT_LANES) {
+        struct pt_discs discs;
+        int32_t box[4][PT_LANES];
+        uint32_t words[PT_LANES];
+        vf p[3];
+        // surface words lie in file order, each may be a cache miss: they are asked for ahead
+        for (uint32_t k = i + 8 * PT_LANES; k < i + 9 * PT_LANES && k < count; k++)
+            __builtin_prefetch(source->surface + source->ids[k]);
+        for (uint32_t k = 0; k < 3; k++)
+            p[k] = vf_load(source->positions + (size_t)k * source->chunk->padded + i);
+        pt_disc_project(source, p, vm_first(pt_lanes_left(i, count)), &discs);
+        discs.id = vi_load(source->ids + i);
+        vi word = vi_gather(source->surface, discs.id, discs.drawn);
+        pt_disc_cull(source, p, word, &discs);
+        pt_disc_size(source, word, &discs);
+        uint32_t drawn = vm_bits(discs.drawn);
+        if (source->chunk->sifted)
+            drawn &= bins->drawn[source->chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD;
+        if (!drawn)
+            continue;
+        for (int k = 0; k < 4; k++)
+            vi_store(box[k], discs.box[k], vm_first(PT_LANES));
+        vi_store(words, word, vm_first(PT_LANES));
+        for (; drawn; drawn &= drawn - 1) {
+            uint32_t k = (uint32_t)__builtin_ctz(drawn);
+            const int32_t one[4] = { box[0][k], box[1][k], box[2][k], box[3][k] };
+            pt_bin_disc(bins, heads, one, c << PT_BIN_CHUNK_SHIFT | (i + k), words[k]);
+        }
+    }
 }
 
 static void pt_bin_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -88,25 +121,7 @@ static void pt_bin_chunks(void *context, uint32_t begin, uint32_t end, uint32_t 
     uint32_t *heads = bins->heads + (size_t)thread * bins->bins, instance = 0;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(bins->call); c++) {
         const struct pt_disc_source source = pt_bin_source(bins, c, &instance);
-        for (uint32_t i = 0; i < source.chunk->count; i += PT_LANES) {
-            struct pt_discs discs;
-            int32_t box[4][PT_LANES];
-            vi id, word;
-            pt_disc_place(&source, vi_add(vi_set(i), vi_lanes()), vm_first(pt_lanes_left(i, source.chunk->count)), &discs, &id,
-                          &word);
-            uint32_t drawn = vm_bits(discs.drawn);
-            if (source.chunk->sifted)
-                drawn &= bins->drawn[source.chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD;
-            if (!drawn)
-                continue;
-            for (int k = 0; k < 4; k++)
-                vi_store(box[k], discs.box[k], vm_first(PT_LANES));
-            for (; drawn; drawn &= drawn - 1) {
-                uint32_t k = (uint32_t)__builtin_ctz(drawn);
-                const int32_t one[4] = { box[0][k], box[1][k], box[2][k], box[3][k] };
-                pt_bin_disc(bins, heads, one, c << PT_BIN_CHUNK_SHIFT | (i + k));
-            }
-        }
+        pt_bin_chunk(bins, heads, &source, c);
     }
 }
 
@@ -143,49 +158,54 @@ static inline int pt_bins_fill(struct pt_bins *bins)
     }
 }
 
-typedef void pt_bin_look(const struct pt_bins *bins, uint32_t instance, vi id, const struct pt_discs *discs, void *looks);
-typedef void pt_bin_work(void *context, const struct pt_disc *disc, const void *looks, uint32_t lane);
+// What is done with PT_LANES discs of an instance.
+typedef void pt_bin_work(void *context, uint32_t instance, const struct pt_discs *discs);
 
-// The discs of up to PT_LANES entries of one chunk.
-static inline __attribute__((always_inline)) void pt_bin_draw(const struct pt_bins *bins, const uint32_t *entries, uint32_t count,
-                                                              uint32_t *instance, pt_bin_look *look, void *looks,
-                                                              pt_bin_work *work, void *context)
+// Asks for what the discs of a block are looked up by: colours lie in file order, each is a cache miss of its own.
+static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_block *block, uint32_t instance, int colors)
 {
-    const struct pt_disc_source source = pt_bin_source(bins, entries[0] >> PT_BIN_CHUNK_SHIFT, instance);
-    struct pt_disc disc[PT_LANES];
-    struct pt_discs discs;
-    vi id, word, slot = vi_and(vi_load(entries), vi_set((1u << PT_BIN_CHUNK_SHIFT) - 1));
-    pt_disc_place(&source, slot, vm_first(count), &discs, &id, &word);
-    pt_disc_shape(&source, word, &discs);
-    pt_disc_store(&discs, vi_add(id, vi_set(source.chunk->id_base)), disc);
-    if (look)
-        look(bins, *instance, id, &discs, looks);
-    for (uint32_t i = 0; i < count; i++)
-        work(context, &disc[i], looks, i);
+    static const uint32_t bytes[] = { 0, 3, 12, 0 }; // by color_format
+    for (uint32_t i = 0; i < block->count && colors; i++) {
+        const struct pt_disc_source source = pt_bin_source(bins, block->entries[i] >> PT_BIN_CHUNK_SHIFT, &instance);
+        const char *color = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 5);
+        const uint32_t slot = block->entries[i] & ((1u << PT_BIN_CHUNK_SHIFT) - 1);
+        __builtin_prefetch(color + (size_t)bytes[source.args->instance.color_format] * source.ids[slot]);
+    }
 }
 
-// Calls work for every disc of a bin. looks: room for what `look` (may be NULL) finds out about PT_LANES discs.
-static inline __attribute__((always_inline)) void pt_bin_walk(const struct pt_bins *bins, uint32_t bin, pt_bin_look *look,
-                                                              void *looks, pt_bin_work *work, void *context)
+// Calls work for the discs of a bin, up to PT_LANES of one chunk at a time. colors: 1 where it looks those up.
+static inline __attribute__((always_inline)) void pt_bin_walk(const struct pt_bins *bins, uint32_t bin, int colors,
+                                                              pt_bin_work *work, void *context)
 {
     uint32_t instance = 0;
     for (uint32_t thread = 0; thread < pt_pool_threads(bins->call->pool); thread++)
         for (uint32_t b = bins->heads[(size_t)thread * bins->bins + bin]; b != PT_BIN_NONE; b = bins->blocks[b].before) {
             const struct pt_bin_block *block = &bins->blocks[b];
+            const uint32_t *entries = block->entries;
+            if (block->before != PT_BIN_NONE)
+                pt_bin_ask(bins, &bins->blocks[block->before], instance, colors);
             for (uint32_t i = 0, next; i < block->count; i = next) {
-                for (next = i + 1; next < block->count && next - i < PT_LANES &&
-                                   block->entries[next] >> PT_BIN_CHUNK_SHIFT == block->entries[i] >> PT_BIN_CHUNK_SHIFT;)
+                const uint32_t chunk = entries[i] >> PT_BIN_CHUNK_SHIFT;
+                for (next = i + 1; next < block->count && next - i < PT_LANES && entries[next] >> PT_BIN_CHUNK_SHIFT == chunk;)
                     next++;
-                pt_bin_draw(bins, block->entries + i, next - i, &instance, look, looks, work, context);
+                const struct pt_disc_source source = pt_bin_source(bins, chunk, &instance);
+                const vi slot = vi_and(vi_load(entries + i), vi_set((1u << PT_BIN_CHUNK_SHIFT) - 1));
+                const vi word = vi_load(block->words + i);
+                struct pt_discs discs;
+                vf p[3];
+                for (uint32_t k = 0; k < 3; k++)
+                    p[k] = vf_gather(source.positions + (size_t)k * source.chunk->padded, slot, vm_first(next - i));
+                pt_disc_project(&source, p, vm_first(next - i), &discs);
+                discs.id = vi_gather(source.ids, slot, vm_first(next - i));
+                pt_disc_size(&source, word, &discs);
+                pt_disc_shape(&source, word, &discs);
+                pt_disc_tighten(bins->view, &discs);
+                work(context, instance, &discs);
             }
         }
 }
 
-// A tile's pixels in the window: x0, y0, width, height.
-struct pt_disc_tile {
-    int32_t x, y, width, height;
-};
-
+// A tile's pixels in the window.
 static inline struct pt_disc_tile pt_bin_tile(const struct pt_bins *bins, uint32_t tile)
 {
     const uint32_t x = tile % bins->columns * PT_DISC_TILE, y = tile / bins->columns * PT_DISC_TILE;
@@ -200,16 +220,6 @@ static inline int pt_bin_empty(const struct pt_bins *bins, uint32_t bin)
         if (bins->heads[(size_t)thread * bins->bins + bin] != PT_BIN_NONE)
             return 0;
     return 1;
-}
-
-// The disc's box within the tile: x0, y0, x1, y1, the ends not included. 0: none.
-static inline int pt_disc_in_tile(const struct pt_disc *disc, const struct pt_disc_tile *tile, int32_t box[4])
-{
-    box[0] = disc->box[0] > tile->x ? disc->box[0] : tile->x;
-    box[1] = disc->box[1] > tile->y ? disc->box[1] : tile->y;
-    box[2] = disc->box[2] < tile->x + tile->width ? disc->box[2] + 1 : tile->x + tile->width;
-    box[3] = disc->box[3] < tile->y + tile->height ? disc->box[3] + 1 : tile->y + tile->height;
-    return box[0] < box[2] && box[1] < box[3];
 }
 
 #endif

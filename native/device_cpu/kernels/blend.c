@@ -2,63 +2,64 @@
 // blend: normal and colour of the discs that lie on the nearest surface of each pixel. SPEC 5, solid; twin of
 // shaders/kernels/blend.comp
 //
-// Tile by tile. The sums of a pixel lie side by side: discs cover some five pixels of a tile's row, which leaves vectors of
-// pixels half empty. They are 32 bits wide and emptied into 64 before they could overflow.
+// Tile by tile. The sums of a pixel lie side by side, one vector whatever the level; they are 32 bits wide and emptied into
+// 64 before they could overflow.
 #include "bins.h"
 #include "shade.h"
 
+typedef float vf_four __attribute__((vector_size(16))); // half of a vf_eight
+
 enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = 8 }; // colour 3, opacity, normal 3, weight
+
+// That sums take before they are emptied: 2^31, less what float32 may count wrong.
+#define SUM_ROOM 2147352576.0f
+
+// What a disc adds at weight 1.
+struct terms {
+    float color[PT_LANES][4], normal[PT_LANES][4];
+    float most[PT_LANES]; // of their sizes
+};
+
+struct place {
+    int32_t column, row;
+};
 
 struct tile {
     const struct pt_bins *bins;
     struct pt_disc_tile at;
-    float nearest[PT_DISC_TILE * PT_DISC_STRIDE], farthest[PT_DISC_TILE * PT_DISC_STRIDE];
-    uint32_t id[PT_DISC_TILE * PT_DISC_STRIDE];
-    float away[PT_DISC_TILE * PT_DISC_STRIDE]; // squared distance of the nearest disc's own pixel
-    int32_t left; // that the sums can take
+    float nearest[TILE_PIXELS], farthest[TILE_PIXELS];
+    uint32_t id[TILE_PIXELS];
+    struct place own[TILE_PIXELS]; // where the nearest disc's point fell
+    float left;                    // that the sums can take
     int emptied;
     int32_t sums[TILE_PIXELS][SUMS];
     int64_t wide[TILE_PIXELS][SUMS];
+    // of the discs at hand
+    struct terms terms;
+    uint32_t ids[PT_LANES];
+    struct place places[PT_LANES];
 };
-
-struct look {
-    float terms[SUMS];
-    int32_t most; // of their sizes
-};
-
-static inline uint32_t row_of(const struct tile *tile, int32_t x, int32_t y)
-{
-    return (uint32_t)(y - tile->at.y) * PT_DISC_STRIDE + (uint32_t)(x - tile->at.x);
-}
 
 // ---- discs ---------------------------------------------------------------------------------------------------------------
 
-static inline void look_at(const struct pt_bins *bins, uint32_t instance, vi id, const struct pt_discs *discs, void *looks)
+static inline void set_terms(const struct pt_bins *bins, uint32_t instance, const struct pt_discs *discs, struct terms *out)
 {
     const struct instance_args *args = &bins->discs[instance].instance;
     const uint32_t at = bins->first + instance * bins->stride;
-    const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     const void *colors = pt_cpu_data(bins->call, at + 5);
-    struct look *out = looks;
-    vf terms[SUMS];
-    pt_albedo(args, colors, id, 0, discs->drawn, terms);
-    terms[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 6), id, 0, discs->drawn) * scale;
-    vf largest = scale;
+    const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
+    vf color[4], normal[4], largest = scale;
+    pt_albedo(args, colors, discs->id, 0, discs->drawn, color);
+    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 6), discs->id, 0, discs->drawn) * scale;
     for (int k = 0; k < 3; k++) {
-        terms[k] = vf_max(vf_min(terms[k], most), vf_zero() - most) * terms[3];
-        largest = vf_max(largest, vf_abs(terms[k]));
-        terms[4 + k] = discs->n[k] * scale;
+        color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
+        largest = vf_max(largest, vf_abs(color[k]));
+        normal[k] = discs->n[k] * scale;
     }
-    terms[7] = scale;
-    float lanes[PT_LANES];
-    for (int k = 0; k < SUMS; k++) {
-        vf_store(lanes, terms[k], vm_first(PT_LANES));
-        for (uint32_t i = 0; i < PT_LANES; i++)
-            out[i].terms[k] = lanes[i];
-    }
-    vf_store(lanes, largest, vm_first(PT_LANES));
-    for (uint32_t i = 0; i < PT_LANES; i++)
-        out[i].most = (int32_t)lanes[i] + 1;
+    normal[3] = scale;
+    vf_store4(out->color[0], color, vm_bits(vm_first(PT_LANES)));
+    vf_store4(out->normal[0], normal, vm_bits(vm_first(PT_LANES)));
+    vf_store(out->most, largest, vm_first(PT_LANES));
 }
 
 static void empty_sums(struct tile *tile)
@@ -69,48 +70,58 @@ static void empty_sums(struct tile *tile)
             tile->sums[i][k] = 0;
         }
     tile->emptied = 1;
-    tile->left = INT32_MAX;
+    tile->left = SUM_ROOM;
 }
 
-static inline void draw(void *context, const struct pt_disc *disc, const void *looks, uint32_t lane)
+static inline void add_up(void *context, uint32_t covered, const struct pt_disc_pixels *pixels)
 {
     struct tile *tile = context;
-    const struct view_args *view = tile->bins->view;
-    const struct look *look = (const struct look *)looks + lane;
-    vf_eight terms;
-    int32_t box[4];
-    if (!pt_disc_in_tile(disc, &tile->at, box))
-        return;
-    if (tile->left < look->most)
+    for (; covered; covered &= covered - 1) {
+        const int k = __builtin_ctz(covered);
+        const uint32_t at = pixels->index[k];
+        const float z = pt_float(pixels->z[k]);
+        if (!(tile->nearest[at] <= z && z <= tile->farthest[at]))
+            continue;
+        tile->own[at] = tile->id[at] == tile->ids[k] ? tile->places[k] : tile->own[at];
+        vf_four color, normal;
+        memcpy(&color, tile->terms.color[k], 16);
+        memcpy(&normal, tile->terms.normal[k], 16);
+        vf_eight terms = __builtin_shufflevector(color, normal, 0, 1, 2, 3, 4, 5, 6, 7);
+        *(vi_eight *)(void *)tile->sums[at] += __builtin_convertvector(terms * pixels->weight[k], vi_eight);
+    }
+}
+
+// Sees to it that the sums have room for `size` more.
+static inline void take_room(struct tile *tile, float size)
+{
+    if (tile->left < size)
         empty_sums(tile);
-    tile->left -= look->most;
-    memcpy(&terms, look->terms, sizeof terms);
-    for (int32_t y = box[1]; y < box[3]; y++)
-        for (int32_t x = box[0]; x < box[2]; x += PT_LANES) {
-            const uint32_t at = row_of(tile, x, y);
-            vf z, square;
-            vm beside;
-            vm covered =
-                pt_disc_pixels(view, disc, x, y, vm_first(pt_lanes_left((uint32_t)x, (uint32_t)box[2])), &z, &square, &beside);
-            covered = vm_and(covered, vm_and(vf_le(vf_load(tile->nearest + at), z), vf_le(z, vf_load(tile->farthest + at))));
-            uint32_t bits = vm_bits(covered);
-            if (!bits)
-                continue;
-            vm shown = vm_and(covered, vi_eq(vi_load(tile->id + at), vi_set(disc->id)));
-            if (vm_bits(shown)) {
-                vf dx = vi_convert(vi_sub(vi_add(vi_set((uint32_t)x), vi_lanes()), vi_set((uint32_t)disc->column)));
-                vf dy = vf_set((float)(y - disc->row));
-                vf_store(tile->away + at, dx * dx + dy * dy, shown);
-            }
-            float weights[PT_LANES];
-            vf_store(weights, pt_disc_weights(view, disc, x, y, square, beside), vm_first(PT_LANES));
-            int32_t(*sums)[SUMS] = tile->sums + (y - tile->at.y) * PT_DISC_TILE + (x - tile->at.x);
-            for (; bits; bits &= bits - 1) {
-                const int k = __builtin_ctz(bits);
-                vi_eight *sum = (vi_eight *)(void *)sums[k];
-                *sum += __builtin_convertvector(terms * weights[k], vi_eight);
-            }
-        }
+    tile->left -= size;
+}
+
+static inline void draw(void *context, uint32_t instance, const struct pt_discs *discs)
+{
+    struct tile *tile = context;
+    vi places[2];
+    float size = 0.0f;
+    set_terms(tile->bins, instance, discs, &tile->terms);
+    for (uint32_t i = 0; i < PT_LANES; i++)
+        size += tile->terms.most[i] + 1.0f;
+    vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)), vm_first(PT_LANES));
+    vi_zip(discs->column, discs->row, places);
+    vi_store(tile->places, places[0], vm_first(PT_LANES));
+    vi_store((uint32_t *)(void *)tile->places + PT_LANES, places[1], vm_first(PT_LANES));
+    if (size <= SUM_ROOM) {
+        take_room(tile, size);
+        pt_disc_draw(tile->bins->view, discs, &tile->at, 1, add_up, tile);
+        return;
+    }
+    for (uint32_t i = 0; i < PT_LANES; i++) { // so bright that they have room one by one only
+        struct pt_discs one = *discs;
+        one.drawn = vm_and(discs->drawn, vm_of_bits(1u << i));
+        take_room(tile, tile->terms.most[i] + 1.0f);
+        pt_disc_draw(tile->bins->view, &one, &tile->at, 1, add_up, tile);
+    }
 }
 
 // ---- tiles ---------------------------------------------------------------------------------------------------------------
@@ -121,14 +132,13 @@ static int load(struct tile *tile, const uint64_t *keys, const float *deff)
     int any = 0;
     for (int32_t y = 0; y < tile->at.height; y++) {
         const size_t from = (size_t)(tile->at.y + y) * tile->bins->view->width + (size_t)tile->at.x;
-        const uint32_t to = (uint32_t)y * PT_DISC_STRIDE;
-        for (uint32_t x = 0; x < (uint32_t)tile->at.width; x += PT_LANES) {
+        const uint32_t to = (uint32_t)y * PT_DISC_TILE;
+        for (uint32_t x = 0; x < (uint32_t)tile->at.width; x += PT_LANES) { // tiles are whole vectors wide
             vf z = vi_float(vi_load_z(keys + from + x));
-            any |= vm_bits(vf_lt(z, empty)) != 0;
+            any |= vm_bits(vm_and(vf_lt(z, empty), vm_first(pt_lanes_left(x, (uint32_t)tile->at.width)))) != 0;
             vf_store(tile->nearest + to + x, z, vm_first(PT_LANES));
             vf_store(tile->farthest + to + x, z + vf_load(deff + from + x), vm_first(PT_LANES));
             vi_store(tile->id + to + x, vi_load_id(keys + from + x), vm_first(PT_LANES));
-            vf_store(tile->away + to + x, vf_zero(), vm_first(PT_LANES));
         }
     }
     return any;
@@ -142,12 +152,19 @@ static float wide_sum(int64_t sum)
     return sum < 0 ? -value : value;
 }
 
-static void sums_of(const struct tile *tile, uint32_t pixel, uint32_t count, float sums[SUMS][PT_LANES])
+static void sums_of(const struct tile *tile, uint32_t pixel, vm some, vf sums[SUMS])
 {
-    for (uint32_t i = 0; i < count; i++)
-        for (int k = 0; k < SUMS; k++)
-            sums[k][i] = tile->emptied ? wide_sum(tile->wide[pixel + i][k] + tile->sums[pixel + i][k])
-                                       : (float)tile->sums[pixel + i][k];
+    float lanes[PT_LANES];
+    for (uint32_t k = 0; k < SUMS; k++) {
+        if (!tile->emptied) {
+            vi at = vi_add(vi_mul(vi_add(vi_set(pixel), vi_lanes()), vi_set(SUMS)), vi_set(k));
+            sums[k] = vi_convert(vi_gather(tile->sums, at, some));
+            continue;
+        }
+        for (uint32_t i = 0; i < PT_LANES; i++)
+            lanes[i] = vm_bits(some) >> i & 1u ? wide_sum(tile->wide[pixel + i][k] + tile->sums[pixel + i][k]) : 0.0f;
+        sums[k] = vf_load(lanes);
+    }
 }
 
 // Those of `some` whose points have normals.
@@ -188,16 +205,13 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
         for (uint32_t x = 0; x < (uint32_t)tile->at.width; x += PT_LANES) {
             const uint32_t px = (uint32_t)tile->at.x + x, py = (uint32_t)(tile->at.y + y);
             const size_t at = (size_t)py * bins->view->width + px;
-            const uint32_t row = (uint32_t)y * PT_DISC_STRIDE + x;
+            const uint32_t pixel = (uint32_t)y * PT_DISC_TILE + x;
             const uint32_t count = pt_lanes_left(x, (uint32_t)tile->at.width);
-            vm some = vm_and(vm_first(count), vf_lt(vf_load(tile->nearest + row), vf_set(pt_float(PT_KEY_EMPTY_Z))));
+            vm some = vm_and(vm_first(count), vf_lt(vf_load(tile->nearest + pixel), vf_set(pt_float(PT_KEY_EMPTY_Z))));
             if (!vm_bits(some))
                 continue;
-            float lanes[SUMS][PT_LANES];
-            vf sums[SUMS], color[4], n[4], away = vf_load(tile->away + row);
-            sums_of(tile, (uint32_t)y * PT_DISC_TILE + x, count, lanes);
-            for (int k = 0; k < SUMS; k++)
-                sums[k] = vf_load(lanes[k]);
+            vf sums[SUMS], color[4], n[4];
+            sums_of(tile, pixel, some, sums);
             vm colored = vm_and(some, vf_le(one, sums[3]));
             vf share = vf_rcp(vf_select(colored, sums[3], one));
             for (int k = 0; k < 3; k++)
@@ -206,7 +220,10 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
             color[3] = vf_select(vf_lt(sums[3], weight), vf_min(sums[3] * vf_rcp(weight), one), one); // opaque: 1 exactly
             vf_load4(normals + 4 * at, n);
             mean_normal(bins->view, sums, px, py, with_normals(bins, vi_load_id(keys + at), some), n);
-            n[3] = vf_select(vf_lt(zero, away), away * vf_rsqrt(vf_max(away, one)), zero);
+            const vi pair = vi_load(tile->own + pixel), other = vi_load((const uint32_t *)(const void *)(tile->own + pixel) + PT_LANES);
+            vf dx = vi_convert(vi_sub(vi_add(vi_set(px), vi_lanes()), vi_evens(pair, other)));
+            vf dy = vi_convert(vi_sub(vi_set(py), vi_odds(pair, other))), away = dx * dx + dy * dy;
+            n[3] = away * vf_rsqrt(vf_max(away, one));
             vf_store4(normals + 4 * at, n, vm_bits(some));
             vf_store4(albedo + 4 * at, color, vm_bits(some));
         }
@@ -217,17 +234,16 @@ static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t th
     const struct pt_bins *bins = context;
     const uint32_t large = bins->bins - 1;
     struct tile *tile = (struct tile *)bins->call->scratch[1].memory + thread;
-    struct look looks[PT_LANES];
     tile->bins = bins;
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
         tile->at = pt_bin_tile(bins, t);
         if (!load(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 1)))
             continue;
         memset(tile->sums, 0, sizeof tile->sums);
-        tile->left = INT32_MAX;
+        tile->left = SUM_ROOM;
         tile->emptied = 0;
-        pt_bin_walk(bins, t, look_at, looks, draw, tile);
-        pt_bin_walk(bins, large, look_at, looks, draw, tile);
+        pt_bin_walk(bins, t, 1, draw, tile);
+        pt_bin_walk(bins, large, 1, draw, tile);
         save(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 2), pt_cpu_data(bins->call, 3));
     }
 }

@@ -11,21 +11,18 @@
 #include "device_cpu/rows.h"
 #include "device_cpu/simd.h"
 
-struct pt_disc {
-    float x, y, z, gx, gy, e, f, g;
-    int32_t box[4];   // x0, y0, x1, y1: pixels of the window that it may cover, both ends included
-    int32_t column, row; // that it falls into; not always in the window
-    uint32_t id;
-};
-
-// PT_LANES of them as they are made.
+// PT_LANES of them.
 struct pt_discs {
     vf x, y, z, radius;
     vf gx, gy, e, f, g;
-    vi box[4], column, row;
-    vf n[3];     // unit, towards the viewer; 0 where the point has none
+    vi box[4];      // x0, y0, x1, y1: pixels of the window that they may cover, both ends included
+    vi column, row; // that they fall into; not always in the window
+    vi id;          // in their cloud
+    vf n[3];        // unit, towards the viewer; 0 where the point has none
     vm drawn;
 };
+
+enum { PT_DISC_TILE = 64 }; // pixels
 
 struct pt_disc_source {
     const struct view_args *view;
@@ -84,15 +81,11 @@ static inline void pt_disc_box(const struct view_args *view, struct pt_discs *d)
     }
 }
 
-// 1. Projects those of a chunk's points that `slot` and `lanes` name; faces the viewer, radius, box. Returns their ids and
-// surface words.
-static inline void pt_disc_place(const struct pt_disc_source *s, vi slot, vm lanes, struct pt_discs *d, vi *id, vi *word)
+// 1. Projects points of a chunk, at p.
+static inline void pt_disc_project(const struct pt_disc_source *s, const vf p[3], vm lanes, struct pt_discs *d)
 {
     const struct view_args *view = s->view;
     const vf far = vf_set(PT_DISC_FAR);
-    vf p[3], v[3];
-    for (uint32_t k = 0; k < 3; k++)
-        p[k] = vf_gather(s->positions + (size_t)k * s->chunk->padded, slot, lanes);
     d->z = vf_transform(s->chunk, 2, p[0], p[1], p[2]);
     d->x = vf_transform(s->chunk, 0, p[0], p[1], p[2]);
     d->y = vf_transform(s->chunk, 1, p[0], p[1], p[2]);
@@ -104,20 +97,28 @@ static inline void pt_disc_place(const struct pt_disc_source *s, vi slot, vm lan
     // NaN fails every comparison
     d->drawn = vm_and(vm_and(lanes, vm_and(vf_le(vf_set(view->z_near), d->z), vf_le(d->z, vf_set(view->z_far)))),
                       vm_and(vf_lt(vf_abs(d->x), far), vf_lt(vf_abs(d->y), far)));
-    *id = vi_gather(s->ids, slot, d->drawn);
-    *word = vi_gather(s->surface, *id, d->drawn);
-    if (s->chunk->cull) {
-        vf n[3];
-        vf_decode_normal(*word, n);
-        for (uint32_t k = 0; k < 3; k++)
-            v[k] = vf_set(s->chunk->eye[k]) - vf_set(s->chunk->eye[3]) * p[k];
-        vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
-        vm none = vi_eq(vi_and(*word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
-        d->drawn = vm_and(d->drawn, vm_not(vm_and(away, vm_not(none))));
-    }
-    d->radius = pt_disc_radius(s->args, s->radii, *id, *word, d->drawn);
+}
+
+// Leaves out those that face away: positions p, surface words.
+static inline void pt_disc_cull(const struct pt_disc_source *s, const vf p[3], vi word, struct pt_discs *d)
+{
+    vf n[3], v[3];
+    if (!s->chunk->cull)
+        return;
+    vf_decode_normal(word, n);
+    for (uint32_t k = 0; k < 3; k++)
+        v[k] = vf_set(s->chunk->eye[k]) - vf_set(s->chunk->eye[3]) * p[k];
+    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
+    vm none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
+    d->drawn = vm_and(d->drawn, vm_not(vm_and(away, vm_not(none))));
+}
+
+// Radius and box, by the surface words.
+static inline void pt_disc_size(const struct pt_disc_source *s, vi word, struct pt_discs *d)
+{
+    d->radius = pt_disc_radius(s->args, s->radii, d->id, word, d->drawn);
     d->radius = vf_select(vf_le(vf_set(PT_DISC_LEAST), d->radius), d->radius, vf_zero());
-    pt_disc_box(view, d);
+    pt_disc_box(s->view, d);
 }
 
 // 3. plane and ellipse
@@ -174,67 +175,126 @@ static inline void pt_disc_shape(const struct pt_disc_source *s, vi word, struct
     d->g = vf_select(flat, d->g, vf_set(1e20f));
 }
 
-static inline void pt_disc_store(const struct pt_discs *d, vi id, struct pt_disc out[PT_LANES])
+// 4. The ellipse's own box, which is smaller, where it is no needle and its middle lies in the window: within q of
+// e dx^2 + f dx dy + g dy^2 = q^2, for the greatest q there is. Leaves out no pixel that is covered.
+static inline void pt_disc_tighten(const struct view_args *view, struct pt_discs *d)
 {
-    const vf *const numbers[8] = { &d->x, &d->y, &d->z, &d->gx, &d->gy, &d->e, &d->f, &d->g };
-    const vi *const words[7] = { &d->box[0], &d->box[1], &d->box[2], &d->box[3], &d->column, &d->row, &id };
-    uint32_t lanes[15][PT_LANES];
-    for (int k = 0; k < 8; k++)
-        vf_store((float *)lanes[k], *numbers[k], vm_first(PT_LANES));
-    for (int k = 0; k < 7; k++)
-        vi_store(lanes[8 + k], *words[k], vm_first(PT_LANES));
-    for (uint32_t i = 0; i < PT_LANES; i++)
-        for (int k = 0; k < 15; k++)
-            memcpy((char *)&out[i] + 4 * k, &lanes[k][i], 4);
-}
-_Static_assert(sizeof(struct pt_disc) == 60, "pt_disc_store writes its words one after another");
-
-// What of PT_LANES pixels of the window from (x, y) on the disc covers: their depths; `beside` are covered by the point alone.
-// square: distance over radius squared, where covered and not beside. inverse_q is left for it.
-static inline vm pt_disc_pixels(const struct view_args *view, const struct pt_disc *d, int32_t x, int32_t y, vm lanes, vf *z,
-                                vf *square, vm *beside)
-{
-    const vf half = vf_set(0.5f), one = vf_set(1.0f);
-    vf dx = (vi_convert(vi_add(vi_set((uint32_t)(view->origin_x + x)), vi_lanes())) + half) - vf_set(d->x);
-    vf dy = (vf_set((float)(view->origin_y + y)) + half) - vf_set(d->y);
-    vf slope = vf_set(d->gx) * dx + vf_set(d->gy) * dy, q = one, inverse = one;
-    *square = (vf_set(d->e) * dx + vf_set(d->f) * dy) * dx + (vf_set(d->g) * dy) * dy;
-    vm covered = lanes;
-    if (view->perspective) {
-        q = one + slope;
-        covered = vm_and(covered, vf_le(vf_set(PT_DISC_LEAST), q));
-        inverse = vf_rcp(q);
-        *z = vf_set(d->z) * inverse;
-        *square = *square * (inverse * inverse);
-    } else {
-        *z = vf_set(d->z) + slope;
+    const vf half = vf_set(0.5f), one = vf_set(1.0f), slack = vf_set(0.02f);
+    const vf determinant = d->e * d->g - (d->f * d->f) * vf_set(0.25f);
+    const vf inverse = vf_rcp(vf_max(determinant, vf_set(1e-30f)));
+    const vf at[2] = { d->x, d->y }, size[2] = { d->g, d->e };
+    vm round = vm_and(vf_le((d->e * d->g) * vf_set(1e-3f), determinant), vf_le(vf_set(1e-30f), determinant));
+    vf first[2], last[2], own[2], most = one;
+    for (int k = 0; k < 2; k++) {
+        first[k] = vi_convert(d->box[k]);
+        last[k] = vi_convert(d->box[2 + k]);
+        own[k] = vi_convert(k ? d->row : d->column);
+        round = vm_and(round, vm_and(vf_le(first[k], own[k]), vf_le(own[k], last[k])));
+        most = most + vf_abs(k ? d->gy : d->gx) * ((last[k] - first[k]) + one);
     }
-    covered = vm_and(covered, vf_le(*square, one));
-    *beside = vm_of_bits(0);
-    if (y == d->row) {
-        vm own = vm_and(lanes, vi_eq(vi_add(vi_set((uint32_t)x), vi_lanes()), vi_set((uint32_t)d->column)));
-        *beside = vm_and(own, vm_not(covered));
-        *z = vf_select(*beside, vf_set(d->z), *z);
-        covered = vm_or(covered, own);
+    for (int k = 0; k < 2; k++) {
+        const vf square = vf_max(size[k] * inverse, vf_set(1e-12f)), origin = vf_set((float)(k ? view->origin_y : view->origin_x));
+        const vf reach = pt_clamp_far((square * vf_rsqrt(square)) * (most * vf_set(1.001f)) + slack);
+        const vf begin = vf_floor((at[k] - reach) + half) - origin, end = vf_floor((at[k] + reach) - half) - origin;
+        d->box[k] = vi_select(round, vf_int(vf_min(vf_max(first[k], begin), own[k])), d->box[k]);
+        d->box[2 + k] = vi_select(round, vf_int(vf_max(vf_min(last[k], end), own[k])), d->box[2 + k]);
     }
-    return vm_and(covered, vm_and(vf_le(vf_set(view->z_near), *z), vf_le(*z, vf_set(view->z_far))));
 }
 
-// The weights of those pixels: exp(-2 square) within 2.4e-4; in its own pixel the disc is a pixel wide at least.
-static inline vf pt_disc_weights(const struct view_args *view, const struct pt_disc *d, int32_t x, int32_t y, vf square, vm beside)
+// A part of the window: first column and row, and how many.
+struct pt_disc_tile {
+    int32_t x, y, width, height;
+};
+
+// What discs show of one pixel each.
+struct pt_disc_pixels {
+    uint32_t index[PT_LANES]; // of the pixel in the tile, rows of PT_DISC_TILE
+    uint32_t z[PT_LANES];     // its depth there, bits
+    float weight[PT_LANES];
+};
+
+typedef void pt_disc_work(void *context, uint32_t covered, const struct pt_disc_pixels *pixels);
+
+// The greatest of some lanes.
+static inline uint32_t pt_most_of(vi value, uint32_t lanes)
 {
-    if (y == d->row) {
-        const vf half = vf_set(0.5f), two = vf_set(2.0f);
-        vf dx = (vi_convert(vi_add(vi_set((uint32_t)(view->origin_x + x)), vi_lanes())) + half) - vf_set(d->x);
-        vf dy = (vf_set((float)(view->origin_y + y)) + half) - vf_set(d->y), pixel = (dx * dx + dy * dy) * two;
-        vm own = vi_eq(vi_add(vi_set((uint32_t)x), vi_lanes()), vi_set((uint32_t)d->column));
-        square = vf_select(beside, pixel, square);
-        square = vf_select(own, vf_min(pixel, square), square);
+    uint32_t each[PT_LANES], most = 0;
+    vi_store(each, value, vm_first(PT_LANES));
+    for (; lanes; lanes &= lanes - 1)
+        most = each[__builtin_ctz(lanes)] > most ? each[__builtin_ctz(lanes)] : most;
+    return most;
+}
+
+static inline vi pt_lesser(vi a, vi b) { return vi_select(vi_lt_unsigned(a, b), a, b); }
+
+// Calls work for the pixels of a tile that the discs cover: one disc a lane, all of them a step to the right or up at a time.
+// (They are a few pixels wide: lanes along a row would idle, and what is done with a pixel comes one at a time anyway.)
+// weigh: 1 with weights, exp(-2 s) within 2.4e-4, s squared distance over radius squared; in its own pixel a disc is a pixel
+// wide at least.
+static inline __attribute__((always_inline)) void pt_disc_draw(const struct view_args *view, const struct pt_discs *d,
+                                                               const struct pt_disc_tile *tile, int weigh, pt_disc_work *work,
+                                                               void *context)
+{
+    const vf half = vf_set(0.5f), one = vf_set(1.0f), two = vf_set(2.0f), least = vf_set(PT_DISC_LEAST);
+    const vf z_near = vf_set(view->z_near), z_far = vf_set(view->z_far);
+    const vi tile_x = vi_set((uint32_t)tile->x), tile_y = vi_set((uint32_t)tile->y), next = vi_set(1);
+    // boxes within the tile
+    const vi x0 = vi_select(vi_lt_unsigned(d->box[0], tile_x), tile_x, d->box[0]);
+    const vi y0 = vi_select(vi_lt_unsigned(d->box[1], tile_y), tile_y, d->box[1]);
+    const vi x1 = pt_lesser(vi_add(d->box[2], next), vi_set((uint32_t)(tile->x + tile->width)));
+    const vi y1 = pt_lesser(vi_add(d->box[3], next), vi_set((uint32_t)(tile->y + tile->height)));
+    const vm inside = vm_and(d->drawn, vm_and(vi_lt_unsigned(x0, x1), vi_lt_unsigned(y0, y1)));
+    const uint32_t lanes = vm_bits(inside);
+    const vi columns = vi_sub(x1, x0), rows = vi_sub(y1, y0), own_column = vi_sub(d->column, x0), own_row = vi_sub(d->row, y0);
+    const uint32_t most_columns = pt_most_of(columns, lanes), most_rows = pt_most_of(rows, lanes);
+    // halves of pixels are exact: the window's corner, then a step at a time
+    const vf first_x = vi_convert(vi_add(vi_set((uint32_t)view->origin_x), x0)) + half;
+    vf py = vi_convert(vi_add(vi_set((uint32_t)view->origin_y), y0)) + half;
+    vi row = vi_add(vi_mul(vi_sub(y0, tile_y), vi_set(PT_DISC_TILE)), vi_sub(x0, tile_x));
+    // discs that may pass the ends of the view
+    const vf reach = d->radius * vf_set(1.01f);
+    const int ends = (vm_bits(vm_and(vf_le(z_near, d->z - reach), vf_le(d->z + reach, z_far))) & lanes) != lanes;
+    struct pt_disc_pixels pixels;
+    for (uint32_t j = 0; j < most_rows; j++, py = py + one, row = vi_add(row, vi_set(PT_DISC_TILE))) {
+        const vm in_rows = vm_and(inside, vi_lt_unsigned(vi_set(j), rows)), in_own = vm_and(in_rows, vi_eq(own_row, vi_set(j)));
+        const vf dy = py - d->y, rise = d->gy * dy, cross = d->f * dy, along = (d->g * dy) * dy;
+        vf px = first_x;
+        for (uint32_t i = 0; i < most_columns; i++, px = px + one) {
+            const vm lane = vm_and(in_rows, vi_lt_unsigned(vi_set(i), columns)), own = vm_and(lane, vm_and(in_own, vi_eq(own_column, vi_set(i))));
+            const vf dx = px - d->x, slope = d->gx * dx + rise;
+            vf square = (d->e * dx + cross) * dx + along, z = d->z + slope;
+            vm covered = lane;
+            if (view->perspective) {
+                const vf q = one + slope, inverse = vf_rcp(q);
+                covered = vm_and(covered, vf_le(least, q));
+                z = d->z * inverse;
+                square = square * (inverse * inverse);
+            }
+            covered = vm_and(covered, vf_le(square, one));
+            const vm beside = vm_and(own, vm_not(covered)); // covered by the point alone
+            z = vf_select(beside, d->z, z);
+            covered = vm_or(covered, beside);
+            if (ends)
+                covered = vm_and(covered, vm_and(vf_le(z_near, z), vf_le(z, z_far)));
+            const uint32_t bits = vm_bits(covered);
+            if (!bits)
+                continue;
+            vi_store(pixels.index, vi_add(row, vi_set(i)), vm_first(PT_LANES));
+            vi_store(pixels.z, vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), vm_first(PT_LANES)); // the sign bit of -0 is dropped
+            if (weigh) {
+                if (vm_bits(own)) {
+                    const vf pixel = (dx * dx + dy * dy) * two;
+                    square = vf_select(own, vf_select(beside, pixel, vf_min(pixel, square)), square);
+                }
+                vf w = vf_set(0.25565624f) * square - vf_set(1.03321445f);
+                w = w * square + vf_set(1.90144324f);
+                w = w * square - vf_set(1.98814547f);
+                w = w * square + vf_set(0.99976468f);
+                vf_store(pixels.weight, w, vm_first(PT_LANES));
+            }
+            work(context, bits, &pixels);
+        }
     }
-    vf w = vf_set(0.25565624f) * square - vf_set(1.03321445f);
-    w = w * square + vf_set(1.90144324f);
-    w = w * square - vf_set(1.98814547f);
-    return w * square + vf_set(0.99976468f);
 }
 
 #endif

@@ -4,70 +4,52 @@
 // Tile by tile, in memory that the first-level cache holds.
 #include "bins.h"
 
+enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE };
+
 struct tile {
-    const struct view_args *view;
+    const struct pt_bins *bins;
     struct pt_disc_tile at;
-    uint32_t z[PT_DISC_TILE * PT_DISC_STRIDE], id[PT_DISC_TILE * PT_DISC_STRIDE];
-    float limit[PT_DISC_TILE * PT_DISC_STRIDE];
+    uint64_t keys[TILE_PIXELS];
+    float limit[TILE_PIXELS]; // only what lies beyond counts
+    uint32_t ids[PT_LANES];   // of the discs at hand
     int limited;
 };
 
-static inline uint32_t row_of(const struct tile *tile, int32_t x, int32_t y)
-{
-    return (uint32_t)(y - tile->at.y) * PT_DISC_STRIDE + (uint32_t)(x - tile->at.x);
-}
-
-static inline void draw(void *context, const struct pt_disc *disc, const void *looks, uint32_t lane)
+static inline void take_least(void *context, uint32_t covered, const struct pt_disc_pixels *pixels)
 {
     struct tile *tile = context;
-    const vi id = vi_set(disc->id);
-    int32_t box[4];
-    (void)looks;
-    (void)lane;
-    if (!pt_disc_in_tile(disc, &tile->at, box))
-        return;
-    for (int32_t y = box[1]; y < box[3]; y++)
-        for (int32_t x = box[0]; x < box[2]; x += PT_LANES) {
-            const uint32_t at = row_of(tile, x, y);
-            vf z, square;
-            vm beside;
-            vm covered = pt_disc_pixels(tile->view, disc, x, y, vm_first(pt_lanes_left((uint32_t)x, (uint32_t)box[2])), &z,
-                                        &square, &beside);
-            if (tile->limited)
-                covered = vm_and(covered, vf_lt(vf_load(tile->limit + at), z));
-            vi bits = vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), seen = vi_load(tile->z + at); // the sign bit of -0 is dropped
-            vm nearer = vi_lt_unsigned(bits, seen),
-               equal = vm_and(vi_eq(bits, seen), vi_lt_unsigned(id, vi_load(tile->id + at)));
-            covered = vm_and(covered, vm_or(nearer, equal));
-            vi_store(tile->z + at, bits, covered);
-            vi_store(tile->id + at, id, covered);
-        }
+    for (; covered; covered &= covered - 1) {
+        const int k = __builtin_ctz(covered);
+        uint64_t key = (uint64_t)pixels->z[k] << 32 | tile->ids[k], *at = &tile->keys[pixels->index[k]];
+        if (tile->limited && !(tile->limit[pixels->index[k]] < pt_float(pixels->z[k])))
+            continue;
+        *at = key < *at ? key : *at;
+    }
+}
+
+static inline void draw(void *context, uint32_t instance, const struct pt_discs *discs)
+{
+    struct tile *tile = context;
+    vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)), vm_first(PT_LANES));
+    pt_disc_draw(tile->bins->view, discs, &tile->at, 0, take_least, tile);
 }
 
 static void load(struct tile *tile, const uint64_t *keys, const float *limit)
 {
     for (int32_t y = 0; y < tile->at.height; y++) {
-        const size_t from = (size_t)(tile->at.y + y) * tile->view->width + (size_t)tile->at.x;
-        const uint32_t to = (uint32_t)y * PT_DISC_STRIDE;
-        for (uint32_t x = 0; x < (uint32_t)tile->at.width; x += PT_LANES) {
-            vi_store(tile->z + to + x, vi_load_z(keys + from + x), vm_first(PT_LANES));
-            vi_store(tile->id + to + x, vi_load_id(keys + from + x), vm_first(PT_LANES));
-            if (limit)
-                vf_store(tile->limit + to + x, vf_load(limit + from + x), vm_first(PT_LANES));
-        }
+        const size_t from = (size_t)(tile->at.y + y) * tile->bins->view->width + (size_t)tile->at.x;
+        memcpy(tile->keys + y * PT_DISC_TILE, keys + from, (size_t)tile->at.width * 8);
+        if (limit)
+            memcpy(tile->limit + y * PT_DISC_TILE, limit + from, (size_t)tile->at.width * 4);
     }
     tile->limited = limit != NULL;
 }
 
 static void save(const struct tile *tile, uint64_t *keys)
 {
-    for (int32_t y = 0; y < tile->at.height; y++) {
-        const size_t to = (size_t)(tile->at.y + y) * tile->view->width + (size_t)tile->at.x;
-        const uint32_t from = (uint32_t)y * PT_DISC_STRIDE;
-        for (uint32_t x = 0; x < (uint32_t)tile->at.width; x += PT_LANES)
-            vi_store_keys(keys + to + x, vi_load(tile->z + from + x), vi_load(tile->id + from + x),
-                          vm_bits(vm_first(pt_lanes_left(x, (uint32_t)tile->at.width))));
-    }
+    for (int32_t y = 0; y < tile->at.height; y++)
+        memcpy(keys + (size_t)(tile->at.y + y) * tile->bins->view->width + (size_t)tile->at.x, tile->keys + y * PT_DISC_TILE,
+               (size_t)tile->at.width * 8);
 }
 
 static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -78,14 +60,14 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
     const uint32_t large = bins->bins - 1;
     struct tile tile;
     (void)thread;
-    tile.view = bins->view;
+    tile.bins = bins;
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
         if (pt_bin_empty(bins, t) && pt_bin_empty(bins, large))
             continue;
         tile.at = pt_bin_tile(bins, t);
         load(&tile, pt_cpu_data(bins->call, 0), limit);
-        pt_bin_walk(bins, t, NULL, NULL, draw, &tile);
-        pt_bin_walk(bins, large, NULL, NULL, draw, &tile);
+        pt_bin_walk(bins, t, 0, draw, &tile);
+        pt_bin_walk(bins, large, 0, draw, &tile);
         save(&tile, pt_cpu_data(bins->call, 0));
     }
 }

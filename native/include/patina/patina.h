@@ -312,7 +312,7 @@ typedef struct patina_cloud_style {
                                   // is as much lighter, by this number alone
     uint32_t shadow_off;          // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
     float radius;                 // of every point's disc, world units, for PATINA_SURFACE_SPLATS; 0 = the point's own, else
-                                  // 1.5 times the local spacing
+                                  // 1.75 times the local spacing
     uint32_t color_source;        // patina_color_source
     const float *ramp;            // ramp_count x 3, linear; copied. Evenly spaced over the range, straight between, even
                                   // beyond. NULL = from black to white. A scalar that is NaN takes `color`
