@@ -75,6 +75,7 @@ class Viewport:
         self.area = 0  # where it is, to find its statistics
         self.message = ""  # what went wrong last
         self.notices: list[str] = []
+        self._lost: tuple[sync.DeviceChoice, str] | None = None  # a device that failed, and what to say of it
         self.shown: Shown | None = None
         self.pictures = 0  # finished so far
         self.trusted = sync.Trusted()
@@ -101,7 +102,7 @@ class Viewport:
         self.trusted.forget(sync.changed_owners(depsgraph) if self._scene else None)
         view = self._read_view(context)
         scene = sync.describe_viewport(depsgraph, view, self.trusted, context.space_data)
-        self.notices = scene.notices
+        self.notices = scene.notices + ([self._lost[1]] if self._lost and self._lost[0] == scene.device else [])
         self.pace.budget = depsgraph.scene.patina.navigation_ms / 1000.0
         self._scene = scene
         self._view = view
@@ -268,16 +269,24 @@ class Viewport:
         if self._wanted and wish.level == pace.FULL:
             raise native.PatinaCancelled("a newer picture is wanted", native.CANCELLED)
         description = wish.description(clouds)
-        try:
-            return (yield from self._render_on(render.device_for(description.device), wish, description, start))
-        except native.PatinaCancelled:
-            raise
-        except native.PatinaError:
-            if not self._frame or not self._frame[0].name.startswith("gl"):
+        if not self._lost or self._lost[0] != description.device:
+            try:
+                return (yield from self._render_on(render.device_for(description.device), wish, description, start))
+            except native.PatinaCancelled:
                 raise
-            self._frame = None
+            except native.PatinaError as error:
+                if not self._frame or not self._frame[0].name.startswith("gl"):
+                    raise
+                self._lose_device(description.device, str(error))
         device = render.device_for(replace(description.device, name="cpu"))
         return (yield from self._render_on(device, wish, description, start))
+
+    def _lose_device(self, choice: sync.DeviceChoice, reason: str) -> None:
+        """From now on the processor draws, until another device is asked for."""
+        self._lost = (choice, f"{self._frame[0].name} failed, the processor draws: {reason}")
+        self.notices = [*self.notices, self._lost[1]]
+        self._frame = None
+        render.forget_device()
 
     def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription,
                    start: float) -> Steps[Shown]:

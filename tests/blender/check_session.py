@@ -4,6 +4,7 @@
 import os
 import threading
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -167,6 +168,38 @@ def test_registers_twice():
     new_scene()
     add_points([(0, 0, -2)])
     check(drawn(render()), "a render after registering again")
+
+
+def test_memory_runs_short():
+    """A picture that memory has no room for: a message that says so, and Blender draws the next one."""
+    import resource
+    scene = new_scene(4000, 3000)
+    add_points(*sphere(2000))
+    scene.render.resolution_percentage = 1
+    render()
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    scene.render.resolution_percentage = 100
+    resource.setrlimit(resource.RLIMIT_AS, (held + (400 << 20), before[1]))  # planes of such a picture take 1.5 GB
+    try:
+        text = failing_render()
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+    check("out of memory" in text, text)
+    scene.render.resolution_percentage = 1
+    check(drawn(render()), "nothing was drawn afterwards")
+
+
+def test_wrong_attribute_names():
+    """Each is named in a warning; the points are drawn without."""
+    new_scene()
+    obj = add_points(*sphere(2000))
+    obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute = "collor", "norm", "opaque"
+    picture = render()
+    text = " ".join(text for kind, text in reports if kind == 'WARNING')
+    for name, use in (("collor", "colour"), ("norm", "normal"), ("opaque", "opacity")):
+        check(f"no point attribute '{name}' to take as {use}" in text, text)
+    check(drawn(picture), "nothing was drawn")
 
 
 def test_cpu_takes_over():

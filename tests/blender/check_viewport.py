@@ -65,6 +65,12 @@ def setup(overlays=False):
     return scene
 
 
+def toggle_local_view():
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        bpy.ops.view3d.localview(frame_selected=False)
+
+
 def screenshot(name):
     """The view's pixels as shown, (height, width, 4) 0..1, row 0 at the bottom."""
     path = os.path.join(KEEP or str(SCRATCH), f"{name}.png")
@@ -298,12 +304,9 @@ def test_local_view_and_border():
     bpy.context.view_layer.objects.active = first
     first.select_set(True)
     bpy.data.objects["second"].select_set(False)
-    window = bpy.context.window_manager.windows[0]
-    with bpy.context.temp_override(window=window, area=area(), region=window_region()):
-        bpy.ops.view3d.localview(frame_selected=False)
+    toggle_local_view()
     yield lambda: shown() and shown().shown.stats["points"] == 20000
-    with bpy.context.temp_override(window=window, area=area(), region=window_region()):
-        bpy.ops.view3d.localview(frame_selected=False)
+    toggle_local_view()
     yield lambda: shown() and shown().shown.stats["points"] == 40000
     space = area().spaces[0]
     space.use_render_border = True
@@ -414,6 +417,69 @@ def test_failure_is_said():
     view().view_rotation = Quaternion((0, 1, 0), 0.6)
     yield newer(before)
     check(not found.message, found.message)
+
+
+def test_meshes_among_points():
+    """A mesh is drawn, follows its object without being read again, changes with its faces, and leaves in local view."""
+    scene = setup()
+    points = add_points(*sphere(5000, 1.0, (0, 0, 0)))
+    mesh = bpy.data.meshes.new("square")
+    mesh.from_pydata([(-0.5, -0.5, 2), (0.5, -0.5, 2), (0.5, 0.5, 2), (-0.5, 0.5, 2)], [], [(0, 1, 2, 3)])
+    obj = bpy.data.objects.new("square", mesh)
+    scene.collection.objects.link(obj)
+    nearest = lambda: float(shown().shown.depth.min())
+    yield lambda: settled(5000) and abs(nearest() - 4.0) < 1e-3
+    check(shown().shown.stats["triangles"] == 2, f"{shown().shown.stats['triangles']} triangles")
+    reads = shown().trusted.reads
+    obj.location.z = 1.0
+    yield lambda: settled(5000) and abs(nearest() - 3.0) < 1e-3
+    check(shown().trusted.reads == reads, "moving an object read it again")
+    for vertex in mesh.vertices:
+        vertex.co.z = 2.5
+    mesh.update()
+    yield lambda: settled(5000) and abs(nearest() - 2.5) < 1e-3
+    bpy.context.view_layer.objects.active = points
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other == points)
+    toggle_local_view()
+    yield lambda: settled(5000) and shown().shown.stats["triangles"] == 0
+    toggle_local_view()
+    yield lambda: settled(5000) and shown().shown.stats["triangles"] == 2
+
+
+def test_processor_takes_over():
+    """A GPU that fails in mid-session: the processor goes on, the sidebar says why; another choice is tried anew."""
+    scene = setup()
+    gpu = viewport.native.Device("cpu")  # stands for one: here it is to fail, not to draw
+    gpu.name = "gl-egl"
+    honest, honest_start, tried = viewport.render.device_for, viewport.native.Frame.start, []
+
+    def failing(self, scene):
+        if self._device is gpu and len(tried) < 3:
+            tried.append(1)
+            raise viewport.native.PatinaError("the context is lost", -6)
+        return honest_start(self, scene)
+
+    viewport.render.device_for = lambda choice: gpu if choice.name == "gl-egl" else honest(choice)
+    try:
+        scene.patina.device = 'GL'
+        add_points(*sphere(5000, 1.0, (0, 0, 0)))
+        yield lambda: settled(5000) and shown().shown.device == "gl-egl"
+        found = shown()
+        viewport.native.Frame.start = failing
+        for turn in (0.5, 0.7):
+            before = found.pictures
+            view().view_rotation = Quaternion((0, 1, 0), turn)
+            yield newer(before)
+            check(found.shown.device.startswith("cpu") and not found.message, f"{found.shown.device}: {found.message}")
+            check(any("the context is lost" in notice for notice in found.notices), f"{found.notices}")
+        check(len(tried) == 1, f"the lost device was tried {len(tried)} times")
+        scene.patina.device = 'CPU'
+        scene.update_tag()  # as the user interface does
+        yield lambda: not any("the context is lost" in notice for notice in found.notices)
+    finally:
+        viewport.render.device_for, viewport.native.Frame.start = honest, honest_start
+        scene.patina.device = 'AUTO'
 
 
 class _Layout:
