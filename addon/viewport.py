@@ -84,6 +84,7 @@ class Viewport:
         self._view: sync.View | None = None
         self._moved = 0.0  # when
         self._local = False  # in local view
+        self._clips: list[sync.Clip] = []  # of the view
         self._last: Wish | None = None  # that was asked for
         self._wanted: Wish | None = None
         self._working: Wish | None = None
@@ -105,7 +106,7 @@ class Viewport:
         self.notices = scene.notices + ([self._lost[1]] if self._lost and self._lost[0] == scene.device else [])
         self.pace.budget = depsgraph.scene.patina.navigation_ms / 1000.0
         self._scene = scene
-        self._view = view
+        self._view, self._clips = view, sync.view_clips(context.region_data)
         self._local = context.space_data.local_view is not None
         self._moved = time.monotonic()
         self._ask(self.pace.level)
@@ -116,8 +117,9 @@ class Viewport:
         if self._scene and self._local != (context.space_data.local_view is not None):  # Blender says nothing of it
             self.update(context, depsgraph)
         view = self._read_view(context)
-        if self._scene and view != self._view:
-            self._view = view
+        clips = sync.view_clips(context.region_data)
+        if self._scene and (view != self._view or clips != self._clips):
+            self._view, self._clips = view, clips
             self._moved = time.monotonic()
             self._ask(self.pace.level)
         if self.shown:
@@ -167,7 +169,8 @@ class Viewport:
     def _ask(self, level: pace.Level) -> None:
         if self._closed:
             return
-        self._wanted = self._last = Wish(self._scene, self._view, level)
+        scene = replace(self._scene, clips=[*self._scene.clips, *self._clips])
+        self._wanted = self._last = Wish(scene, self._view, level)
         # a quick picture of the moment before is worth its end, a whole one is not
         if self._rendering and self._working.level == pace.FULL:
             self._frame[1].cancel()

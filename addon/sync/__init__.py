@@ -15,7 +15,7 @@ import bpy
 from .. import migrate
 from . import clips, clouds, effects, lights, lines, settings, world
 from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
-from .clips import Clip
+from .clips import Clip, of_view as view_clips
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
 from .effects import Effects
 from .lights import Light
@@ -27,7 +27,7 @@ from .world import Mist
 __all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Lines", "MeshItem", "Mist",
            "Panorama", "Pending", "Effects", "Focus",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
-           "describe_viewport", "final_view", "style_of", "viewport_view"]
+           "describe_viewport", "final_view", "style_of", "view_clips", "viewport_view"]
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,19 @@ def collect(depsgraph: bpy.types.Depsgraph) -> list[Clip]:
     return clips
 
 
+def of_view(region_3d: bpy.types.RegionView3D) -> list[Clip]:
+    """The clipping region of a 3D view (Alt B): planes whose outer side is not shown."""
+    clips = []
+    for plane in region_3d.clip_planes if region_3d.use_clip_planes else ():
+        inward = Vector(plane[:3])
+        if not inward.length:
+            continue
+        matrix = (-inward).to_track_quat('Z', 'Y').to_matrix().to_4x4()
+        matrix.translation = inward * (-plane[3] / inward.length_squared)
+        clips.append(Clip(row_major(matrix), shape=1, cut=0, tint=(0.0, 0.0, 0.0), tint_strength=0.0, tint_width=0.0))
+    return clips
+
+
 def _box(obj: bpy.types.Object) -> Matrix:
     """The object's box from -1 to 1, in its own coordinates."""
     if obj.type == 'EMPTY':

@@ -65,6 +65,13 @@ def setup(overlays=False):
     return scene
 
 
+def clip_border(xmin, xmax, ymin, ymax):
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        bpy.ops.view3d.clip_border(xmin=xmin, xmax=xmax, ymin=ymin, ymax=ymax)
+    area().tag_redraw()  # as the end of the gesture does
+
+
 def toggle_local_view():
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
@@ -445,6 +452,27 @@ def test_meshes_among_points():
     yield lambda: settled(5000) and shown().shown.stats["triangles"] == 0
     toggle_local_view()
     yield lambda: settled(5000) and shown().shown.stats["triangles"] == 2
+
+
+def test_clipping_region():
+    """Alt B shows what lies in a rectangle of the view, from all sides; again, and all is back."""
+    setup()
+    add_points(*sphere(20000, 1.0, (0, 0, 0)))
+    yield lambda: settled(20000)
+    drawn = lambda: int(np.isfinite(shown().shown.depth).sum())
+    whole, region, before = drawn(), window_region(), shown().pictures
+    clip_border(region.width // 2, region.width, 0, region.height)
+    yield newer(before)
+    yield lambda: settled(20000) and drawn() < 0.6 * whole
+    columns = np.nonzero(np.isfinite(shown().shown.depth[..., 0]).any(axis=0))[0]
+    check(abs(columns.min() - shown().shown.depth.shape[1] / 2) < 3, f"columns from {columns.min()} on")
+    check(0.4 * whole < drawn(), f"{drawn()} of {whole} pixels")
+    view().view_rotation = Quaternion((0, 1, 0), np.pi)  # from behind, the right half is the left one
+    yield lambda: settled(20000) and np.nonzero(np.isfinite(shown().shown.depth[..., 0]).any(axis=0))[0].max() < \
+        shown().shown.depth.shape[1] / 2 + 3
+    view().use_clip_planes = False
+    area().tag_redraw()
+    yield lambda: settled(20000) and drawn() > 0.9 * whole
 
 
 def test_processor_takes_over():
