@@ -4,7 +4,8 @@
 The worker never touches Blender's API; the calling thread polls, shows progress and cancels. Only for operators, which
 Blender waits for, and final renders, which Blender itself runs on a thread with Python. Beside a Blender that goes on,
 Python on a thread of ours makes it crash: some of its code takes "Python runs somewhere" for "I hold Python's lock".
-There, work is made of steps: a generator that yields each native task and goes on when it is done.
+There, work is made of steps: a generator that yields each native task and goes on when it is done, and pauses where Python
+itself works for long.
 """
 
 from __future__ import annotations
@@ -17,8 +18,23 @@ from .native import Task
 
 T = TypeVar("T")
 
+
+
+class Pause:
+    """What a step of Python's own work yields in place of a task: who drives the steps may look at the clock."""
+
+    _seen = False
+
+    def done(self) -> bool:
+        seen, self._seen = self._seen, True
+        return seen
+
+    def close(self) -> None:
+        """As a task's."""
+
+
 # Work made of steps, which gives a T
-Steps = Generator[Task, None, T]
+Steps = Generator["Task | Pause", None, T]
 
 # Seconds between two polls: a tenth of the 0.2 s within which a cancel shall show, and no load on a farm node.
 INTERVAL = 0.02

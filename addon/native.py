@@ -264,6 +264,9 @@ _CALLS = {
     "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_task_set_colors": (c_void_p, POINTER(_Array), _OUT),
     "patina_task_fingerprint": (POINTER(_CloudDesc), POINTER(c_uint64), _OUT),
+    "patina_task_open_file": (c_char_p, c_void_p, _OUT),
+    "patina_task_save": (c_void_p, c_char_p, _OUT),
+    "patina_task_take_file": (c_void_p, _OUT),
     "patina_task_done": (c_void_p,),
     "patina_task_wait": (c_void_p,),
     "patina_task_take_cloud": (c_void_p, _OUT),
@@ -482,7 +485,8 @@ class Cloud(_Handle):
     @classmethod
     def start(cls, positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
               opacities: np.ndarray | None, progress: Progress | None = None, radii: np.ndarray | None = None,
-              scalars: np.ndarray | None = None, classes: np.ndarray | None = None) -> Task:
+              scalars: np.ndarray | None = None, classes: np.ndarray | None = None,
+              origin: tuple[float, ...] = (0.0,) * 3) -> Task:
         """A task that gives the cloud."""
         def take(task: Task) -> Cloud:
             cloud = cls.__new__(cls)
@@ -491,7 +495,8 @@ class Cloud(_Handle):
             return cloud
 
         arrays = (positions, normals, colors, opacities, radii, scalars, classes)
-        return Task("build", byref(_describe(*arrays)), _handle_of(progress), keep=(arrays, progress), finish=take)
+        return Task("build", byref(_describe(*arrays, origin=origin)), _handle_of(progress), keep=(arrays, progress),
+                    finish=take)
 
     @classmethod
     def open(cls, path: Path) -> Cloud:
@@ -501,8 +506,9 @@ class Cloud(_Handle):
         cloud._learn()
         return cloud
 
-    def save(self, path: Path) -> None:
-        self._call("save", os.fsencode(path))
+    def start_save(self, path: Path) -> Task:
+        """A task that writes the cloud."""
+        return Task("save", self._handle, os.fsencode(path), keep=(self,))
 
     def _learn(self) -> None:
         info = _CloudInfo()
@@ -553,6 +559,20 @@ class File(_Handle):
 
     def __init__(self, path: str, progress: Progress | None = None) -> None:
         super().__init__(os.fsencode(path), _handle_of(progress), create="patina_file_open")
+        self._learn()
+
+    @classmethod
+    def start(cls, path: str, progress: Progress | None = None) -> Task:
+        """A task that gives the file."""
+        def take(task: Task) -> File:
+            file = cls.__new__(cls)
+            _Handle.__init__(file, task._handle, blame=(task._handle,), create="patina_task_take_file")
+            file._learn()
+            return file
+
+        return Task("open_file", os.fsencode(path), _handle_of(progress), keep=(progress,), finish=take)
+
+    def _learn(self) -> None:
         info = _FileInfo()
         self._call("get_info", byref(info))
         self.format = info.format.decode()

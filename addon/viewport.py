@@ -21,7 +21,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from . import native, pace, render, sync
-from .jobs import Steps
+from .jobs import Pause, Steps
 
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
@@ -89,7 +89,7 @@ class Viewport:
         self._wanted: Wish | None = None
         self._working: Wish | None = None
         self._steps: Steps[Shown] | None = None  # of the work
-        self._task: native.Task | None = None  # the step under way
+        self._task: native.Task | Pause | None = None  # the step under way
         self._progress: native.Progress | None = None  # while clouds are made
         self._rendering = False  # while the frame is drawn
         self._closed = False

@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct patina_task {
     struct pt_handle handle;
@@ -25,6 +26,9 @@ struct patina_task {
     size_t size; // of them
     patina_cloud *painted; // the caller's
     patina_cloud *cloud;   // built, until it is taken
+    char *path;            // its own copy
+    const patina_cloud *saved;
+    patina_file *file; // opened, until it is taken
 };
 
 static void *thread_main(void *argument)
@@ -72,6 +76,10 @@ static int build(struct patina_task *task) { return patina_cloud_create(&task->d
 
 static int paint(struct patina_task *task) { return patina_cloud_set_colors(task->painted, &task->color); }
 
+static int open_file(struct patina_task *task) { return patina_file_open(task->path, task->progress, &task->file); }
+
+static int save(struct patina_task *task) { return patina_cloud_save(task->saved, task->path); }
+
 static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }
 
 int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_task **out)
@@ -107,6 +115,42 @@ int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], p
     return start(&(struct patina_task){ .work = fingerprint, .desc = *desc, .fingerprint = values }, out);
 }
 
+// Starts a task that has a path.
+static int start_at(struct patina_task *task, const char *path, patina_task **out)
+{
+    if (!path)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "a task: path is NULL");
+    task->path = strdup(path);
+    if (!task->path)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "a task: out of memory");
+    const int code = start(task, out);
+    if (code)
+        free(task->path);
+    return code;
+}
+
+int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out)
+{
+    return start_at(&(struct patina_task){ .work = open_file, .progress = progress }, path, out);
+}
+
+int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out)
+{
+    return start_at(&(struct patina_task){ .work = save, .saved = cloud }, path, out);
+}
+
+int patina_task_take_file(patina_task *task, patina_file **out)
+{
+    if (!task || !out)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_take_file: task or out is NULL");
+    int error = patina_task_wait(task);
+    *out = task->file;
+    task->file = NULL;
+    if (error || *out)
+        return error;
+    return pt_fail(&task->handle, PATINA_ERROR_EMPTY, "patina_task_take_file: no file, or it was taken");
+}
+
 int patina_task_done(const patina_task *task) { return !task || atomic_load(&task->done); }
 
 int patina_task_wait(patina_task *task)
@@ -137,6 +181,8 @@ void patina_task_destroy(patina_task *task)
         return;
     patina_task_wait(task);
     patina_cloud_destroy(task->cloud);
+    patina_file_destroy(task->file);
+    free(task->path);
     pt_handle_destroy(&task->handle);
     free(task);
 }

@@ -9,11 +9,12 @@ from types import ModuleType
 import bpy
 import numpy as np
 
+from ..jobs import Steps
 from ..native import PatinaError
 from . import conf, e57, las, library, pcd
 from .reading import Filter, PointFile, Progress
 
-__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "preview", "reader", "to_mesh"]
+__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "preview", "reader", "steps", "to_mesh"]
 
 # One colour and one normal attribute, under names that every Blender from 3.4 on allows ("normal" is reserved
 # before 4.0) and that sync.attributes looks for.
@@ -32,6 +33,14 @@ def reader(path: Path) -> ModuleType:
     if module is None:
         raise PatinaError(f"'{path.suffix}' is none of {' '.join(FORMATS)}", -5)
     return module
+
+
+def steps(path: Path, progress: Progress) -> Steps[PointFile]:
+    """All points of a file, read in steps; at once by those formats that know no steps. PatinaError when it cannot be read."""
+    module = reader(path)
+    if hasattr(module, "steps"):
+        return (yield from module.steps(path, progress))
+    return module.read(path, Filter(), progress)
 
 
 def preview(path: Path) -> list[str]:

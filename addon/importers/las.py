@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import native
+from .. import jobs, native
 from .reading import PIECE, Filter, PointFile, Progress, colors_of, origin_of
+
+SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
 _OLD = [("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bit_fields", "u1"),
         ("raw_classification", "u1"), ("scan_angle_rank", "i1"), ("user_data", "u1"), ("point_source_id", "<u2")]
@@ -92,7 +94,7 @@ def preview(path: Path) -> list[str]:
             *([header.crs[:60]] * bool(header.crs))]
 
 
-def _pieces(path: Path, header: Header) -> Iterator[np.ndarray]:
+def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray]:
     if header.compressed:
         try:
             import laspy
@@ -102,7 +104,7 @@ def _pieces(path: Path, header: Header) -> Iterator[np.ndarray]:
             raise native.PatinaError(MISSING.format(python=sys.executable), -5) from None
         try:
             with laspy.open(str(path)) as file:
-                for points in file.chunk_iterator(PIECE):
+                for points in file.chunk_iterator(size):
                     yield points.array
         except (laspy.errors.LaspyException, lazrs.LazrsError, ValueError, OSError) as error:
             raise _fail(path, f"cannot be unpacked: {error}") from None
@@ -118,8 +120,8 @@ def _pieces(path: Path, header: Header) -> Iterator[np.ndarray]:
     have = (path.stat().st_size - header.data_offset) // kind.itemsize
     if have < header.points:
         raise _fail(path, f"ends after {max(have, 0):,} of {header.points:,} points")
-    for first in range(0, header.points, PIECE):
-        yield np.fromfile(path, kind, min(PIECE, header.points - first), offset=header.data_offset + first * kind.itemsize)
+    for first in range(0, header.points, size):
+        yield np.fromfile(path, kind, min(size, header.points - first), offset=header.data_offset + first * kind.itemsize)
 
 
 class _Columns:
@@ -152,21 +154,30 @@ class _Columns:
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     """Reads and filters piece by piece. PatinaError when it cannot be read."""
+    return jobs.finish(_steps(path, wanted, progress, PIECE))
+
+
+def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same without a filter, with a pause after each small piece."""
+    return _steps(path, Filter(), progress, SMALL_PIECE)
+
+
+def _steps(path: Path, wanted: Filter, progress: Progress, size: int) -> jobs.Steps[PointFile]:
     try:
         header = read_header(path)
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
     try:
-        return _read(path, header, wanted, progress)
+        return (yield from _read(path, header, wanted, progress, size))
     except (MemoryError, OverflowError):
         raise native.PatinaError(f"{path.name}: memory is short for its {header.points:,} points", -2) from None
 
 
-def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> PointFile:
+def _read(path: Path, header: Header, wanted: Filter, progress: Progress, size: int) -> jobs.Steps[PointFile]:
     origin = origin_of(header.lower, header.upper, float(header.scale.min()))
     columns = _Columns(header.points)
     done = 0
-    for piece in _pieces(path, header):
+    for piece in _pieces(path, header, size):
         progress.step(done / max(header.points, 1))
         names = piece.dtype.names
         positions = np.empty((len(piece), 3), np.float32)
@@ -187,6 +198,7 @@ def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> Poi
         if "red" in names:
             found["rgb"] = np.stack([piece[name][keep] for name in ("red", "green", "blue")], 1)
         columns.add(found)
+        yield jobs.Pause()
     return _assemble(path, header, origin, columns)
 
 

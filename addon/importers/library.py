@@ -7,13 +7,21 @@ from collections import deque
 from itertools import islice
 from pathlib import Path
 
-from .. import native
+from .. import jobs, native
 from .reading import Filter, PointFile, Progress, scanners_of
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     """Reads a file whole, then filters. PatinaError when it cannot be read."""
-    with progress.inner() as inner, native.File(str(path), inner) as file:
+    return jobs.finish(steps(path, progress)).filtered(wanted)
+
+
+def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same without a filter, in steps."""
+    with progress.inner() as inner:
+        task = native.File.start(str(path), inner)
+    yield task
+    with task.result() as file:
         scanners = _scanners(path) if file.format == "PTX" else []
         return PointFile(
             name=path.stem,
@@ -23,7 +31,7 @@ def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
             scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
             origin=file.origin,
             invalid=file.invalid_positions,
-            notes=scanners_of(scanners, file.origin)).filtered(wanted)
+            notes=scanners_of(scanners, file.origin))
 
 
 def _scanners(path: Path) -> list[list[float]]:

@@ -65,9 +65,11 @@ class PointFile:
 class Progress:
     """Of one file; value() and cancel() from any thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, given: native.Progress | None = None) -> None:
+        """given: serves all calls of the library, for one who has it already."""
         self._value = 0.0
         self._cancelled = False
+        self._given = given
         self._native: native.Progress | None = None
 
     def value(self) -> float:
@@ -89,7 +91,7 @@ class Progress:
     @contextlib.contextmanager
     def inner(self) -> Iterator[native.Progress]:
         """For a call of the library. Stays open until this object goes, for other threads may look at it."""
-        self._native = native.Progress()
+        self._native = self._given or native.Progress()
         if self._cancelled:
             self._native.cancel()
         yield self._native

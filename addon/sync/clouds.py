@@ -101,9 +101,8 @@ class PendingLink(Pending):
         self._source = source
 
     def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
-        yield from ()  # no steps: a kept cloud opens at once, and reading a file that has changed is Python's work
         if self._cloud is None:
-            self._cloud = CACHE.obtain_linked(self._source, Progress())
+            self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
         return self._cloud
 
 
@@ -157,14 +156,14 @@ class CloudCache:
         self._keep(identity, fingerprint, cloud)
         return cloud
 
-    def obtain_linked(self, source: linked.Source, progress: Progress) -> native.Cloud:
+    def obtain_linked(self, source: linked.Source, progress: Progress) -> Steps[native.Cloud]:
         """The cloud of a linked file as it is now."""
         with self._lock:
             known, cloud = self._entries.pop(source.identity(), ((), None))
             if cloud:
                 self._entries[source.identity()] = (known, cloud)
                 return cloud
-        cloud = linked.load(source, progress).cloud
+        cloud = (yield from linked.steps(source, progress)).cloud
         self._keep(source.identity(), (), cloud)
         return cloud
 
@@ -274,7 +273,7 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
 
         def work() -> native.Cloud:
             if link:
-                return CACHE.obtain_linked(link, progress)
+                return jobs.finish(CACHE.obtain_linked(link, progress))
             with progress.inner() as inner:
                 return jobs.finish(CACHE.obtain(identity, arrays, inner))
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .. import importers, native
+from .. import importers, jobs, native
 from ..importers.origin import PROPERTY
 from . import attributes, sequence
 from .colors import scalar_name
@@ -79,6 +79,11 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "") -> Source
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
     """Maps the kept cloud, or builds and keeps it. Any thread. PatinaError when the file cannot be read."""
+    return jobs.finish(steps(source, progress or importers.Progress()))
+
+
+def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
+    """The same in steps."""
     notes = source.kept.with_suffix(".json")
     try:
         kept = json.loads(notes.read_text("utf-8"))
@@ -87,20 +92,23 @@ def load(source: Source, progress: importers.Progress | None = None) -> Linked:
         return found
     except (native.PatinaError, OSError, ValueError, KeyError):
         pass  # not there yet, of another version, or damaged: it is made anew
-    progress = progress or importers.Progress()
-    points = importers.reader(source.path).read(source.path, importers.Filter(), progress)
+    points = yield from importers.steps(source.path, progress)
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
     with progress.inner() as inner:
-        cloud = native.Cloud(points.positions, points.normals, points.colors, inner, origin=offset,
-                             scalars=_column(points, source.scalar), classes=_classes(points))
+        task = native.Cloud.start(points.positions, points.normals, points.colors, None, inner, origin=offset,
+                                  scalars=_column(points, source.scalar), classes=_classes(points))
+    yield task
+    cloud = task.result()
     try:
         for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
             old.unlink()
-        cloud.save(source.kept)
+        task = cloud.start_save(source.kept)
+        yield task
+        task.result()
         notes.write_text(json.dumps({"origin": origin, "scanners": scanners}), "utf-8")
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's

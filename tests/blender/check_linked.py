@@ -9,7 +9,7 @@ import numpy as np
 from check_import import columns, import_ply, write_ply
 from harness import SCRATCH, check, check_close, new_scene, patina, render, reports, stats
 
-from patina.importers import library
+from patina.importers import las, library
 from patina.sync import linked
 
 bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
@@ -44,12 +44,12 @@ def test_same_picture():
 def test_opens_from_its_cache():
     path = dense("cached.ply", 300000)
     first = linked.load(linked.source(path))
-    read, library.read = library.read, lambda *arguments: 1 / 0
+    read, library.steps = library.steps, lambda *arguments: 1 / 0
     start = time.perf_counter()
     try:
         again = linked.load(linked.source(path))
     finally:
-        library.read = read
+        library.steps = read
     print(f"  opened again in {time.perf_counter() - start:.3f} s, {again.cloud.bytes / 300000:.2f} bytes a point in memory")
     check(again.cloud.count == first.cloud.count and again.box == first.box, "another cloud")
     check(again.cloud.bytes < 300000, f"{again.cloud.bytes} bytes of memory")
@@ -98,3 +98,25 @@ def test_cancel_while_reading():
         check(False, "a cancelled file was read")
     check(not linked.source(path).kept.exists(), "half a cloud was kept")
     check(linked.load(linked.source(path)).cloud.count == 200000, "the next time it is read")
+
+
+def test_reading_in_steps():
+    """A file that changed is read in tasks, or in short pieces: nobody waits for it, and who loses interest just stops."""
+    path = dense("steps.ply", 50000)
+    kinds = [type(step).__name__ for step in linked.steps(linked.source(path), patina.importers.Progress())]
+    check(kinds == ["Task"] * 3, f"PLY: {kinds}")  # open, build, save
+    import_ply(path)
+    points = SCRATCH / "steps.las"
+    bpy.ops.export_scene.patina_points(filepath=str(points), kind='LAS')
+    piece, las.SMALL_PIECE = las.SMALL_PIECE, 10000
+    try:
+        kinds = [type(step).__name__ for step in linked.steps(linked.source(points), patina.importers.Progress())]
+        check(kinds == ["Pause"] * 5 + ["Task"] * 2, f"LAS: {kinds}")
+        os.utime(points, (1, 1))
+        given_up = linked.steps(linked.source(points), patina.importers.Progress())
+        next(given_up)
+        given_up.close()
+    finally:
+        las.SMALL_PIECE = piece
+    check(not linked.source(points).kept.exists(), "half a cloud was kept")
+    check(linked.load(linked.source(points)).cloud.count == 50000, "the next time it is read")

@@ -9,10 +9,12 @@ import time
 
 import bpy
 import numpy as np
+from check_import import import_ply as import_points
 from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, sphere
 from mathutils import Matrix, Quaternion
 
 from patina import pace, viewport
+from patina.importers import las
 
 KEEP = os.environ.get("PATINA_SCREENSHOTS")  # a folder that keeps them
 
@@ -620,6 +622,33 @@ def figures_ten_million():
           f"each, {np.median(uploads) * 1e3:.1f} ms upload. Blender "
           f"drew {len(draws) / 8.0:.1f} times a second; {len(empty) / 4.0:.1f} with the picture left out, for "
           f"{bare:.1f} pictures/s. Whole picture {rest:.2f} s after the last motion")
+
+
+def test_a_changed_link_keeps_nobody_waiting():
+    """A linked LAS that changed is read piece by piece; Blender goes on between them, the old picture stays."""
+    from check_linked import dense
+    source = import_points(dense("changed.ply", 60000, (0, 0, 0)))[0]
+    path = SCRATCH / "changed.las"
+    bpy.ops.export_scene.patina_points(filepath=str(path), kind='LAS')
+    scene = setup()
+    check(source is not None and scene, "a scene of its own")
+    import_points(path, link=True)
+    yield lambda: settled(60000)
+    found, before = shown(), shown().pictures
+    piece, las.SMALL_PIECE = las.SMALL_PIECE, 3000
+    turns = []
+    os.utime(path, (1, 1))
+    bpy.context.view_layer.objects.active.location.x = 0.1
+
+    def read_again():
+        if found.pictures == before:
+            turns.append(found.shown.stats["points"])
+        return found.pictures > before and settled(60000)
+
+    yield read_again
+    las.SMALL_PIECE = piece
+    check(len(turns) >= 3 and set(turns) == {60000}, f"{len(turns)} turns of Blender while 20 pieces were read")
+    check(not found.message, found.message)
 
 
 def test_rest_is_rest():

@@ -206,12 +206,57 @@ static void test_colors(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// A cloud is written, a file opened: as the calls themselves do it, errors too.
+static void test_files(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/patina-task-XXXXXX";
+    const int descriptor = mkstemp(path);
+    assert_true(descriptor >= 0);
+    close(descriptor);
+    const patina_cloud_desc desc = describe(1000);
+    patina_cloud *cloud = NULL, *back = NULL;
+    patina_task *task = NULL;
+    patina_file *file = NULL, *again = NULL;
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    assert_int_equal(patina_task_save(cloud, path, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_OK);
+    assert_int_equal(patina_task_take_file(task, &file), PATINA_ERROR_EMPTY);
+    patina_task_destroy(task);
+    assert_int_equal(patina_cloud_open(path, &back), PATINA_OK);
+    patina_cloud_destroy(back);
+
+    assert_int_equal(patina_write_ply(path, &desc), PATINA_OK);
+    assert_int_equal(patina_task_open_file(path, NULL, &task), PATINA_OK);
+    assert_int_equal(patina_task_take_file(task, &file), PATINA_OK);
+    assert_int_equal(patina_task_take_file(task, &again), PATINA_ERROR_EMPTY);
+    patina_file_info info = { .struct_size = sizeof info };
+    assert_int_equal(patina_file_get_info(file, &info), PATINA_OK);
+    assert_int_equal(info.count, 1000);
+    patina_file_destroy(file);
+    patina_task_destroy(task);
+
+    assert_int_equal(patina_task_open_file(path, NULL, &task), PATINA_OK);
+    patina_task_destroy(task); // not taken
+    unlink(path);
+    assert_int_equal(patina_task_open_file(path, NULL, &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_FILE);
+    assert_non_null(strstr(message(task), path));
+    patina_task_destroy(task);
+    assert_int_equal(patina_task_save(cloud, "/no/such/folder/cloud", &task), PATINA_OK);
+    assert_int_equal(patina_task_wait(task), PATINA_ERROR_FILE);
+    patina_task_destroy(task);
+    assert_int_equal(patina_task_open_file(NULL, NULL, &task), PATINA_ERROR_ARGUMENT);
+    patina_cloud_destroy(cloud);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_builds_and_renders), cmocka_unit_test(test_errors_come_through),
         cmocka_unit_test(test_cancel),             cmocka_unit_test(test_destroy_waits),
         cmocka_unit_test(test_fingerprints),       cmocka_unit_test(test_colors),
+        cmocka_unit_test(test_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

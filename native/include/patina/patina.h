@@ -647,12 +647,16 @@ PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *c
 // against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
 // written once the task is done. About as fast as memory is read.
 PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);
+PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
+PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
 // Waits for the end and returns what the call returned; its message is at the task.
 PATINA_API int patina_task_wait(patina_task *task);
 // Waits, and gives ownership of the cloud that patina_task_build made; PATINA_ERROR_EMPTY the second time or without one.
 PATINA_API int patina_task_take_cloud(patina_task *task, patina_cloud **out);
-PATINA_API void patina_task_destroy(patina_task *task); // waits; a cloud that was not taken goes too
+// The same for the file that patina_task_open_file opened.
+PATINA_API int patina_task_take_file(patina_task *task, patina_file **out);
+PATINA_API void patina_task_destroy(patina_task *task); // waits; a cloud or file that was not taken goes too
 
 #ifdef __cplusplus
 }
