@@ -4,7 +4,7 @@
 import re
 
 import bpy
-from harness import REPOSITORY, check
+from harness import REPOSITORY, check, new_scene
 
 import patina
 
@@ -96,3 +96,24 @@ def test_labels():
         check(getattr(cls, "bl_parent_id", "") in known | {""}, f"{cls.__name__} hangs from nothing")
         check(cls.__name__.startswith("PATINA_PT_"), cls.__name__)
     check(patina.bl_info["name"] == "Patina", "loaded")
+
+
+def test_shipped_presets():
+    """Each sets all that a preset holds, and nothing else; Standard is what a new scene has."""
+    from patina.ui import presets
+    names = [value.partition(".")[2] for value in presets.PATINA_OT_preset_add.preset_values]
+    shipped = sorted(presets.SHIPPED.glob("*.py"))
+    check(len(shipped) == 5, f"{shipped}")
+    for path in shipped:
+        settings = new_scene().patina
+        settings.error_target, settings.quality, settings.fill, settings.fill_iterations = 50.0, 'PAPER', 'OFF', 9
+        settings.antialias, settings.samples = 'OFF', 77
+        lines = [line.split(" = ")[0] for line in path.read_text().splitlines() if line.startswith("patina.")]
+        check(lines == [f"patina.{name}" for name in names], f"{path.name} sets {lines}")
+        bpy.ops.script.execute_preset(filepath=str(path), menu_idname="PATINA_PT_presets")
+        found = {name: getattr(settings, name) for name in names}
+        if path.stem == "Standard":
+            wanted = {name: settings.bl_rna.properties[name].default for name in names}
+            check(found == wanted, f"{found} is not {wanted}")
+        if path.stem == "Final":
+            check(found["samples"] == 16 and found["quality"] == 'REFINED', f"{found}")

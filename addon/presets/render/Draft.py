@@ -1,0 +1,11 @@
+import bpy
+
+# What a quick look needs: filling as in the paper, one sample.
+patina = bpy.context.scene.patina
+
+patina.error_target = 0.0
+patina.quality = 'PAPER'
+patina.fill = 'PAPER'
+patina.fill_iterations = 0
+patina.antialias = 'BACKGROUND'
+patina.samples = 1

@@ -1,0 +1,11 @@
+import bpy
+
+# Nothing is filled in: for judging a scan.
+patina = bpy.context.scene.patina
+
+patina.error_target = 0.0
+patina.quality = 'REFINED'
+patina.fill = 'OFF'
+patina.fill_iterations = 0
+patina.antialias = 'OFF'
+patina.samples = 1

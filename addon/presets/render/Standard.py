@@ -1,0 +1,11 @@
+import bpy
+
+# What a new scene has.
+patina = bpy.context.scene.patina
+
+patina.error_target = 0.0
+patina.quality = 'REFINED'
+patina.fill = 'CLOSED'
+patina.fill_iterations = 0
+patina.antialias = 'LAYERS'
+patina.samples = 1

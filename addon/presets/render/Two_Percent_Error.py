@@ -1,0 +1,11 @@
+import bpy
+
+# The cheapest way to a colour error of two percent.
+patina = bpy.context.scene.patina
+
+patina.error_target = 2.0
+patina.quality = 'REFINED'
+patina.fill = 'CLOSED'
+patina.fill_iterations = 0
+patina.antialias = 'LAYERS'
+patina.samples = 1
