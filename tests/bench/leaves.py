@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The leaf test: real scans with vegetation, noise and outliers under a sun, and how many specks their shadows show.
+
+    build/out/venv/bin/python tests/bench/leaves.py [--library FILE] [--pictures FOLDER] [--size N]
+
+A speck is a pixel whose share of light differs by more than 0.7 of the shadow's strength from the mean of six to eight
+neighbours on the same surface; counted among 10,000 pixels that face the sun. Scans are those of ../shared/data; one that is not there is a
+line that says so. Another build's --library gives the counts before a change."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = ROOT.parent / "shared/data"
+SCANS = ("lidar/lion_takanawa_normals.ply", "heritage/espacio_escultorico_full_density_crop.las", "lidar/vol_total.las",
+         "lidar/FSite7_orig-utm.pcd", "lidar/vegetation_1_3.las")
+SUN = np.array([-0.5, 0.6, -0.6])
+WAYS = {"1 sample": (1, 0.0, 0.0), "16 samples": (16, 0.03, 0.0), "half transparent": (1, 0.0, 0.5)}  # angle, transparency
+
+
+def package() -> None:
+    """The add-on's readers without Blender: the package, but not what registers it."""
+    for name, folder in (("patina", ROOT / "addon"), ("patina.importers", ROOT / "addon/importers")):
+        sys.modules[name] = ModuleType(name)
+        sys.modules[name].__path__ = [str(folder)]
+
+
+def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
+    from patina import native
+    from patina.importers import las, pcd
+    from patina.importers.reading import Filter, Progress
+
+    if path.suffix == ".ply":
+        with native.File(str(path)) as file:
+            return file.positions(), file.normals()
+    points = (las if path.suffix == ".las" else pcd).read(path, Filter(), Progress())
+    return points.positions, points.normals
+
+
+def specks(shadow: np.ndarray, depth: np.ndarray, normal: np.ndarray, near: float,
+           strength: float) -> tuple[int, int]:
+    """Specks, and pixels that could be some. near: how far apart neighbours of one surface lie at most; strength: light
+    that a shadow takes."""
+    some, total, count = np.isfinite(depth), np.zeros(shadow.shape), np.zeros(shadow.shape)
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            if dx or dy:
+                z = np.roll(depth, (dy, dx), (0, 1))
+                same = some & np.isfinite(z) & (np.abs(np.where(np.isfinite(z), z, 0) - np.where(some, depth, 0)) < near)
+                total += np.where(same, np.roll(shadow, (dy, dx), (0, 1)), 0.0)
+                count += same
+    able = (count >= 6) & (-(normal @ SUN) / np.linalg.norm(SUN) > 0.1)
+    return int((able & (np.abs(shadow - total / np.maximum(count, 1)) > 0.7 * strength)).sum()), int(able.sum())
+
+
+def render(frame: Any, cloud: Any, camera: dict[str, Any], size: int, way: tuple[int, float, float]) -> dict[str, np.ndarray]:
+    from patina import native
+
+    samples, angle, transparency = way
+    with native.Scene() as scene:
+        scene.add_cloud(cloud, lighting=2, transparency=transparency)
+        scene.add_light(type=1, power=3.0, direction=SUN.tolist(), shadows=1, angle=angle)
+        scene.set_settings(width=size, height=size, shadow_samples=samples, world_color=[0.15] * 3)
+        scene.set_camera(**camera)
+        frame.render(scene)
+    return {name: frame.read(name) for name in ("COMBINED", "DEPTH", "NORMAL", "SHADOW")}
+
+
+def camera_of(position: np.ndarray) -> dict[str, Any]:
+    """Frames what lies between the 1st and 99th percentiles: outliers are not to shrink the rest."""
+    from truth import look
+
+    low, high = np.nanpercentile(position, [1, 99], axis=0)
+    centre, reach = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    one = look(centre + 1.5 * reach * np.array([0.55, -0.65, 0.52]), centre)
+    return type(one)(**{**vars(one), "near": 0.02 * reach, "far": 20.0 * reach}).fields()
+
+
+def save(path: Path, rgba: np.ndarray) -> None:
+    import matplotlib.image
+
+    matplotlib.image.imsave(path, np.clip(rgba[::-1, :, :3], 0.0, 1.0) ** (1 / 2.2))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--library", type=Path, default=ROOT / "build/out/release/libpatina.so")
+    parser.add_argument("--pictures", type=Path, help="a folder for them")
+    parser.add_argument("--size", type=int, default=1024)
+    options = parser.parse_args()
+    os.environ["PATINA_LIBRARY"] = str(options.library.resolve())
+    sys.path.insert(0, str(ROOT / "tests"))
+    package()
+    from patina import native
+
+    print("| scan | points | " + " | ".join(WAYS) + " |\n" + "|---" * (2 + len(WAYS)) + "|")
+    with native.Device("cpu") as device, native.Frame(device) as frame:
+        for name in SCANS:
+            if not (DATA / name).is_file():
+                print(f"skip {name}: there is no ../shared/data/{name}")
+                continue
+            position, normal = read(DATA / name)
+            cells = []
+            with native.Cloud(position, normal) as cloud:
+                for way, how in WAYS.items():
+                    planes = render(frame, cloud, camera_of(position), options.size, how)
+                    near = 8.0 * cloud.layer_distance  # 16 spacings
+                    found, able = specks(planes["SHADOW"][..., 0], planes["DEPTH"][..., 0], planes["NORMAL"], near,
+                                         1.0 - how[2])
+                    cells.append(f"{1e4 * found / max(able, 1):.1f}")
+                    if options.pictures:
+                        options.pictures.mkdir(parents=True, exist_ok=True)
+                        save(options.pictures / f"{Path(name).stem} {way}.png", planes["COMBINED"])
+            print(f"| {Path(name).stem} | {len(position):,} | " + " | ".join(cells) + " |", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
