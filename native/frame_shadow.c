@@ -5,9 +5,11 @@
 
 #include "residency.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+enum { FAINT_LAYERS = 8 }; // of a caster whose points have opacities of their own, at most
 enum { FIRST_COMPARED = 4 }; // samples after which a light may stop, because all agree or enough is known; then at every doubling
 
 // ---- what is at hand ---------------------------------------------------------------------------------------------------
@@ -170,6 +172,7 @@ struct update {
     uint32_t group_count;
     struct pt_instance *instances; // scratch: casters
     struct pt_mesh_instance *meshes; // likewise
+    const struct pt_buffer *opacities; // of the group's caster
 };
 
 // How many maps of a sample the instance is tested against.
@@ -177,7 +180,8 @@ static uint32_t maps_of(const struct update *update, const struct pt_plan_light 
 {
     uint32_t count = 0;
     for (uint32_t g = 0; g < update->group_count; g++)
-        count += (uint32_t)pt_group_receives(update->scene, &update->groups[g], instance);
+        if (pt_group_receives(update->scene, &update->groups[g], instance))
+            count += update->groups[g].faint ? FAINT_LAYERS : 1;
     return planned->cube ? 6 * count : count;
 }
 
@@ -297,7 +301,8 @@ static int test_instance(struct update *update, const struct patina_scene *view,
     struct pt_buffer *const bound[] = { &planes[PT_PLANE_KEYS][0], &planes[PT_PLANE_FROM][0], &planes[PT_PLANE_DEFF][0],
                                         &chunk_buffer, &resident->buffers[PT_POSITIONS], &resident->buffers[PT_IDS],
                                         &resident->buffers[PT_SURFACE], pt_shadows_buffer(frame, PT_MARKS, i),
-                                        pt_shadows_buffer(frame, PT_SHADOWS, i), &frame->shadows.differs };
+                                        pt_shadows_buffer(frame, PT_SHADOWS, i), &frame->shadows.differs,
+                                        (struct pt_buffer *)update->opacities };
     args->base = light * (uint32_t)instance->cloud->info.count;
     error = device->ops->run(device, PT_KERNEL_lit, args, sizeof *args, bound, sizeof bound / sizeof *bound, &frame->cancel);
     args->base = light;
@@ -305,18 +310,67 @@ static int test_instance(struct update *update, const struct patina_scene *view,
     return error ? error : device->ops->finish(device);
 }
 
-// One map of a sample: drawn, and everyone tested whom it concerns. args->base: the light's place.
-static int test_map(struct update *update, const struct pt_plan_light *planned, const struct pt_shadow_group *group,
-                    uint32_t sample, uint32_t face, struct lit_args *args)
+// The group's caster, as kernels need it where its points have opacities of their own.
+static int take_caster(struct update *update, const struct pt_shadow_group *group, struct lit_args *args)
 {
     struct patina_frame *frame = update->frame;
-    struct patina_scene view = { 0 };
-    struct pt_plan map = { 0 };
-    double window[4], start = pt_milliseconds(), drawn;
-    if (!pt_light_scene(update->scene, planned, group, sample, face, update->instances, update->meshes, &view, window))
+    struct pt_resident *resident;
+    update->opacities = pt_shadows_buffer(frame, PT_MARKS, UINT32_MAX); // none
+    args->loss = group->loss;
+    args->faint = (uint32_t)group->faint;
+    if (!group->faint)
         return PATINA_OK;
-    pt_handle_init(&view.handle);
-    int error = pt_plan_map(&view, &map);
+    const struct pt_instance *caster = &update->scene->instances[group->only];
+    int error = pt_residency_take(&frame->residency, frame->device, caster->cloud, &resident);
+    if (!error)
+        update->opacities = &resident->buffers[PT_OPACITIES];
+    args->caster = caster->id_base;
+    return error;
+}
+
+// Sets the limit behind which the next layer of a faint caster lies, where the light is not spent. *some: it is not everywhere.
+static int limit_map(struct update *update, const struct pt_plan *map, const struct pt_shadow_group *group, int *some)
+{
+    const struct pt_device_ops *ops = update->frame->device->ops;
+    struct pt_buffer(*planes)[PT_SLOTS] = update->frame->shadows.planes;
+    const struct pt_instance *caster = &update->scene->instances[group->only];
+    size_t count = (size_t)map->view.width * map->view.height;
+    uint64_t *keys = malloc(count * sizeof *keys);
+    uint32_t *from = malloc(count * sizeof *from);
+    float *deff = malloc(count * sizeof *deff), *limit = malloc(count * sizeof *limit);
+    int error = keys && from && deff && limit ? pt_frame_ensure_plane(update->frame, planes, map, PT_PLANE_LIMIT, 0)
+                                              : pt_fail(&update->frame->device->handle, PATINA_ERROR_MEMORY, "a light's map: out of memory");
+    if (!error && (ops->buffer_read(update->frame->device, &planes[PT_PLANE_KEYS][0], 0, keys, count * sizeof *keys) ||
+                   ops->buffer_read(update->frame->device, &planes[PT_PLANE_FROM][0], 0, from, count * sizeof *from) ||
+                   ops->buffer_read(update->frame->device, &planes[PT_PLANE_DEFF][0], 0, deff, count * sizeof *deff)))
+        error = PATINA_ERROR_DEVICE;
+    *some = 0;
+    for (size_t i = 0; i < count && !error; i++) {
+        uint32_t id = (uint32_t)keys[i] - caster->id_base, bits = (uint32_t)(keys[i] >> 32);
+        int ended = bits == PT_KEY_EMPTY_Z || (group->loss == 255 && caster->cloud->opacities[id] == 255);
+        float z;
+        memcpy(&z, &bits, sizeof z);
+        limit[i] = ended ? INFINITY : z + deff[from[i] & ~PT_FROM_MIXED];
+        *some |= !ended;
+    }
+    if (!error)
+        error = ops->buffer_write(update->frame->device, &planes[PT_PLANE_LIMIT][0], 0, limit, count * sizeof *limit);
+    free(keys);
+    free(from);
+    free(deff);
+    free(limit);
+    return error;
+}
+
+// One layer of a map: drawn, and everyone tested whom it concerns. args->base: the light's place. *some: there may be one behind.
+static int test_layer(struct update *update, const struct pt_plan_light *planned, const struct pt_shadow_group *group,
+                      const struct patina_scene *view, const double window[4], int *some, struct lit_args *args)
+{
+    struct patina_frame *frame = update->frame;
+    struct pt_plan map = { 0 };
+    double start = pt_milliseconds(), drawn;
+    int error = pt_plan_map(view, &map, *some);
+    *some = 0;
     if (!error && pt_plan_shows(&map))
         error = draw_map(update, &map);
     drawn = pt_milliseconds();
@@ -326,16 +380,32 @@ static int test_map(struct update *update, const struct pt_plan_light *planned, 
         frame->shadow_size[0] = map.crop[2] > frame->shadow_size[0] ? map.crop[2] : frame->shadow_size[0];
         frame->shadow_size[1] = map.crop[3] > frame->shadow_size[1] ? map.crop[3] : frame->shadow_size[1];
         args->view = map.view;
-        args->loss = group->loss;
         set_window(&map, window, args->window);
         for (uint32_t i = 0; i < update->scene->instance_count && !error; i++)
             if (pt_group_receives(update->scene, group, i)) {
                 args->alone = maps_of(update, planned, i) == 1;
-                error = test_instance(update, &view, &map, i, args);
+                error = test_instance(update, view, &map, i, args);
             }
         pt_frame_note_time(frame, "lit", pt_milliseconds() - drawn);
+        if (!error && group->faint)
+            error = limit_map(update, &map, group, some);
     }
     pt_plan_destroy(&map);
+    return error;
+}
+
+// One map of a sample, with its layers.
+static int test_map(struct update *update, const struct pt_plan_light *planned, const struct pt_shadow_group *group,
+                    uint32_t sample, uint32_t face, struct lit_args *args)
+{
+    struct patina_scene view = { 0 };
+    double window[4];
+    int some = 0, error = take_caster(update, group, args);
+    if (error || !pt_light_scene(update->scene, planned, group, sample, face, update->instances, update->meshes, &view, window))
+        return error;
+    pt_handle_init(&view.handle);
+    for (uint32_t layer = 0; layer < FAINT_LAYERS && !error && (some || !layer); layer++)
+        error = test_layer(update, planned, group, &view, window, &some, args);
     pt_handle_destroy(&view.handle);
     return error;
 }
@@ -350,7 +420,7 @@ static int close_sample(struct update *update, const struct pt_plan_light *plann
     double start = pt_milliseconds();
     int error = PATINA_OK;
     memset(args->window, 0, sizeof args->window);
-    args->alone = 0;
+    args->alone = args->faint = 0;
     args->close = 1;
     for (uint32_t i = 0; i < update->scene->instance_count && !error; i++) {
         struct pt_plan scratch = { 0 };

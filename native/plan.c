@@ -29,7 +29,7 @@ static const struct {
 static void plan_scatter(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1, .sifted = plan->drawn_words > 0};
+    struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1 || builder->behind, .sifted = plan->drawn_words > 0};
     struct pt_ref *refs = pt_arena_take(&plan->arena, (3 + 4 * (size_t)plan->instance_count) * sizeof *refs);
     uint32_t count = 0;
     if (!refs) {
@@ -561,9 +561,9 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
     pt_plan_paper(builder);
 }
 
-int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan)
+int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behind)
 {
-    struct pt_builder builder = {.scene = scene, .plan = plan};
+    struct pt_builder builder = {.scene = scene, .plan = plan, .behind = behind};
     *plan = (struct pt_plan){0};
     int error = pt_plan_view(scene, plan);
     if (plan->iterations > MAP_ITERATIONS)

@@ -202,7 +202,8 @@ void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_inst
 // ---- shadows: plan_light.c -----------------------------------------------------------------------------------------------
 
 // The passes of a depth map with its holes filled, and no more: scatter to fill.
-int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan);
+// behind: only of what lies behind the limit plane.
+int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behind);
 
 // Lists plan->lights, with what their maps are like.
 int pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
@@ -213,10 +214,11 @@ int pt_mesh_casts(const struct pt_mesh_instance *instance);
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
 
 // The maps of one sample: those of all opaque casters; of all but one that must not shadow itself, for that one; and of
-// every transparent caster by itself. NO_CASTER: for everyone else.
+// every transparent caster by itself, layer behind layer where its points have opacities of their own.
 struct pt_shadow_group {
     uint32_t only, without; // instances, or PT_NO_INSTANCE
     uint32_t loss;          // 1..255
+    int faint;              // its points have opacities of their own
 };
 enum { PT_NO_INSTANCE = 0xFFFFFFFFu };
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 2 instances + 1

@@ -56,7 +56,10 @@ static int spares_itself(const struct pt_instance *instance)
     return (instance->style.shadow_off & PATINA_SHADOW_NO_SELF) != 0;
 }
 
-static int opaque(const struct pt_instance *instance) { return casts(instance) && loss_of(instance) == 255; }
+static int opaque(const struct pt_instance *instance)
+{
+    return casts(instance) && loss_of(instance) == 255 && !instance->cloud->info.has_opacities;
+}
 
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups)
 {
@@ -66,13 +69,14 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         casters += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
     if (casters)
-        groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, PT_NO_INSTANCE, 255 };
+        groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, PT_NO_INSTANCE, 255, 0 };
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
         if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
-            groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, i, 255 };
-        if (casts(instance) && loss_of(instance) && loss_of(instance) < 255)
-            groups[count++] = (struct pt_shadow_group){ i, PT_NO_INSTANCE, loss_of(instance) };
+            groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, i, 255, 0 };
+        if (casts(instance) && loss_of(instance) && !opaque(instance))
+            groups[count++] = (struct pt_shadow_group){ i, PT_NO_INSTANCE, loss_of(instance),
+                                                        instance->cloud->info.has_opacities != 0 };
     }
     return count;
 }

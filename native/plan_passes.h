@@ -13,6 +13,7 @@ struct pt_builder {
     uint32_t room;
     uint32_t layer;  // that passes are added for; 0: the whole picture
     uint32_t finish; // first shading pass of the last layer planned
+    int behind;      // of a light's map: the limit plane holds
     int failed;      // memory lacked: the plan fails as a whole
 };
 

@@ -43,6 +43,8 @@ static uint64_t fingerprint_of(const struct patina_cloud *cloud)
         for (uint32_t i = 0; i < chunk->count; i++)
             hash = mix(hash, cloud->surface[cloud->ids[chunk->first + i]]);
     }
+    if (cloud->opacities)
+        hash = pt_fingerprint(hash, cloud->opacities, cloud->info.count);
     return hash;
 }
 

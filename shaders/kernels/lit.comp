@@ -17,6 +17,8 @@ layout(std430, binding = 8) readonly buffer marks_block { uint marks[]; };
 layout(std430, binding = 9) buffer shadows_block { uint words[]; };
 layout(std430, binding = 10) buffer differs_block { uint differs[]; };
 
+layout(std430, binding = 11) readonly buffer opacities_block { uint opacities[]; };
+
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
 
@@ -64,8 +66,10 @@ float layer_distance(view_args view, vec2 ray, float z, uint id, out bool none)
                              none ? 1.0 : inverse);
 }
 
-bool in_shadow(view_args view, chunk_view chunk, uint at, uint id)
+// pixel: of the map, where the point is.
+bool in_shadow(view_args view, chunk_view chunk, uint at, uint id, out uint pixel)
 {
+    pixel = 0u;
     // 1. project
     vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
     precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];
@@ -79,7 +83,7 @@ bool in_shadow(view_args view, chunk_view chunk, uint at, uint id)
     if (!(args.window[0] <= x && x < args.window[2] && args.window[1] <= y && y < args.window[3] && view.z_near <= z))
         return false;
     int column = int(floor(x)) - view.origin_x, row = int(floor(y)) - view.origin_y;
-    uint pixel = uint(row) * view.width + uint(column);
+    pixel = uint(row) * view.width + uint(column);
     float map = read_z(pixel);
     // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
     precise float least = 0.999 * pt_layer_distance(view, args.instance.d_min, 0.0, z, 1.0);
@@ -99,14 +103,27 @@ bool in_shadow(view_args view, chunk_view chunk, uint at, uint id)
     return until < z && supported(view, column, row, d, z);
 }
 
-// 3. what the sample takes goes into the word. Returns whether the samples so far differ.
-bool note(uint at, bool shadowed)
+// a b / 255 of a, b up to 255, rounded: exact.
+uint share(uint a, uint b)
+{
+    uint product = a * b + 128u;
+    return (product + (product >> 8)) >> 8;
+}
+
+// 3. what the map takes of 255 from a point in the shadow of a texel.
+uint loss_at(uint texel)
+{
+    if (args.faint == 0u)
+        return args.loss;
+    uint id = read_key(texel).x - args.caster;
+    return share(args.loss, opacities[id >> 2] >> 8u * (id & 3u) & 255u);
+}
+
+// 4. what the sample takes goes into the word. Returns whether the samples so far differ.
+bool note(uint at, uint loss)
 {
     uint word = words[at], sum = word & PT_SHADOW_SUM, lost = word >> PT_SHADOW_SHIFT;
-    if (shadowed) { // of the light that is left; the division by 255 is exact
-        uint more = (255u - lost) * args.loss + 128u;
-        lost += (more + (more >> 8)) >> 8;
-    }
+    lost += share(255u - lost, loss); // of the light that is left
     bool whole = args.alone != 0u || args.close != 0u;
     words[at] = whole ? sum + lost : sum | lost << PT_SHADOW_SHIFT;
     return whole && sum + lost != args.samples * lost;
@@ -125,8 +142,9 @@ void main()
         uint id = ids[base + i];
         if (args.marked != 0u && (marks[id >> 2] >> 8u * (id & 3u) & 255u) == 0u)
             continue;
-        bool shadowed = in_shadow(view, chunk, 3u * base + i, id);
-        if ((all || shadowed) && note(args.base + id, shadowed) && args.compare != 0u)
+        uint pixel;
+        bool shadowed = in_shadow(view, chunk, 3u * base + i, id, pixel);
+        if ((all || shadowed) && note(args.base + id, shadowed ? loss_at(pixel) : 0u) && args.compare != 0u)
             differs[0] = 1u;
     }
 }

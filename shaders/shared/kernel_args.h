@@ -317,7 +317,8 @@ struct mark_args {
 // this view with a texel PT_TEXEL_SLACK wider. Without a normal, d_eff is at least that of the surface that the map shows there,
 // and z_map the greatest of the 3 x 3 texels around: no slope gives acne, and shadows end a texel early. z > z_map + d_eff
 // must hold at PT_SHADOW_SUPPORT of the 8 texels around, too.
-// Points outside the window or before z_near are lit.
+// Points outside the window or before z_near are lit. With `faint` the caster's points have opacities of their own: the loss is
+// also in proportion to that of the point that the map shows.
 struct lit_args {
     struct view_args view;         // of the map
     struct instance_args instance; // of the receiver: d_min, spacing, normals towards the light
@@ -329,6 +330,7 @@ struct lit_args {
     uint32_t samples; // with this one
     uint32_t compare; // 1: differs[0] becomes 1 unless every point's samples lost the same
     uint32_t marked;  // 1: only points with a mark
+    uint32_t faint, caster; // caster: first id of the only cloud that casts
 };
 
 // smooth: 3 x 3 low-pass over non-background neighbours of the same layer. [D 3.4]

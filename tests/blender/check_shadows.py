@@ -75,6 +75,17 @@ def test_switches():
     check(not lit(lambda scene: setattr(scene.objects["floor"].patina, "self_shadows", False)), "others' shadows fall")
 
 
+def test_opacities_of_points():
+    """A ball whose points let three quarters through, by an attribute: once above and once below it."""
+    scene = stage()
+    mesh = scene.objects["ball"].data
+    values = np.full(len(mesh.vertices), 0.25, np.float32)
+    mesh.attributes.new("glass", 'FLOAT', 'POINT').data.foreach_set("value", values)
+    scene.objects["ball"].patina.opacity_attribute = "glass"
+    share = float(pixel(render(), SHADOWED, "Shadow")[0])
+    check(abs(share - 0.75**2) < 0.01, f"{share} of the light arrives")
+
+
 def test_error_target():
     """The tighter the target, the nearer to the shadow of many samples; the samples set are not asked."""
     scene = stage('AREA')

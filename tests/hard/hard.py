@@ -56,8 +56,6 @@ NOT_BUILT = {
     "d = 0 and d = r in the density integral": "soft transparency",
     "r → 0, r ≫ scene": "soft transparency",
     "10⁴ soft fragments in one pixel": "soft transparency",
-    "light inside the cloud, at a point, behind the plane: its shadows": "shadows",
-    "sun at grazing angle: its shadows": "shadows",
 }
 
 # what C tests hold against the float64 reference, key by key -> program, test
@@ -474,6 +472,43 @@ def light_behind(device: native.Device) -> tuple[str, bool]:
 def grazing(device: native.Device) -> tuple[str, bool]:
     towards = np.array([np.cos(np.radians(1.0)), 0.0, np.sin(np.radians(1.0))])
     return lit_ball(device, Light(power=3.0, towards=towards), Rectangle(), 1e-3)
+
+
+def unshadowed(device: native.Device, surface: Any, light: dict[str, Any], most: float = 0.0) -> tuple[str, bool]:
+    """Nothing stands between the light and any point: the share of points that are dark all the same."""
+    position, normal = surface.sample(100_000, np.random.default_rng(11))
+    with native.Scene() as scene, native.Frame(device) as frame, native.Cloud(position.astype(np.float32),
+                                                                             normal.astype(np.float32)) as cloud:
+        scene.add_cloud(cloud, lighting=2)
+        scene.add_light(power=1.0, shadows=1, **light)
+        scene.set_settings(width=16, height=16)
+        frame.bake_shadows(scene)
+        share = frame.shadows(0, 0, len(position))
+    good = bool(((share >= 0.0) & (share <= 1.0)).all())
+    dark = float((share < 0.5).mean())
+    return f"dark though nothing is in the way {dark:.2%} (≤ {most:.2%})", good and dark <= most
+
+
+@hard("light inside the cloud: its shadows")
+def shadows_from_inside(device: native.Device) -> tuple[str, bool]:
+    return unshadowed(device, Sphere(), {"type": 2, "position": [0.1, 0.2, 0.3]})
+
+
+@hard("light at a point of the cloud: its shadows")
+def shadows_from_a_point(device: native.Device) -> tuple[str, bool]:
+    position, _ = Sphere().sample(100_000, np.random.default_rng(11))
+    return unshadowed(device, Sphere(), {"type": 2, "position": position[77].tolist()})
+
+
+@hard("light behind the plane: its shadows")
+def shadows_from_behind(device: native.Device) -> tuple[str, bool]:
+    return unshadowed(device, Rectangle(), {"type": 2, "position": [0.0, 0.0, -1.0]})
+
+
+@hard("sun at a grazing angle, 1 degree: its shadows")
+def shadows_of_a_grazing_sun(device: native.Device) -> tuple[str, bool]:
+    return unshadowed(device, Rectangle(), {"type": 1, "direction": [-np.cos(np.radians(1.0)), 0.0,
+                                                                     -np.sin(np.radians(1.0))]})
 
 
 # ---- the table -----------------------------------------------------------------------------------------------------

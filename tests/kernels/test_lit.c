@@ -13,7 +13,7 @@ struct setup {
     struct chunk_view chunks[CHUNKS];
     float *positions;
     uint32_t *ids, *surface, *words;
-    uint8_t *marks;
+    uint8_t *marks, *opacities; // opacities: of the map's points
 };
 
 // Looks as the map's view does: object and view space are the same, but for z.
@@ -65,6 +65,10 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     s.surface = harness_alloc(h, POINTS * 4);
     s.words = harness_alloc(h, (POINTS + 7) * 4);
     s.marks = harness_alloc(h, POINTS);
+    s.opacities = harness_alloc(h, s.map.count + 4);
+    for (size_t i = 0; i < s.map.count; i++)
+        s.opacities[i] = (uint8_t)rng_next(rng);
+    s.args.caster = s.map.id_base;
     uint32_t *order = harness_alloc(h, POINTS * 4), next = 0;
     for (uint32_t i = 0; i < POINTS; i++) {
         uint32_t j = rng_below(rng, i + 1);
@@ -96,11 +100,13 @@ static void check(struct harness *h, const struct setup *s, uint32_t base, doubl
     struct pt_buffer *positions = harness_buffer(h, s->positions, SLOTS * 12), *ids = harness_buffer(h, s->ids, SLOTS * 4);
     struct pt_buffer *surface = harness_buffer(h, s->surface, POINTS * 4), *marks = harness_buffer(h, s->marks, POINTS);
     struct pt_buffer *words = harness_buffer(h, s->words, (POINTS + 7) * 4), *flag = harness_buffer(h, &differs, 4);
-    HARNESS_RUN(h, lit, &args, keys, from, deff, chunks, positions, ids, surface, marks, words, flag);
+    struct pt_buffer *opacities = harness_buffer(h, s->opacities, count + 4);
+    HARNESS_RUN(h, lit, &args, keys, from, deff, chunks, positions, ids, surface, marks, words, flag, opacities);
     const uint32_t *got = harness_read(h, words), *got_flag = harness_read(h, flag);
     harness_same(h, "words", got, POINTS + 7, 4, 1, POINTS + 7);
     struct ref_planes planes = picture_planes(&s->map);
     planes.surface = s->surface;
+    planes.opacities = s->opacities;
     for (uint32_t c = 0; c < CHUNKS; c++)
         for (uint32_t i = 0; i < s->chunks[c].count; i++) {
             uint32_t id = s->ids[s->chunks[c].first + i], word = s->words[base + id];
@@ -110,7 +116,12 @@ static void check(struct harness *h, const struct setup *s, uint32_t base, doubl
                 continue;
             }
             enum ref_truth truth = ref_lit(&args, &planes, &s->chunks[c], s->positions, s->ids, i);
-            uint32_t dark = ref_shadow_word(&args, word, 1), light = ref_shadow_word(&args, word, 0), now = got[base + id];
+            struct lit_args own = args;
+            if (!ref_lit_loss(&args, &planes, &s->chunks[c], s->positions, i, &own.loss)) {
+                open++;
+                continue;
+            }
+            uint32_t dark = ref_shadow_word(&own, word, 1), light = ref_shadow_word(&own, word, 0), now = got[base + id];
             int undone = !args.alone && !args.close; // what the sample lost so far is in the upper bits
             expected_differs |= (args.alone || args.close) && (now & PT_SHADOW_SUM) != args.samples * (now - (word & PT_SHADOW_SUM));
             open += truth == REF_UNSURE;
@@ -175,6 +186,22 @@ static void samples(struct harness *h)
             s.args.compare = 1;
             for (uint32_t k = 0; k < POINTS + 7; k++)
                 s.words[k] = rng_below(&rng, 4 * 255 + 1) | (mode ? rng_below(&rng, 256) << PT_SHADOW_SHIFT : 0);
+            check(h, &s, 0, TOL_UNSURE_SHARE);
+        }
+}
+
+// Casters whose points have opacities of their own, 0 and 255 among them.
+static void faint(struct harness *h)
+{
+    for (uint32_t mode = 0; mode < 3; mode++)
+        for (int kind = 0; kind < PICTURE_KINDS; kind++) {
+            struct rng rng = {60 + mode};
+            struct setup s = make(h, &rng, kind % 2, (enum picture_kind)kind);
+            s.args.faint = 1;
+            s.args.loss = mode == 2 ? 99 : 255;
+            s.args.alone = mode == 0;
+            for (size_t i = 0; i < s.map.count; i += 7)
+                s.opacities[i] = i % 2 ? 255 : 0;
             check(h, &s, 0, TOL_UNSURE_SHARE);
         }
 }
@@ -297,6 +324,7 @@ int main(int argc, char **argv)
         {"marked points only", marks, 0},
         {"windows", window, 0},
         {"samples of several maps", samples, 0},
+        {"points of opacities of their own", faint, 0},
         {"agreement", agreement, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

@@ -108,6 +108,25 @@ enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *pla
     return unsure || (shadowed && lit) ? REF_UNSURE : shadowed ? REF_YES : REF_NO;
 }
 
+int ref_lit_loss(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
+                 const float *positions, uint32_t slot, uint32_t *loss)
+{
+    const struct view_args *view = &args->view;
+    *loss = args->loss;
+    if (!args->faint)
+        return 1;
+    struct ref_place place = ref_place(view, chunk, positions, slot);
+    double x = floor(place.x.lo) - view->origin_x, y = floor(place.y.lo) - view->origin_y;
+    if (place.known && (floor(place.x.hi) != floor(place.x.lo) || floor(place.y.hi) != floor(place.y.lo)))
+        return 0;
+    if (!(place.known && x >= 0.0 && y >= 0.0 && x < view->width && y < view->height))
+        return 1; // beyond the map, or behind it: lit
+    uint64_t key = planes->keys[(size_t)y * view->width + (size_t)x];
+    if (key != REF_EMPTY_KEY)
+        *loss = (uint32_t)floor(args->loss * planes->opacities[ref_key_id(key) - args->caster] / 255.0 + 0.5);
+    return 1;
+}
+
 uint32_t ref_shadow_word(const struct lit_args *args, uint32_t word, int shadowed)
 {
     uint32_t sum = word & PT_SHADOW_SUM, lost = word >> PT_SHADOW_SHIFT;

@@ -214,6 +214,9 @@ int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint
 // Is the point of this slot in shadow? planes: of the light's map.
 enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
                        const float *positions, const uint32_t *ids, uint32_t slot);
+// What the map takes of 255 from that point, if it is in its shadow. 0: float32 may find the point at another texel.
+int ref_lit_loss(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
+                 const float *positions, uint32_t slot, uint32_t *loss);
 // A shadow word after a sample whose map says so.
 uint32_t ref_shadow_word(const struct lit_args *args, uint32_t word, int shadowed);
 

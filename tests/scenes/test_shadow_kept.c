@@ -363,6 +363,74 @@ static void test_switches(void **state)
     patina_device_destroy(device);
 }
 
+// A sheet over the floor, a quarter opaque where x < 0 and opaque beside it, and under its half with y > 0 an opaque sheet of the
+// same cloud. Under a sun from above.
+static void test_opacities_of_points(void **state)
+{
+    (void)state;
+    enum { SHEET = 20000, BELOW = 10000 };
+    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, top[3] = {0, 0, 1}, middle[3] = {0, 0.5, 0.5};
+    struct points sheet = points_rectangle(SHEET, 2, 2, POINTS_NORMALS, 8), below = points_rectangle(BELOW, 2, 1, POINTS_NORMALS, 9);
+    struct points both = points_create(SHEET + BELOW, POINTS_NORMALS), ground = points_rectangle(FLOOR, 2, 2, POINTS_NORMALS, 4);
+    uint8_t *opacity = malloc(SHEET + BELOW);
+    points_transform(&sheet, unit, top);
+    points_transform(&below, unit, middle);
+    memcpy(both.position, sheet.position, SHEET * 12);
+    memcpy(both.position + 3 * SHEET, below.position, BELOW * 12);
+    memcpy(both.normal, sheet.normal, SHEET * 12);
+    memcpy(both.normal + 3 * SHEET, below.normal, BELOW * 12);
+    for (uint32_t i = 0; i < SHEET + BELOW; i++)
+        opacity[i] = i < SHEET && both.position[3 * i] < 0.0f ? 64 : 255;
+    patina_cloud_desc desc = points_desc(&both);
+    desc.opacity = (patina_array){.data = opacity, .type = PATINA_UINT8, .components = 1};
+    patina_cloud *glass_cloud = NULL, *ground_cloud = points_upload(&ground);
+    CHECK(patina_cloud_create(&desc, NULL, &glass_cloud), NULL);
+    patina_scene *scene = scene_of(glass_cloud, NULL);
+    CHECK(patina_scene_add_cloud(scene, ground_cloud, NULL), scene);
+    patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 1, .direction = {0, 0, -1}, .shadows = 1};
+    CHECK(patina_scene_add_light(scene, &sun), scene);
+    float *truth = NULL, *values = malloc((SHEET + BELOW + FLOOR) * sizeof *values), *under = values + SHEET + BELOW;
+    for (uint32_t d = 0; d < support_device_count(); d++) {
+        patina_device *device = support_device_open(support_device_name(d), 0, 0);
+        if (!device)
+            continue;
+        patina_frame *frame = frame_on(device);
+        CHECK(patina_frame_bake_shadows(frame, scene), frame);
+        CHECK(patina_frame_read_shadows(frame, 0, 0, values, (SHEET + BELOW) * 4), frame);
+        CHECK(patina_frame_read_shadows(frame, 1, 0, under, FLOOR * 4), frame);
+        if (truth)
+            assert_memory_equal(values, truth, (SHEET + BELOW + FLOOR) * 4);
+        else {
+            truth = malloc((SHEET + BELOW + FLOOR) * 4);
+            memcpy(truth, values, (SHEET + BELOW + FLOOR) * 4);
+        }
+        patina_frame_destroy(frame);
+        patina_device_destroy(device);
+    }
+    const float through = 1.0f - 64.0f / 255.0f;
+    uint32_t wrong = 0, seen = 0;
+    for (uint32_t i = 0; i < SHEET + BELOW + FLOOR; i++) {
+        const float *p = i < SHEET + BELOW ? both.position + 3 * i : ground.position + 3 * (i - SHEET - BELOW);
+        if (fabsf(p[0]) < 0.06f || fabsf(p[1]) < 0.06f || fabsf(p[0]) > 0.94f || fabsf(p[1]) > 0.94f)
+            continue; // borders
+        float expected = i < SHEET ? 1.0f : p[0] >= 0.0f ? 0.0f : i < SHEET + BELOW || p[1] < 0.0f ? through : 0.0f;
+        seen++;
+        wrong += fabsf(values[i] - expected) > 1e-6f;
+    }
+    printf("  %u of %u points away from borders are wrong\n", wrong, seen);
+    assert_true(seen > 30000 && wrong * 1000 < seen);
+    free(truth);
+    free(values);
+    free(opacity);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(glass_cloud);
+    patina_cloud_destroy(ground_cloud);
+    points_free(&sheet);
+    points_free(&below);
+    points_free(&both);
+    points_free(&ground);
+}
+
 // ---- files ---------------------------------------------------------------------------------------------------------
 
 static void refuse(patina_frame *frame, struct stage *stage, const char *path, const char *why)
@@ -544,6 +612,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_error_target),
         cmocka_unit_test(test_early_stop),
         cmocka_unit_test(test_switches),
+        cmocka_unit_test(test_opacities_of_points),
         cmocka_unit_test(test_files),
         cmocka_unit_test(test_hard_lights),
         cmocka_unit_test(test_reasons),

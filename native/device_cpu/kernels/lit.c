@@ -87,9 +87,9 @@ static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm 
     return vf_layer_distance(view, instance->d_min, spacing, z, vf_select(*none, vf_set(1.0f), inverse));
 }
 
-// Which of PT_LANES points are in shadow.
+// Which of PT_LANES points are in shadow; *texel: of the map, where they are.
 static uint32_t in_shadow(const struct lit *lit, const struct chunk_view *chunk, const float *positions, uint32_t i, vi id,
-                          vm lanes)
+                          vm lanes, vi *texel)
 {
     const struct view_args *view = &lit->args.view;
     const uint64_t *keys = pt_cpu_data(lit->call, 0);
@@ -100,7 +100,7 @@ static uint32_t in_shadow(const struct lit *lit, const struct chunk_view *chunk,
     if (!vm_bits(inside))
         return 0;
     vi column = vi_sub(vf_int(vf_floor(at[0])), origin_x), row = vi_sub(vf_int(vf_floor(at[1])), origin_y);
-    vi pixel = vi_add(vi_mul(row, vi_set(view->width)), column);
+    vi pixel = *texel = vi_add(vi_mul(row, vi_set(view->width)), column);
     vf map = vi_float(vi_gather_z(keys, pixel, inside));
     // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
     vf least = vf_set(0.999f) * vf_layer_distance(view, lit->args.instance.d_min, vf_zero(), z, vf_set(1.0f));
@@ -121,14 +121,28 @@ static uint32_t in_shadow(const struct lit *lit, const struct chunk_view *chunk,
     return vm_bits(supported(&around, d, z, dark));
 }
 
-// 3. what the sample takes goes into the word. Returns whether the samples so far differ.
-static inline uint32_t note(const struct lit_args *args, uint32_t *word, uint32_t shadowed)
+// a b / 255 of a, b up to 255, rounded: exact.
+static inline uint32_t share(uint32_t a, uint32_t b)
+{
+    uint32_t product = a * b + 128;
+    return (product + (product >> 8)) >> 8;
+}
+
+// 3. what the map takes of 255 from a point in the shadow of a texel.
+static inline uint32_t loss_at(const struct lit *lit, uint32_t texel)
+{
+    if (!lit->args.faint)
+        return lit->args.loss;
+    const uint32_t *keys = pt_cpu_data(lit->call, 0); // low words: ids
+    const uint8_t *opacities = pt_cpu_data(lit->call, 10);
+    return share(lit->args.loss, opacities[keys[2 * (size_t)texel] - lit->args.caster]);
+}
+
+// 4. what the sample takes goes into the word. Returns whether the samples so far differ.
+static inline uint32_t note(const struct lit_args *args, uint32_t *word, uint32_t loss)
 {
     uint32_t sum = *word & PT_SHADOW_SUM, lost = *word >> PT_SHADOW_SHIFT;
-    if (shadowed) { // of the light that is left; the division by 255 is exact
-        uint32_t more = (255 - lost) * args->loss + 128;
-        lost += (more + (more >> 8)) >> 8;
-    }
+    lost += share(255 - lost, loss); // of the light that is left
     if (args->alone || args->close) {
         *word = sum + lost;
         return (sum + lost) != args->samples * lost;
@@ -154,10 +168,12 @@ static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
             if (!vm_bits(lanes))
                 continue;
         }
-        uint32_t shadowed = in_shadow(lit, chunk, positions, i, id, lanes);
+        vi texel = vi_set(0);
+        uint32_t shadowed = in_shadow(lit, chunk, positions, i, id, lanes, &texel), texels[PT_LANES];
+        vi_store(texels, texel, vm_first(PT_LANES));
         for (uint32_t left = all ? vm_bits(lanes) : shadowed; left; left &= left - 1) {
             uint32_t k = (uint32_t)__builtin_ctz(left);
-            differs |= note(args, words + ids[i + k], shadowed >> k & 1u);
+            differs |= note(args, words + ids[i + k], shadowed >> k & 1u ? loss_at(lit, texels[k]) : 0);
         }
     }
     return differs;

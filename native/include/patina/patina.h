@@ -309,7 +309,8 @@ typedef struct patina_cloud_style {
     uint32_t shininess;           // Phong exponent; 0 = 32
     float transparency;           // share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn at all.
                                   // Opacity is 1 - transparency, times the point's own. Paper [D 5]. Its shadow
-                                  // is as much lighter, by this number alone
+                                  // is as much lighter: by this number once, however many of its surfaces stand
+                                  // in the way; where points have opacities of their own, by up to 8 of them
     uint32_t shadow_off;          // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
     float radius;                 // of every point's disc, world units, for PATINA_SURFACE_SPLATS; 0 = the point's own, else
                                   // 1.75 times the local spacing
