@@ -51,7 +51,7 @@ static void plan_scatter(struct pt_builder *builder)
     if (args.sifted)
         refs[count++] = pt_buffer_of(PT_DRAWN, 0);
     struct pt_pass *pass = pt_add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
-    if (args.behind)
+    if (builder->layer > 1)
         PT_REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
     else
         PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view",
