@@ -78,8 +78,10 @@ def hard(name: str) -> Callable:
 
 
 def draw(device: native.Device, clouds: list[native.Cloud], camera: Camera, width: int, height: int,
-         lights: tuple[Light, ...] = (), style: dict[str, Any] | None = None, **settings: Any) -> Shown:
+         lights: tuple[Light, ...] = (), style: dict[str, Any] | None = None, effects: dict[str, Any] | None = None,
+         **settings: Any) -> Shown:
     scene = native.Scene()
+    scene.set_effects(**(effects or {}))
     for cloud in clouds:
         scene.add_cloud(cloud, **(style or {}))
     for light in lights:
@@ -509,6 +511,54 @@ def shadows_from_behind(device: native.Device) -> tuple[str, bool]:
 def shadows_of_a_grazing_sun(device: native.Device) -> tuple[str, bool]:
     return unshadowed(device, Rectangle(), {"type": 1, "direction": [-np.cos(np.radians(1.0)), 0.0,
                                                                      -np.sin(np.radians(1.0))]})
+
+
+# ---- depth cues and drawing ----------------------------------------------------------------------------------------
+
+EFFECTS = {"edl_strength": 1.0, "obscurance_strength": 1.0, "toon_bands": 4, "toon_softness": 0.5, "hatch_levels": 3,
+           "hatch_ground": 0.5, "fog_start": 1.0, "fog_end": 6.0, "fog_density": 0.7, "focus_aperture": 0.05,
+           "focus_distance": 3.0, "paper_grain": 0.3}
+
+
+@hard("depth cues and drawing at 2²³")
+def effects_far(device: native.Device) -> tuple[str, bool]:
+    """The same picture as at the origin; strokes of hatching lie elsewhere there, as much of them."""
+    position, normal, color = ball(60_000)
+    pictures, inks = [], []
+    bare, strokes = {**EFFECTS, "hatch_levels": 0}, {"hatch_levels": 3, "hatch_ground": 1.0}
+    for place in (0.0, 2.0**23):
+        world = np.rint(position.astype(np.float64) * 2.0**20) / 2.0**20 + place
+        camera = look(np.array([0.25, -2.75, 2.25]) + place, np.full(3, place))
+        pictures.append(draw(device, [cloud_of(world, normal, color)], camera, 200, 200, effects=bare))
+        inks.append(draw(device, [cloud_of(world, normal, color * 0.2)], camera, 200, 200, effects=strokes).rgba.sum())
+    near, far = pictures
+    both = np.isfinite(near.depth) & np.isfinite(far.depth)
+    alike = np.abs(near.depth[both] - far.depth[both]) < 1e-5
+    shares = np.abs(near.rgba[both] - far.rgba[both]).max(axis=1)[alike]
+    ink = abs(inks[1] / inks[0] - 1.0)
+    text, holds = same("colours off by", float(shares.max()), 1e-3, far)
+    return f"{text}, ink by {ink:.2g} (≤ 0.01)", bool(holds and ink <= 0.01)
+
+
+@hard("depth cues and drawing over nonsense and extremes")
+def effects_of_nonsense(device: native.Device) -> tuple[str, bool]:
+    position, normal, color = ball()
+    position[::35, 0], normal[5::31, 1], color[11::29] = np.nan, np.inf, 0.0
+    shown = [draw(device, [cloud_of(position, normal, color)], VIEW, 120, 120, (SUN,), {"lighting": 2}, EFFECTS),
+             draw(device, [cloud_of(np.float32([[0.125, 0.0, 0.0]]))], VIEW, 67, 45, effects=EFFECTS),
+             draw(device, [cloud_of(position, normal, color)], VIEW, 1, 1, effects=EFFECTS)]
+    for scale in (1e-6, 1e6):
+        world = np.random.default_rng(5).uniform(-0.55, 0.55, (20_000, 3)) * scale
+        half = 0.5 * scale
+        camera = Camera(look(np.array([0.1, -0.2, 0.3]) * scale, np.zeros(3)).matrix, -half, half, -half, half, -2.0 * scale,
+                        2.0 * scale, True)
+        scaled = {"fog_end": 1.0 * scale, "fog_start": -1.0 * scale, "focus_distance": scale, "focus_aperture": 0.2 * scale}
+        shown.append(draw(device, [cloud_of(world)], camera, 128, 128, effects=EFFECTS | scaled))
+    deepest = look(np.zeros(3), np.array([0.0, 0.0, -1.0]), 50.0)
+    deepest = Camera(**{**vars(deepest), "near": 1e-3, "far": 1e4})
+    shown.append(draw(device, [cloud_of(decades(1))], deepest, 128, 128, effects=EFFECTS))
+    problems = [problem for problem in map(sane, shown) if problem]
+    return "; ".join(problems) or f"{len(shown)} pictures, all sane", not problems
 
 
 # ---- the table -----------------------------------------------------------------------------------------------------

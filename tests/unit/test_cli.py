@@ -344,6 +344,31 @@ def test_choices_change_the_picture():
         seen[picture] = choice
 
 
+def test_effects():
+    """Each effect changes the picture in its own way; a region is a crop with all of them; what cannot be is refused."""
+    ball("effects.ply", 3000)
+    base = ("render", "effects.ply", "-o", "effect.png", "--size", "120x100", "--lit")
+    effects = (("--edl", "1"), ("--edl", "1,4"), ("--obscurance", "2,0.5"), ("--toon", "3,0.2"), ("--hatch", "2"),
+               ("--hatch", "1,8,0.5,1,0.2,0,0"), ("--fog", "1,6"), ("--fog", "1,6,0.5,0.9,0.1,0.1"), ("--focus", "2,0.3"),
+               ("--paper", "0.4"), ("--paper", "0.1,0.9,0.8,0.6"))
+    seen = {}
+    for choice in ((), *effects):
+        run(*base, *choice)
+        picture = (FOLDER / "effect.png").read_bytes()
+        assert picture not in seen, (choice, seen[picture])
+        seen[picture] = choice
+    every = [word for choice in effects[::2] for word in choice]
+    run(*base, *every)
+    whole = read_png("effect.png")
+    run(*base, *every, "--region", "30,20,77,63")
+    assert read_png("effect.png")[3] == [row[30:77] for row in whole[3][100 - 63:100 - 20]]
+    for option, value, code in (("--edl", "1,2,3", 2), ("--toon", "2.5", 2), ("--fog", "3", 2), ("--focus", "2", 2),
+                                ("--paper", "0.1,1", 2), ("--edl", "-1", 1), ("--toon", "1", 1), ("--fog", "5,5", 1),
+                                ("--hatch", "4", 1), ("--focus", "0,1", 1)):
+        said = run("render", "effects.ply", "-o", "y.png", option, value, code=code).stderr
+        assert said.startswith("patina: ") and not (FOLDER / "y.png").exists(), (option, value, said)
+
+
 def test_several_files():
     wall("left.ply", lambda x, z: (255, 0, 0))
     right = [(0.5 + x * 0.01, -1, z * 0.01) for x in range(40) for z in range(-20, 20)]
