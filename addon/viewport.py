@@ -48,7 +48,8 @@ class Wish:
         lines = self.scene.lines
         if lines and not lines.world:
             lines = replace(lines, width=lines.width / shrink)
-        return replace(self.scene, clouds=clouds, camera=self.view.camera, settings=settings, lines=lines)
+        return replace(self.scene, clouds=clouds, camera=self.view.camera, settings=settings, lines=lines,
+                       effects=self.scene.effects.through(self.view.focus).shrunk(shrink))
 
 
 @dataclass(frozen=True)

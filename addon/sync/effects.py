@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -35,6 +35,14 @@ class Effects:
     paper_color: tuple[float, float, float]
     paper_grain: float
 
+    def through(self, focus: Focus | None) -> Effects:
+        """With the depth of field of a view."""
+        return replace(self, focus_aperture=focus.aperture if focus else 0.0, focus_distance=focus.distance if focus else 0.0)
+
+    def shrunk(self, factor: int) -> Effects:
+        """For a picture of larger pixels, as far as lengths in pixels may become less."""
+        return replace(self, edl_radius=max(self.edl_radius / factor, 1.0), hatch_spacing=max(self.hatch_spacing / factor, 3.0))
+
 
 def read(scene: bpy.types.Scene, focus: Focus | None, notices: list[str]) -> Effects:
     effects = scene.patina.effects
@@ -59,10 +67,10 @@ def read(scene: bpy.types.Scene, focus: Focus | None, notices: list[str]) -> Eff
         fog_end=effects.fog_end,
         fog_fixed=int(effects.fog_use_color),
         fog_color=tuple(effects.fog_color),
-        focus_aperture=focus.aperture if focus else 0.0,
-        focus_distance=focus.distance if focus else 0.0,
+        focus_aperture=0.0,
+        focus_distance=0.0,
         paper_color=_paper(effects.paper_color) if effects.use_paper else (1.0, 1.0, 1.0),
-        paper_grain=effects.paper_grain if effects.use_paper else 0.0)
+        paper_grain=effects.paper_grain if effects.use_paper else 0.0).through(focus)
 
 
 def _paper(color: bpy.types.bpy_prop_array) -> tuple[float, float, float]:

@@ -190,6 +190,20 @@ def test_depth_of_field():
     check((render()["Combined"] == sharp).all(), "not sharp again")
 
 
+def test_larger_pixels():
+    """While a viewport moves its pixels are larger: strokes stay as wide on screen, down to what can be drawn."""
+    scene = dense_scene()
+    effects = scene.patina.effects
+    effects.use_hatch, effects.hatch_spacing, effects.edl_radius = True, 20.0, 3.0
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view = sync.final_view(scene.camera, depsgraph)
+    read = sync.describe(depsgraph, view, lambda what, progress: False).effects
+    check((read.shrunk(2).hatch_spacing, read.shrunk(2).edl_radius) == (10.0, 1.5), f"{read.shrunk(2)}")
+    check((read.shrunk(8).hatch_spacing, read.shrunk(8).edl_radius) == (3.0, 1.0), f"{read.shrunk(8)}")
+    check(read.shrunk(1) == read, "at rest they change")
+
+
 def test_tiles_and_layers():
     """Effects in tiles are those of the whole, behind transparent points too."""
     scene = dense_scene(97, 71)

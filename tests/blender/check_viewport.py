@@ -207,6 +207,28 @@ def test_same_as_final():
     check(off.mean() < 0.002, f"{off.mean():.2%} of the pixels differ")
 
 
+def test_depth_of_field_of_the_camera():
+    """A view through the camera has its depth of field, a free view has none."""
+    scene = setup()
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    add_points(positions, colors, normals)
+    lens = scene.camera.data.dof
+    lens.use_dof, lens.aperture_fstop, lens.focus_distance = True, 0.05, 2.0
+    scene.camera.location = (0, 0, 6)
+    yield lambda: settled(20000)
+
+    def soft():
+        alpha = shown().shown.color[..., 3]
+        return int(((alpha > 0.02) & (alpha < 0.98)).sum())
+
+    free = soft()
+    before = shown().pictures
+    view().view_perspective = 'CAMERA'
+    area().tag_redraw()
+    yield lambda: newer(before)() and settled(20000)
+    check(soft() > 3 * free, f"{free} soft pixels before, {soft()} through the camera")
+
+
 def test_what_changes_is_read():
     """The camera, a transform and painting read no more than what changed."""
     scene = setup()
