@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 from bpy.types import Context, Operator
 
 from .. import jobs, native
@@ -91,4 +92,23 @@ def _linked_range(obj: bpy.types.Object, frame: int) -> tuple[float, float] | No
     return cloud.scalar_range(SHARE) if cloud.has_scalars else None
 
 
-register, unregister = bpy.utils.register_classes_factory((PATINA_OT_new_ramp, PATINA_OT_robust_range))
+@persistent
+def _follow_ramps(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Blender tells viewports nothing of a texture: the objects that take its ramp are said to have changed."""
+    painted = {update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Texture)}
+    for obj in bpy.data.objects if painted else ():
+        if obj.patina.colors.texture in painted:
+            obj.update_tag(refresh={'OBJECT'})
+
+
+_register, _unregister = bpy.utils.register_classes_factory((PATINA_OT_new_ramp, PATINA_OT_robust_range))
+
+
+def register() -> None:
+    _register()
+    bpy.app.handlers.depsgraph_update_post.append(_follow_ramps)
+
+
+def unregister() -> None:
+    bpy.app.handlers.depsgraph_update_post.remove(_follow_ramps)
+    _unregister()

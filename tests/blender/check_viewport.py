@@ -692,3 +692,33 @@ def test_rest_is_rest():
     viewport.Viewport.draw = draw
     check(len(calls) <= 1 and found.pictures == pictures, f"{len(calls)} draws, {found.pictures - pictures} pictures")
     check(not bpy.app.timers.is_registered(viewport._tick), "the timer still runs")
+
+
+def test_clips_and_ramps_follow():
+    """A moved clip box, and a ramp that is painted, show at once; the points are read only once."""
+    setup()
+    obj = add_points(*sphere(60000, 1.5, (0, 0, 0)))
+    obj.patina.lighting = 'UNLIT'
+    obj.patina.colors.source = 'HEIGHT'
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.patina_new_ramp()
+    box = bpy.data.objects.new("box", None)
+    box.patina.clip.shape = 'BOX'
+    box.scale = (2, 2, 2)
+    bpy.context.scene.collection.objects.link(box)
+    yield lambda: settled(60000)
+    found = shown()
+    reads, whole = found.trusted.reads, (found.shown.color[..., 3] > 0).sum()
+    pictures = found.pictures
+    box.location.x = 2.0  # the right half
+    yield newer(pictures)
+    half = shown().shown.color[..., 3] > 0
+    check(0.4 * whole < half.sum() < 0.6 * whole, f"{half.sum()} of {whole} pixels")
+    middle = half.shape[1] // 2
+    check(half[:, middle + 2:].sum() > 0.95 * half.sum(), "those on the right")
+    pictures = shown().pictures
+    for element in obj.patina.colors.texture.color_ramp.elements:
+        element.color = (0.0, 0.0, 1.0, 1.0)
+    yield lambda: newer(pictures)() and np.median(shown().shown.color[half], axis=0)[2] > 0.999  # each stop is a change
+    check_close(np.median(shown().shown.color[half], axis=0), (0, 0, 1, 1), 1e-4, "painted blue")
+    check(shown().trusted.reads == reads, "the points were not read again")
