@@ -630,32 +630,6 @@ static int build_cloud(struct build *build)
     return PATINA_OK;
 }
 
-static size_t type_bytes(uint32_t type)
-{
-    switch (type) {
-    case PATINA_FLOAT64: return 8;
-    case PATINA_FLOAT32: return 4;
-    case PATINA_UINT16: return 2;
-    case PATINA_UINT8: return 1;
-    }
-    return 0;
-}
-
-int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components,
-                   uint32_t most_components)
-{
-    if (!array->data)
-        return PATINA_OK;
-    if (array->type > PATINA_INT32 || !(types >> array->type & 1u))
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: element type %u is not supported", what, array->type);
-    if (array->components < least_components || array->components > most_components)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: %u components; %u%s needed", what, array->components,
-                       least_components, most_components > 3 ? " or 4 are" : most_components > 1 ? " are" : " is");
-    if (!array->stride)
-        array->stride = array->components * type_bytes(array->type);
-    return PATINA_OK;
-}
-
 static int check_desc(patina_cloud_desc *desc)
 {
     const uint32_t floats = 1u << PATINA_FLOAT32 | 1u << PATINA_FLOAT64;

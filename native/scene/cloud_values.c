@@ -1,31 +1,36 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Values of points beside their surface and colour: scalars, which ramps colour, and classes, which can be hidden.
+// Callers' arrays are checked here; and values of points beside their surface and colour: scalars, which ramps colour, and
+// classes, which can be hidden.
 #include "cloud.h"
 #include "fingerprint.h"
+#include "io/file.h"
 #include "memory.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const uint8_t type_sizes[] = {
-    [PATINA_FLOAT32] = 4, [PATINA_FLOAT64] = 8, [PATINA_UINT8] = 1, [PATINA_UINT16] = 2, [PATINA_UINT32] = 4,
-    [PATINA_INT8] = 1,    [PATINA_INT16] = 2,   [PATINA_INT32] = 4,
-};
+int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components,
+                   uint32_t most_components)
+{
+    if (!array->data)
+        return PATINA_OK;
+    if (array->type > PATINA_INT32 || !(types >> array->type & 1u))
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: element type %u is not supported", what, array->type);
+    if (array->components < least_components || array->components > most_components)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: %u components; %u%s needed", what, array->components,
+                       least_components, most_components > 3 ? " or 4 are" : most_components > 1 ? " are" : " is");
+    if (!array->stride)
+        array->stride = array->components * pt_type_size(array->type);
+    return PATINA_OK;
+}
 
 enum { NUMBERS = (1 << (PATINA_INT32 + 1)) - 2 }; // every patina_type
 
-static int check_values(patina_array *array, const char *what, uint32_t types)
-{
-    if (array->data && !array->stride && array->type <= PATINA_INT32)
-        array->stride = type_sizes[array->type];
-    return pt_check_array(array, what, types, 1, 1);
-}
-
 int pt_check_values(patina_array *scalar, patina_array *classes)
 {
-    int error = check_values(scalar, "scalar", NUMBERS);
-    return error ? error : check_values(classes, "classes", 1u << PATINA_UINT8);
+    int error = pt_check_array(scalar, "scalar", NUMBERS, 1, 1);
+    return error ? error : pt_check_array(classes, "classes", 1u << PATINA_UINT8, 1, 1);
 }
 
 static float read_value(const patina_array *array, uint64_t index)
@@ -41,7 +46,7 @@ static float read_value(const patina_array *array, uint64_t index)
         int16_t i16;
         int32_t i32;
     } v;
-    memcpy(&v, at, type_sizes[array->type]);
+    memcpy(&v, at, pt_type_size(array->type));
     switch (array->type) {
     case PATINA_FLOAT32: return v.f;
     case PATINA_FLOAT64: return (float)v.d;
@@ -84,7 +89,7 @@ int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar)
     if (!cloud || !scalar)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_scalars: bad arguments");
     patina_array checked = *scalar;
-    int error = check_values(&checked, "scalar", NUMBERS);
+    int error = pt_check_array(&checked, "scalar", NUMBERS, 1, 1);
     if (error)
         return pt_fail_again(&cloud->handle, error);
     if (take_scalars(cloud, &checked))

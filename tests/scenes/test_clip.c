@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { COUNT = 60000, WIDTH = 200, HEIGHT = 150, MOST_CLIPS = 4 };
 
@@ -442,12 +443,83 @@ static void test_ramps(void **state)
     clear_stage(&stage);
 }
 
+// Scalars of every type; a saved cloud has scalars and classes as before; ramps by name.
+static void test_values(void **state)
+{
+    static const float positions[4][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 }, { NAN, 0, 0 } };
+    static const float f32[4] = { -1.5f, 7.0f, NAN, INFINITY };
+    static const double f64[4] = { -1.5, 7.0, 2.0, 3.0 };
+    static const uint8_t u8[4] = { 1, 255, 3, 200 };
+    static const uint16_t u16[4] = { 1, 65535, 3, 4 };
+    static const uint32_t u32[4] = { 1, 4000000000u, 3, 4 };
+    static const int8_t i8[4] = { -128, 127, 0, 1 };
+    static const int16_t i16[4] = { -32768, 32767, 0, 1 };
+    static const int32_t i32[4] = { -2000000000, 2000000000, 0, 1 };
+    static const struct {
+        patina_array array;
+        float least, most;
+    } known[] = { { { f32, PATINA_FLOAT32, 1, 0 }, -1.5f, 7.0f },  { { f64, PATINA_FLOAT64, 1, 0 }, -1.5f, 7.0f },
+                  { { u8, PATINA_UINT8, 1, 0 }, 1.0f, 255.0f },    { { u16, PATINA_UINT16, 1, 0 }, 1.0f, 65535.0f },
+                  { { u32, PATINA_UINT32, 1, 0 }, 1.0f, 4e9f },    { { i8, PATINA_INT8, 1, 0 }, -128.0f, 127.0f },
+                  { { i16, PATINA_INT16, 1, 0 }, -32768.0f, 32767.0f }, { { i32, PATINA_INT32, 1, 0 }, -2e9f, 2e9f } };
+    patina_cloud_desc desc = { .struct_size = sizeof desc, .count = 4, .position = { positions, PATINA_FLOAT32, 3, 0 } };
+    desc.classes = (patina_array){ u8, PATINA_UINT8, 1, 0 };
+    patina_cloud *cloud;
+    patina_cloud_info info = { .struct_size = sizeof info };
+    char path[] = "/tmp/patina-test-XXXXXX";
+    (void)state;
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        desc.scalar = known[i].array;
+        CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+        CHECK(patina_cloud_get_info(cloud, &info), cloud);
+        assert_true(info.has_scalars && info.scalar_range[0] == known[i].least && info.scalar_range[1] == known[i].most);
+        assert_int_equal(info.class_bits[0], 1u << 1 | 1u << 3);
+        assert_int_equal(info.class_bits[7], 1u << 31);
+        assert_int_equal(info.class_bits[6], 0); // of a point that is not drawn
+        patina_cloud_destroy(cloud);
+    }
+    desc.classes.type = PATINA_FLOAT32;
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
+    assert_non_null(strstr(support_message(NULL), "classes"));
+    struct stage stage = set_stage();
+    patina_cloud *opened;
+    int file = mkstemp(path);
+    assert_true(file >= 0);
+    close(file);
+    CHECK(patina_cloud_save(stage.cloud, path), stage.cloud);
+    CHECK(patina_cloud_open(path, &opened), NULL);
+    unlink(path);
+    patina_cloud_style style = { .struct_size = sizeof style, .color_source = PATINA_COLOR_SCALAR, .hidden_classes = { 1u << 2 } };
+    patina_device *device = support_device_first();
+    patina_scene *a = scene_of(stage.cloud, &style), *b = scene_of(opened, &style);
+    struct picture first = picture_render(device, a, &stage.camera, &stage.settings);
+    struct picture second = picture_render(device, b, &stage.camera, &stage.settings);
+    picture_assert_identical(&second, &first, 0, 0, "a cloud that was saved and opened");
+    picture_free(&first);
+    picture_free(&second);
+    patina_scene_destroy(a);
+    patina_scene_destroy(b);
+    patina_cloud_destroy(opened);
+    patina_device_destroy(device);
+    clear_stage(&stage);
+    static const char *const names[] = { "grey", "viridis", "heat", "spectrum", "relief", "diverging", "classes" };
+    static float ramp[PATINA_MAX_RAMP][3];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        CHECK(patina_ramp(names[i], ramp), NULL);
+        for (int k = 0; k < PATINA_MAX_RAMP; k++)
+            for (int c = 0; c < 3; c++)
+                assert_true(ramp[k][c] >= 0.0f && ramp[k][c] <= 1.0f);
+    }
+    assert_int_equal(patina_ramp("plaid", ramp), PATINA_ERROR_ARGUMENT);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = { cmocka_unit_test(test_shapes),   cmocka_unit_test(test_hard_shapes),
                                         cmocka_unit_test(test_refusals), cmocka_unit_test(test_chunks),
                                         cmocka_unit_test(test_classes),  cmocka_unit_test(test_shadows),
-                                        cmocka_unit_test(test_tint),     cmocka_unit_test(test_ramps) };
+                                        cmocka_unit_test(test_tint),     cmocka_unit_test(test_ramps),
+                                        cmocka_unit_test(test_values) };
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
