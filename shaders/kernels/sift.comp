@@ -18,22 +18,15 @@ layout(std430, binding = 5) writeonly buffer drawn_block { uint drawn[]; };
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
 
-// (lo + R p) + hi, row k.
-float clip_row(uint clip, uint k, vec3 p)
-{
-    precise float sum = ((clips[clip].lo[k] + clips[clip].row[3u * k] * p.x) + clips[clip].row[3u * k + 1u] * p.y) +
-                        clips[clip].row[3u * k + 2u] * p.z;
-    precise float total = sum + clips[clip].hi[k];
-    return total;
-}
+#include "lib/clip.glsl"
 
 // Of a plane: cut.
 bool inside(uint clip, vec3 p)
 {
     if (clips[clip].shape == PT_CLIP_PLANE)
-        return 0.0 < clip_row(clip, 2u, p);
-    return pt_abs(clip_row(clip, 0u, p)) <= 1.0 && pt_abs(clip_row(clip, 1u, p)) <= 1.0 &&
-           pt_abs(clip_row(clip, 2u, p)) <= 1.0;
+        return 0.0 < pt_clip_row(clip, 2u, p);
+    return pt_abs(pt_clip_row(clip, 0u, p)) <= 1.0 && pt_abs(pt_clip_row(clip, 1u, p)) <= 1.0 &&
+           pt_abs(pt_clip_row(clip, 2u, p)) <= 1.0;
 }
 
 bool hidden(uint slot)

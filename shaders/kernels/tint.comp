@@ -9,22 +9,16 @@ layout(std430, binding = 0) readonly buffer arguments_block { tint_args args; };
 layout(std430, binding = 2) readonly buffer clips_block { clip_view clips[]; };
 layout(std430, binding = 3) buffer color_block { vec4 color[]; };
 
-float clip_row(uint clip, uint k, vec3 p)
-{
-    precise float sum = ((clips[clip].lo[k] + clips[clip].row[3u * k] * p.x) + clips[clip].row[3u * k + 1u] * p.y) +
-                        clips[clip].row[3u * k + 2u] * p.z;
-    precise float total = sum + clips[clip].hi[k];
-    return total;
-}
+#include "lib/clip.glsl"
 
 // How far from the cut.
 float distance_to(uint clip, vec3 p)
 {
     if (clips[clip].shape == PT_CLIP_PLANE)
-        return pt_negate(clip_row(clip, 2u, p));
+        return pt_negate(pt_clip_row(clip, 2u, p));
     float d = 0.0;
     for (uint k = 0u; k < 3u; k++) {
-        precise float inside = (1.0 - pt_abs(clip_row(clip, k, p))) * clips[clip].half_size[k];
+        precise float inside = (1.0 - pt_abs(pt_clip_row(clip, k, p))) * clips[clip].half_size[k];
         d = k == 0u ? inside : pt_min(inside, d);
     }
     return clips[clip].shape == PT_CLIP_CUT ? pt_negate(d) : d;

@@ -3,31 +3,23 @@
 // shaders/kernels/sift.comp
 //
 // Distances to a clip are sums of products in one written order, as scatter's: what is cut is cut on every device.
+#include "clip.h"
 #include "device_cpu/cpu.h"
-#include "device_cpu/simd.h"
 
 struct sift {
     const struct pt_cpu_call *call;
     uint32_t hides[256]; // by class
 };
 
-// (lo + R p) + hi, row k.
-static inline vf clip_row(const struct clip_view *clip, int k, const vf p[3])
-{
-    const float *row = clip->row + 3 * k;
-    vf sum = ((vf_set(clip->lo[k]) + vf_set(row[0]) * p[0]) + vf_set(row[1]) * p[1]) + vf_set(row[2]) * p[2];
-    return sum + vf_set(clip->hi[k]);
-}
-
 // Of a plane: cut.
 static inline vm inside(const struct clip_view *clip, const vf p[3])
 {
     const vf one = vf_set(1.0f);
     if (clip->shape == PT_CLIP_PLANE)
-        return vf_lt(vf_zero(), clip_row(clip, 2, p));
-    vm in = vf_le(vf_abs(clip_row(clip, 0, p)), one);
-    in = vm_and(in, vf_le(vf_abs(clip_row(clip, 1, p)), one));
-    return vm_and(in, vf_le(vf_abs(clip_row(clip, 2, p)), one));
+        return vf_lt(vf_zero(), pt_clip_row(clip, 2, p));
+    vm in = vf_le(vf_abs(pt_clip_row(clip, 0, p)), one);
+    in = vm_and(in, vf_le(vf_abs(pt_clip_row(clip, 1, p)), one));
+    return vm_and(in, vf_le(vf_abs(pt_clip_row(clip, 2, p)), one));
 }
 
 // Which of PT_LANES points from slot i of the chunk on.

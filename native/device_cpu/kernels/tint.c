@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // tint: the surface near a cut takes the cut's colour, as sections are drawn; twin of shaders/kernels/tint.comp
+#include "clip.h"
 #include "device_cpu/rows.h"
 
 // How far PT_LANES pixels lie from a cut, and how it is tinted.
@@ -7,24 +8,17 @@ struct band {
     vf d, strength, width, tint[3];
 };
 
-static inline vf clip_row(const struct clip_view *clip, int k, const vf p[3])
-{
-    const float *row = clip->row + 3 * k;
-    vf sum = ((vf_set(clip->lo[k]) + vf_set(row[0]) * p[0]) + vf_set(row[1]) * p[1]) + vf_set(row[2]) * p[2];
-    return sum + vf_set(clip->hi[k]);
-}
-
 static inline struct band band_of(const struct clip_view *clip, const vf p[3])
 {
     struct band band = { .strength = vf_set(clip->strength), .width = vf_set(clip->width) };
     for (int k = 0; k < 3; k++)
         band.tint[k] = vf_set(clip->tint[k]);
     if (clip->shape == PT_CLIP_PLANE) {
-        band.d = vf_zero() - clip_row(clip, 2, p);
+        band.d = vf_zero() - pt_clip_row(clip, 2, p);
         return band;
     }
     for (int k = 0; k < 3; k++) {
-        vf inside = (vf_set(1.0f) - vf_abs(clip_row(clip, k, p))) * vf_set(clip->half_size[k]);
+        vf inside = (vf_set(1.0f) - vf_abs(pt_clip_row(clip, k, p))) * vf_set(clip->half_size[k]);
         band.d = k ? vf_min(inside, band.d) : inside;
     }
     if (clip->shape == PT_CLIP_CUT)
