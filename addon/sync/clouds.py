@@ -147,8 +147,8 @@ class CloudCache:
             task = cloud.start_colors(arrays.colors)
         else:
             cloud = None  # frees the old one before the new one is built
-            task = native.Cloud.start(arrays.positions, arrays.normals, arrays.colors, arrays.opacities, progress,
-                                      scalars=arrays.scalars, classes=arrays.classes, radii=arrays.radii)
+            task = native.Cloud.start(arrays.positions, arrays.normals, arrays.colors, arrays.opacities, progress, arrays.radii,
+                                      arrays.scalars, arrays.classes)
         yield task
         cloud = task.result() or cloud
         if recolor:

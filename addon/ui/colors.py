@@ -30,6 +30,8 @@ class PATINA_PT_color(_ColorPanel, Panel):
         obj = context.object
         group = obj.patina.colors
         layout.prop(group, "source")
+        if group.source == 'FIXED':
+            layout.prop(obj.patina, "color", text=" ")
         if group.source == 'SCALAR':
             if obj.patina.linked_file:
                 layout.prop(group, "scalar")
