@@ -44,7 +44,8 @@ LARGEST = 1 << 20  # bytes of a file
 
 # What makes up a look; a group stands for all its properties.
 SCENE = ("smooth", "use_shadows", "shadow_samples", "studio", "effects", "lines")
-POINTS = ("lighting", "opacity", "color", "ambient", "diffuse", "specular", "shininess")
+POINTS = ("lighting", "opacity", "color", "ambient", "diffuse", "specular", "shininess", "colors.source", "colors.ramp",
+          "colors.exposure", "colors.contrast")
 
 
 class StyleError(Exception):
