@@ -12,7 +12,7 @@ import matplotlib.font_manager
 from PIL import Image, ImageDraw, ImageFont
 
 STYLES = Path(__file__).resolve().parents[2] / "addon/presets/styles"
-COLUMNS, SIDE, GAP, LABEL = 3, 512, 12, 40  # pixels
+COLUMNS, SIDE, GAP, LABEL = 3, 400, 10, 34  # pixels
 PAPER, INK = (250, 250, 248), (40, 40, 40)
 
 
@@ -22,14 +22,14 @@ def main(folder: Path, target: Path) -> None:
     rows = -(-len(keys) // COLUMNS)
     sheet = Image.new("RGB", (COLUMNS * (SIDE + GAP) + GAP, rows * (SIDE + LABEL + GAP) + GAP), PAPER)
     draw = ImageDraw.Draw(sheet)
-    font = ImageFont.truetype(matplotlib.font_manager.findfont("DejaVu Sans"), 22)
+    font = ImageFont.truetype(matplotlib.font_manager.findfont("DejaVu Sans"), 19)
     for number, key in enumerate(keys):
         x = GAP + number % COLUMNS * (SIDE + GAP)
         y = GAP + number // COLUMNS * (SIDE + LABEL + GAP)
         with Image.open(folder / f"{key}.png") as picture:
             sheet.paste(picture.convert("RGB").resize((SIDE, SIDE), Image.Resampling.LANCZOS), (x, y))
         draw.text((x + SIDE // 2, y + SIDE + LABEL // 2), told[key]["name"], INK, font, anchor="mm")
-    sheet.save(target, **({"quality": 88} if target.suffix == ".jpg" else {}))
+    sheet.save(target, **({"quality": 85} if target.suffix == ".jpg" else {}))
 
 
 main(Path(sys.argv[1]), Path(sys.argv[2]))
