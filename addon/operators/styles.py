@@ -94,8 +94,10 @@ class PATINA_OT_save_style(_StyleOperator, Operator):
         path = styles.own_folder(create=True) / f"{key}.json"
         styles.write(path, styles.taken(label, context.scene, _points(context)))
         context.scene.patina.style.applied = key
-        problem = _picture(context, path.with_suffix(".png"), self.thumbnail == 'SCENE')
-        return [problem] if problem else []
+        custom = _points(context).patina.colors
+        lost = custom.ramp == 'CUSTOM' and custom.source not in {'OWN', 'FIXED'}
+        notices = ["a ramp of your own is not kept in the style"] if lost else []
+        return notices + list(filter(None, [_picture(context, path.with_suffix(".png"), self.thumbnail == 'SCENE')]))
 
 
 class PATINA_OT_load_style(_StyleOperator, Operator, ImportHelper):
@@ -121,7 +123,7 @@ class PATINA_OT_load_style(_StyleOperator, Operator, ImportHelper):
         notices = styles.apply_to_scene(context.scene, path.stem)
         context.scene.patina.style.applied = path.stem
         if not path.with_suffix(".png").is_file() and _points(context):
-            notices += filter(None, [_picture(context, path.with_suffix(".png"), False)])
+            notices += list(filter(None, [_picture(context, path.with_suffix(".png"), False)]))
         return notices
 
 
