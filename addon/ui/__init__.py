@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from . import colors, effects, lines, motion, panels, panorama, presets, sequence, standard, statistics, styles
 
-_MODULES = (presets, styles, panels, colors, lines, effects, motion, panorama, sequence, statistics, standard)
+# What makes the look comes first, then how it is drawn.
+_MODULES = (presets, styles, lines, effects, panels, colors, motion, panorama, sequence, statistics, standard)
 
 
 def register() -> None:
