@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 from bpy_extras.object_utils import world_to_camera_view
-from harness import add_points, check, check_close, drawn, failing_render, linear, new_scene, render
+from harness import add_points, check, check_close, drawn, linear, new_scene, render
 from mathutils import Euler, Matrix, Vector
 
 MARGIN = 0.02  # pixels: nearer to a pixel's edge float32 may fall on either side
@@ -206,11 +206,3 @@ def test_clip_distances():
     scene.camera.data.clip_start, scene.camera.data.clip_end = 2.0, 5.0
     add_points([(0, 0, -1), (0.5, 0, -3), (-0.5, 0, -6)])
     check(len(drawn(render())) == 1, "points before clip_start and beyond clip_end must not show")
-
-
-def test_panoramic_is_refused():
-    scene = new_scene()
-    scene.camera.data.type = 'PANO'
-    add_points([(0, 0, -2)])
-    message = failing_render()
-    check("panoramic" in message and "perspective and orthographic" in message, message)

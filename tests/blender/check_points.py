@@ -208,9 +208,9 @@ def test_cache():
 
     class Counting(original):
         @classmethod
-        def start(cls, *arguments):
+        def start(cls, *arguments, **named):
             built.append(1)
-            return original.start(*arguments)
+            return original.start(*arguments, **named)
 
     clouds.native.Cloud = Counting
     try:
