@@ -111,9 +111,9 @@ static void plan_toon(struct pt_builder *builder, enum pt_plane color)
                              .bands = (float)effects->toon_bands - 0.5f,
                              .inverse = (float)(1.0 / (effects->toon_bands - 0.5)),
                              .steepness = 1.0f / fmaxf(effects->toon_softness, TOON_SHARP)};
-    PT_REASON(PT_ADD(builder, toon, args,
-                     {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_UNLIT, 0), pt_plane_at(color, 0)}),
-              "light in %u bands", effects->toon_bands);
+    PT_REASON(
+        PT_ADD(builder, toon, args, {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_UNLIT, 0), pt_plane_at(color, 0)}),
+        "light in %u bands", effects->toon_bands);
 }
 
 // ---- hatching ------------------------------------------------------------------------------------------------------------
@@ -193,7 +193,10 @@ static void plan_fog(struct pt_builder *builder, enum pt_plane color)
 
 // ---- depth of field ------------------------------------------------------------------------------------------------------
 
-static int focuses(const struct patina_scene *scene) { return scene->effects.focus_aperture > 0.0f; }
+static int focuses(const struct patina_scene *scene)
+{
+    return scene->effects.focus_aperture > 0.0f;
+}
 
 // Radius in pixels of the circle of confusion of what is infinitely far, in orthographic views of a world unit out of focus.
 static double focus_scale(const struct patina_scene *scene)
@@ -201,7 +204,8 @@ static double focus_scale(const struct patina_scene *scene)
     const patina_camera *camera = &scene->camera;
     const patina_effects *effects = &scene->effects;
     double width = fmax((camera->right - camera->left) / scene->settings.width,
-                        (camera->top - camera->bottom) / scene->settings.height); // of a pixel: at distance 1, or anywhere
+                        (camera->top - camera->bottom) /
+                            scene->settings.height); // of a pixel: at distance 1, or anywhere
     return fmin(0.5 * (double)effects->focus_aperture / ((double)effects->focus_distance * width), 1e9);
 }
 
@@ -222,15 +226,16 @@ int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct 
         return 0;
     }
     double most = focus_most(scene), distance = (double)scene->effects.focus_distance;
-    struct focus_args args = {.view = compose->view,
-                              .crop_x = compose->crop_x,
-                              .crop_y = compose->crop_y,
-                              .crop_width = compose->crop_width,
-                              .crop_height = compose->crop_height,
-                              .distance = (float)(scene->camera.orthographic ? distance - scene->camera.near_clip : distance),
-                              .scale = (float)focus_scale(scene),
-                              .most = (float)most,
-                              .reach = (uint32_t)fmin(ceil(most + 0.5), PT_FOCUS_MOST)};
+    struct focus_args args = {
+        .view = compose->view,
+        .crop_x = compose->crop_x,
+        .crop_y = compose->crop_y,
+        .crop_width = compose->crop_width,
+        .crop_height = compose->crop_height,
+        .distance = (float)(scene->camera.orthographic ? distance - scene->camera.near_clip : distance),
+        .scale = (float)focus_scale(scene),
+        .most = (float)most,
+        .reach = (uint32_t)fmin(ceil(most + 0.5), PT_FOCUS_MOST)};
     for (int k = 0; k < 4; k++)
         args.background[k] = compose->background[k];
     PT_REASON(PT_ADD(builder, focus, args,
@@ -269,7 +274,10 @@ int pt_effects_want_normals(const struct patina_scene *scene)
     return scene->effects.obscurance_strength > 0.0f || scene->effects.hatch_levels;
 }
 
-int pt_effects_want_albedo(const struct patina_scene *scene) { return scene->effects.toon_bands > 0; }
+int pt_effects_want_albedo(const struct patina_scene *scene)
+{
+    return scene->effects.toon_bands > 0;
+}
 
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color)
 {

@@ -37,11 +37,13 @@ class Effects:
 
     def through(self, focus: Focus | None) -> Effects:
         """With the depth of field of a view."""
-        return replace(self, focus_aperture=focus.aperture if focus else 0.0, focus_distance=focus.distance if focus else 0.0)
+        return replace(self, focus_aperture=focus.aperture if focus else 0.0,
+                       focus_distance=focus.distance if focus else 0.0)
 
     def shrunk(self, factor: int) -> Effects:
         """For a picture of larger pixels, as far as lengths in pixels may become less."""
-        return replace(self, edl_radius=max(self.edl_radius / factor, 1.0), hatch_spacing=max(self.hatch_spacing / factor, 3.0))
+        return replace(self, edl_radius=max(self.edl_radius / factor, 1.0),
+                       hatch_spacing=max(self.hatch_spacing / factor, 3.0))
 
 
 def read(scene: bpy.types.Scene, focus: Focus | None, notices: list[str]) -> Effects:

@@ -2,7 +2,10 @@
 // A scene's effects: checked, defaults made explicit.
 #include "scene.h"
 
-static int within(float value, float least, float most) { return value >= least && value <= most; } // NaN is not
+static int within(float value, float least, float most)
+{
+    return value >= least && value <= most;
+} // NaN is not
 
 static int refuse(const patina_scene *scene, const char *what)
 {
@@ -24,9 +27,11 @@ static int check_drawing(const patina_scene *scene, patina_effects *e)
         return refuse(scene, "hatch_opacity and hatch_ground must be within 0 and 1");
     if (!within(e->fog_density, 0.0f, 1.0f) || e->fog_fixed > 1)
         return refuse(scene, "fog_density must be within 0 and 1, fog_fixed 0 or 1");
-    if (e->fog_density > 0.0f && !(within(e->fog_start, -1e30f, 1e30f) && within(e->fog_end, -1e30f, 1e30f) && e->fog_end > e->fog_start))
+    if (e->fog_density > 0.0f &&
+        !(within(e->fog_start, -1e30f, 1e30f) && within(e->fog_end, -1e30f, 1e30f) && e->fog_end > e->fog_start))
         return refuse(scene, "fog_end must be beyond fog_start");
-    if (!within(e->focus_aperture, 0.0f, 1e30f) || (e->focus_aperture > 0.0f && !within(e->focus_distance, 1e-30f, 1e30f)))
+    if (!within(e->focus_aperture, 0.0f, 1e30f) ||
+        (e->focus_aperture > 0.0f && !within(e->focus_distance, 1e-30f, 1e30f)))
         return refuse(scene, "focus_aperture must be 0 or more, focus_distance above 0");
     if (e->paper_color[0] == 0.0f && e->paper_color[1] == 0.0f && e->paper_color[2] == 0.0f)
         e->paper_color[0] = e->paper_color[1] = e->paper_color[2] = 1.0f;

@@ -91,9 +91,8 @@ int tool_parse_effect(const char *name, const char *value, patina_effects *effec
         const char *name;
         int (*parse)(const char *value, patina_effects *effects);
     } options[] = {
-        {"--edl", parse_edl},
-        {"--obscurance", parse_obscurance}, {"--toon", parse_toon},   {"--hatch", parse_hatch},
-        {"--fog", parse_fog},               {"--focus", parse_focus}, {"--paper", parse_paper},
+        {"--edl", parse_edl}, {"--obscurance", parse_obscurance}, {"--toon", parse_toon},   {"--hatch", parse_hatch},
+        {"--fog", parse_fog}, {"--focus", parse_focus},           {"--paper", parse_paper},
     };
     for (size_t i = 0; i < sizeof options / sizeof *options; i++)
         if (!strcmp(name, options[i].name))

@@ -29,7 +29,8 @@ static void check(struct harness *h, const struct picture *picture, const struct
         for (size_t c = 0; c < 4 && picture->keys[i] == REF_EMPTY_KEY; c++)
             colors[4 * i + c] = NAN;
     struct pt_buffer *out = harness_buffer(h, NULL, inside * 16);
-    HARNESS_RUN(h, focus, args, harness_buffer(h, picture->keys, count * 8), harness_buffer(h, colors, count * 16), out);
+    HARNESS_RUN(h, focus, args, harness_buffer(h, picture->keys, count * 8), harness_buffer(h, colors, count * 16),
+                out);
     const float *got = harness_read(h, out);
     struct ref_planes planes = picture_planes(picture);
     for (size_t i = 0; i < inside; i++) {
@@ -37,8 +38,8 @@ static void check(struct harness *h, const struct picture *picture, const struct
         struct ref_color expected = ref_focus(args, &planes, x, y);
         for (int c = 0; c < 4; c++)
             if (!harness_near(got[4 * i + (size_t)c], expected.color[c], expected.error[c]))
-                harness_fail(h, "combined", x, y, "channel %d: got %.9g, expected %.9g +- %.2g", c, got[4 * i + (size_t)c],
-                             expected.color[c], expected.error[c]);
+                harness_fail(h, "combined", x, y, "channel %d: got %.9g, expected %.9g +- %.2g", c,
+                             got[4 * i + (size_t)c], expected.color[c], expected.error[c]);
     }
 }
 
@@ -46,7 +47,8 @@ static struct picture random_picture(struct harness *h, uint64_t seed, uint32_t 
                                      enum picture_kind kind)
 {
     struct rng rng = {seed};
-    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind, kind % 2 ? 0.9 : 0.5);
+    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind,
+                                            kind % 2 ? 0.9 : 0.5);
     picture_invent(&picture, &rng, 0.5, 4);
     for (size_t i = 0; i < picture.count; i++) {
         float alpha = rng_below(&rng, 3) ? 1.0f : (float)rng_unit(&rng);
@@ -74,7 +76,8 @@ static void hard(struct harness *h)
     static const float background[4] = {0.05f, 0.1f, 0.2f, 1.0f};
     for (size_t s = 0; s < 4; s++) {
         struct picture picture = random_picture(h, s, sizes[s][0], sizes[s][1], 1, PICTURE_SURFACES);
-        const uint32_t crop[4] = {sizes[s][0] / 3, sizes[s][1] / 4, sizes[s][0] - sizes[s][0] / 3, sizes[s][1] - sizes[s][1] / 4};
+        const uint32_t crop[4] = {sizes[s][0] / 3, sizes[s][1] / 4, sizes[s][0] - sizes[s][0] / 3,
+                                  sizes[s][1] - sizes[s][1] / 4};
         struct focus_args args = args_of(&picture.view, crop, 4.0f, 6.0f);
         memcpy(args.background, background, sizeof background);
         check(h, &picture, &args);
@@ -93,7 +96,8 @@ static void sanity(struct harness *h)
     struct ref_planes planes = picture_planes(&picture);
     const uint32_t whole[4] = {0, 0, 33, 33};
     struct focus_args args = args_of(&picture.view, whole, 5.0f, 6.0f);
-    HARNESS_CHECK(h, fabs(ref_focus(&args, &planes, 16, 16).color[0] - (double)picture.color[4 * (16 * 33 + 16)]) < 1e-6);
+    HARNESS_CHECK(h,
+                  fabs(ref_focus(&args, &planes, 16, 16).color[0] - (double)picture.color[4 * (16 * 33 + 16)]) < 1e-6);
     args.distance = 8.0f;
     for (size_t i = 0; i < picture.count; i++)
         for (size_t c = 0; c < 4; c++)
@@ -110,6 +114,7 @@ static void sanity(struct harness *h)
 
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {{"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
+    static const struct harness_case cases[] = {
+        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

@@ -15,7 +15,8 @@ struct ref_color ref_fog(const struct fog_args *args, const struct ref_planes *p
         double own = planes->color[4 * pixel + (size_t)c] * (1.0 - share), veil = args->color[c] * share * alpha;
         out.color[c] = own + veil;
         // of the share: a difference, two products
-        out.error[c] = 6.0 * TOL_UNIT * (fabs((double)planes->color[4 * pixel + (size_t)c]) + fabs(args->color[c] * alpha));
+        out.error[c] = 6.0 * TOL_UNIT *
+                       (fabs((double)planes->color[4 * pixel + (size_t)c]) + fabs(args->color[c] * alpha));
     }
     out.color[3] = alpha;
     return out;

@@ -81,7 +81,8 @@ struct ref_color ref_obscure(const struct obscure_args *args, const struct ref_p
     double light = fmax(1.0 - args->strength * sum / total, 0.0);
     for (int c = 0; c < 4; c++) {
         out.color[c] = planes->color[4 * pixel + (size_t)c] * (c < 3 ? light : 1.0);
-        out.error[c] = c < 3 ? TOL_COLOR * fabs((double)planes->color[4 * pixel + (size_t)c]) * (1.0 + args->strength) : 0.0;
+        out.error[c] = c < 3 ? TOL_COLOR * fabs((double)planes->color[4 * pixel + (size_t)c]) * (1.0 + args->strength)
+                             : 0.0;
     }
     return out;
 }

@@ -30,8 +30,9 @@ static struct row ring_row(const struct focus *focus, uint32_t thread, int32_t y
     float *base = focus->rows + thread * focus->thread_floats;
     const uint32_t slot = (uint32_t)(y + (int32_t)focus->ring) % focus->ring;
     const size_t s = focus->stride;
-    float *at = base + slot * CHANNELS * s + PT_ROW_PAD, *largest = base + focus->ring * CHANNELS * s + slot * focus->blocks;
-    return (struct row){ at, at + s, at + 2 * s, { at + 3 * s, at + 4 * s, at + 5 * s, at + 6 * s }, largest };
+    float *at = base + slot * CHANNELS * s + PT_ROW_PAD,
+          *largest = base + focus->ring * CHANNELS * s + slot * focus->blocks;
+    return (struct row){at, at + s, at + 2 * s, {at + 3 * s, at + 4 * s, at + 5 * s, at + 6 * s}, largest};
 }
 
 // Radius of the circle of confusion, pixels.
@@ -135,7 +136,8 @@ static float look(const struct focus *focus, uint32_t thread, uint32_t x, int32_
 }
 
 // PT_LANES pixels from (x, y) on. most: from this distance on taps add nothing.
-static void focus_pixels(const struct focus *focus, uint32_t thread, uint32_t x, int32_t y, float most, struct sums *sums)
+static void focus_pixels(const struct focus *focus, uint32_t thread, uint32_t x, int32_t y, float most,
+                         struct sums *sums)
 {
     const int32_t reach = most < (float)focus->args->reach ? (int32_t)most : (int32_t)focus->args->reach;
     const struct row own = ring_row(focus, thread, y);
@@ -185,11 +187,11 @@ static void focus_units(void *context, uint32_t begin, uint32_t end, uint32_t th
 int PT_KERNEL_ENTRY(focus)(const struct pt_cpu_call *call)
 {
     const struct focus_args *args = call->arguments;
-    struct focus focus = { .call = call,
-                           .args = args,
-                           .stride = pt_row_stride(args->view.width),
-                           .blocks = (args->view.width + BLOCK - 1) / BLOCK,
-                           .ring = 2 * args->reach + BLOCK };
+    struct focus focus = {.call = call,
+                          .args = args,
+                          .stride = pt_row_stride(args->view.width),
+                          .blocks = (args->view.width + BLOCK - 1) / BLOCK,
+                          .ring = 2 * args->reach + BLOCK};
     focus.thread_floats = focus.ring * (CHANNELS * focus.stride + focus.blocks);
     focus.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * focus.thread_floats * sizeof(float));
     if (!focus.rows)

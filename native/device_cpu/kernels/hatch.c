@@ -8,7 +8,8 @@ struct pixel {
     vf back;                   // (n . r) / (n . r)^2
 };
 
-static void place(const struct hatch_args *args, const float *shading, uint32_t x, uint32_t y, vf z, vm some, struct pixel *p)
+static void place(const struct hatch_args *args, const float *shading, uint32_t x, uint32_t y, vf z, vm some,
+                  struct pixel *p)
 {
     const struct view_args *view = &args->view;
     const vf zero = vf_zero(), one = vf_set(1.0f);
@@ -40,7 +41,8 @@ static void place(const struct hatch_args *args, const float *shading, uint32_t 
 static vf stroke(const struct hatch_args *args, uint32_t level, const struct pixel *p, vf wide)
 {
     const float *a = args->axes + 3 * level;
-    const vf zero = vf_zero(), half = vf_set(0.5f), one = vf_set(1.0f), axis[3] = { vf_set(a[0]), vf_set(a[1]), vf_set(a[2]) };
+    const vf zero = vf_zero(), half = vf_set(0.5f), one = vf_set(1.0f),
+             axis[3] = {vf_set(a[0]), vf_set(a[1]), vf_set(a[2])};
     vf along = (axis[0] * p->place[0] + axis[1] * p->place[1]) + axis[2] * p->place[2];
     along = along + vf_set(args->offsets[level]);
     // how much it grows a pixel on: the surface goes on in its tangent plane
@@ -52,7 +54,7 @@ static vf stroke(const struct hatch_args *args, uint32_t level, const struct pix
     vf period = vi_float(exponent), inverse = vi_float(vi_sub(vi_set(254u << 23), exponent));
     vf fade = wanted * inverse - one;
     vf at = along * inverse, line = vf_floor(at + half);
-    vf off = vf_abs(at - line) * (period * root); // pixels
+    vf off = vf_abs(at - line) * (period * root);         // pixels
     vf odd = line - vf_set(2.0f) * vf_floor(line * half); // 0 or 1
     vf reach = (half * wide) * (one - odd * fade);
     vf edge = vf_min(vf_max((reach - off) + half, zero), one);

@@ -82,7 +82,7 @@ static void gather_row(void *context, uint32_t y)
     float *out = pt_cpu_data(obscure->call, 5);
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         size_t at = (size_t)y * view->width + x;
-        struct point p = { .z = vi_float(vi_load_z(obscure->planes.keys + at)) };
+        struct point p = {.z = vi_float(vi_load_z(obscure->planes.keys + at))};
         vm some = vm_and(vm_first(pt_lanes_left(x, view->rect[2])), vf_lt(p.z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
         vf sum = vf_zero();
         if (!vm_bits(some))
@@ -100,7 +100,7 @@ static struct row ring_row(const struct obscure *obscure, uint32_t thread, int32
 {
     const uint32_t slot = (uint32_t)(y + RING) % RING;
     float *row = obscure->rows + ((size_t)thread * RING + slot) * 2 * obscure->stride + PT_ROW_PAD;
-    return (struct row){ row, row + obscure->stride };
+    return (struct row){row, row + obscure->stride};
 }
 
 static void load_row(const struct obscure *obscure, int32_t y, const struct row *row)
@@ -119,7 +119,7 @@ static void load_row(const struct obscure *obscure, int32_t y, const struct row 
 
 static void blur_row(const struct obscure *obscure, const struct row rows[RING], uint32_t y)
 {
-    static const float weights[RING] = { 0.5f, 1.0f, 1.0f, 1.0f, 0.5f };
+    static const float weights[RING] = {0.5f, 1.0f, 1.0f, 1.0f, 0.5f};
     const struct view_args *view = &obscure->args->view;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
     float *colors = pt_cpu_data(obscure->call, 4);
@@ -178,13 +178,13 @@ int PT_KERNEL_ENTRY(obscure)(const struct pt_cpu_call *call)
 {
     const struct obscure_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct obscure obscure = { .call = call,
-                               .args = args,
-                               .planes = { .view = &args->view,
-                                           .keys = pt_cpu_data(call, 0),
-                                           .from = pt_cpu_data(call, 1),
-                                           .deff = pt_cpu_data(call, 2) },
-                               .stride = pt_row_stride(args->view.width) };
+    struct obscure obscure = {.call = call,
+                              .args = args,
+                              .planes = {.view = &args->view,
+                                         .keys = pt_cpu_data(call, 0),
+                                         .from = pt_cpu_data(call, 1),
+                                         .deff = pt_cpu_data(call, 2)},
+                              .stride = pt_row_stride(args->view.width)};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     obscure.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * RING * 2 * obscure.stride * sizeof(float));

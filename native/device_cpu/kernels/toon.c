@@ -30,7 +30,8 @@ static void toon_row(void *context, uint32_t y)
     float *colors = (float *)pt_cpu_data(call, 2) + 4 * row;
     const vf dark = vf_set(PT_TOON_DARK), one = vf_set(1.0f);
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
-        vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])), vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
+        vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])),
+                         vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
         vf albedo[4], color[4];
         if (!vm_bits(some))
             continue;
