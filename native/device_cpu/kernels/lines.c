@@ -258,12 +258,15 @@ static struct found search(const struct lines *lines, const struct line_row *row
         const struct line_row *row = rows + dy;
         if (!nearer[PT_LINE_MOST + dy])
             continue;
+        vf disc = vf_load(row->disc + (int32_t)x + dx);
+        vm hit = vm_and(some, vf_lt(disc, z));
+        if (!vm_bits(hit)) // as of most pixels: few have discs
+            continue;
         vf square = vf_set((float)(tap >> 16)), distance = square * vf_rsqrt(square);
         vm open = vm_and(some, vf_lt(found.beyond, (vf_set(args->most) + half) - distance));
         if (!vm_bits(open))
             break;
-        vm hit = vm_and(open, shows(lines, &tangent, z, vf_load(row->disc + (int32_t)x + dx),
-                                     vf_load(row->z + (int32_t)x + dx), dx, dy));
+        hit = vm_and(vm_and(open, hit), shows(lines, &tangent, z, disc, vf_load(row->z + (int32_t)x + dx), dx, dy));
         if (!vm_bits(hit))
             continue;
         vf radius = args->world ? vf_load(row->radius + (int32_t)x + dx) : vf_set(args->most);
