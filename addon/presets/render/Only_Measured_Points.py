@@ -3,6 +3,7 @@ import bpy
 # Nothing is filled in: for judging a scan.
 patina = bpy.context.scene.patina
 
+patina.surface = 'FILL'
 patina.error_target = 0.0
 patina.quality = 'REFINED'
 patina.fill = 'OFF'

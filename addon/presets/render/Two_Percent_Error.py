@@ -3,6 +3,7 @@ import bpy
 # The cheapest way to a colour error of two percent.
 patina = bpy.context.scene.patina
 
+patina.surface = 'FILL'
 patina.error_target = 2.0
 patina.quality = 'REFINED'
 patina.fill = 'CLOSED'
