@@ -104,13 +104,19 @@ int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_g
 
 // Bounds of the casters' chunks in a frame (rows x, y, z) from `eye`; perspective: of x / -z and y / -z too.
 struct extent {
+    const double *axes, *eye;
     int some, behind; // behind: part of it is beside or behind the eye
     double lower[3], upper[3];
     double tangent[4]; // left, bottom, right, top
 };
 
-static void extend(struct extent *extent, const double p[3])
+static void extend(void *context, const double corner[3])
 {
+    struct extent *extent = context;
+    double p[3], away[3];
+    for (int k = 0; k < 3; k++)
+        away[k] = corner[k] - extent->eye[k];
+    pt_apply(extent->axes, away, p);
     for (int k = 0; k < 3; k++) {
         extent->lower[k] = extent->some ? fmin(extent->lower[k], p[k]) : p[k];
         extent->upper[k] = extent->some ? fmax(extent->upper[k], p[k]) : p[k];
@@ -122,22 +128,6 @@ static void extend(struct extent *extent, const double p[3])
         extent->tangent[2 + k] = extent->some ? fmax(extent->tangent[2 + k], tangent) : tangent;
     }
     extent->some = 1;
-}
-
-static void extend_by_box(struct extent *extent, const struct pt_chunk *box, const double matrix[16], const double axes[9],
-                          const double eye[3])
-{
-    double linear[9], translation[3], p[3], q[3];
-    pt_split_matrix(matrix, linear, translation);
-    for (int corner = 0; corner < 8; corner++) {
-        for (int k = 0; k < 3; k++)
-            p[k] = box->origin[k] + (double)(corner >> k & 1 ? box->box_max[k] : box->box_min[k]);
-        pt_apply(linear, p, q);
-        for (int k = 0; k < 3; k++)
-            q[k] = (q[k] + translation[k]) - eye[k];
-        pt_apply(axes, q, p);
-        extend(extent, p);
-    }
 }
 
 // The scene with those of its clips that count for shadows. Its handle is not to be touched.
@@ -152,7 +142,7 @@ static struct patina_scene as_cut(const struct patina_scene *scene)
 static struct extent look(const struct patina_scene *scene, const struct pt_shadow_group *group, const double axes[9],
                           const double eye[3])
 {
-    struct extent extent = { 0 };
+    struct extent extent = { .axes = axes, .eye = eye };
     const struct patina_scene cut = as_cut(scene);
     struct pt_inverse_clip *room = malloc((cut.clip_count + 1) * sizeof *room); // without: chunks are seen whole
     for (uint32_t i = 0; i < scene->instance_count; i++) {
@@ -162,12 +152,12 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
         const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, room) : (struct pt_sieve){ .instance = instance };
         for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
             if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-                extend_by_box(&extent, &instance->cloud->chunks[c], instance->style.world_from_object, axes, eye);
+                pt_box_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, &extent);
     }
     free(room);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (meshes_cast(group) && pt_mesh_casts(&scene->meshes[i]))
-            extend_by_box(&extent, &scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, axes, eye);
+            pt_box_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, extend, &extent);
     return extent;
 }
 

@@ -394,7 +394,7 @@ int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines)
 
 // ---- a camera that frames the scene -----------------------------------------------------------------------------------
 
-static void box_corners(const struct pt_chunk *box, const double matrix[16], pt_corner_work *work, void *context)
+void pt_box_corners(const struct pt_chunk *box, const double matrix[16], pt_corner_work *work, void *context)
 {
     double linear[9], translation[3], p[3], q[3];
     pt_split_matrix(matrix, linear, translation);
@@ -419,11 +419,11 @@ int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *contex
         struct pt_sieve sieve = pt_sieve_make(scene, &scene->instances[i], room);
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
             if (pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-                box_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
+                pt_box_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
     }
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (pt_mesh_drawn(scene->meshes[i].mesh))
-            box_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
+            pt_box_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
     free(room);
     return PATINA_OK;
 }

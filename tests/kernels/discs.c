@@ -25,6 +25,28 @@ void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene
         scene->radii[instance][i] = rng_below(rng, 8) ? (float)rng_range(rng, 0.0, largest) : 0.0f;
 }
 
+struct view_args discs_window(uint32_t width, uint32_t height, int perspective, double focal)
+{
+    struct view_args view = points_window(width, height, perspective, focal);
+    view.ray_x0 = (float)(-(view.origin_x + 0.5 * width) / focal);
+    view.ray_y0 = (float)(-(view.origin_y + 0.5 * height) / focal);
+    return view;
+}
+
+struct disc_scene discs_in_window(struct harness *h, struct rng *rng, uint32_t width, uint32_t height, double largest)
+{
+    static const uint32_t few[] = {16, 40, 1};
+    const double focal = width;
+    struct disc_scene scene = {.points = {.view = discs_window(width, height, 1, focal)}};
+    struct camera camera = points_look(rng, &scene.points.view, focal, 3.0), turned = camera;
+    for (int k = 0; k < 6; k++) // squeezed into the window's shape
+        camera.rotation[k] *= k < 3 ? 1.0 : (double)height / width;
+    camera.shift[0] = camera.shift[1] = 0.0;
+    points_scatter_about(rng, points_add_cloud(h, rng, &scene.points, &camera, few, 3, 0, 0), 1.5);
+    discs_describe(h, rng, &scene, 0, &turned, 0.0f, largest, 1);
+    return scene;
+}
+
 struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
 {
     struct pt_buffer *buffers[2 + 5 * MOST_INSTANCES];

@@ -15,6 +15,10 @@ struct disc_scene {
 // `largest`. Normals turn with the camera.
 void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene, uint32_t instance,
                     const struct camera *camera, float radius, double largest, int has_normals);
+// points_window with the rays of the camera.
+struct view_args discs_window(uint32_t width, uint32_t height, int perspective, double focal);
+// A cloud in a window of any shape, its discs of radii up to `largest`.
+struct disc_scene discs_in_window(struct harness *h, struct rng *rng, uint32_t width, uint32_t height, double largest);
 // Runs splat; returns the key plane.
 struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene);
 // Every point of the scene, by rising id; count is the number of points.

@@ -20,14 +20,6 @@ struct paint {
     size_t color_bytes[MOST_INSTANCES];
 };
 
-static struct view_args window(uint32_t width, uint32_t height, int perspective, double focal)
-{
-    struct view_args view = points_window(width, height, perspective, focal);
-    view.ray_x0 = (float)(-(view.origin_x + 0.5 * width) / focal);
-    view.ray_y0 = (float)(-(view.origin_y + 0.5 * height) / focal);
-    return view;
-}
-
 // Bytes, floats (brighter than blends take among them) or the style's colour, by instance.
 static struct paint paint(struct harness *h, struct rng *rng, struct disc_scene *scene)
 {
@@ -156,7 +148,7 @@ static void random_discs(struct harness *h, int perspective, uint32_t seed, doub
 {
     struct rng rng = {seed};
     const double focal = perspective ? 60.0 : 20.0;
-    struct disc_scene scene = {.points = {.view = window(67, 45, perspective, focal)}};
+    struct disc_scene scene = {.points = {.view = discs_window(67, 45, perspective, focal)}};
     for (uint32_t i = 0; i < 3; i++) {
         struct camera camera = points_look(&rng, &scene.points.view, focal, 4.0);
         points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, i == 1, i * 5000),
@@ -193,7 +185,7 @@ static void sheet(struct harness *h)
 {
     static const uint32_t many[] = {4000, 4000, 4000};
     struct rng rng = {6};
-    struct disc_scene scene = {.points = {.view = window(67, 45, 0, 20.0)}};
+    struct disc_scene scene = {.points = {.view = discs_window(67, 45, 0, 20.0)}};
     struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .shift = {0, 0, -4}, .focal = 20.0};
     camera.center_x = scene.points.view.origin_x + 33.5;
     camera.center_y = scene.points.view.origin_y + 22.5;
@@ -224,7 +216,7 @@ static void overflow(struct harness *h)
 {
     static const uint32_t many[] = {4096, 4096, 4096, 100};
     struct rng rng = {7};
-    struct disc_scene scene = {.points = {.view = window(17, 9, 1, 60.0)}};
+    struct disc_scene scene = {.points = {.view = discs_window(17, 9, 1, 60.0)}};
     struct camera camera = points_look(&rng, &scene.points.view, 60.0, 4.0);
     camera.shift[0] = camera.shift[1] = 0.0;
     struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 4, 0, 0);
@@ -256,17 +248,9 @@ static void overflow(struct harness *h)
 static void plane_sizes(struct harness *h)
 {
     static const uint32_t shapes[][2] = {{1, 1}, {16384, 1}, {1, 333}};
-    static const uint32_t few[] = {16, 40, 1};
     struct rng rng = {8};
     for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
-        const double focal = shapes[i][0];
-        struct disc_scene scene = {.points = {.view = window(shapes[i][0], shapes[i][1], 1, focal)}};
-        struct camera camera = points_look(&rng, &scene.points.view, focal, 3.0), turned = camera;
-        for (int k = 0; k < 6; k++) // squeezed into the window's shape
-            camera.rotation[k] *= k < 3 ? 1.0 : (double)shapes[i][1] / shapes[i][0];
-        camera.shift[0] = camera.shift[1] = 0.0;
-        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, few, 3, 0, 0), 1.5);
-        discs_describe(h, &rng, &scene, 0, &turned, 0.0f, 0.01, 1);
+        struct disc_scene scene = discs_in_window(h, &rng, shapes[i][0], shapes[i][1], 0.01);
         const struct paint colors = paint(h, &rng, &scene);
         run(h, &scene, &colors);
     }
@@ -275,7 +259,7 @@ static void plane_sizes(struct harness *h)
 // Reference alone: two discs in one pixel, at the middle and at the rim of a third's.
 static void sanity(struct harness *h)
 {
-    const struct view_args view = window(64, 64, 0, 10.0);
+    const struct view_args view = discs_window(64, 64, 0, 10.0);
     struct ref_disc discs[2] = {{.id = 0, .possible = 1, .definite = 1, .n = {0, 0, 1}, .has_normal = 1, .has_normals = 1, .radius = 1.0}};
     discs[0].place = (struct ref_place){1, {48.5, 48.5}, {40.5, 40.5}, {2.0, 2.0}};
     discs[1] = discs[0];

@@ -50,20 +50,11 @@ static uint64_t *check_scene(struct harness *h, struct disc_scene *scene)
     return keys;
 }
 
-// The window's rays are the camera's.
-static struct view_args window(uint32_t width, uint32_t height, int perspective, double focal)
-{
-    struct view_args view = points_window(width, height, perspective, focal);
-    view.ray_x0 = (float)(-(view.origin_x + 0.5 * width) / focal);
-    view.ray_y0 = (float)(-(view.origin_y + 0.5 * height) / focal);
-    return view;
-}
-
 static void random_discs(struct harness *h, int perspective, uint32_t seed, double largest, float radius)
 {
     struct rng rng = {seed};
     const double focal = perspective ? 60.0 : 20.0;
-    struct disc_scene scene = {.points = {.view = window(67, 45, perspective, focal)}};
+    struct disc_scene scene = {.points = {.view = discs_window(67, 45, perspective, focal)}};
     for (uint32_t i = 0; i < 3; i++) {
         struct camera camera = points_look(&rng, &scene.points.view, focal, 4.0);
         for (int k = 0; k < 9; k++) // the second is mirrored
@@ -100,7 +91,7 @@ static void points(struct harness *h)
 {
     for (int p = 0; p < 2; p++) {
         struct rng rng = {5};
-        struct disc_scene scene = {.points = {.view = window(67, 45, p, p ? 60.0 : 20.0)}};
+        struct disc_scene scene = {.points = {.view = discs_window(67, 45, p, p ? 60.0 : 20.0)}};
         struct camera camera = points_look(&rng, &scene.points.view, p ? 60.0 : 20.0, 4.0);
         struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 1, 0);
         points_scatter_about(&rng, cloud, 2.0);
@@ -127,17 +118,9 @@ static void points(struct harness *h)
 static void plane_sizes(struct harness *h)
 {
     static const uint32_t shapes[][2] = {{1, 1}, {16384, 1}, {1, 333}, {64, 64}, {17, 2}};
-    static const uint32_t few[] = {16, 40, 1};
     struct rng rng = {6};
     for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
-        const double focal = shapes[i][0];
-        struct disc_scene scene = {.points = {.view = window(shapes[i][0], shapes[i][1], 1, focal)}};
-        struct camera camera = points_look(&rng, &scene.points.view, focal, 3.0), turned = camera;
-        for (int k = 0; k < 6; k++) // squeezed into the window's shape
-            camera.rotation[k] *= k < 3 ? 1.0 : (double)shapes[i][1] / shapes[i][0];
-        camera.shift[0] = camera.shift[1] = 0.0;
-        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, few, 3, 0, 0), 1.5);
-        discs_describe(h, &rng, &scene, 0, &turned, 0.0f, 0.1, 1);
+        struct disc_scene scene = discs_in_window(h, &rng, shapes[i][0], shapes[i][1], 0.1);
         check_scene(h, &scene);
     }
 }
@@ -149,7 +132,7 @@ static void not_numbers(struct harness *h)
     enum { ODD = sizeof odd / sizeof odd[0] };
     for (int p = 0; p < 2; p++) {
         struct rng rng = {7};
-        struct disc_scene scene = {.points = {.view = window(67, 45, p, p ? 60.0 : 20.0)}};
+        struct disc_scene scene = {.points = {.view = discs_window(67, 45, p, p ? 60.0 : 20.0)}};
         struct camera camera = points_look(&rng, &scene.points.view, p ? 60.0 : 20.0, 4.0);
         struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 1, 0);
         points_scatter_about(&rng, cloud, 1.0);
@@ -164,7 +147,7 @@ static void not_numbers(struct harness *h)
 static void camera_plane(struct harness *h)
 {
     struct rng rng = {8};
-    struct disc_scene scene = {.points = {.view = window(67, 45, 1, 60.0)}};
+    struct disc_scene scene = {.points = {.view = discs_window(67, 45, 1, 60.0)}};
     struct camera camera = points_look(&rng, &scene.points.view, 60.0, 0.0); // in the middle of the cloud
     points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, 0), 1.0);
     discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.6, 1);
@@ -176,7 +159,7 @@ static void coincident(struct harness *h)
 {
     for (int p = 0; p < 2; p++) {
         struct rng rng = {9};
-        struct disc_scene scene = {.points = {.view = window(67, 45, p, 60.0)}};
+        struct disc_scene scene = {.points = {.view = discs_window(67, 45, p, 60.0)}};
         struct camera camera = points_look(&rng, &scene.points.view, 60.0, 4.0);
         const uint32_t bases[3] = {0xFFFFFFFEu - 882u, 70000u, 0x80000000u};
         for (uint32_t i = 0; i < 3; i++) {
@@ -203,7 +186,7 @@ static void edge_on(struct harness *h)
     static const double lean[6] = {0.0, 1e-7, 1e-6, 1e-4, 1e-2, 0.1};
     struct rng rng = {10};
     for (int p = 0; p < 2; p++) {
-        struct disc_scene scene = {.points = {.view = window(48, 6, p, 10.0)}};
+        struct disc_scene scene = {.points = {.view = discs_window(48, 6, p, 10.0)}};
         scene.points.view.origin_x = scene.points.view.origin_y = 0;
         scene.points.view.ray_x0 = scene.points.view.ray_y0 = 0.0f;
         struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = 10.0};
@@ -227,7 +210,7 @@ static void edge_on(struct harness *h)
 static void limits(struct harness *h)
 {
     struct rng rng = {11};
-    struct disc_scene scene = {.points = {.view = window(67, 45, 1, 60.0)}};
+    struct disc_scene scene = {.points = {.view = discs_window(67, 45, 1, 60.0)}};
     for (uint32_t i = 0; i < 2; i++) {
         struct camera camera = points_look(&rng, &scene.points.view, 60.0, 4.0);
         points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, i * 5000), 2.0);
@@ -256,7 +239,7 @@ static void orthographic_scales(struct harness *h)
     for (int i = 0; i < 2; i++) {
         struct rng rng = {12};
         const double focal = 67.0 / scales[i];
-        struct disc_scene scene = {.points = {.view = window(67, 45, 0, focal)}};
+        struct disc_scene scene = {.points = {.view = discs_window(67, 45, 0, focal)}};
         scene.points.view.z_far = (float)(200.0 * scales[i]); // near = -far = -100 scales
         struct camera camera = points_look(&rng, &scene.points.view, focal, 0.0);
         camera.near_clip = -100.0 * scales[i];
@@ -269,7 +252,7 @@ static void orthographic_scales(struct harness *h)
 
 static void nothing(struct harness *h)
 {
-    struct disc_scene scene = {.points = {.view = window(67, 45, 1, 60.0)}};
+    struct disc_scene scene = {.points = {.view = discs_window(67, 45, 1, 60.0)}};
     const uint64_t *keys = harness_read(h, discs_splat(h, &scene));
     for (size_t i = 0; i < (size_t)67 * 45; i++)
         HARNESS_CHECK(h, keys[i] == REF_EMPTY_KEY);
@@ -278,7 +261,7 @@ static void nothing(struct harness *h)
 // Reference alone: a disc that faces the view is a circle, and flatter the more it leans.
 static void sanity(struct harness *h)
 {
-    const struct view_args view = window(64, 64, 0, 10.0);
+    const struct view_args view = discs_window(64, 64, 0, 10.0);
     const struct chunk_view chunk = {.row = {10, 0, 0, 0, 10, 0, 0, 0, -1}, .hi = {48.5f, 40.5f, 0}, .count = 1, .padded = 1};
     const float p[3] = {0.0f, 0.0f, -2.0f};
     struct disc_args args = {.instance = {.has_normals = 1, .normal_matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1}}, .radius = 1.0f};

@@ -5,6 +5,7 @@
 #define PT_BINS_H
 
 #include "disc.h"
+#include "shade.h"
 
 #include <stdatomic.h>
 
@@ -164,12 +165,11 @@ typedef void pt_bin_work(void *context, uint32_t instance, const struct pt_discs
 // Asks for what the discs of a block are looked up by: colours lie in file order, each is a cache miss of its own.
 static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_block *block, uint32_t instance, int colors)
 {
-    static const uint32_t bytes[] = { 0, 3, 12, 0 }; // by color_format
     for (uint32_t i = 0; i < block->count && colors; i++) {
         const struct pt_disc_source source = pt_bin_source(bins, block->entries[i] >> PT_BIN_CHUNK_SHIFT, &instance);
         const char *color = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 5);
         const uint32_t slot = block->entries[i] & ((1u << PT_BIN_CHUNK_SHIFT) - 1);
-        __builtin_prefetch(color + (size_t)bytes[source.args->instance.color_format] * source.ids[slot]);
+        __builtin_prefetch(color + (size_t)pt_color_bytes[source.args->instance.color_format] * source.ids[slot]);
     }
 }
 

@@ -5,7 +5,6 @@
 // Tile by tile. The sums of a pixel lie side by side, one vector whatever the level; they are 32 bits wide and emptied into
 // 64 before they could overflow.
 #include "bins.h"
-#include "shade.h"
 
 typedef float vf_four __attribute__((vector_size(16))); // half of a vf_eight
 
