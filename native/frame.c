@@ -489,12 +489,9 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
                        pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, expected,
                        size);
-    for (size_t i = 0; pass == PATINA_PASS_SHADOW && frame->all_lit && i < size / sizeof *pixels; i++)
-        pixels[i] = 1.0f;
-    if (pass == PATINA_PASS_SHADOW && frame->all_lit)
-        return PATINA_OK;
-    if (pass == PATINA_PASS_LINE && !frame->has_lines) {
-        memset(pixels, 0, size);
+    if ((pass == PATINA_PASS_SHADOW && frame->all_lit) || (pass == PATINA_PASS_LINE && !frame->has_lines)) { // no plane
+        for (size_t i = 0; i < size / sizeof *pixels; i++)
+            pixels[i] = pass == PATINA_PASS_SHADOW ? 1.0f : 0.0f;
         return PATINA_OK;
     }
     int error = frame->device->ops->buffer_read(frame->device, &frame->planes[pass_table[pass].plane][0], 0, pixels, size);

@@ -9,35 +9,36 @@ struct span {
     double least, most;
 };
 
-static void widen(struct span *span, double value)
+struct spread {
+    const struct patina_scene *scene;
+    int distances; // of corners in the world; else heights
+    double axes[9], eye[3];
+    struct span span;
+};
+
+static void widen(void *context, const double corner[3])
 {
-    span->least = fmin(span->least, value);
-    span->most = fmax(span->most, value);
+    struct spread *spread = context;
+    double value = corner[2], away[3];
+    for (int k = 0; k < 3; k++)
+        away[k] = corner[k] - spread->eye[k];
+    if (spread->distances)
+        value = spread->scene->camera.orthographic ? -pt_dot(spread->axes + 6, away) : sqrt(pt_dot(away, away));
+    spread->span.least = fmin(spread->span.least, value);
+    spread->span.most = fmax(spread->span.most, value);
 }
 
 // Heights or distances of the corners of the cloud's chunks; of distances the least is 0 where the eye is among them.
 static struct span span_of_boxes(const struct patina_scene *scene, const struct pt_instance *instance)
 {
-    const struct patina_cloud *cloud = instance->cloud;
+    static const double as_it_is[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
     const enum patina_color_source source = instance->style.color_source;
-    struct span span = { INFINITY, -INFINITY };
-    double linear[9], translation[3], axes[9], eye[3], p[3], q[3];
-    pt_split_matrix(instance->style.world_from_object, linear, translation);
-    pt_camera_axes(&scene->camera, axes, eye);
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
-        for (int corner = 0; corner < 8; corner++) {
-            const struct pt_chunk *chunk = &cloud->chunks[c];
-            for (int k = 0; k < 3; k++)
-                p[k] = chunk->origin[k] + (double)(corner >> k & 1 ? chunk->box_max[k] : chunk->box_min[k]);
-            pt_apply(linear, p, q);
-            for (int k = 0; k < 3; k++)
-                q[k] += translation[k] - (source == PATINA_COLOR_DISTANCE ? eye[k] : 0.0);
-            if (source != PATINA_COLOR_DISTANCE)
-                widen(&span, source == PATINA_COLOR_HEIGHT ? q[2] : p[2]);
-            else
-                widen(&span, scene->camera.orthographic ? -pt_dot(axes + 6, q) : sqrt(pt_dot(q, q)));
-        }
-    return span;
+    const double *matrix = source == PATINA_COLOR_OBJECT_HEIGHT ? as_it_is : instance->style.world_from_object;
+    struct spread spread = { .scene = scene, .distances = source == PATINA_COLOR_DISTANCE, .span = { INFINITY, -INFINITY } };
+    pt_camera_axes(&scene->camera, spread.axes, spread.eye);
+    for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
+        pt_chunk_corners(&instance->cloud->chunks[c], matrix, widen, &spread);
+    return spread.span;
 }
 
 static struct span span_of(const struct patina_scene *scene, const struct pt_instance *instance)

@@ -34,36 +34,44 @@ static void plan_edl(struct pt_builder *builder, enum pt_plane color)
 
 // ---- ambient obscurance ------------------------------------------------------------------------------------------------
 
-// Of all clouds, world; lower > upper where there is no point.
-static void scene_box(const struct patina_scene *scene, double lower[3], double upper[3])
+struct box {
+    double lower[3], upper[3];
+};
+
+static void include(void *context, const double corner[3])
 {
+    struct box *box = context;
     for (int k = 0; k < 3; k++) {
-        lower[k] = INFINITY;
-        upper[k] = -INFINITY;
+        box->lower[k] = fmin(box->lower[k], corner[k]);
+        box->upper[k] = fmax(box->upper[k], corner[k]);
     }
+}
+
+// Of all clouds, world; lower > upper where there is no point.
+static struct box scene_box(const struct patina_scene *scene)
+{
+    struct box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const patina_cloud_info *info = &scene->instances[i].cloud->info;
-        double linear[9], translation[3], corner[3], moved[3];
-        pt_split_matrix(scene->instances[i].style.world_from_object, linear, translation);
-        for (int c = 0; c < 8 && info->drawn; c++) {
-            for (int k = 0; k < 3; k++)
-                corner[k] = c >> k & 1 ? info->box_max[k] : info->box_min[k];
-            pt_apply(linear, corner, moved);
-            for (int k = 0; k < 3; k++) {
-                lower[k] = fmin(lower[k], moved[k] + translation[k]);
-                upper[k] = fmax(upper[k], moved[k] + translation[k]);
-            }
-        }
+        if (info->drawn)
+            pt_box_corners(info->box_min, info->box_max, scene->instances[i].style.world_from_object, include, &box);
     }
+    return box;
+}
+
+static double diagonal_square(const struct box *box)
+{
+    double square = 0.0;
+    for (int k = 0; k < 3; k++)
+        square += (box->upper[k] - box->lower[k]) * (box->upper[k] - box->lower[k]);
+    return square;
 }
 
 // A 32nd of the diagonal of all clouds' boxes: the folds of a statue, the corners of a room.
 static double usual_radius(const struct patina_scene *scene)
 {
-    double lower[3], upper[3], square = 0.0;
-    scene_box(scene, lower, upper);
-    for (int k = 0; k < 3; k++)
-        square += (upper[k] - lower[k]) * (upper[k] - lower[k]);
+    const struct box box = scene_box(scene);
+    double square = diagonal_square(&box);
     return isfinite(square) && square > 0.0 ? sqrt(square) / 32.0 : 1.0;
 }
 
@@ -119,13 +127,11 @@ static void plan_toon(struct pt_builder *builder, enum pt_plane color)
 // ---- hatching ------------------------------------------------------------------------------------------------------------
 
 // A place near the scene's middle where planes of all spacings meet, along an axis: coordinates from there are small.
-static double anchor_of(const double lower[3], const double upper[3], const double axis[3])
+static double anchor_of(const struct box *box, const double axis[3])
 {
-    double middle[3], square = 0.0;
-    for (int k = 0; k < 3; k++) {
-        middle[k] = 0.5 * (lower[k] + upper[k]);
-        square += (upper[k] - lower[k]) * (upper[k] - lower[k]);
-    }
+    double middle[3], square = diagonal_square(box);
+    for (int k = 0; k < 3; k++)
+        middle[k] = 0.5 * (box->lower[k] + box->upper[k]);
     if (!(square > 0.0) || !isfinite(square))
         return 0.0;
     double grid = exp2(ceil(log2(sqrt(square))) + 1.0);
@@ -150,9 +156,9 @@ static void plan_hatch(struct pt_builder *builder, enum pt_plane color)
                               .width = 0.6f * effects->hatch_spacing,
                               .opacity = effects->hatch_opacity,
                               .ground = effects->hatch_ground};
-    double camera[9], position[3], lower[3], upper[3];
+    const struct box box = scene_box(scene);
+    double camera[9], position[3];
     pt_camera_axes(&scene->camera, camera, position);
-    scene_box(scene, lower, upper);
     for (int level = 0; level < PT_HATCH_LEVELS; level++) {
         double axis[3], view[3], length = sqrt(pt_dot(axes[level], axes[level]));
         for (int k = 0; k < 3; k++) {
@@ -162,7 +168,7 @@ static void plan_hatch(struct pt_builder *builder, enum pt_plane color)
         pt_apply(camera, axis, view);
         for (int k = 0; k < 3; k++)
             args.axes[3 * level + k] = (float)view[k];
-        args.offsets[level] = (float)(pt_dot(axis, position) - anchor_of(lower, upper, axis));
+        args.offsets[level] = (float)(pt_dot(axis, position) - anchor_of(&box, axis));
         args.tones[level] = tones[level];
     }
     PT_REASON(PT_ADD(builder, hatch, args, {pt_keys_of(builder, 0), pt_shading_of(builder), pt_plane_at(color, 0)}),
@@ -201,12 +207,8 @@ static int focuses(const struct patina_scene *scene)
 // Radius in pixels of the circle of confusion of what is infinitely far, in orthographic views of a world unit out of focus.
 static double focus_scale(const struct patina_scene *scene)
 {
-    const patina_camera *camera = &scene->camera;
     const patina_effects *effects = &scene->effects;
-    double width = fmax((camera->right - camera->left) / scene->settings.width,
-                        (camera->top - camera->bottom) /
-                            scene->settings.height); // of a pixel: at distance 1, or anywhere
-    return fmin(0.5 * (double)effects->focus_aperture / ((double)effects->focus_distance * width), 1e9);
+    return fmin(0.5 * (double)effects->focus_aperture / ((double)effects->focus_distance * pt_pixel_width(scene)), 1e9);
 }
 
 static double focus_most(const struct patina_scene *scene)

@@ -152,12 +152,12 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
         const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, room) : (struct pt_sieve){ .instance = instance };
         for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
             if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-                pt_box_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, &extent);
+                pt_chunk_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, &extent);
     }
     free(room);
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (meshes_cast(group) && pt_mesh_casts(&scene->meshes[i]))
-            pt_box_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, extend, &extent);
+            pt_chunk_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, extend, &extent);
     return extent;
 }
 

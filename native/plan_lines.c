@@ -33,19 +33,13 @@ static void find_depths(const struct patina_scene *scene, double *nearest, doubl
     *farthest = fmax(depths.farthest - from, *nearest);
 }
 
-static double footprint(const struct patina_scene *scene)
-{
-    const patina_camera *camera = &scene->camera;
-    return fmax((camera->right - camera->left) / scene->settings.width, (camera->top - camera->bottom) / scene->settings.height);
-}
-
 float pt_line_radius(const struct patina_scene *scene)
 {
     double width = (double)scene->lines.width, nearest, farthest;
     if (!scene->has_lines)
         return 0.0f;
     if (scene->lines.world) {
-        width /= footprint(scene);
+        width /= pt_pixel_width(scene);
         find_depths(scene, &nearest, &farthest);
         if (!scene->camera.orthographic)
             width /= nearest;

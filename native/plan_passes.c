@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "plan_passes.h"
 
+#include <math.h>
 #include <string.h>
 
 static void *copy(struct pt_builder *builder, const void *source, size_t size)
@@ -48,6 +49,12 @@ void pt_skip(struct pt_builder *builder, const char *name, const char *reason)
     struct pt_skipped *skipped = &builder->plan->skipped[builder->plan->skipped_count++];
     skipped->name = name;
     snprintf(skipped->reason, sizeof skipped->reason, "%s", reason);
+}
+
+double pt_pixel_width(const struct patina_scene *scene)
+{
+    const patina_camera *camera = &scene->camera;
+    return fmax((camera->right - camera->left) / scene->settings.width, (camera->top - camera->bottom) / scene->settings.height);
 }
 
 struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level)

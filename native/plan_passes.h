@@ -102,6 +102,8 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t instance);
 
 // ---- views -------------------------------------------------------------------------------------------------------------
 
+// Of a pixel of the full picture: at distance 1 in perspective, or anywhere; world units.
+double pt_pixel_width(const struct patina_scene *scene);
 struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level);
 // The instance's rectangle, wider by what filling may carry its points.
 struct view_args pt_view_of(const struct pt_plan *plan, const struct pt_plan_instance *instance, uint32_t margin);

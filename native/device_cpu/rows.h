@@ -33,6 +33,17 @@ static inline int pt_rows(const struct pt_cpu_call *call, const struct view_args
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
 
+// The same for the rows of a crop: y counts from its first.
+static inline int pt_crop_rows(const struct pt_cpu_call *call, const struct view_args *view, uint32_t width, uint32_t height,
+                               pt_row_work *work)
+{
+    struct view_args crop = *view;
+    crop.rect[0] = crop.rect[1] = 0;
+    crop.rect[2] = width;
+    crop.rect[3] = height;
+    return pt_rows(call, &crop, work);
+}
+
 static inline uint32_t pt_lanes_left(uint32_t x, uint32_t end) { return end - x < PT_LANES ? end - x : PT_LANES; }
 
 // Asks for the attributes, `size` bytes a point, of the next PT_LANES pixels from x on: they lie in file order, each is a

@@ -394,18 +394,28 @@ int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines)
 
 // ---- a camera that frames the scene -----------------------------------------------------------------------------------
 
-void pt_box_corners(const struct pt_chunk *box, const double matrix[16], pt_corner_work *work, void *context)
+void pt_box_corners(const double lower[3], const double upper[3], const double matrix[16], pt_corner_work *work, void *context)
 {
     double linear[9], translation[3], p[3], q[3];
     pt_split_matrix(matrix, linear, translation);
     for (int corner = 0; corner < 8; corner++) {
         for (int k = 0; k < 3; k++)
-            p[k] = box->origin[k] + (double)(corner >> k & 1 ? box->box_max[k] : box->box_min[k]);
+            p[k] = corner >> k & 1 ? upper[k] : lower[k];
         pt_apply(linear, p, q);
         for (int k = 0; k < 3; k++)
             q[k] += translation[k];
         work(context, q);
     }
+}
+
+void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_corner_work *work, void *context)
+{
+    double lower[3], upper[3];
+    for (int k = 0; k < 3; k++) {
+        lower[k] = chunk->origin[k] + (double)chunk->box_min[k];
+        upper[k] = chunk->origin[k] + (double)chunk->box_max[k];
+    }
+    pt_box_corners(lower, upper, matrix, work, context);
 }
 
 // PATINA_ERROR_MEMORY when there is none; without points, nothing is called back.
@@ -419,11 +429,11 @@ int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *contex
         struct pt_sieve sieve = pt_sieve_make(scene, &scene->instances[i], room);
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
             if (pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
-                pt_box_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
+                pt_chunk_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);
     }
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         if (pt_mesh_drawn(scene->meshes[i].mesh))
-            pt_box_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
+            pt_chunk_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
     free(room);
     return PATINA_OK;
 }

@@ -53,8 +53,9 @@ void pt_split_matrix(const double matrix[16], double linear[9], double translati
 // mesh's box; of chunks that clips cut away, nothing. PATINA_ERROR_MEMORY when there is none; without points, nothing is
 // called back.
 typedef void pt_corner_work(void *context, const double corner[3]);
-// The eight of a box, in the world.
-void pt_box_corners(const struct pt_chunk *box, const double matrix[16], pt_corner_work *work, void *context);
+// The eight of a box, moved by a matrix.
+void pt_box_corners(const double lower[3], const double upper[3], const double matrix[16], pt_corner_work *work, void *context);
+void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_corner_work *work, void *context);
 int pt_each_corner(const struct patina_scene *scene, pt_corner_work *work, void *context);
 
 #endif

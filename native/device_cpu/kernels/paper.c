@@ -49,9 +49,5 @@ static void paper_row(void *context, uint32_t y)
 int PT_KERNEL_ENTRY(paper)(const struct pt_cpu_call *call)
 {
     const struct paper_args *args = call->arguments;
-    struct view_args crop = args->view; // the rows of the crop
-    crop.rect[0] = crop.rect[1] = 0;
-    crop.rect[2] = args->crop_width;
-    crop.rect[3] = args->crop_height;
-    return pt_rows(call, &crop, paper_row);
+    return pt_crop_rows(call, &args->view, args->crop_width, args->crop_height, paper_row);
 }
