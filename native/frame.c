@@ -151,12 +151,12 @@ static int upload(struct render *render)
         if (error)
             return pt_fail_again(&render->frame->handle, error);
     }
-    for (uint32_t i = 0; i < plan->mesh_count && plan->triangles; i++)
-        if (pt_residency_take_mesh(&render->frame->residency, device, plan->meshes[i].instance->mesh, &render->meshes[i]))
-            return pt_fail_again(&render->frame->handle, PATINA_ERROR_MEMORY);
-    if (pt_clip_buffers_fill(device, plan, &render->frame->clips))
-        return pt_fail_again(&render->frame->handle, PATINA_ERROR_MEMORY);
-    return PATINA_OK;
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < plan->mesh_count && plan->triangles && !error; i++)
+        error = pt_residency_take_mesh(&render->frame->residency, device, plan->meshes[i].instance->mesh, &render->meshes[i]);
+    if (!error)
+        error = pt_clip_buffers_fill(device, plan, &render->frame->clips);
+    return error ? pt_fail_again(&render->frame->handle, error) : PATINA_OK;
 }
 
 static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *ref)
