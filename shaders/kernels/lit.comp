@@ -36,6 +36,17 @@ float farthest(view_args view, int column, int row)
     return most;
 }
 
+// Whether one of the texels around shows nothing.
+bool beside_nothing(view_args view, int column, int row)
+{
+    bool beside = false;
+    for (int y = row - 1; y <= row + 1; y++)
+        for (int x = column - 1; x <= column + 1; x++)
+            beside = beside || ((x != column || y != row) && on_map(view, x, y) &&
+                                pt_float(PT_KEY_EMPTY_Z) <= read_z(uint(y) * view.width + uint(x)));
+    return beside;
+}
+
 // Whether enough of the texels around shadow the point, too.
 bool supported(view_args view, int column, int row, float d, float z)
 {
@@ -97,7 +108,8 @@ bool in_shadow(view_args view, chunk_view chunk, uint at, uint id, out uint pixe
     if (!(until < z))
         return false;
     if (none) {
-        d = pt_max(d, read_deff(read_from(pixel)));
+        precise float steep = d * PT_SHADOW_STEEP;
+        d = pt_max(beside_nothing(view, column, row) ? steep : d, read_deff(read_from(pixel)));
         until = farthest(view, column, row) + d;
     }
     return until < z && supported(view, column, row, d, z);

@@ -87,6 +87,7 @@
 // lit: so many of the 8 texels around must shadow the point as well: one or two texels by themselves are a stray point, whose
 // shadow is a speck. A line of texels has them.
 #define PT_SHADOW_SUPPORT 2
+#define PT_SHADOW_STEEP 20.0f // 1 / C
 #define PT_STEEP 0.5f // normals
 
 // A window of pixels of the full picture, at a level of the pyramid (a pixel of level l is 2^l wide).
@@ -315,8 +316,10 @@ struct mark_args {
 
 // lit: points against the filled map of a light [D 6], SPEC 4. A point is in shadow if z > z_map + d_eff, d_eff of the point in
 // this view with a texel PT_TEXEL_SLACK wider. Without a normal, d_eff is at least that of the surface that the map shows there,
-// and z_map the greatest of the 3 x 3 texels around: no slope gives acne, and shadows end a texel early. z > z_map + d_eff
-// must hold at PT_SHADOW_SUPPORT of the 8 texels around, too.
+// and z_map the greatest of the 3 x 3 texels around: no slope gives acne, and shadows end a texel early. Where one of these
+// shows nothing, the surface ends within them, and no neighbour tells how far away its last points are: d_eff is then at least
+// PT_SHADOW_STEEP times the point's own, that of the steepest slope. z > z_map + d_eff must hold at PT_SHADOW_SUPPORT of the 8
+// texels around, too.
 // Points outside the window or before z_near are lit. With `faint` the caster's points have opacities of their own: the loss is
 // also in proportion to that of the point that the map shows.
 struct lit_args {

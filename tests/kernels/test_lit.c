@@ -243,6 +243,13 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_YES);
     keys[0] = ref_key(2.2f, 0); // one neighbour is farther
     HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    keys[0] = REF_EMPTY_KEY; // the surface ends there: 20 times 0.2
+    positions[32] = -5.95f;
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    positions[32] = -6.05f;
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_YES);
+    keys[0] = ref_key(2.2f, 0);
+    positions[32] = -2.55f;
     args.instance.has_normals = 1;
     surface = 4095u | 4095u << 13; // towards the light: 0.2
     for (int k = 0; k < 9; k += 4)
@@ -270,6 +277,8 @@ static void two_ways(struct harness *h)
         for (uint32_t normals = 0; normals < 2; normals++) {
             struct rng rng = {50};
             struct setup s = make(h, &rng, p, PICTURE_SURFACES);
+            for (int i = 0; i < 8; i++) // hardly a hole: without normals little is dark beside one
+                picture_invent(&s.map, &rng, 1.0, 5);
             struct ref_planes planes = picture_planes(&s.map);
             planes.surface = s.surface;
             s.args.instance.has_normals = normals;

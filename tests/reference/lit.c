@@ -50,6 +50,17 @@ static double farthest_around(const struct view_args *view, const uint64_t *keys
     return farthest;
 }
 
+// A surface ends beside texels that show nothing.
+static int beside_nothing(const struct view_args *view, const uint64_t *keys, int px, int py)
+{
+    int count = 0;
+    for (int y = py - 1; y <= py + 1; y++)
+        for (int x = px - 1; x <= px + 1; x++)
+            if (x >= 0 && y >= 0 && x < (int)view->width && y < (int)view->height)
+                count += keys[(size_t)y * view->width + (size_t)x] == REF_EMPTY_KEY;
+    return count > 0;
+}
+
 // Do enough of the texels around shadow a point at z with this d_eff?
 static enum ref_truth supported(const struct view_args *view, const uint64_t *keys, int px, int py, struct ref_range d,
                                 struct ref_range z)
@@ -92,6 +103,8 @@ enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *pla
             enum ref_truth before = ref_less_equal(place.z, ref_exactly(map));
             if (!has_normal && isfinite(map)) { // what the map shows there may be steeper, and as far as its neighbours
                 double shown = planes->deff[planes->from[pixel] & ~PT_FROM_MIXED];
+                if (beside_nothing(view, planes->keys, (int)px - view->origin_x, (int)py - view->origin_y))
+                    d = (struct ref_range){d.lo / (double)PT_COSINE_FLOOR, d.hi / (double)PT_COSINE_FLOOR};
                 d = (struct ref_range){fmax(d.lo, shown), fmax(d.hi, shown)};
                 map = farthest_around(view, planes->keys, (int)px - view->origin_x, (int)py - view->origin_y);
             }

@@ -10,23 +10,45 @@ struct lit {
     struct lit_args args; // with the wider texel
 };
 
-// 1. project: pixel and z; which lanes the map says something about.
-static vm project(const struct view_args *view, const float window[4], const struct chunk_view *chunk,
-                  const float *positions, uint32_t i, vf at[2], vf *z)
+// Points of a chunk that may be in shadow wait for their surface words, which are fetched meanwhile.
+enum { BLOCK = 8, QUEUE = BLOCK * PT_LANES };
+
+struct queue {
+    uint32_t count, slot[QUEUE + PT_LANES], id[QUEUE + PT_LANES];
+};
+
+// Where PT_LANES points fall: z, pixel and texel, and which of them lie behind what the map shows there by more than their
+// least d_eff.
+struct fall {
+    vf at[2], z, map;
+    vi column, row, texel;
+    vm behind;
+};
+
+// 1. project and compare.
+static struct fall fall_of(const struct lit *lit, const struct chunk_view *chunk, const vf p[3], vm lanes)
 {
-    vf px = vf_load(positions + i), py = vf_load(positions + chunk->padded + i);
-    vf pz = vf_load(positions + 2 * (size_t)chunk->padded + i);
-    *z = vf_transform(chunk, 2, px, py, pz);
-    at[0] = vf_transform(chunk, 0, px, py, pz);
-    at[1] = vf_transform(chunk, 1, px, py, pz);
+    const struct view_args *view = &lit->args.view;
+    const float *window = lit->args.window;
+    struct fall f = { .z = vf_transform(chunk, 2, p[0], p[1], p[2]) };
+    for (uint32_t k = 0; k < 2; k++)
+        f.at[k] = vf_transform(chunk, k, p[0], p[1], p[2]);
     if (view->perspective) {
-        vf r = vf_rcp(*z);
-        at[0] = at[0] * r;
-        at[1] = at[1] * r;
+        vf r = vf_rcp(f.z);
+        f.at[0] = f.at[0] * r;
+        f.at[1] = f.at[1] * r;
     }
-    vm inside = vm_and(vm_and(vf_le(vf_set(window[0]), at[0]), vf_lt(at[0], vf_set(window[2]))),
-                       vm_and(vf_le(vf_set(window[1]), at[1]), vf_lt(at[1], vf_set(window[3]))));
-    return vm_and(inside, vf_le(vf_set(view->z_near), *z));
+    vm inside = vm_and(vm_and(vf_le(vf_set(window[0]), f.at[0]), vf_lt(f.at[0], vf_set(window[2]))),
+                       vm_and(vf_le(vf_set(window[1]), f.at[1]), vf_lt(f.at[1], vf_set(window[3]))));
+    inside = vm_and(lanes, vm_and(inside, vf_le(vf_set(view->z_near), f.z)));
+    f.column = vi_sub(vf_int(vf_floor(f.at[0])), vi_set((uint32_t)view->origin_x));
+    f.row = vi_sub(vf_int(vf_floor(f.at[1])), vi_set((uint32_t)view->origin_y));
+    f.texel = vi_add(vi_mul(f.row, vi_set(view->width)), f.column);
+    f.map = vi_float(vi_gather_z(pt_cpu_data(lit->call, 0), f.texel, inside));
+    // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
+    vf least = vf_set(0.999f) * vf_layer_distance(view, lit->args.instance.d_min, vf_zero(), f.z, vf_set(1.0f));
+    f.behind = vm_and(inside, vf_lt(f.map + least, f.z));
+    return f;
 }
 
 // Depths of the map around those of PT_LANES texels, or 0 beyond its edge.
@@ -54,6 +76,15 @@ static vf farthest(const struct around *around, vf map)
     for (uint32_t i = 0; i < 8; i++)
         z = vf_select(vm_and(around->known[i], vf_lt(around->z[i], empty)), vf_max(z, around->z[i]), z);
     return z;
+}
+
+// Which of `lanes` have a texel around that shows nothing.
+static vm beside_nothing(const struct around *around, vm lanes)
+{
+    vm beside = vm_not(lanes);
+    for (uint32_t i = 0; i < 8; i++)
+        beside = vm_or(beside, vm_and(around->known[i], vf_le(vf_set(pt_float(PT_KEY_EMPTY_Z)), around->z[i])));
+    return vm_and(lanes, beside);
 }
 
 // Those of `dark` that enough of the texels around shadow, too.
@@ -87,38 +118,24 @@ static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm 
     return vf_layer_distance(view, instance->d_min, spacing, z, vf_select(*none, vf_set(1.0f), inverse));
 }
 
-// Which of PT_LANES points are in shadow; *texel: of the map, where they are.
-static uint32_t in_shadow(const struct lit *lit, const struct chunk_view *chunk, const float *positions, uint32_t i, vi id,
-                          vm lanes, vi *texel)
+// Which of PT_LANES points are in shadow.
+static uint32_t in_shadow(const struct lit *lit, const struct fall *f, vi id)
 {
-    const struct view_args *view = &lit->args.view;
-    const uint64_t *keys = pt_cpu_data(lit->call, 0);
-    const vi origin_x = vi_set((uint32_t)view->origin_x), origin_y = vi_set((uint32_t)view->origin_y);
     struct around around;
-    vf at[2], z;
-    vm inside = vm_and(lanes, project(view, lit->args.window, chunk, positions, i, at, &z)), none;
-    if (!vm_bits(inside))
-        return 0;
-    vi column = vi_sub(vf_int(vf_floor(at[0])), origin_x), row = vi_sub(vf_int(vf_floor(at[1])), origin_y);
-    vi pixel = *texel = vi_add(vi_mul(row, vi_set(view->width)), column);
-    vf map = vi_float(vi_gather_z(keys, pixel, inside));
-    // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
-    vf least = vf_set(0.999f) * vf_layer_distance(view, lit->args.instance.d_min, vf_zero(), z, vf_set(1.0f));
-    vm behind = vm_and(inside, vf_lt(map + least, z));
-    if (!vm_bits(behind))
-        return 0;
-    vf d = layer_distance(lit, at, z, id, behind, &none);
-    vm dark = vm_and(behind, vf_lt(map + d, z));
+    vm none;
+    vf d = layer_distance(lit, f->at, f->z, id, f->behind, &none);
+    vm dark = vm_and(f->behind, vf_lt(f->map + d, f->z));
     if (!vm_bits(dark))
         return 0;
-    look_around(view, keys, column, row, dark, &around);
+    look_around(&lit->args.view, pt_cpu_data(lit->call, 0), f->column, f->row, dark, &around);
     none = vm_and(none, dark);
     if (vm_bits(none)) {
-        vi source = vi_and(vi_gather(pt_cpu_data(lit->call, 1), pixel, none), vi_set(~PT_FROM_MIXED));
-        d = vf_select(none, vf_max(d, vf_gather(pt_cpu_data(lit->call, 2), source, none)), d);
-        dark = vm_and(dark, vf_lt(vf_select(none, farthest(&around, map), map) + d, z));
+        vi source = vi_and(vi_gather(pt_cpu_data(lit->call, 1), f->texel, none), vi_set(~PT_FROM_MIXED));
+        vf steep = vf_select(beside_nothing(&around, none), d * vf_set(PT_SHADOW_STEEP), d);
+        d = vf_select(none, vf_max(steep, vf_gather(pt_cpu_data(lit->call, 2), source, none)), d);
+        dark = vm_and(dark, vf_lt(vf_select(none, farthest(&around, f->map), f->map) + d, f->z));
     }
-    return vm_bits(supported(&around, d, z, dark));
+    return vm_bits(supported(&around, d, f->z, dark));
 }
 
 // a b / 255 of a, b up to 255, rounded: exact.
@@ -151,30 +168,78 @@ static inline uint32_t note(const struct lit_args *args, uint32_t *word, uint32_
     return 0;
 }
 
-static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
+// Where PT_LANES points of the chunk are, from slot i on.
+static void load_points(const float *positions, uint32_t padded, uint32_t i, vf p[3])
+{
+    for (uint32_t k = 0; k < 3; k++)
+        p[k] = vf_load(positions + k * (size_t)padded + i);
+}
+
+// Queues those of QUEUE slots from `first` on that have to be tested, or looked at in any case.
+static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, const float *positions, const uint32_t *ids,
+                       uint32_t first, struct queue *queue)
 {
     const struct lit_args *args = &lit->args;
+    const uint8_t *marks = pt_cpu_data(lit->call, 7);
+    const uint32_t *surface = pt_cpu_data(lit->call, 6);
+    vm lanes[BLOCK];
+    for (uint32_t k = 0; k < BLOCK; k++) { // a tight loop of its own: marks lie in file order
+        uint32_t i = first + k * PT_LANES;
+        lanes[k] = vm_first(i < chunk->count ? pt_lanes_left(i, chunk->count) : 0);
+        if (args->marked && i < chunk->count) {
+            vi mark = vi_and(vi_gather_bytes(marks, vi_load(ids + i), lanes[k]), vi_set(255));
+            lanes[k] = vm_and(lanes[k], vm_not(vi_eq(mark, vi_set(0))));
+        }
+    }
+    queue->count = 0;
+    for (uint32_t k = 0; k < BLOCK; k++) {
+        uint32_t i = first + k * PT_LANES, left = vm_bits(lanes[k]);
+        vf p[3];
+        if (left && !args->close && !args->compare) { // else lit points have to be looked at too
+            load_points(positions, chunk->padded, i, p);
+            left = vm_bits(fall_of(lit, chunk, p, lanes[k]).behind);
+        }
+        for (; left; left &= left - 1, queue->count++) {
+            uint32_t slot = i + (uint32_t)__builtin_ctz(left);
+            queue->slot[queue->count] = slot;
+            queue->id[queue->count] = ids[slot];
+            __builtin_prefetch(surface + ids[slot]);
+        }
+    }
+}
+
+// Tests PT_LANES queued points from `at` on.
+static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk, const float *positions,
+                           const struct queue *queue, uint32_t at)
+{
+    const struct lit_args *args = &lit->args;
+    uint32_t *words = (uint32_t *)pt_cpu_data(lit->call, 8) + args->base, texels[PT_LANES], differs = 0;
+    vm lanes = vm_first(queue->count - at < PT_LANES ? queue->count - at : PT_LANES);
+    vi slot = vi_load(queue->slot + at);
+    vf p[3];
+    for (uint32_t k = 0; k < 3; k++)
+        p[k] = vf_gather(positions + k * (size_t)chunk->padded, slot, lanes);
+    struct fall fall = fall_of(lit, chunk, p, lanes);
+    uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, vi_load(queue->id + at)) : 0;
+    uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed;
+    vi_store(texels, fall.texel, vm_first(PT_LANES));
+    for (; left; left &= left - 1) {
+        uint32_t k = (uint32_t)__builtin_ctz(left);
+        differs |= note(args, words + queue->id[at + k], shadowed >> k & 1u ? loss_at(lit, texels[k]) : 0);
+    }
+    return differs;
+}
+
+static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
+{
     const float *positions = (const float *)pt_cpu_data(lit->call, 4) + 3 * (size_t)chunk->first;
     const uint32_t *ids = (const uint32_t *)pt_cpu_data(lit->call, 5) + chunk->first;
-    const uint8_t *marks = pt_cpu_data(lit->call, 7);
-    uint32_t *words = (uint32_t *)pt_cpu_data(lit->call, 8) + args->base, differs = 0;
-    int all = args->close || args->compare; // lit points have to be looked at too
-    for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
-        vm lanes = vm_first(pt_lanes_left(i, chunk->count));
-        vi id = vi_load(ids + i);
-        if (args->marked) {
-            vi mark = vi_and(vi_gather_bytes(marks, id, lanes), vi_set(255));
-            lanes = vm_and(lanes, vm_not(vi_eq(mark, vi_set(0))));
-            if (!vm_bits(lanes))
-                continue;
-        }
-        vi texel = vi_set(0);
-        uint32_t shadowed = in_shadow(lit, chunk, positions, i, id, lanes, &texel), texels[PT_LANES];
-        vi_store(texels, texel, vm_first(PT_LANES));
-        for (uint32_t left = all ? vm_bits(lanes) : shadowed; left; left &= left - 1) {
-            uint32_t k = (uint32_t)__builtin_ctz(left);
-            differs |= note(args, words + ids[i + k], shadowed >> k & 1u ? loss_at(lit, texels[k]) : 0);
-        }
+    uint32_t differs = 0;
+    struct queue queue;
+    for (uint32_t first = 0; first < chunk->count; first += QUEUE) {
+        fill_queue(lit, chunk, positions, ids, first, &queue);
+        for (uint32_t at = 0; at < queue.count; at += PT_LANES)
+            differs |= lit_points(lit, chunk, positions, &queue, at);
     }
     return differs;
 }
