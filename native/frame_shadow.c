@@ -500,7 +500,13 @@ static int test_light(struct update *update, uint32_t index)
     struct pt_shadow_light *light = &frame->shadows.lights[index];
     struct pt_shadow_sums before = { 0 };
     uint32_t wanted = samples_wanted(update->scene, update->plan, index, light), done = light->samples;
-    int error = done || done == wanted ? PATINA_OK : clear_words(update, index);
+    double start = pt_milliseconds();
+    if (done == wanted)
+        return PATINA_OK;
+    int error = pt_plan_light_map(update->scene, update->plan, index);
+    pt_frame_note_time(frame, "light map", pt_milliseconds() - start);
+    if (!error && !done)
+        error = clear_words(update, index);
     if (!error && done < wanted && measures_at(update, index, done))
         error = measure_error(update, index, &before);
     if (!done)
@@ -578,10 +584,11 @@ int pt_shadows_bake(struct patina_frame *frame, const struct patina_scene *scene
     struct patina_scene whole = *scene; // its handle is not touched
     struct pt_plan plan = { 0 };
     whole.settings.shadow_lazy = whole.settings.shadow_progressive = 0;
-    int error = pt_plan_lights(&whole, &plan);
+    int error = PATINA_OK;
+    pt_plan_lights(&whole, &plan);
     frame->timing_count = 0;
     frame->shadow_maps = 0;
-    if (!error && (!plan.light_count || !scene->instance_count))
+    if (!plan.light_count || !scene->instance_count)
         error = pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "shadows: no light of the scene casts any, or there is no cloud");
     if (!error)
         error = pt_shadows_open(frame, &whole, &plan);

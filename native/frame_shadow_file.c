@@ -289,11 +289,8 @@ int pt_shadows_load(struct patina_frame *frame, const struct patina_scene *scene
     if (!data)
         return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be read", path);
     struct reader reader = { .frame = frame, .path = path, .at = data, .end = data + size };
-    int error = pt_plan_lights(scene, &plan);
-    if (error)
-        pt_fail_again(&frame->handle, error);
-    if (!error)
-        error = check_header(&reader, scene, &plan);
+    pt_plan_lights(scene, &plan);
+    int error = check_header(&reader, scene, &plan);
     if (!error)
         error = take_textures(&reader, frame, scene, &plan);
     pt_plan_destroy(&plan);

@@ -586,7 +586,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has no camera");
     int error = pt_plan_view(scene, plan);
     if (!error && pt_plan_shows(plan) && !no_shadows(scene))
-        error = pt_plan_lights(scene, plan);
+        pt_plan_lights(scene, plan);
     if (!error) {
         if (pt_plan_shows(plan))
             plan_points(&builder);

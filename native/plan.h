@@ -104,6 +104,7 @@ struct pt_bounds {
 struct pt_plan_light {
     const patina_light_desc *light;
     uint32_t samples;  // wanted
+    // pt_plan_light_map
     uint32_t cube;     // six maps a sample instead of one
     uint32_t capped;   // its texels are wider than the points' spacing asks for
     double texel;      // width of a texel: at distance 1, or of suns anywhere
@@ -178,6 +179,8 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
 
 // plan_view.c: how the camera sees the scene.
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
+// No more than the spacings on screen.
+int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
 // How far, in pixels, the effects of a picture carry influence. (plan_effects.c)
 uint32_t pt_effects_reach(const struct patina_scene *scene);
 // Every chunk of the instance as the plan's view sees it, inside or outside; nothing is culled.
@@ -205,8 +208,10 @@ void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_inst
 // behind: only of what lies behind the limit plane.
 int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behind);
 
-// Lists plan->lights, with what their maps are like.
-int pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
+// Lists plan->lights.
+void pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
+// What the maps of light i are like, and its reason: before they are drawn or told of. Lights whose textures are kept need none.
+int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i);
 int pt_receives(const struct pt_instance *instance); // shadows, at all
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
 // Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late. Not

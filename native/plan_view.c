@@ -629,28 +629,42 @@ static void place_mesh(struct pt_plan *plan, const struct camera *camera, const 
     plan->triangles += mesh->info.triangle_count;
 }
 
+// What the whole picture sees decides spacing, levels, guard: a region must decide alike. 160 covers any guard.
+static int look_around(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
+{
+    plan->instance_count = scene->instance_count;
+    survey->objects = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->objects);
+    survey->seen = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->seen);
+    survey->seen_count = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->seen_count);
+    survey->sieves = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->sieves);
+    if (!survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
+        return PATINA_ERROR_MEMORY;
+    int error = set_camera(scene, &survey->camera);
+    const struct camera bare = survey->camera;
+    pad_camera(&survey->camera, 160);
+    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
+        error = look_at_instance(scene, plan, survey, i);
+    survey->camera = bare;
+    return error ? error : spacing_on_screen(plan, survey);
+}
+
+int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
+{
+    struct survey survey = { 0 };
+    return look_around(scene, plan, &survey);
+}
+
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = { 0 };
-    plan->instance_count = scene->instance_count;
     plan->instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *plan->instances);
-    survey.objects = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.objects);
-    survey.seen = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.seen);
-    survey.seen_count = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.seen_count);
     plan->mesh_count = scene->mesh_count;
     plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
-    survey.sieves = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey.sieves);
-    if (!plan->instances || !plan->meshes || !survey.sieves || !survey.objects || !survey.seen || !survey.seen_count)
+    if (!plan->instances || !plan->meshes)
         return PATINA_ERROR_MEMORY;
-    int error = set_camera(scene, &survey.camera);
+    // 1. Spacings.
+    int error = look_around(scene, plan, &survey);
     if (error)
-        return error;
-    // 1. What the whole picture sees decides spacing, levels, guard: a region must decide alike. 160 covers any guard.
-    struct camera bare = survey.camera;
-    pad_camera(&survey.camera, 160);
-    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
-        error = look_at_instance(scene, plan, &survey, i);
-    if (error || (error = spacing_on_screen(plan, &survey)))
         return error;
     choose_filling(&scene->settings, plan);
     choose_layers(&scene->settings, plan);
@@ -661,7 +675,6 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     uint32_t guard = round_up(8 + 4 * cell + pt_line_reach(plan), cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
-    survey.camera = bare;
     pad_camera(&survey.camera, guard);
     set_view(&survey.camera, &plan->view);
     choose_window(scene, plan, guard);
