@@ -46,6 +46,7 @@ void pt_shadows_release(struct patina_frame *frame)
         for (int level = 0; level < PT_SLOTS; level++)
             frame->device->ops->buffer_destroy(frame->device, &shadows->planes[p][level]);
     frame->device->ops->buffer_destroy(frame->device, &shadows->differs);
+    frame->device->ops->buffer_destroy(frame->device, &shadows->some);
     pt_clip_buffers_release(frame->device, &shadows->clips);
 }
 
@@ -185,41 +186,39 @@ static uint32_t maps_of(const struct update *update, const struct pt_plan_light 
     return planned->cube ? 6 * count : count;
 }
 
-// Where a pass of a map finds its buffer. NULL: cannot be had, the message is at the frame.
-static struct pt_buffer *map_buffer(struct update *update, const struct pt_plan *map, struct pt_buffer *chunks,
-                                    const struct pt_ref *ref)
+// Where a pass of a map finds its buffer.
+static int map_buffer(struct update *update, const struct pt_plan *map, struct pt_buffer *chunks, const struct pt_ref *ref,
+                      struct pt_buffer **out)
 {
     struct patina_frame *frame = update->frame;
-    struct pt_resident *resident;
-    if (ref->of == PT_OF_FRAME)
-        return pt_frame_ensure_plane(frame, frame->shadows.planes, map, ref->which, ref->index)
-                   ? NULL
-                   : &frame->shadows.planes[ref->which][ref->index];
-    if (ref->of == PT_OF_MESH) {
-        if (pt_residency_take_mesh(&frame->residency, frame->device, map->meshes[ref->index].instance->mesh, &resident)) {
-            pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY);
-            return NULL;
-        }
-        return &resident->buffers[ref->which];
+    struct pt_resident *resident = NULL;
+    int error = PATINA_OK;
+    if (ref->of == PT_OF_FRAME) {
+        *out = &frame->shadows.planes[ref->which][ref->index];
+        return pt_frame_ensure_plane(frame, frame->shadows.planes, map, ref->which, ref->index);
     }
-    if (ref->which == PT_CHUNKS)
-        return &chunks[ref->index];
-    if (ref->which == PT_CLIPS || ref->which == PT_DRAWN)
-        return pt_clip_buffer(&frame->shadows.clips, ref->which);
-    if (pt_residency_take(&frame->residency, frame->device, map->instances[ref->index].instance->cloud, &resident)) {
-        pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY);
-        return NULL;
-    }
-    return &resident->buffers[ref->which];
+    if (ref->of == PT_OF_INSTANCE && ref->which == PT_CHUNKS)
+        *out = &chunks[ref->index];
+    else if (ref->of == PT_OF_INSTANCE && (ref->which == PT_CLIPS || ref->which == PT_DRAWN))
+        *out = pt_clip_buffer(&frame->shadows.clips, ref->which);
+    else if (ref->of == PT_OF_MESH)
+        error = pt_residency_take_mesh(&frame->residency, frame->device, map->meshes[ref->index].instance->mesh, &resident);
+    else
+        error = pt_residency_take(&frame->residency, frame->device, map->instances[ref->index].instance->cloud, &resident);
+    if (!error && resident)
+        *out = &resident->buffers[ref->which];
+    return error;
 }
 
 static int run_map_pass(struct update *update, const struct pt_plan *map, struct pt_buffer *chunks, struct pt_buffer **bound,
                         const struct pt_pass *pass)
 {
     struct patina_frame *frame = update->frame;
-    for (uint32_t i = 0; i < pass->ref_count; i++)
-        if (!(bound[i] = map_buffer(update, map, chunks, &pass->refs[i])))
-            return PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < pass->ref_count; i++) {
+        int error = map_buffer(update, map, chunks, &pass->refs[i], &bound[i]);
+        if (error)
+            return error;
+    }
     return frame->device->ops->run(frame->device, pass->kernel, pass->arguments, pass->argument_size, bound,
                                    pass->ref_count, &frame->cancel);
 }
@@ -329,47 +328,37 @@ static int take_caster(struct update *update, const struct pt_shadow_group *grou
 }
 
 // Sets the limit behind which the next layer of a faint caster lies, where the light is not spent. *some: it is not everywhere.
-static int limit_map(struct update *update, const struct pt_plan *map, const struct pt_shadow_group *group, int *some)
+static int limit_map(struct update *update, const struct pt_plan *map, const struct pt_shadow_group *group, uint32_t *some)
 {
-    const struct pt_device_ops *ops = update->frame->device->ops;
-    struct pt_buffer(*planes)[PT_SLOTS] = update->frame->shadows.planes;
-    const struct pt_instance *caster = &update->scene->instances[group->only];
-    size_t count = (size_t)map->view.width * map->view.height;
-    uint64_t *keys = malloc(count * sizeof *keys);
-    uint32_t *from = malloc(count * sizeof *from);
-    float *deff = malloc(count * sizeof *deff), *limit = malloc(count * sizeof *limit);
-    int error = keys && from && deff && limit ? pt_frame_ensure_plane(update->frame, planes, map, PT_PLANE_LIMIT, 0)
-                                              : pt_fail(&update->frame->device->handle, PATINA_ERROR_MEMORY, "a light's map: out of memory");
-    if (!error && (ops->buffer_read(update->frame->device, &planes[PT_PLANE_KEYS][0], 0, keys, count * sizeof *keys) ||
-                   ops->buffer_read(update->frame->device, &planes[PT_PLANE_FROM][0], 0, from, count * sizeof *from) ||
-                   ops->buffer_read(update->frame->device, &planes[PT_PLANE_DEFF][0], 0, deff, count * sizeof *deff)))
-        error = PATINA_ERROR_DEVICE;
-    *some = 0;
-    for (size_t i = 0; i < count && !error; i++) {
-        uint32_t id = (uint32_t)keys[i] - caster->id_base, bits = (uint32_t)(keys[i] >> 32);
-        int ended = bits == PT_KEY_EMPTY_Z || (group->loss == 255 && caster->cloud->opacities[id] == 255);
-        float z;
-        memcpy(&z, &bits, sizeof z);
-        limit[i] = ended ? INFINITY : z + deff[from[i] & ~PT_FROM_MIXED];
-        *some |= !ended;
-    }
+    struct patina_frame *frame = update->frame;
+    const struct pt_device_ops *ops = frame->device->ops;
+    struct pt_buffer(*planes)[PT_SLOTS] = frame->shadows.planes;
+    struct pt_resident *resident;
+    struct limit_args args = { .view = map->view, .caster = update->scene->instances[group->only].id_base, .loss = group->loss };
+    const uint32_t whole[4] = { 0, 0, map->view.width, map->view.height };
+    memcpy(args.view.rect, whole, sizeof whole);
+    int error = pt_frame_ensure_plane(frame, planes, map, PT_PLANE_LIMIT, 0);
     if (!error)
-        error = ops->buffer_write(update->frame->device, &planes[PT_PLANE_LIMIT][0], 0, limit, count * sizeof *limit);
-    free(keys);
-    free(from);
-    free(deff);
-    free(limit);
-    return error;
+        error = pt_residency_take(&frame->residency, frame->device, update->scene->instances[group->only].cloud, &resident);
+    *some = 0;
+    if (!error)
+        error = ops->buffer_write(frame->device, &frame->shadows.some, 0, some, sizeof *some);
+    if (error)
+        return error;
+    struct pt_buffer *const bound[] = { &planes[PT_PLANE_KEYS][0], &planes[PT_PLANE_FROM][0], &planes[PT_PLANE_DEFF][0],
+                                        &resident->buffers[PT_OPACITIES], &planes[PT_PLANE_LIMIT][0], &frame->shadows.some };
+    error = ops->run(frame->device, PT_KERNEL_limit, &args, sizeof args, bound, sizeof bound / sizeof *bound, &frame->cancel);
+    return error ? error : ops->buffer_read(frame->device, &frame->shadows.some, 0, some, sizeof *some);
 }
 
 // One layer of a map: drawn, and everyone tested whom it concerns. args->base: the light's place. *some: there may be one behind.
 static int test_layer(struct update *update, const struct pt_plan_light *planned, const struct pt_shadow_group *group,
-                      const struct patina_scene *view, const double window[4], int *some, struct lit_args *args)
+                      const struct patina_scene *view, const double window[4], uint32_t *some, struct lit_args *args)
 {
     struct patina_frame *frame = update->frame;
     struct pt_plan map = { 0 };
     double start = pt_milliseconds(), drawn;
-    int error = pt_plan_map(view, &map, *some);
+    int error = pt_plan_map(view, &map, *some != 0);
     *some = 0;
     if (!error && pt_plan_shows(&map))
         error = draw_map(update, &map);
@@ -400,7 +389,8 @@ static int test_map(struct update *update, const struct pt_plan_light *planned, 
 {
     struct patina_scene view = { 0 };
     double window[4];
-    int some = 0, error = take_caster(update, group, args);
+    uint32_t some = 0;
+    int error = take_caster(update, group, args);
     if (error || !pt_light_scene(update->scene, planned, group, sample, face, update->instances, update->meshes, &view, window))
         return error;
     pt_handle_init(&view.handle);
@@ -568,6 +558,8 @@ int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *sce
             update.group_count = pt_shadow_groups(scene, update.groups);
         if (!error && !frame->shadows.differs.size)
             error = ops->buffer_create(frame->device, sizeof(uint32_t), NULL, 0, &frame->shadows.differs);
+        if (!error && !frame->shadows.some.size)
+            error = ops->buffer_create(frame->device, sizeof(uint32_t), NULL, 0, &frame->shadows.some);
         for (uint32_t i = 0; i < plan->light_count && !error; i++)
             error = test_light(&update, i);
         free(update.groups);

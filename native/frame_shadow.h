@@ -24,7 +24,7 @@ struct pt_shadows {
     uint32_t instance_count;
     struct pt_shadow_light lights[PT_MAX_LIGHTS]; // in the plan's order
     uint32_t light_count;
-    struct pt_buffer differs; // one word
+    struct pt_buffer differs, some; // one word each: see lit, limit
     struct pt_clip_buffers clips; // of the map at hand
 };
 

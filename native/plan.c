@@ -425,6 +425,8 @@ static void plan_marks(struct pt_builder *builder)
                                    : "whole shadow textures, to be kept");
     if (none)
         pt_skip(builder, "lit", none);
+    if (none || !pt_casts_in_layers(builder->scene))
+        pt_skip(builder, "limit", none ? none : "the points of no cloud that casts have opacities of their own");
     for (uint32_t i = 0; i < plan->instance_count && !none && lazy; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count || !pt_receives(instance->instance))
@@ -549,7 +551,7 @@ static void plan_points(struct pt_builder *builder)
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    static const char *const others[] = {"raster", "cover",  "mark",  "lit", "shade",     "obscure", "edl",
+    static const char *const others[] = {"raster", "cover",  "mark",  "lit", "limit", "shade",     "obscure", "edl",
                                          "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel",
                                          "lines",  "ink"};
     builder->plan->light_count = 0;

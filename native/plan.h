@@ -214,6 +214,7 @@ void pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
 int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i);
 int pt_receives(const struct pt_instance *instance); // shadows, at all
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
+int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: its points have opacities of their own
 // Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late. Not
 // with an error target: a part of the picture would stop at other samples than the whole.
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);

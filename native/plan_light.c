@@ -63,6 +63,20 @@ static int opaque(const struct pt_instance *instance)
     return casts(instance) && loss_of(instance) == 255 && !instance->cloud->info.has_opacities;
 }
 
+// Layer behind layer, for its points have opacities of their own.
+static int in_layers(const struct pt_instance *instance)
+{
+    return casts(instance) && loss_of(instance) && instance->cloud->info.has_opacities;
+}
+
+int pt_casts_in_layers(const struct patina_scene *scene)
+{
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (in_layers(&scene->instances[i]))
+            return 1;
+    return 0;
+}
+
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups)
 {
     uint32_t count = 0, casters = 0;
@@ -77,8 +91,7 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
         if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
             groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, i, 255, 0 };
         if (casts(instance) && loss_of(instance) && !opaque(instance))
-            groups[count++] = (struct pt_shadow_group){ i, PT_NO_INSTANCE, loss_of(instance),
-                                                        instance->cloud->info.has_opacities != 0 };
+            groups[count++] = (struct pt_shadow_group){ i, PT_NO_INSTANCE, loss_of(instance), in_layers(instance) };
     }
     return count;
 }

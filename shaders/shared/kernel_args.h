@@ -336,6 +336,14 @@ struct lit_args {
     uint32_t faint, caster; // caster: first id of the only cloud that casts
 };
 
+// limit: what a map's next layer sees lies beyond z + deff[from]; +inf (nothing does) where the map is empty, or the point that it
+// shows takes all light: opacity and loss are 255.
+struct limit_args {
+    struct view_args view;
+    uint32_t caster; // first id of the only cloud that casts
+    uint32_t loss;   // as in lit_args
+};
+
 // smooth: 3 x 3 low-pass over non-background neighbours of the same layer. [D 3.4]
 struct smooth_args {
     struct view_args view;

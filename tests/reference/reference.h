@@ -211,6 +211,9 @@ int ref_fill(const struct fill_args *args, const float *normal, const float *def
 // Does the picture show the point `id` of the instance somewhere in its rectangle?
 int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint32_t id);
 
+// Exact. planes: of the light's map, with the caster's opacities.
+float ref_limit(const struct limit_args *args, const struct ref_planes *planes, int x, int y);
+
 // Is the point of this slot in shadow? planes: of the light's map.
 enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
                        const float *positions, const uint32_t *ids, uint32_t slot);

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// limit: from where on a light's next map of a faint caster sees its points [D 6]; twin of shaders/kernels/limit.comp
+#include "device_cpu/rows.h"
+
+static void limit_row(void *context, uint32_t y)
+{
+    const struct pt_cpu_call *call = context;
+    const struct limit_args *args = call->arguments;
+    const uint32_t *rect = args->view.rect;
+    const size_t row = (size_t)y * args->view.width;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
+    const uint32_t *from = (const uint32_t *)pt_cpu_data(call, 1) + row;
+    float *limit = (float *)pt_cpu_data(call, 4) + row;
+    const vf finished = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    uint32_t any = 0;
+    for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
+        vm lanes = vm_first(pt_lanes_left(x, rect[2]));
+        vf z = vi_float(vi_load_z(keys + x)), next = finished;
+        vm some = vm_and(lanes, vf_lt(z, finished));
+        if (args->loss == 255 && vm_bits(some)) {
+            vi id = vi_sub(vi_load_id(keys + x), vi_set(args->caster));
+            vi opacity = vi_and(vi_gather_bytes(pt_cpu_data(call, 3), id, some), vi_set(255));
+            some = vm_and(some, vm_not(vi_eq(opacity, vi_set(255))));
+        }
+        if (vm_bits(some)) {
+            vi source = vi_and(vi_load(from + x), vi_set(~PT_FROM_MIXED));
+            next = vf_select(some, z + vf_gather(pt_cpu_data(call, 2), source, some), finished);
+        }
+        vf_store(limit + x, next, lanes);
+        any |= vm_bits(some);
+    }
+    if (any)
+        __atomic_store_n((uint32_t *)pt_cpu_data(call, 5), 1, __ATOMIC_RELAXED);
+}
+
+int PT_KERNEL_ENTRY(limit)(const struct pt_cpu_call *call)
+{
+    const struct limit_args *args = call->arguments;
+    return pt_rows(call, &args->view, limit_row);
+}
