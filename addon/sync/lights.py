@@ -11,8 +11,8 @@ from mathutils import Matrix, Vector
 
 TYPES = {'SUN': 1, 'POINT': 2, 'SPOT': 3, 'AREA': 4}  # patina_light_type
 MOST = 32  # lights of a scene in the library
-# Of an area light's power Cycles radiates pi / 4 in Blender 3.4, all of it in 4.5 and 5.0: measured.
-AREA_SHARE = math.pi / 4 if bpy.app.version < (4, 5, 0) else 1.0
+# Of an area light's power Cycles radiates pi / 4 in Blender 3.4, all of it in 4.2, 4.5 and 5.0: measured.
+AREA_SHARE = math.pi / 4 if bpy.app.version < (4, 2, 0) else 1.0
 SMALLEST = 1e-6  # stands for zero where zero would mean "default" to the library
 
 

@@ -119,7 +119,7 @@ def test_area():
     place = np.array((3.0, 2.0, 6.0))
     toward = place - POINT
     distance = np.linalg.norm(toward)
-    share = np.pi / 4 if bpy.app.version < (4, 5, 0) else 1.0
+    share = np.pi / 4 if bpy.app.version < (4, 2, 0) else 1.0
     for shape, size in (('SQUARE', 0.2), ('DISK', 0.3), ('RECTANGLE', 0.1)):
         scene = lit_point()
         light = add_light('AREA', 500.0, place, direction=(0, 0, -1)).data
@@ -161,7 +161,7 @@ def test_like_cycles():
     bpy.ops.mesh.primitive_plane_add(size=6, location=(0, 0, -5))
     wall = bpy.context.object
     wall.data.materials.append(matt(0.8))
-    spots = {} if bpy.app.version < (4, 5, 0) else {'SPOT': dict(spot_size=1.2, spot_blend=0.5, shadow_soft_size=0.01)}
+    spots = {} if bpy.app.version < (4, 2, 0) else {'SPOT': dict(spot_size=1.2, spot_blend=0.5, shadow_soft_size=0.01)}
     lights = {'SUN': dict(angle=0.1), 'POINT': dict(shadow_soft_size=0.1), 'AREA': dict(shape='DISK', size=1.0), **spots}
     for kind, properties in lights.items():
         obj = add_light(kind, 2.0 if kind == 'SUN' else 100.0, (0.5, 0.3, -2.5), direction=(-0.3, 0.2, -1))
