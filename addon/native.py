@@ -15,7 +15,7 @@ import os
 import sys
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_double, c_float, c_int
 from ctypes import c_size_t, c_uint32, c_uint64, c_void_p, sizeof
 from pathlib import Path
@@ -182,6 +182,10 @@ class _Lines(_Descriptor):
                 ("transparency", c_float), ("soft", c_float), ("surface", c_uint32), ("paper", c_float * 3)]
 
 
+class _Read(Structure):
+    _fields_ = [("pass_", c_uint32), ("pixels", c_void_p), ("size", c_size_t)]
+
+
 class _ExpectedError(Structure):
     _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float)]
 
@@ -259,8 +263,7 @@ _CALLS = {
     "patina_panorama_camera": (POINTER(_Panorama), c_uint32, POINTER(_Camera), POINTER(c_uint32)),
     "patina_panorama_join": (POINTER(_Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
     "patina_panorama_join_keys": (POINTER(_Panorama), c_void_p * 6, c_void_p, c_size_t),
-    "patina_task_render": (c_void_p, c_void_p, _OUT),
-    "patina_task_read": (c_void_p, c_uint32, c_void_p, c_size_t, _OUT),
+    "patina_task_render": (c_void_p, c_void_p, c_void_p, c_uint32, _OUT),
     "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_task_set_colors": (c_void_p, POINTER(_Array), _OUT),
     "patina_task_fingerprint": (POINTER(_CloudDesc), POINTER(c_uint64), _OUT),
@@ -665,9 +668,13 @@ class Frame(_Handle):
         _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
                self._device._handle)
 
-    def start(self, scene: Scene) -> Task:
-        """render() as a task."""
-        return Task("render", self._handle, scene._handle, keep=(self, self._device, scene))
+    def start(self, scene: Scene, planes: Iterable[str], height: int, width: int) -> Task:
+        """A task that renders, and gives these planes of the picture as read() would. Its size: of the scene's region."""
+        pixels = [np.empty((height, width, PLANES[plane][1]), np.float32) for plane in planes]
+        reads = (_Read * len(pixels))(*(_Read(PLANES[plane][0], values.ctypes.data, values.nbytes)
+                                        for plane, values in zip(planes, pixels, strict=True)))
+        return Task("render", self._handle, scene._handle, reads, len(reads), keep=(self, self._device, scene, reads, pixels),
+                    finish=lambda task: pixels)
 
     def bake_shadows(self, scene: Scene) -> None:
         """Whole shadow textures of the scene's casting lights, without a picture."""
@@ -704,14 +711,6 @@ class Frame(_Handle):
         else:
             self._call("read", number, pixels.ctypes.data, pixels.nbytes)
         return pixels
-
-    def start_read(self, plane: str) -> Task:
-        """read() of a plane of the picture as a task."""
-        number, channels = PLANES[plane]
-        stats = self.stats()
-        pixels = np.empty((stats["height"], stats["width"], channels), np.float32)
-        return Task("read", self._handle, number, pixels.ctypes.data, pixels.nbytes, keep=(self, self._device, pixels),
-                    finish=lambda task: pixels)
 
     def read_keys(self) -> np.ndarray:
         """What each pixel shows, (height, width, 1) uint64: float bits of z << 32 | id."""

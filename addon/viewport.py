@@ -96,7 +96,7 @@ class Viewport:
         self._closed = False
         self._news = False
         self._frame: tuple[native.Device, native.Frame] | None = None
-        self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture] | None = None
+        self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
         _VIEWPORTS.add(self)
 
     def update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
@@ -192,8 +192,11 @@ class Viewport:
         return f"{self.shown.stats['points']:,} points, {self.shown.stats['ms']:.0f} ms, {self.shown.device}"
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
+        overlays = context.space_data.overlay.show_overlays
         if self._drawn is None or self._drawn[0] is not self.shown:
-            self._drawn = (self.shown, *_upload(self.shown))
+            self._drawn = (self.shown, _upload(self.shown), None)
+        if overlays and self._drawn[2] is None:
+            self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.depth), 'R32F'))
         shown, color, depth = self._drawn
         projection = context.region_data.window_matrix
         camera = shown.wish.view.camera
@@ -205,13 +208,11 @@ class Viewport:
         state = gpu.state
         shader.bind()
         shader.uniform_sampler("picture", color)
-        shader.uniform_sampler("depths", depth)
+        shader.uniform_sampler("depths", depth or color)  # any will do where it is not looked at
         shader.uniform_float("projection", (projection[2][2], projection[2][3], near, camera.orthographic))
         shader.uniform_float("cover", 4.0 * shown.pixel)
         # the colour over everything, the depth where nothing of Blender's is nearer, so that overlays are hidden rightly
-        for colors, test in ((True, 'ALWAYS'), (False, 'LESS_EQUAL')):
-            if not colors and not context.space_data.overlay.show_overlays:
-                break
+        for colors, test in ((True, 'NONE'), (False, 'LESS_EQUAL'))[:1 + overlays]:
             state.blend_set('ALPHA_PREMULT' if colors else 'NONE')
             state.color_mask_set(colors, colors, colors, colors)
             state.depth_test_set(test)
@@ -299,22 +300,18 @@ class Viewport:
         frame = self._frame[1]
         with native.Scene() as scene:
             render.describe(scene, description, ["DEPTH"])
-            task = frame.start(scene)
+            settings = description.settings
+            x0, y0, x1, y1 = settings.region
+            task = frame.start(scene, ("COMBINED", "DEPTH"), y1 - y0, x1 - x0)
             self._rendering = True
             try:
                 yield task
-                task.result()
+                planes = task.result()
             finally:
                 self._rendering = False
-        planes = []
-        for plane in ("COMBINED", "DEPTH"):
-            task = frame.start_read(plane)
-            yield task
-            planes.append(task.result())
-        settings, stats, passes = description.settings, frame.stats(), frame.pass_stats()
+        stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
-        x0, y0, x1, y1 = settings.region
         return Shown(wish, description.clouds, *planes,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
@@ -378,10 +375,9 @@ def _redraw_panels(area_pointer: int) -> None:
                         region.tag_redraw()
 
 
-def _upload(shown: Shown) -> tuple[gpu.types.GPUTexture, gpu.types.GPUTexture]:
-    """Colour, and the depth that overlays hide behind."""
+def _upload(shown: Shown) -> gpu.types.GPUTexture:
     np.minimum(shown.color, LARGEST, out=shown.color)
-    return _texture(shown.color, 'RGBA16F'), _texture(_covering(shown.depth), 'R32F')
+    return _texture(shown.color, 'RGBA16F')
 
 
 def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:

@@ -21,9 +21,8 @@ struct patina_task {
     patina_array color;
     patina_progress *progress;
     uint64_t *fingerprint;
-    uint32_t pass;
-    float *pixels;
-    size_t size; // of them
+    const patina_read *reads;
+    uint32_t read_count;
     patina_cloud *painted; // the caller's
     patina_cloud *cloud;   // built, until it is taken
     char *path;            // its own copy
@@ -65,11 +64,12 @@ static int start(const struct patina_task *task, patina_task **out)
     return pt_fail(NULL, PATINA_ERROR_MEMORY, "a task: the system gives no thread");
 }
 
-static int render(struct patina_task *task) { return patina_frame_render(task->frame, task->scene); }
-
-static int read_pass(struct patina_task *task)
+static int render(struct patina_task *task)
 {
-    return patina_frame_read(task->frame, task->pass, task->pixels, task->size);
+    int code = patina_frame_render(task->frame, task->scene);
+    for (uint32_t i = 0; i < task->read_count && !code; ++i)
+        code = patina_frame_read(task->frame, task->reads[i].pass, task->reads[i].pixels, task->reads[i].size);
+    return code;
 }
 
 static int build(struct patina_task *task) { return patina_cloud_create(&task->desc, task->progress, &task->cloud); }
@@ -82,15 +82,12 @@ static int save(struct patina_task *task) { return patina_cloud_save(task->saved
 
 static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }
 
-int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_task **out)
+int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
+                       patina_task **out)
 {
-    return start(&(struct patina_task){ .work = render, .frame = frame, .scene = scene }, out);
-}
-
-int patina_task_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size, patina_task **out)
-{
-    patina_frame *reading = (patina_frame *)frame; // which changes nothing of it
-    const struct patina_task task = { .work = read_pass, .frame = reading, .pass = pass, .pixels = pixels, .size = size };
+    if (count && !reads)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_render: reads is NULL");
+    const struct patina_task task = { .work = render, .frame = frame, .scene = scene, .reads = reads, .read_count = count };
     return start(&task, out);
 }
 

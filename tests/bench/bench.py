@@ -14,6 +14,7 @@ of them, in the same order; "absent" what could not be measured, and why.
 
 --only meshes: as triangles against as points; only --full does it too.
 --only import: a LAZ of 30 million points into Blender, 1 million with --quick; else only --full does it.
+--only viewport: orbiting 10 million points in Blender's window, 1 million with --quick; else only --full does it.
 """
 
 from __future__ import annotations
@@ -39,12 +40,14 @@ import readme
 import report
 import soft
 import stage
+import window
 
 ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
 GROUPS = ("headline", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
-          "effects", "lines", "styles", "peers", "hard", "import", "meshes", "cues")
+          "effects", "lines", "styles", "peers", "hard", "import", "meshes", "cues",
+          "viewport")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -137,7 +140,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "frames": options.frames,
         "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
         "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
-        "rows": [], "details": [], "absent": [], "hard": "", "import": "", "meshes": "",
+        "rows": [], "details": [], "absent": [], "hard": "", "import": "", "meshes": "", "viewport": "",
     }
     for case in chosen(options):
         reason = too_large(case)
@@ -158,6 +161,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         result["meshes"] = meshes.measure(options.library)
     if "import" in options.only or options.full:
         result["import"] = imports.measure(1_000_000 if options.quick else 30_000_000, options.library)
+    if "viewport" in options.only or options.full:
+        result["viewport"] = window.measure(1_000_000 if options.quick else 10_000_000, options.library)
     return result
 
 

@@ -140,10 +140,10 @@ def update(result: dict[str, Any], root: Path) -> str:
     """Writes what the run holds and the README has marks for; returns what, in a sentence."""
     against = [row for row in joined(result, "headline", "peers") if row["points"] == 1_000_000 and row["error"]]
     title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
-    plots.pareto(against, root / ".pictures/pareto.png", title)
-    parts = {"speed": speed(result)}
+    parts = {}
     if joined(result, "headline"):
-        parts |= {"aims": aims(result), "memory": memory(result)}
+        plots.pareto(against, root / ".pictures/pareto.png", title)
+        parts |= {"speed": speed(result), "aims": aims(result), "memory": memory(result)}
         if joined(result, "peers"):
             parts["others"] = others(result)
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
@@ -156,10 +156,11 @@ def update(result: dict[str, Any], root: Path) -> str:
         if papers.ratios(result, quality):
             parts[f"papers {quality}"] = papers.table(result, quality)
     program = root / "build/out/release/tests/scenes/test_holes"
-    if program.is_file():
+    if program.is_file() and result["rows"]:
         parts["holes"] = holes(program)
-    if result.get("meshes"):
-        parts["meshes"] = result["meshes"]
+    for name in ("meshes", "viewport", "import"):
+        if result.get(name):
+            parts[name] = result[name]
     if result.get("hard"):
         parts["hard"] = hard(result["hard"])
     path = root / "README.md"
@@ -171,4 +172,4 @@ def update(result: dict[str, Any], root: Path) -> str:
             text = before + begin + part + "\n" + rest[rest.index(end):]
             written.append(name)
     path.write_text(text)
-    return f"README.md: {', '.join(written) or 'no marks found'}; .pictures/pareto.png"
+    return f"README.md: {', '.join(written) or 'no marks found'}"

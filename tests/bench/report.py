@@ -121,6 +121,8 @@ def markdown(result: dict[str, Any]) -> str:
         text += ["## Meshes", "", result["meshes"], ""]
     if result.get("import"):
         text += ["## Large imports", "", result["import"], ""]
+    if result.get("viewport"):
+        text += ["## Viewport", "", result["viewport"], ""]
     skipped = {name: reason for row in joined(result) for name, reason in (row.get("skipped") or {}).items()}
     if skipped:
         text += ["Left out: " + "; ".join(f"*{name}*: {reason}" for name, reason in sorted(skipped.items())) + ".", ""]

@@ -3,7 +3,8 @@
 
     xvfb-run -a -s "-screen 0 1280x800x24" blender --factory-startup --python tests/blender/test_window.py [-- NAME ...]
 
-NAME figures_ten_million measures instead; long_session is for long_session.py. A test is a generator: it yields what it waits for, a function that says whether it has come.
+NAME figures measures instead (figures.py); long_session is for long_session.py. A test is a generator: it yields what it
+waits for, a function that says whether it has come.
 """
 
 import os
@@ -25,8 +26,11 @@ def tests():
     if names == ["long_session"]:
         import session_rounds
         yield "long_session", session_rounds.long_session
+    if names == ["figures"]:
+        import figures
+        yield "figures", figures.orbit_figures
     for name, test in vars(check_viewport).items():
-        if name.startswith("test_") and (not names or any(part in name for part in names)) or name in names:
+        if name.startswith("test_") and (not names or any(part in name for part in names)):
             yield name.removeprefix("test_"), test
 
 

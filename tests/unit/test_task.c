@@ -79,10 +79,14 @@ static void test_builds_and_renders(void **state)
         assert_int_equal(patina_scene_set_camera(scene, &camera), PATINA_OK);
         assert_int_equal(patina_frame_create(device, &frame), PATINA_OK);
         if (i == 0) {
-            assert_int_equal(patina_task_render(frame, scene, &task), PATINA_OK);
-            assert_int_equal(patina_task_wait(task), PATINA_OK);
+            patina_read read = { PATINA_PASS_COMBINED, pixels[i], sizeof pixels[i] - 1 };
+            assert_int_equal(patina_task_render(frame, scene, &read, 1, &task), PATINA_OK);
+            assert_int_equal(patina_task_wait(task), PATINA_ERROR_ARGUMENT);
+            assert_non_null(strstr(message(task), "patina_frame_read"));
             patina_task_destroy(task);
-            assert_int_equal(patina_task_read(frame, PATINA_PASS_COMBINED, pixels[i], sizeof pixels[i], &task), PATINA_OK);
+            read.size = sizeof pixels[i];
+            assert_int_equal(patina_task_render(frame, scene, &read, 1, &task), PATINA_OK);
+            assert_int_equal(patina_task_wait(task), PATINA_OK);
         } else {
             assert_int_equal(patina_frame_render(frame, scene), PATINA_OK);
             assert_int_equal(patina_frame_read(frame, PATINA_PASS_COMBINED, pixels[i], sizeof pixels[i]), PATINA_OK);
@@ -113,7 +117,8 @@ static void test_errors_come_through(void **state)
     assert_int_equal(patina_task_take_cloud(task, &cloud), PATINA_ERROR_ARGUMENT);
     assert_null(cloud);
     patina_task_destroy(task);
-    assert_int_equal(patina_task_render(NULL, NULL, &task), PATINA_OK);
+    assert_int_equal(patina_task_render(NULL, NULL, NULL, 1, &task), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_task_render(NULL, NULL, NULL, 0, &task), PATINA_OK);
     assert_int_equal(patina_task_wait(task), PATINA_ERROR_ARGUMENT);
     assert_non_null(strstr(message(task), "patina_frame_render"));
     patina_task_destroy(task);

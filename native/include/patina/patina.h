@@ -636,9 +636,17 @@ PATINA_API int patina_panorama_join_keys(const patina_panorama *panorama, const 
 
 // Each starts one call. Handles and arrays that it is given must stay until the task is done; descriptors are copied. Stop
 // it with patina_frame_cancel or patina_progress_cancel.
-PATINA_API int patina_task_render(patina_frame *frame, const patina_scene *scene, patina_task **out); // patina_frame_render
-PATINA_API int patina_task_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size,
-                                patina_task **out); // patina_frame_read
+
+// A pass that a task reads once its picture is done: the arguments of patina_frame_read.
+typedef struct patina_read {
+    uint32_t pass;
+    float *pixels;
+    size_t size;
+} patina_read;
+
+// patina_frame_render, then patina_frame_read of each of `count` reads, which must stay like other arrays; 0: none.
+PATINA_API int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
+                                  patina_task **out);
 PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress,
                                  patina_task **out); // patina_cloud_create
 PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
