@@ -4,8 +4,10 @@
     build/out/venv/bin/python tests/bench/leaves.py [--library FILE] [--pictures FOLDER] [--size N]
 
 A speck is a pixel whose share of light differs by more than 0.7 of the shadow's strength from the mean of six to eight
-neighbours on the same surface; counted among 10,000 pixels that face the sun. Scans are those of ../shared/data; one that is not there is a
-line that says so. Another build's --library gives the counts before a change."""
+neighbours on the same surface; counted among 10,000 pixels that take a tenth of the sun's light or more. The share is what the picture shows: its
+colour with shadows over that without, under the sun alone, neither smoothed. Half transparent clouds are counted twice: in
+every layer by itself, and in the picture that the layers make, whose surface is the nearest one. Scans are those of
+../shared/data; one that is not there is a line that says so. Another build's --library gives the counts before a change."""
 
 from __future__ import annotations
 
@@ -24,6 +26,8 @@ SCANS = ("lidar/lion_takanawa_normals.ply", "heritage/espacio_escultorico_full_d
          "lidar/FSite7_orig-utm.pcd", "lidar/vegetation_1_3.las")
 SUN = np.array([-0.5, 0.6, -0.6])
 WAYS = {"1 sample": (1, 0.0, 0.0), "16 samples": (16, 0.03, 0.0), "half transparent": (1, 0.0, 0.5)}  # angle, transparency
+HEAD = (*WAYS, "its layers")
+LAYERS = 4  # of a half transparent cloud
 
 
 def package() -> None:
@@ -45,33 +49,50 @@ def read(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     return points.positions, points.normals
 
 
-def specks(shadow: np.ndarray, depth: np.ndarray, normal: np.ndarray, near: float,
-           strength: float) -> tuple[int, int]:
+def specks(share: np.ndarray, depth: np.ndarray, near: float, strength: float) -> tuple[int, int]:
     """Specks, and pixels that could be some. near: how far apart neighbours of one surface lie at most; strength: light
     that a shadow takes."""
-    some, total, count = np.isfinite(depth), np.zeros(shadow.shape), np.zeros(shadow.shape)
+    some, total, count = np.isfinite(depth), np.zeros(share.shape), np.zeros(share.shape)
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
             if dx or dy:
                 z = np.roll(depth, (dy, dx), (0, 1))
-                same = some & np.isfinite(z) & (np.abs(np.where(np.isfinite(z), z, 0) - np.where(some, depth, 0)) < near)
-                total += np.where(same, np.roll(shadow, (dy, dx), (0, 1)), 0.0)
+                same = some & np.roll(some, (dy, dx), (0, 1))
+                same &= np.abs(np.where(same, z, 0.0) - np.where(same, depth, 0.0)) < near
+                total += np.where(same, np.roll(share, (dy, dx), (0, 1)), 0.0)
                 count += same
-    able = (count >= 6) & (-(normal @ SUN) / np.linalg.norm(SUN) > 0.1)
-    return int((able & (np.abs(shadow - total / np.maximum(count, 1)) > 0.7 * strength)).sum()), int(able.sum())
+    able = count >= 6
+    return int((able & (np.abs(share - total / np.maximum(count, 1)) > 0.7 * strength)).sum()), int(able.sum())
 
 
-def render(frame: Any, cloud: Any, camera: dict[str, Any], size: int, way: tuple[int, float, float]) -> dict[str, np.ndarray]:
+def render(frame: Any, cloud: Any, camera: dict[str, Any], way: tuple[int, float, float], shadows: int = 1,
+           **settings: Any) -> None:
     from patina import native
 
     samples, angle, transparency = way
     with native.Scene() as scene:
         scene.add_cloud(cloud, lighting=2, transparency=transparency)
-        scene.add_light(type=1, power=3.0, direction=SUN.tolist(), shadows=1, angle=angle)
-        scene.set_settings(width=size, height=size, shadow_samples=samples, world_color=[0.15] * 3)
+        scene.add_light(type=1, power=3.0, direction=SUN.tolist(), shadows=shadows, angle=angle)
+        scene.set_settings(shadow_samples=samples, layers=LAYERS, **settings)
         scene.set_camera(**camera)
         frame.render(scene)
-    return {name: frame.read(name) for name in ("COMBINED", "DEPTH", "NORMAL", "SHADOW")}
+
+
+def shares(frame: Any, cloud: Any, camera: dict[str, Any], size: int, way: tuple[int, float, float]
+           ) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Share of the light, and depth, of every pixel: of the picture, then of every layer. Depth is infinite where there is
+    little light that shadows could take."""
+    suffixes = ["", *(f" {layer}" for layer in range(1, LAYERS + 1))]
+    shown, depth = [], []
+    for shadows in (1, 0):
+        render(frame, cloud, camera, way, shadows, width=size, height=size, smooth=3, antialias=2, layer_passes=3)
+        shown.append([frame.read("COMBINED" + suffix)[..., :3].sum(axis=2) for suffix in suffixes])
+        depth = [frame.read("DEPTH" + suffix)[..., 0] for suffix in suffixes]
+    found = []
+    for dark, bare, z in zip(*shown, depth):
+        some = bare > 0.1 * bare.max()
+        found.append((dark / np.where(some, bare, 1.0), np.where(some, z, np.inf)))
+    return found
 
 
 def camera_of(position: np.ndarray) -> dict[str, Any]:
@@ -101,7 +122,7 @@ def main() -> int:
     package()
     from patina import native
 
-    print("| scan | points | " + " | ".join(WAYS) + " |\n" + "|---" * (2 + len(WAYS)) + "|")
+    print("| scan | points | " + " | ".join(HEAD) + " |\n" + "|---" * (2 + len(HEAD)) + "|")
     with native.Device("cpu") as device, native.Frame(device) as frame:
         for name in SCANS:
             if not (DATA / name).is_file():
@@ -111,14 +132,15 @@ def main() -> int:
             cells = []
             with native.Cloud(position, normal) as cloud:
                 for way, how in WAYS.items():
-                    planes = render(frame, cloud, camera_of(position), options.size, how)
-                    near = 8.0 * cloud.layer_distance  # 16 spacings
-                    found, able = specks(planes["SHADOW"][..., 0], planes["DEPTH"][..., 0], planes["NORMAL"], near,
-                                         1.0 - how[2])
-                    cells.append(f"{1e4 * found / max(able, 1):.1f}")
+                    camera, near = camera_of(position), 8.0 * cloud.layer_distance  # 16 spacings
+                    counts = [specks(*one, near, 1.0 - how[2]) for one in shares(frame, cloud, camera, options.size, how)]
+                    for some in (counts[:1], counts[1:])[: 1 + (how[2] > 0.0)]:
+                        found, able = np.sum(some, axis=0)
+                        cells.append(f"{1e4 * found / max(able, 1):.1f}")
                     if options.pictures:
                         options.pictures.mkdir(parents=True, exist_ok=True)
-                        save(options.pictures / f"{Path(name).stem} {way}.png", planes["COMBINED"])
+                        render(frame, cloud, camera, how, width=options.size, height=options.size, world_color=[0.15] * 3)
+                        save(options.pictures / f"{Path(name).stem} {way}.png", frame.read("COMBINED"))
             print(f"| {Path(name).stem} | {len(position):,} | " + " | ".join(cells) + " |", flush=True)
     return 0
 
