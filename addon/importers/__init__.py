@@ -21,6 +21,9 @@ __all__ = ["FORMATS", "Filter", "PointFile", "Progress", "preview", "reader", "s
 COLOR_NAME = "Col"
 NORMAL_NAME = "Normal"
 
+# What Blender takes bytes as: as they are from 4.2 on (0.1 ms a million), before that rather as wider ones (25 ms, bytes 55).
+WHOLE = np.int8 if bpy.app.version >= (4, 2, 0) else np.int32
+
 
 # ending → module with read(path, filter, progress) and preview(path)
 FORMATS = {".ply": library, ".xyz": library, ".txt": library, ".csv": library, ".asc": library, ".pts": library,
@@ -52,8 +55,8 @@ def preview(path: Path) -> list[str]:
 
 
 def to_mesh(points: PointFile) -> bpy.types.Mesh:
-    """A mesh of vertices alone. Byte colours stay bytes, everything else is float. Takes the arrays out of `points` one by
-    one: a large cloud needs little more memory than the mesh."""
+    """A mesh of vertices alone. Byte colours stay bytes, and so do scalars from -128 to 127 that come as such; everything else
+    is float. Takes the arrays out of `points` one by one: a large cloud needs little more memory than the mesh."""
     mesh = bpy.data.meshes.new(points.name)
     mesh.vertices.add(len(points.positions))
     mesh.vertices.foreach_set("co", points.positions.reshape(-1))
@@ -65,7 +68,10 @@ def to_mesh(points: PointFile) -> bpy.types.Mesh:
         _add(mesh, NORMAL_NAME, 'FLOAT_VECTOR').data.foreach_set("vector", points.normals.reshape(-1))
         points.normals = None
     for name in list(points.scalars):
-        _add(mesh, name, 'FLOAT').data.foreach_set("value", points.scalars.pop(name))
+        _add_scalar(mesh, name, points.scalars.pop(name))
+    selected = mesh.attributes.get(".select_vert")
+    if selected:  # Blender selects new vertices with a byte each, and some versions copy it
+        mesh.attributes.remove(selected)
     for name, value in points.notes.items():
         mesh[f"patina_{name}"] = value
     mesh.update()
@@ -80,6 +86,16 @@ def _add_colors(mesh: bpy.types.Mesh, colors: np.ndarray) -> None:
         attribute = _add(mesh, COLOR_NAME, 'FLOAT_COLOR')
         attribute.data.foreach_set("color", colors.reshape(-1))
     mesh.color_attributes.active_color = mesh.attributes[attribute.name]
+
+
+def _add_scalar(mesh: bpy.types.Mesh, name: str, values: np.ndarray) -> None:
+    if values.dtype.itemsize == 1 and values.max(initial=0) <= 127:
+        values = values.astype(WHOLE)
+        kind = 'INT8'
+    else:
+        values = values.astype(np.float32, copy=False)
+        kind = 'FLOAT'
+    _add(mesh, name, kind).data.foreach_set("value", values)
 
 
 def _add(mesh: bpy.types.Mesh, name: str, kind: str) -> bpy.types.Attribute:

@@ -219,5 +219,6 @@ def _assemble(path: Path, header: Header, origin: tuple[float, float, float], co
         notes["gps_time_start"] = start
     del times
     for name in columns:
-        scalars[name] = columns.take(name).astype(np.float32)
+        values = columns.take(name)
+        scalars[name] = values if values.dtype.itemsize == 1 else values.astype(np.float32)
     return PointFile(path.stem, positions, None, colors, scalars, origin, 0, notes)

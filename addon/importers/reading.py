@@ -44,7 +44,7 @@ class PointFile:
     positions: np.ndarray  # (n, 3) float32, relative to origin
     normals: np.ndarray | None  # (n, 3) float32
     colors: np.ndarray | None  # (n, 4) uint8 sRGB or float32 linear
-    scalars: dict[str, np.ndarray]  # (n,) float32 by name
+    scalars: dict[str, np.ndarray]  # (n,) float32, or bytes with a sign or without, by name
     origin: tuple[float, float, float]  # float64
     invalid: int  # positions that are not finite
     # kept with the mesh: "crs", "gps_time_start", "scanners" (x, y, z of each, relative to origin)

@@ -113,11 +113,10 @@ def _read(obj: bpy.types.Object, scene_origin: np.ndarray) -> exporters.Points |
 def _scalars(data: bpy.types.ID, count: int) -> dict[str, np.ndarray]:
     found = {}
     for attribute in data.attributes:
-        if attribute.domain == 'POINT' and attribute.data_type in {'FLOAT', 'INT'} and len(attribute.data) == count and \
-                not attribute.name.startswith("."):
-            values = np.empty(count, np.float32 if attribute.data_type == 'FLOAT' else np.int32)
-            attribute.data.foreach_get("value", values)
-            found[attribute.name] = values.astype(np.float32)
+        if attribute.data_type in {'FLOAT', 'INT', 'INT8'} and not attribute.name.startswith("."):
+            values = attributes.scalars(data, count, attribute.name)
+            if values is not None:
+                found[attribute.name] = values[:, 0]
     return found
 
 

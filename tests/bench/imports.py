@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How long a large LAZ takes to come into Blender, and how much memory: as a mesh, as a linked cloud, and again.
 
-bench.py calls measure(); the file runs itself in a bpy module, once to write the LAZ and once for each import. Processor
-seconds stand beside the others, for other programs make those long.
+bench.py calls measure(); the file runs itself in a bpy module, once to write the LAZ and once for each import, and in Debian's
+Blender. Processor seconds stand beside the others, for other programs make those long.
 """
 
 from __future__ import annotations
@@ -37,17 +37,22 @@ def measure(points: int, library: Path) -> str:
         environment = {**os.environ, "PYTHONPATH": name, "PATINA_LIBRARY": str(library),
                        "BLENDER_USER_DATAFILES": str(folder / "data"), "PYTHONDONTWRITEBYTECODE": "1"}
         rows = []
-        for step, label in (("write", ""), ("mesh", "import as a mesh"), ("link", "link, the first time"),
-                            ("link", "link, again")):
-            done = subprocess.run([python, __file__, step, folder / "scan.laz", str(points)], env=environment,
+        module, debian = [python, __file__], [
+            "blender", "-b", "--factory-startup", "--python-use-system-env", "--python", __file__, "--"]
+        for program, step, label in ((module, "write", ""), (module, "mesh", "import as a mesh"),
+                                     (debian, "mesh", "the same in Debian's Blender"),
+                                     (module, "link", "link, the first time"), (module, "link", "link, again")):
+            done = subprocess.run([*program, step, folder / "scan.laz", str(points)], env=environment,
                                   capture_output=True, text=True, check=False)
             if done.returncode:
                 return f"Large imports: {label or step}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}"
             if label:
                 got = json.loads(done.stdout.splitlines()[-1])
+                if program is module:
+                    before = got["before_mb"]
                 rows.append(f"| {label} | {got['seconds']:.2f} | {got['processor']:.2f} | {got['peak_mb']:,.0f} |")
         size = (folder / "scan.laz").stat().st_size / 1e6
-        head = f"{points:,} points, LAZ of {size:,.0f} MB, Blender 4.5 as a module (its {got['before_mb']:,.0f} MB counted)."
+        head = f"{points:,} points, LAZ of {size:,.0f} MB, Blender 4.5 as a module (its {before:,.0f} MB counted)."
         return "\n".join([head, "", "| | s | processor, s | peak memory, MB |", "|---|---|---|---|", *rows])
 
 
@@ -93,7 +98,8 @@ def bring(step: str, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "write":
-        write(Path(sys.argv[2]), int(sys.argv[3]))
+    wanted = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
+    if wanted[0] == "write":
+        write(Path(wanted[1]), int(wanted[2]))
     else:
-        bring(sys.argv[1], Path(sys.argv[2]))
+        bring(wanted[0], Path(wanted[1]))

@@ -82,12 +82,15 @@ def test_las_round_trip():
     points = importers.PointFile(
         "scan", (world - (431000, 4581000, 2000)).astype(np.float32), None,
         np.concatenate([rng.integers(0, 256, (2000, 3)), np.full((2000, 1), 255)], 1).astype(np.uint8),
-        {"intensity": rng.integers(0, 60000, 2000).astype(np.float32), "class": np.full(2000, 6, np.float32),
-         "gps_time": np.arange(2000, dtype=np.float32)}, (431000.0, 4581000.0, 2000.0), 0,
+        {"intensity": rng.integers(0, 60000, 2000).astype(np.float32), "class": np.full(2000, 6, np.uint8),
+         "user_data": rng.integers(0, 256, 2000).astype(np.uint8), "gps_time": np.arange(2000, dtype=np.float32)}, (431000.0, 4581000.0, 2000.0), 0,
         {"crs": "PROJCS[\"somewhere\"]", "gps_time_start": 3e8})
     given = replace(points, scalars=dict(points.scalars))
     obj = bpy.data.objects.new("scan", importers.to_mesh(given))
     check(not len(given.positions) and given.colors is None and not given.scalars, "the mesh takes the arrays over")
+    kinds = {name: obj.data.attributes[name].data_type for name in points.scalars}
+    check(kinds == {"intensity": 'FLOAT', "class": 'INT8', "user_data": 'FLOAT', "gps_time": 'FLOAT'}, f"{kinds}")
+    check(".select_vert" not in obj.data.attributes, "a byte a point for the selection")
     importers.origin.place(obj, points.origin, importers.origin.shared(bpy.context.scene, [points.origin]))
     bpy.context.scene.collection.objects.link(obj)
     obj.select_set(True)
@@ -98,7 +101,7 @@ def test_las_round_trip():
         back = importers.reader(path).read(path, importers.Filter(), importers.Progress())
         check_close(back.positions.astype(np.float64) + back.origin, kept, tolerance + 4e-6, kind)
         check_close(back.colors, points.colors, 0, f"{kind} colours")
-        for name in ("intensity", "class"):
+        for name in ("intensity", "class", "user_data"):
             check_close(back.scalars[name], points.scalars[name], 0, f"{kind} {name}")
     path = SCRATCH / "trip.las"
     back = las.read(path, importers.Filter(), importers.Progress())
