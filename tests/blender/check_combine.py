@@ -51,10 +51,11 @@ def picture(scene):
     return pixels
 
 
-def test_cycles_and_points_hide_each_other():
+def hide_each_other(engine):
+    """The crossing as this engine and Patina draw it together; its scene."""
     scene = crossing()
-    check(bpy.ops.scene.patina_combine(engine='CYCLES') == {'FINISHED'}, "refused")
-    points, before = bpy.data.scenes[f"{scene.name} Points"], len(bpy.data.scenes)
+    check(bpy.ops.scene.patina_combine(engine=engine) == {'FINISHED'}, "refused")
+    points = bpy.data.scenes[f"{scene.name} Points"]
     check(points.objects["points"] == scene.objects["points"], "the objects were copied")
     pixels = picture(scene)
     check_close(pixels[24, 20], (1, 0, 0, 1), 1e-3, "left, the faces are nearer")
@@ -65,9 +66,15 @@ def test_cycles_and_points_hide_each_other():
     # half-transparent points let the faces through
     scene.objects["points"].patina.opacity = 0.5
     check_close(picture(scene)[24, 44], (0.5, 0.5, 0, 1), 5e-3, "through the points")
+    scene.objects["points"].patina.opacity = 1.0
+    return scene
+
+
+def test_cycles_and_points_hide_each_other():
+    scene = hide_each_other('CYCLES')
+    points, before = bpy.data.scenes[f"{scene.name} Points"], len(bpy.data.scenes)
 
     # once more: nothing is there twice, and what was set for the points stays
-    scene.objects["points"].patina.opacity = 1.0
     points.patina.fill = 'OFF'
     check(bpy.ops.scene.patina_combine(engine='CYCLES') == {'FINISHED'}, "refused the second time")
     check(len(bpy.data.scenes) == before, f"{len(bpy.data.scenes)} scenes")

@@ -9,6 +9,7 @@ import time
 
 import bpy
 import numpy as np
+from check_combine import hide_each_other
 from check_import import import_ply as import_points
 from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, sphere
 from mathutils import Matrix, Quaternion
@@ -607,6 +608,13 @@ def test_a_changed_link_keeps_nobody_waiting():
     las.SMALL_PIECE = piece
     check(len(turns) >= 3 and set(turns) == {60000}, f"{len(turns)} turns of Blender while 20 pieces were read")
     check(not found.message, found.message)
+
+
+def test_eevee_and_points_hide_each_other():
+    """EEVEE draws in a window only."""
+    scene = hide_each_other('EEVEE')
+    check(scene.render.engine.startswith('BLENDER_EEVEE'), scene.render.engine)
+    yield lambda: True
 
 
 def test_rest_is_rest():

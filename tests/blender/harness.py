@@ -85,9 +85,10 @@ def new_scene(width=64, height=48):
                        bpy.data.collections, bpy.data.node_groups):
         for item in list(collection):
             collection.remove(item)
-    old = bpy.context.scene
+    old = list(bpy.data.scenes)
     bpy.context.window.scene = scene = bpy.data.scenes.new("test")
-    bpy.data.scenes.remove(old)
+    for other in old:
+        bpy.data.scenes.remove(other)
     render = scene.render
     render.engine = 'PATINA'
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
