@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import native
+from .. import jobs, native
 from . import library
 from .e57 import merge
 from .reading import Filter, PointFile, Progress
@@ -50,10 +50,18 @@ def rotation(q: np.ndarray) -> np.ndarray:
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
+    return jobs.finish(_steps(path, wanted, progress))
+
+
+def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same without a filter, in steps."""
+    return _steps(path, Filter(), progress)
+
+
+def _steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
     scans, parts, done = _scans(path), [], 0
     for index, (name, place) in enumerate(scans):
-        progress.step(index / len(scans))
-        scan = library.read(path.parent / name, Filter(), Progress())
+        scan = yield from library.steps(path.parent / name, progress.part(index, len(scans)))
         matrix = rotation(place[3:])
         positions = (scan.positions.astype(np.float64) + scan.origin) @ matrix.T + place[:3]
         keep = wanted.mask(done, positions)

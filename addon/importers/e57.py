@@ -4,16 +4,26 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import native
+from .. import jobs, native
 from .reading import Filter, PointFile, Progress, colors_of, origin_of, scanners_of
 
 MISSING = ("E57 files need the Python package pye57: Patina's extension for Blender 4.2 and later brings it; elsewhere "
            "run \"{python}\" -m pip install --user pye57")
+
+
+SMALL_PIECE = 1 << 17  # points that take some 30 ms
+
+_CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
+_SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_INVALID = ("cartesianInvalidState", "sphericalInvalidState")
+_COLORS = ("colorRed", "colorGreen", "colorBlue")
+_FIELDS = (*_CARTESIAN, *_SPHERICAL, *_INVALID, "intensity", *_COLORS)
 
 
 def _open(path: Path) -> Any:
@@ -42,36 +52,78 @@ def preview(path: Path) -> list[str]:
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
+    return jobs.finish(_steps(path, wanted, progress))
+
+
+def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same without a filter, with a pause after each piece."""
+    return _steps(path, Filter(), progress)
+
+
+def _steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
     file = _open(path)
     parts: list[dict[str, np.ndarray]] = []
     scanners: list[np.ndarray] = []
-    done, crs = 0, ""
+    done, read, index, crs = 0, 0, 0, ""
     try:
         crs = _crs(file)
-        for index in range(file.scan_count):
-            progress.step(index / max(file.scan_count, 1))
-            header = file.get_header(index)
+        headers = [file.get_header(index) for index in range(file.scan_count)]
+        total = max(sum(header.point_count for header in headers), 1)
+        for index, header in enumerate(headers):
             if header.has_pose():
                 scanners.append(header.translation)
-            data = file.read_scan(index, intensity=True, colors=True, ignore_missing_fields=True)
-            positions = np.stack([data[f"cartesian{axis}"] for axis in "XYZ"], 1)
-            keep = wanted.mask(done, positions)
-            done += len(positions)
-            part = {"positions": positions[keep], "scan": np.full(int(keep.sum()), index, np.float32)}
-            if "intensity" in data:
-                part["intensity"] = data["intensity"][keep]
-            if "colorRed" in data:
-                part["rgb"] = np.stack([data[f"color{name}"] for name in ("Red", "Green", "Blue")], 1)[keep]
-            parts.append(part)
+            for count, data in _pieces(file, header):
+                progress.step(read / total)
+                read += count
+                keep = wanted.mask(done, data["positions"])
+                done += len(keep)
+                part = {name: values[keep] for name, values in data.items()}
+                parts.append(part | {"scan": np.full(int(keep.sum()), index, np.float32)})
+                yield jobs.Pause()
     except native.PatinaError:
         raise
     except Exception as error:
-        raise native.PatinaError(f"{path.name}: scan {len(parts)}: {_first_line(error)}", -4) from None
+        raise native.PatinaError(f"{path.name}: scan {index}: {_first_line(error)}", -4) from None
     finally:
         file.close()
     points = merge(path.stem, parts, {"crs": crs} if crs else {})
     points.notes |= scanners_of(scanners, points.origin)
     return points
+
+
+def _pieces(file: Any, header: Any) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+    """How many points were read, and of the valid ones "positions" in the file's coordinates, "intensity" and "rgb" where
+    there are such."""
+    data, buffers = file.make_buffers([name for name in _FIELDS if name in header.point_fields],
+                                      max(min(SMALL_PIECE, header.point_count), 1))
+    reader = header.points.reader(buffers)
+    try:
+        while count := reader.read():
+            piece = {name: values[:count] for name, values in data.items()}
+            valid = np.ones(count, bool)
+            for name in _INVALID:
+                if name in piece:
+                    valid &= piece[name] == 0
+            piece = {name: values[valid] for name, values in piece.items()}
+            positions = _cartesian(piece)
+            if header.has_pose():
+                positions = file.to_global(positions, header.rotation, header.translation)
+            found = {"positions": positions}
+            if "intensity" in piece:
+                found["intensity"] = piece["intensity"]
+            if all(name in piece for name in _COLORS):
+                found["rgb"] = np.stack([piece[name] for name in _COLORS], 1)
+            yield count, found
+    finally:
+        reader.close()
+
+
+def _cartesian(piece: dict[str, np.ndarray]) -> np.ndarray:
+    if _CARTESIAN[0] in piece:
+        return np.stack([piece[name] for name in _CARTESIAN], 1)
+    away, azimuth, elevation = (piece[name] for name in _SPHERICAL)
+    level = away * np.cos(elevation)
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), away * np.sin(elevation)], 1)
 
 
 def _crs(file: Any) -> str:

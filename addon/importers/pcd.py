@@ -7,11 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import native
+from .. import jobs, native
 from .reading import Filter, PointFile, Progress, origin_of
 
 _KINDS = {("F", 4): "<f4", ("F", 8): "<f8", ("U", 1): "u1", ("U", 2): "<u2", ("U", 4): "<u4", ("U", 8): "<u8",
           ("I", 1): "i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8"}
+
+
+TEXT_PIECE = 1 << 19  # bytes that take some 30 ms
+COPIES = 1 << 16  # of a compressed file, the same
 
 
 def _fail(path: Path, what: str) -> native.PatinaError:
@@ -60,6 +64,16 @@ def preview(path: Path) -> list[str]:
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
+    return jobs.finish(_steps(path, wanted, progress))
+
+
+def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same without a filter, with a pause after each piece of what takes long: text, and what is compressed."""
+    return _steps(path, Filter(), progress)
+
+
+def _steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+    progress.step(0.0)
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -67,25 +81,33 @@ def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     words, at = _header(path, data[:1 << 20])
     kind, count, form = _columns(path, words), _count(path, words), words["DATA"][0]
     if form == "ascii":
-        table = _ascii(path, data[at:], kind, count)
+        table = yield from _ascii(path, data[at:], kind, count, progress)
     elif form == "binary":
         if len(data) - at < count * kind.itemsize:
             raise _fail(path, f"ends after {(len(data) - at) // kind.itemsize:,} of {count:,} points")
         rows = np.frombuffer(data, kind, count, at)
         table = {name: rows[name] for name in kind.names}
     elif form == "binary_compressed":
-        table = _compressed(path, data, at, kind, count, progress)
+        table = yield from _compressed(path, data, at, kind, count, progress)
     else:
         raise _fail(path, f"DATA {form} is not ascii, binary or binary_compressed")
     return _assemble(path, table, wanted)
 
 
-def _ascii(path: Path, text: bytes, kind: np.dtype, count: int) -> dict[str, np.ndarray]:
+def _ascii(path: Path, text: bytes, kind: np.dtype, count: int, progress: Progress) -> jobs.Steps[dict[str, np.ndarray]]:
     width = sum(kind[name].shape[0] for name in kind.names)
-    try:
-        words = np.array(text.split(), np.float64)
-    except ValueError as error:
-        raise _fail(path, str(error)) from None
+    pieces, at = [np.empty(0)], 0
+    while at < len(text):
+        progress.step(at / len(text))
+        end = text.find(b"\n", at + TEXT_PIECE)
+        end = len(text) if end < 0 else end
+        try:
+            pieces.append(np.array(text[at:end].split(), np.float64))
+        except ValueError as error:
+            raise _fail(path, str(error)) from None
+        at = end + 1
+        yield jobs.Pause()
+    words = np.concatenate(pieces)
     if len(words) < count * width:
         raise _fail(path, f"ends after {len(words) // width:,} of {count:,} points")
     rows, table, at = words[:count * width].reshape(count, width), {}, 0
@@ -97,11 +119,11 @@ def _ascii(path: Path, text: bytes, kind: np.dtype, count: int) -> dict[str, np.
 
 
 def _compressed(path: Path, data: bytes, at: int, kind: np.dtype, count: int, progress: Progress) \
-        -> dict[str, np.ndarray]:
+        -> jobs.Steps[dict[str, np.ndarray]]:
     packed, size = (int(value) for value in np.frombuffer(data, "<u4", 2, at)) if len(data) >= at + 8 else (0, 0)
     if size != count * kind.itemsize or len(data) < at + 8 + packed:
         raise _fail(path, "its compressed part is cut short or of another size than its points")
-    plain = _unpack(path, data[at + 8:at + 8 + packed], size, progress)
+    plain = yield from _unpack(path, data[at + 8:at + 8 + packed], size, progress)
     table, at = {}, 0
     for name in kind.names:  # one column after the other
         table[name] = np.frombuffer(plain, kind[name].base, count * kind[name].shape[0], at).reshape(count, -1)
@@ -109,7 +131,7 @@ def _compressed(path: Path, data: bytes, at: int, kind: np.dtype, count: int, pr
     return table
 
 
-def _unpack(path: Path, packed: bytes, size: int, progress: Progress) -> bytearray:
+def _unpack(path: Path, packed: bytes, size: int, progress: Progress) -> jobs.Steps[bytearray]:
     """Marc Lehmann's LZF: runs of bytes, and copies of up to 264 bytes from the last 8192."""
     plain, at, end, polled = bytearray(), 0, len(packed), 0
     try:
@@ -134,8 +156,9 @@ def _unpack(path: Path, packed: bytes, size: int, progress: Progress) -> bytearr
             else:
                 plain += (plain[start:] * (length // back + 1))[:length]
             polled += 1
-            if polled % 65536 == 0:
+            if polled % COPIES == 0:
                 progress.step(at / end)
+                yield jobs.Pause()
     except IndexError:
         raise _fail(path, "its compressed part is cut short") from None
     if len(plain) != size:

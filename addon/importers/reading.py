@@ -71,16 +71,28 @@ class Progress:
         self._cancelled = False
         self._given = given
         self._native: native.Progress | None = None
+        self._part: tuple[Progress, float] | None = None  # under way, and its share of the whole
 
     def value(self) -> float:
-        inner = self._native
+        inner, part = self._native, self._part
+        if part:
+            return self._value + part[1] * part[0].value()
         return inner.value() if inner else self._value
 
     def cancel(self) -> None:
         self._cancelled = True
-        inner = self._native
+        inner, part = self._native, self._part
+        if part:
+            part[0].cancel()
         if inner:
             inner.cancel()
+
+    def part(self, index: int, count: int) -> Progress:
+        """Of one of several files that are read one after the other; until the next one, or inner()."""
+        self.step(index / count)
+        part = Progress(self._given)
+        self._part = (part, 1.0 / count)
+        return part
 
     def step(self, value: float) -> None:
         """Readers call it often. PatinaCancelled when nobody wants the file any more."""
@@ -91,7 +103,7 @@ class Progress:
     @contextlib.contextmanager
     def inner(self) -> Iterator[native.Progress]:
         """For a call of the library. Stays open until this object goes, for other threads may look at it."""
-        self._native = self._given or native.Progress()
+        self._native, self._part = self._given or native.Progress(), None
         if self._cancelled:
             self._native.cancel()
         yield self._native

@@ -11,8 +11,8 @@ from check_import import import_ply as import_points
 from check_import import attribute_of, positions_of
 from harness import REPOSITORY, SCRATCH, Skip, check, check_close, drawn, new_scene, render
 
-from patina import importers
-from patina.importers import e57, las, reading
+from patina import importers, native
+from patina.importers import e57, las, pcd, reading
 
 DATA = REPOSITORY.parent / "shared/data"
 
@@ -251,6 +251,80 @@ def test_previews():
     bad = SCRATCH / "short.las"
     bad.write_bytes(b"LA")
     check("not a LAS file" in importers.preview(bad)[0], f"{importers.preview(bad)}")
+
+
+def check_in_steps(path):
+    """Read in steps a file is what it is read at once; in between there is time for Blender, progress goes on, and a cancel
+    ends it."""
+    whole = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+    progress, shares, steps = importers.Progress(), [], None
+    steps = importers.steps(path, progress)
+    try:
+        while True:
+            task = next(steps)
+            while not task.done():
+                pass
+            shares.append(progress.value())
+    except StopIteration as end:
+        found = end.value
+    check(len(shares) >= 3, f"{path.name}: {len(shares)} steps")
+    check(shares == sorted(shares) and shares[0] < 0.5 and shares[-1] <= 1.0, f"{path.name}: progress {shares}")
+    check_close(found.positions, whole.positions, 0, f"{path.name} in steps")
+    check(found.scalars.keys() == whole.scalars.keys() and (found.colors is None) == (whole.colors is None), "other columns")
+    steps = importers.steps(path, progress := importers.Progress())
+    next(steps)
+    progress.cancel()
+    try:
+        for task in steps:
+            while not task.done():
+                pass
+    except importers.PatinaError as error:
+        check(isinstance(error, native.PatinaCancelled), f"{path.name}: {error}")
+    else:
+        check(False, f"{path.name} was read in spite of a cancel")
+    return found
+
+
+def test_pcd_in_steps():
+    places = np.repeat(np.random.default_rng(6).uniform(0, 9, (1500, 3)).astype(np.float32), 2, axis=0)
+    header = ("VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3000\nHEIGHT 1\nPOINTS 3000\nDATA ")
+    text = "".join("%r %r %r\n" % tuple(map(float, row)) for row in places).encode()
+    plain = places.T.tobytes()  # each number twice: the second is a copy of four bytes from four bytes back
+    packed = b"".join(b"\x03" + plain[i:i + 4] + b"\x40\x03" for i in range(0, len(plain), 8))
+    sizes, pcd.TEXT_PIECE, pcd.COPIES = (pcd.TEXT_PIECE, pcd.COPIES), 20000, 500
+    try:
+        for form, body in (("ascii", text), ("binary_compressed", struct.pack("<II", len(packed), len(plain)) + packed)):
+            path = SCRATCH / f"steps_{form}.pcd"
+            path.write_bytes(header.encode() + form.encode() + b"\n" + body)
+            check_close(check_in_steps(path).positions, places, 1e-6, form)
+    finally:
+        pcd.TEXT_PIECE, pcd.COPIES = sizes
+
+
+def test_conf_in_steps():
+    check_in_steps(shared("stanford/bunny_range/bun.conf"))
+
+
+def test_e57_in_steps():
+    """Also what pye57 itself makes of a file, spherical or not, with a pose or without."""
+    try:
+        import pye57
+    except ImportError:
+        raise Skip("pye57 is not installed here") from None
+    size, e57.SMALL_PIECE = e57.SMALL_PIECE, 500
+    try:
+        for name in ("libE57Format/bunnyDouble.e57", "libE57Format/ColouredCubeFloat.e57", "pdal/A_B.e57",
+                     "pye57/translationWithoutRotation.e57"):
+            path = shared(f"formats/e57/{name}")
+            points = check_in_steps(path) if name.startswith("libE57Format/bunny") else \
+                e57.read(path, importers.Filter(), importers.Progress())
+            file = pye57.E57(str(path))
+            scans = [file.read_scan(index, ignore_missing_fields=True) for index in range(file.scan_count)]
+            wanted = np.concatenate([np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], 1) for scan in scans])
+            file.close()
+            check_close(points.positions.astype(np.float64) + points.origin, wanted, 2e-4, name)
+    finally:
+        e57.SMALL_PIECE = size
 
 
 def test_cancel():
