@@ -114,12 +114,17 @@ def orbit_figures():
     figures["busy_ms"] = 1e3 * busy
     yield lambda: settled(count)
 
-    # what is done of it on the GPU, each waited for
+    # what is done of it on the GPU, each waited for, while no picture is made
     pictures = Timed(viewport.Viewport, "_draw_picture", finish_drawing)
     uploads = Timed(viewport, "_upload", finish_drawing)
-    yield from moving(SECONDS)
+    ask, viewport.Viewport._ask = viewport.Viewport._ask, lambda self, level: None
+    for condition in moving(SECONDS):
+        yield condition
+        found._drawn = None  # uploaded anew each time
+    viewport.Viewport._ask = ask
     pictures.restore()
     uploads.restore()
+    turn(0.0)
     figures |= {"upload_ms": 1e3 * median(uploads.calls), "draw_ms": 1e3 * (median(pictures.calls) - median(uploads.calls))}
     yield lambda: settled(count)
 
