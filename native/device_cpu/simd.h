@@ -16,6 +16,21 @@
 // The name of this level's variant of a kernel's entry: pt_kernel_scatter_avx2.
 #define PT_KERNEL_ENTRY(name) PT_CONCAT(pt_kernel_##name##_, PT_ISA)
 
+#if defined(PT_ISA_AVX2) || defined(PT_ISA_SSE42)
+// Those of four lanes, one behind another.
+static inline void sse_pack(uint32_t *p, __m128i a, uint32_t lanes)
+{
+#define FROM(i, j, k, l) { 0x03020100 + i * 0x04040404, 0x03020100 + j * 0x04040404, 0x03020100 + k * 0x04040404, \
+                           0x03020100 + l * 0x04040404 }
+    static const int32_t from[16][4] = { FROM(0, 0, 0, 0), FROM(0, 0, 0, 0), FROM(1, 0, 0, 0), FROM(0, 1, 0, 0),
+                                         FROM(2, 0, 0, 0), FROM(0, 2, 0, 0), FROM(1, 2, 0, 0), FROM(0, 1, 2, 0),
+                                         FROM(3, 0, 0, 0), FROM(0, 3, 0, 0), FROM(1, 3, 0, 0), FROM(0, 1, 3, 0),
+                                         FROM(2, 3, 0, 0), FROM(0, 2, 3, 0), FROM(1, 2, 3, 0), FROM(0, 1, 2, 3) };
+#undef FROM
+    _mm_storeu_si128((__m128i *)p, _mm_shuffle_epi8(a, _mm_loadu_si128((const __m128i *)from[lanes])));
+}
+#endif
+
 #if defined(PT_ISA_AVX512)
 
 #define PT_LANES 16
@@ -143,6 +158,10 @@ static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
     _mm512_mask_storeu_epi64(keys, (__mmask8)lanes, words[0]);
     _mm512_mask_storeu_epi64(keys + 8, (__mmask8)(lanes >> 8), words[1]);
 }
+static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) // those lanes, one behind another; room for all
+{
+    _mm512_storeu_si512(p, _mm512_maskz_compress_epi32((vm)lanes, a));
+}
 static inline vf vf_look_up(const float *table, int size, vi i) // i < size, 64 or 256; a third of a gather's time
 {
     vf parts[8];
@@ -253,6 +272,11 @@ static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
 }
 static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm256_and_ps(a * b, _mm256_castsi256_ps(m)); }
 static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm256_and_ps(b, _mm256_castsi256_ps(m)); }
+static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
+{
+    sse_pack(p, _mm256_castsi256_si128(a), lanes & 15u);
+    sse_pack(p + __builtin_popcount(lanes & 15u), _mm256_extracti128_si256(a, 1), lanes >> 4);
+}
 static inline vi vi_pairs(vi a)
 {
     return _mm256_permutevar8x32_epi32(a, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3));
@@ -370,6 +394,7 @@ static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
 }
 static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm_and_ps(a * b, _mm_castsi128_ps(m)); }
 static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm_and_ps(b, _mm_castsi128_ps(m)); }
+static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { sse_pack(p, a, lanes); }
 static inline vi vi_pairs(vi a) { return _mm_shuffle_epi32(a, 0x50); }
 static inline vi vi_sides(vi a) { return _mm_shuffle_epi32(a, 0xD8); }
 #define PT_VECTOR(name) _mm_##name
@@ -444,6 +469,7 @@ static inline vi vi_load_id(const uint64_t *keys) { return vi_evens(vi_load(keys
 #endif
 
 #if PT_LANES == 1
+static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { *p = ((void)lanes, a); }
 static inline vi vi_pairs(vi a) { return a; }
 static inline vi vi_sides(vi a) { return a; } // of an even pixel
 static inline vi vi_evens(vi a, vi b) { return ((void)b, a); }

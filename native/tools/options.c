@@ -335,6 +335,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         i++;
     }
     options->settings.film_transparent = options->transparent ? 1 : 0;
+    if (!options->planes)
+        options->settings.passes = 1u << PATINA_PASS_COMBINED; // a PNG shows no other
     if (options->settings.own_background) {
         memcpy(options->settings.background, options->settings.world_color, sizeof options->ambient);
         memcpy(options->settings.world_color, options->ambient, sizeof options->ambient);

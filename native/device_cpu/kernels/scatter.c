@@ -33,56 +33,43 @@ static inline void store_least(struct target target, uint32_t pixel, uint64_t ke
         ;
 }
 
-// Points of a chunk that wait for their surface words: those lie in file order, so each is a cache miss of its own (40% of
-// a frame's scatter before they were fetched ahead).
-enum { QUEUE = 64 };
+// The points of a block that may be nearer, as columns. A block takes its steps one after another, none with a branch on
+// what memory answers: the depths, later the surface words, are asked for at random, and a processor that need not wait
+// for one answer has many under way.
+enum { BLOCK = 256 };
 
-struct queue {
-    uint32_t count, slot[QUEUE + PT_LANES], id[QUEUE + PT_LANES], pixel[QUEUE + PT_LANES], z[QUEUE + PT_LANES];
+struct waiting {
+    uint32_t count, pixel[BLOCK + PT_LANES], z[BLOCK + PT_LANES], id[BLOCK + PT_LANES];
+    float position[3][BLOCK + PT_LANES];
 };
 
-// Which of PT_LANES waiting points face away.
-static uint32_t faces_away(const struct chunk_view *chunk, const float *positions, const uint32_t *surface,
-                           const struct queue *queue, uint32_t at, vm lanes)
+static inline void pack_float(float *p, vf a, uint32_t lanes) { vi_pack((uint32_t *)(void *)p, vf_bits(a), lanes); }
+
+struct window { // the view's, as vectors
+    vf z_near, z_far, left, right, bottom, top;
+    vi origin_x, origin_y, width;
+};
+
+static struct window window_of(const struct view_args *view)
 {
-    vi slot = vi_load(queue->slot + at), word = vi_gather(surface, vi_load(queue->id + at), lanes);
-    vf n[3], v[3];
-    vf_decode_normal(word, n);
-    for (uint32_t k = 0; k < 3; k++)
-        v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * vf_gather(positions + k * chunk->padded, slot, lanes);
-    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
-    return vm_bits(vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE)))));
+    return (struct window){ .z_near = vf_set(view->z_near),
+                            .z_far = vf_set(view->z_far),
+                            .left = vf_set((float)view->origin_x),
+                            .right = vf_set((float)(view->origin_x + (int32_t)view->width)),
+                            .bottom = vf_set((float)view->origin_y),
+                            .top = vf_set((float)(view->origin_y + (int32_t)view->height)),
+                            .origin_x = vi_set((uint32_t)view->origin_x),
+                            .origin_y = vi_set((uint32_t)view->origin_y),
+                            .width = vi_set(view->width) };
 }
 
-static void drain(const struct chunk_view *chunk, const float *positions, const uint32_t *surface, struct queue *queue,
-                  struct target target)
+// 1. Points [first, last) of the chunk: those in view that are nearer than what their pixel holds wait.
+static inline void project(const struct view_args *view, const struct window *w, const struct chunk_view *chunk,
+                           const float *positions, const uint32_t *ids, uint32_t first, uint32_t last, struct target target,
+                           struct waiting *waiting)
 {
-    for (uint32_t at = 0; at < queue->count; at += PT_LANES) {
-        uint32_t left = queue->count - at < PT_LANES ? queue->count - at : PT_LANES;
-        vm lanes = vm_first(left);
-        uint32_t draw = vm_bits(lanes) & ~faces_away(chunk, positions, surface, queue, at, lanes);
-        for (; draw; draw &= draw - 1) {
-            uint32_t k = at + (uint32_t)__builtin_ctz(draw);
-            store_least(target, queue->pixel[k], (uint64_t)queue->z[k] << 32 | (uint32_t)(chunk->id_base + queue->id[k]));
-        }
-    }
-    queue->count = 0;
-}
-
-static void scatter_chunk(const struct view_args *view, const struct chunk_view *chunk, const float *all_positions,
-                          const uint32_t *all_ids, const uint32_t *surface, struct target target)
-{
-    const float *positions = all_positions + 3 * (size_t)chunk->first;
-    const uint32_t *ids = all_ids + chunk->first;
-    const vf z_near = vf_set(view->z_near), z_far = vf_set(view->z_far);
-    const vf left = vf_set((float)view->origin_x), right = vf_set((float)(view->origin_x + (int32_t)view->width));
-    const vf bottom = vf_set((float)view->origin_y), top = vf_set((float)(view->origin_y + (int32_t)view->height));
-    const vi origin_x = vi_set((uint32_t)view->origin_x), origin_y = vi_set((uint32_t)view->origin_y);
-    const vi width = vi_set(view->width);
-    struct queue queue = { .count = 0 };
-
-    for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
-        // 1. project
+    uint32_t count = 0;
+    for (uint32_t i = first; i < last; i += PT_LANES) {
         vf px = vf_load(positions + i), py = vf_load(positions + chunk->padded + i);
         vf pz = vf_load(positions + 2 * (size_t)chunk->padded + i);
         vf z = vf_transform(chunk, 2, px, py, pz);
@@ -92,49 +79,74 @@ static void scatter_chunk(const struct view_args *view, const struct chunk_view 
             x = x * r;
             y = y * r;
         }
-        // 2. clip: NaN fails every comparison; what was sifted out is not drawn
-        vm inside = vm_and(vm_and(vf_le(z_near, z), vf_le(z, z_far)),
-                           vm_and(vm_and(vf_le(left, x), vf_lt(x, right)), vm_and(vf_le(bottom, y), vf_lt(y, top))));
+        // clip: NaN fails every comparison; what was sifted out is not drawn
+        vm inside = vm_and(vm_and(vf_le(w->z_near, z), vf_le(z, w->z_far)),
+                           vm_and(vm_and(vf_le(w->left, x), vf_lt(x, w->right)), vm_and(vf_le(w->bottom, y), vf_lt(y, w->top))));
         if (chunk->sifted)
             inside = vm_and(inside, vm_of_bits(target.drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
         if (!vm_bits(inside))
             continue;
-        // 3. limit and early depth test; the sign bit of -0 is dropped
-        vi column = vi_sub(vf_int(vf_floor(x)), origin_x), row = vi_sub(vf_int(vf_floor(y)), origin_y);
-        vi pixel = vi_add(vi_mul(row, width), column);
+        // limit and early depth test; the sign bit of -0 is dropped
+        vi column = vi_sub(vf_int(vf_floor(x)), w->origin_x), row = vi_sub(vf_int(vf_floor(y)), w->origin_y);
+        vi pixel = vi_add(vi_mul(row, w->width), column);
         vi z_bits = vi_and(vf_bits(z), vi_set(0x7FFFFFFFu));
-        if (target.limit) {
+        if (target.limit)
             inside = vm_and(inside, vf_lt(vf_gather(target.limit, pixel, inside), z));
-            if (!vm_bits(inside))
-                continue;
-        }
         vi stored = vi_gather_z(target.keys, pixel, inside);
         uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z_bits))));
-        if (!nearer)
-            continue;
-        // 4. the least key, back faces first
-        uint32_t pixels[PT_LANES], zs[PT_LANES];
-        vi_store(pixels, pixel, vm_first(PT_LANES));
-        vi_store(zs, z_bits, vm_first(PT_LANES));
-        if (!chunk->cull) {
-            for (; nearer; nearer &= nearer - 1) {
-                uint32_t k = (uint32_t)__builtin_ctz(nearer);
-                store_least(target, pixels[k], (uint64_t)zs[k] << 32 | (uint32_t)(chunk->id_base + ids[i + k]));
-            }
-            continue;
+        vi_pack(waiting->pixel + count, pixel, nearer);
+        vi_pack(waiting->z + count, z_bits, nearer);
+        vi_pack(waiting->id + count, vi_load(ids + i), nearer);
+        if (chunk->cull) {
+            pack_float(waiting->position[0] + count, px, nearer);
+            pack_float(waiting->position[1] + count, py, nearer);
+            pack_float(waiting->position[2] + count, pz, nearer);
         }
-        for (; nearer; nearer &= nearer - 1, queue.count++) {
-            uint32_t k = (uint32_t)__builtin_ctz(nearer);
-            queue.slot[queue.count] = i + k;
-            queue.id[queue.count] = ids[i + k];
-            queue.pixel[queue.count] = pixels[k];
-            queue.z[queue.count] = zs[k];
-            __builtin_prefetch(surface + ids[i + k]);
-        }
-        if (queue.count >= QUEUE - PT_LANES)
-            drain(chunk, positions, surface, &queue, target);
+        count += (uint32_t)__builtin_popcount(nearer);
     }
-    drain(chunk, positions, surface, &queue, target);
+    waiting->count = count;
+}
+
+// 2. Those that face away wait no longer.
+static inline void cull(const struct chunk_view *chunk, const uint32_t *surface, struct waiting *waiting)
+{
+    uint32_t count = 0;
+    for (uint32_t at = 0; at < waiting->count; at += PT_LANES) {
+        vm lanes = vm_first(waiting->count - at < PT_LANES ? waiting->count - at : PT_LANES);
+        vi pixel = vi_load(waiting->pixel + at), z = vi_load(waiting->z + at), id = vi_load(waiting->id + at);
+        vi word = vi_gather(surface, id, lanes);
+        vf n[3], v[3];
+        vf_decode_normal(word, n);
+        for (uint32_t k = 0; k < 3; k++)
+            v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * vf_load(waiting->position[k] + at);
+        vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
+        away = vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))));
+        uint32_t kept = vm_bits(vm_and(lanes, vm_not(away)));
+        vi_pack(waiting->pixel + count, pixel, kept);
+        vi_pack(waiting->z + count, z, kept);
+        vi_pack(waiting->id + count, id, kept);
+        count += (uint32_t)__builtin_popcount(kept);
+    }
+    waiting->count = count;
+}
+
+static void scatter_chunk(const struct view_args *view, const struct chunk_view *chunk, const float *all_positions,
+                          const uint32_t *all_ids, const uint32_t *surface, struct target target)
+{
+    const float *positions = all_positions + 3 * (size_t)chunk->first;
+    const uint32_t *ids = all_ids + chunk->first;
+    const struct window window = window_of(view);
+    struct waiting waiting;
+    for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
+        uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
+        project(view, &window, chunk, positions, ids, first, last, target, &waiting);
+        for (uint32_t i = 0; chunk->cull && i < waiting.count; i++)
+            __builtin_prefetch(surface + waiting.id[i]);
+        if (chunk->cull)
+            cull(chunk, surface, &waiting);
+        for (uint32_t i = 0; i < waiting.count; i++)
+            store_least(target, waiting.pixel[i], (uint64_t)waiting.z[i] << 32 | (uint32_t)(chunk->id_base + waiting.id[i]));
+    }
 }
 
 static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
