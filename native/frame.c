@@ -433,6 +433,8 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     frame->timing_count = 0;
     frame->shadow_maps = frame->shadow_size[0] = frame->shadow_size[1] = 0;
     int error = pt_plan_create(scene, &plan);
+    if (!error && (error = pt_frame_number(frame, scene)))
+        pt_plan_destroy(&plan);
     if (error) {
         atomic_store(&frame->cancel, 0);
         return pt_fail_again(&frame->handle, error);
@@ -536,7 +538,16 @@ int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t 
         if (error)
             return pt_fail_again(&frame->handle, error);
     }
-    return PATINA_OK;
+    return pt_numbering_keys(&frame->numbering, keys, size / sizeof *keys)
+               ? pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: a cloud in view was destroyed since")
+               : PATINA_OK;
+}
+
+int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    return pt_numbering_take(&frame->numbering, scene)
+               ? pt_fail(NULL, PATINA_ERROR_MEMORY, "numbering %u instances: out of memory", scene->instance_count)
+               : PATINA_OK;
 }
 
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size)
@@ -603,4 +614,5 @@ void pt_frame_release(struct patina_frame *frame)
     pt_shadows_release(frame);
     pt_clip_buffers_release(frame->device, &frame->clips);
     pt_residency_release(&frame->residency, frame->device);
+    pt_numbering_release(&frame->numbering);
 }

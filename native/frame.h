@@ -3,6 +3,7 @@
 #define PT_FRAME_H
 
 #include "frame_shadow.h"
+#include "numbering.h"
 
 enum { PT_TIMINGS = PT_KERNEL_COUNT + 4 };
 
@@ -27,6 +28,7 @@ struct patina_frame {
     struct pt_handle handle;
     struct patina_device *device;
     struct pt_residency residency;
+    struct pt_numbering numbering; // of the last scene that was rendered, baked or loaded for
     struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS];
     struct pt_shadows shadows;
     struct pt_clip_buffers clips;
@@ -64,6 +66,8 @@ int pt_frame_clear_keys(struct patina_frame *frame, struct pt_buffer (*planes)[P
                         enum pt_plane which);
 void pt_frame_note_time(struct patina_frame *frame, const char *name, double ms);
 double pt_milliseconds(void);
+// Takes the scene's numbering over; PATINA_ERROR_MEMORY says so.
+int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene);
 void pt_frame_release(struct patina_frame *frame); // planes and resident clouds
 
 #endif

@@ -89,7 +89,7 @@ int pt_shadows_make_places(struct patina_frame *frame, const struct patina_scene
     shadows->instance_count = scene->instance_count;
     shadows->light_count = light_count;
     for (uint32_t i = 0; i < scene->instance_count; i++) {
-        uint64_t points = scene->instances[i].cloud->info.count;
+        uint64_t points = scene->instances[i].cloud->slots;
         shadows->fingerprints[i] = pt_shadows_identity(&scene->instances[i]);
         if (!shadows->fingerprints[i])
             continue;
@@ -155,7 +155,7 @@ int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene
     for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
         const struct pt_device_ops *ops = frame->device->ops;
         if (shadows->fingerprints[i] && !shadows->marks[i].size)
-            error = ops->buffer_create(frame->device, (scene->instances[i].cloud->info.count + 3) / 4 * 4, NULL, 0,
+            error = ops->buffer_create(frame->device, (scene->instances[i].cloud->slots + 3) / 4 * 4, NULL, 0,
                                        &shadows->marks[i]);
         if (!error && shadows->marks[i].size)
             error = ops->buffer_fill(frame->device, &shadows->marks[i], 0, 4);
@@ -298,11 +298,11 @@ static int test_instance(struct update *update, const struct patina_scene *view,
     if (error)
         return error;
     struct pt_buffer *const bound[] = { &planes[PT_PLANE_KEYS][0], &planes[PT_PLANE_FROM][0], &planes[PT_PLANE_DEFF][0],
-                                        &chunk_buffer, &resident->buffers[PT_POSITIONS], &resident->buffers[PT_IDS],
-                                        &resident->buffers[PT_SURFACE], pt_shadows_buffer(frame, PT_MARKS, i),
+                                        &chunk_buffer, &resident->buffers[PT_POSITIONS], &resident->buffers[PT_SURFACE],
+                                        pt_shadows_buffer(frame, PT_MARKS, i),
                                         pt_shadows_buffer(frame, PT_SHADOWS, i), &frame->shadows.differs,
                                         (struct pt_buffer *)update->opacities };
-    args->base = light * (uint32_t)instance->cloud->info.count;
+    args->base = light * (uint32_t)instance->cloud->slots;
     error = device->ops->run(device, PT_KERNEL_lit, args, sizeof *args, bound, sizeof bound / sizeof *bound, &frame->cancel);
     args->base = light;
     device->ops->buffer_destroy(device, &chunk_buffer);
@@ -450,7 +450,7 @@ static int clear_words(struct update *update, uint32_t index)
     }
     int error = PATINA_OK;
     for (uint32_t i = 0; i < frame->shadows.instance_count && !error; i++) {
-        size_t size = (size_t)update->scene->instances[i].cloud->info.count * 4;
+        size_t size = (size_t)update->scene->instances[i].cloud->slots * 4;
         if (!frame->shadows.words[i].size)
             continue;
         void *zeros = calloc(size, 1);
@@ -583,6 +583,8 @@ int pt_shadows_bake(struct patina_frame *frame, const struct patina_scene *scene
     if (!plan.light_count || !scene->instance_count)
         error = pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "shadows: no light of the scene casts any, or there is no cloud");
     if (!error)
+        error = pt_frame_number(frame, scene);
+    if (!error)
         error = pt_shadows_open(frame, &whole, &plan);
     if (!error)
         error = pt_shadows_update(frame, &whole, &plan);
@@ -600,16 +602,25 @@ int pt_shadows_read(const struct patina_frame *frame, uint32_t instance, uint32_
         !shadows->lights[light].samples)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: no texture of light %u on instance %u",
                        light, instance);
-    size_t expected = shadows->words[instance].size / shadows->light_count;
-    if (size != expected)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_shadows: %zu points; got %zu bytes",
-                       expected / 4, size);
-    int error = frame->device->ops->buffer_read(frame->device, &shadows->words[instance], light * expected, values, expected);
+    const struct patina_cloud *cloud = pt_numbering_cloud(&frame->numbering, instance);
+    if (!cloud)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: cloud %u was destroyed since", instance);
+    size_t count = (size_t)cloud->info.count, bytes = shadows->words[instance].size / shadows->light_count;
+    if (size != count * sizeof *values)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_shadows: %zu points; got %zu bytes", count,
+                       size);
+    uint32_t *words = malloc(bytes + 1);
+    if (!words)
+        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
+    int error = frame->device->ops->buffer_read(frame->device, &shadows->words[instance], light * bytes, words, bytes);
     float scale = 1.0f / (255.0f * (float)shadows->lights[light].samples);
-    for (size_t i = 0; i < expected / 4 && !error; i++) { // in place: a word and a float are 4 bytes each
-        uint32_t word;
-        memcpy(&word, values + i, sizeof word);
-        values[i] = 1.0f - (float)(word & PT_SHADOW_SUM) * scale;
+    for (size_t i = 0; i < count && !error; i++)
+        values[i] = 1.0f; // of points that are not drawn
+    for (uint32_t c = 0; c < cloud->chunk_count && !error; c++) {
+        const struct pt_chunk *chunk = &cloud->chunks[c];
+        for (uint32_t slot = chunk->first; slot < chunk->first + chunk->count; slot++)
+            values[cloud->order[slot]] = 1.0f - (float)(words[slot] & PT_SHADOW_SUM) * scale;
     }
+    free(words);
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }

@@ -2,7 +2,7 @@
 // Shadow textures in a file (SPEC 4). Little-endian:
 //   "patshado", u32 version, u32 lights, u32 instances, u32 bytes a word, u64 checksum of all that follows
 //   per light: u32 samples, u32 settled, f32 error, u32 numbers, then float64 numbers: what it depends on (pt_light_key)
-//   per instance: u64 fingerprint (0: receives no shadows), u64 points, then the words, light by light
+//   per instance: u64 fingerprint (0: receives no shadows), u64 slots, then the words of the points in chunk order, light by light
 #include "frame.h"
 
 #include "scene/fingerprint.h"
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { VERSION = 2, HEADER_BYTES = 32 };
+enum { VERSION = 3, HEADER_BYTES = 32 };
 static const char magic[8] = { 'p', 'a', 't', 's', 'h', 'a', 'd', 'o' };
 
 // ---- writing -----------------------------------------------------------------------------------------------------------
@@ -242,7 +242,7 @@ static int check_instances(struct reader reader, const struct patina_scene *scen
 {
     for (uint32_t i = 0; i < reader.instances; i++) {
         const struct pt_instance *instance = &scene->instances[i];
-        uint64_t fingerprint = 0, points = 0, wanted = pt_receives(instance) ? instance->cloud->info.count : 0;
+        uint64_t fingerprint = 0, points = 0, wanted = pt_receives(instance) ? instance->cloud->slots : 0;
         if (take(&reader, &fingerprint, 8) || take(&reader, &points, 8))
             return PATINA_ERROR_FORMAT;
         if (points != wanted || fingerprint != pt_shadows_identity(instance))
@@ -293,6 +293,8 @@ int pt_shadows_load(struct patina_frame *frame, const struct patina_scene *scene
     int error = check_header(&reader, scene, &plan);
     if (!error)
         error = take_textures(&reader, frame, scene, &plan);
+    if (!error)
+        error = pt_frame_number(frame, scene);
     pt_plan_destroy(&plan);
     free(data);
     return error;

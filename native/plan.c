@@ -30,7 +30,7 @@ static void plan_scatter(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1 || builder->behind, .sifted = plan->drawn_words > 0};
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (3 + 4 * (size_t)plan->instance_count) * sizeof *refs);
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (3 + 3 * (size_t)plan->instance_count) * sizeof *refs);
     uint32_t count = 0;
     if (!refs) {
         builder->failed = 1;
@@ -42,7 +42,6 @@ static void plan_scatter(struct pt_builder *builder)
             continue;
         refs[count++] = pt_buffer_of(PT_CHUNKS, i);
         refs[count++] = pt_buffer_of(PT_POSITIONS, i);
-        refs[count++] = pt_buffer_of(PT_IDS, i);
         refs[count++] = pt_buffer_of(PT_SURFACE, i);
         args.instances++;
     }

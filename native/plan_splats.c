@@ -7,9 +7,8 @@
 // Binds what both kernels read of an instance; `blend` reads colours too.
 static uint32_t bind_instance(struct pt_ref *refs, uint32_t i, int blend)
 {
-    static const enum pt_instance_buffer list[] = {PT_CHUNKS, PT_POSITIONS, PT_IDS,      PT_SURFACE,
-                                                   PT_RADII,  PT_COLORS,    PT_OPACITIES};
-    const uint32_t count = blend ? 7 : 5;
+    static const enum pt_instance_buffer list[] = {PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_RADII, PT_COLORS, PT_OPACITIES};
+    const uint32_t count = blend ? 6 : 4;
     for (uint32_t k = 0; k < count; k++)
         refs[k] = pt_buffer_of(list[k], i);
     return count;
@@ -21,7 +20,7 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
 {
     struct pt_plan *plan = builder->plan;
     const size_t head = blend ? sizeof(struct blend_args) : sizeof(struct splat_args);
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 2 + 7 * (size_t)plan->instance_count) * sizeof *refs);
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 2 + 6 * (size_t)plan->instance_count) * sizeof *refs);
     char *args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args));
     if (!refs || !args) {
         builder->failed = 1;

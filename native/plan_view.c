@@ -520,7 +520,7 @@ static void set_instance(const struct camera *camera, const struct object *objec
     const struct patina_cloud *cloud = instance->cloud;
     const patina_cloud_style *style = &instance->style;
     args->id_base = instance->id_base;
-    args->id_count = (uint32_t)cloud->info.count;
+    args->id_count = (uint32_t)cloud->slots;
     args->has_normals = cloud->info.has_normals;
     args->color_format = cloud->color_format;
     args->lit = style->lighting == PATINA_LIGHTING_LIT;

@@ -37,7 +37,7 @@ static int upload_colors(struct patina_device *device, const struct patina_cloud
         return error;
     if (!cloud->colors)
         return PATINA_OK;
-    return device->ops->buffer_create(device, cloud->info.count * pt_color_size(cloud->color_format), cloud->colors, 1,
+    return device->ops->buffer_create(device, cloud->slots * pt_color_size(cloud->color_format), cloud->colors, 1,
                                       &resident->buffers[PT_COLORS]);
 }
 
@@ -49,10 +49,9 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         size_t size;
     } parts[] = {
         { PT_POSITIONS, cloud->positions, cloud->slots * 12 },
-        { PT_IDS, cloud->ids, cloud->slots * 4 },
-        { PT_SURFACE, cloud->surface, cloud->info.count * 4 },
-        { PT_OPACITIES, cloud->opacities, cloud->info.count },
-        { PT_RADII, cloud->radii, cloud->info.count * 4 },
+        { PT_SURFACE, cloud->surface, cloud->slots * 4 },
+        { PT_OPACITIES, cloud->opacities, cloud->slots },
+        { PT_RADII, cloud->radii, cloud->slots * 4 },
         { PT_CLASSES, cloud->classes, cloud->slots },
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {

@@ -13,8 +13,8 @@ enum {
 
 struct instance_buffers {
     enum pt_kernel kernel;
-    uint32_t binding; // of chunks; positions, ids and surface follow
-    const struct pt_buffer *chunks, *positions, *ids, *surface; // ids: NULL where none are read
+    uint32_t binding; // of chunks; positions and surface follow
+    const struct pt_buffer *chunks, *positions, *surface; // surface: NULL where none is read
 };
 
 struct batch {
@@ -28,10 +28,8 @@ static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, 
     int result = pt_gl_bind(d, b->binding, b->chunks->name, 0, b->chunks->size, what);
     if (result == PATINA_OK)
         result = pt_gl_bind(d, b->binding + 1, b->positions->name, batch->first_slot * 12, batch->slots * 12, what);
-    if (result == PATINA_OK && b->ids)
-        result = pt_gl_bind(d, b->binding + 2, b->ids->name, batch->first_slot * 4, batch->slots * 4, what);
     if (result == PATINA_OK && b->surface)
-        result = pt_gl_bind(d, b->binding + 3, b->surface->name, 0, b->surface->size, what);
+        result = pt_gl_bind(d, b->binding + 2, b->surface->name, 0, b->surface->size, what);
     return result;
 }
 
@@ -107,18 +105,17 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
                   uint32_t count, const atomic_int *cancel)
 {
     uint32_t first = d->base.info.key64 ? 2 : 0, last = d->base.info.key64 ? 2 : 1;
-    const struct pt_buffer *limit = args->behind ? buffers[1 + 4 * args->instances] : buffers[0]; // any stands in
-    const struct pt_buffer *drawn = args->sifted ? buffers[1 + 4 * args->instances + args->behind] : buffers[0];
+    const struct pt_buffer *limit = args->behind ? buffers[1 + 3 * args->instances] : buffers[0]; // any stands in
+    const struct pt_buffer *drawn = args->sifted ? buffers[1 + 3 * args->instances + args->behind] : buffers[0];
     int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "scatter");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 6, limit->name, 0, limit->size, "scatter");
+        result = pt_gl_bind(d, 5, limit->name, 0, limit->size, "scatter");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 7, drawn->name, 0, drawn->size, "scatter");
+        result = pt_gl_bind(d, 6, drawn->name, 0, drawn->size, "scatter");
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_scatter, pass, passes[pass]);
-        for (uint32_t i = 0; i < args->instances && 4 * i + 4 < count && result == PATINA_OK; i++) {
-            struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[4 * i + 1], buffers[4 * i + 2], buffers[4 * i + 3],
-                                         buffers[4 * i + 4]};
+        for (uint32_t i = 0; i < args->instances && 3 * i + 3 < count && result == PATINA_OK; i++) {
+            struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[3 * i + 1], buffers[3 * i + 2], buffers[3 * i + 3]};
             result = run_instance(d, &b, pass, cancel);
         }
     }
@@ -127,14 +124,14 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
 
 // ---- discs ---------------------------------------------------------------------------------------------------------------
 
-// All points of instance i, whose buffers start at buffers[0]: chunks, positions, ids, surface, radii and the rest up to `count`,
+// All points of instance i, whose buffers start at buffers[0]: chunks, positions, surface, radii and the rest up to `count`,
 // from binding 2 on.
 static int run_discs(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t pass, uint32_t i, struct pt_buffer *const *buffers,
                      uint32_t count, const atomic_int *cancel)
 {
-    struct instance_buffers b = {kernel, 2, buffers[0], buffers[1], buffers[2], buffers[3]};
+    struct instance_buffers b = {kernel, 2, buffers[0], buffers[1], buffers[2]};
     int result = PATINA_OK;
-    for (uint32_t k = 4; k < count && result == PATINA_OK; k++) {
+    for (uint32_t k = 3; k < count && result == PATINA_OK; k++) {
         int missing = !buffers[k] || !buffers[k]->name; // any stands in
         result = pt_gl_bind(d, 2 + k, missing ? d->arguments : buffers[k]->name, 0,
                             missing ? sizeof(struct splat_args) : buffers[k]->size, pt_kernel_names[kernel]);
@@ -147,16 +144,16 @@ int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt
                 const atomic_int *cancel)
 {
     uint32_t first = d->base.info.key64 ? 2 : 0, last = d->base.info.key64 ? 2 : 1;
-    const struct pt_buffer *limit = args->behind ? buffers[1 + 5 * args->instances] : buffers[0]; // any stands in
+    const struct pt_buffer *limit = args->behind ? buffers[1 + 4 * args->instances] : buffers[0]; // any stands in
     int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "splat");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 7, limit->name, 0, limit->size, "splat");
+        result = pt_gl_bind(d, 6, limit->name, 0, limit->size, "splat");
     if (result == PATINA_OK && args->sifted)
-        result = pt_gl_bind_texture(d, 1, buffers[1 + 5 * args->instances + args->behind]);
+        result = pt_gl_bind_texture(d, 1, buffers[1 + 4 * args->instances + args->behind]);
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_splat, pass, passes[pass]);
         for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
-            result = run_discs(d, PT_KERNEL_splat, pass, i, buffers + 1 + 5 * i, 5, cancel);
+            result = run_discs(d, PT_KERNEL_splat, pass, i, buffers + 1 + 4 * i, 4, cancel);
     }
     return result;
 }
@@ -178,7 +175,7 @@ static int blend_band(struct pt_gl_device *d, const struct blend_args *args, str
         d->gl.ProgramUniform1i(d->programs[PT_KERNEL_blend][step], 4, (GLint)end);
     }
     for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
-        result = run_discs(d, PT_KERNEL_blend, ADD, i, buffers + 4 + 7 * i, 7, cancel);
+        result = run_discs(d, PT_KERNEL_blend, ADD, i, buffers + 4 + 6 * i, 6, cancel);
     return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_blend, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
 }
 
@@ -197,15 +194,15 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 1, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, (size_t)rows * width * SUM_BYTES, "blend");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 9, buffers[2]->name, 0, buffers[2]->size, "blend");
+        result = pt_gl_bind(d, 8, buffers[2]->name, 0, buffers[2]->size, "blend");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 10, buffers[3]->name, 0, buffers[3]->size, "blend");
+        result = pt_gl_bind(d, 9, buffers[3]->name, 0, buffers[3]->size, "blend");
     if (result == PATINA_OK)
         result = pt_gl_bind_texture(d, 0, buffers[0]);
     if (result == PATINA_OK)
         result = pt_gl_bind_texture(d, 2, buffers[1]);
     if (result == PATINA_OK && args->sifted)
-        result = pt_gl_bind_texture(d, 1, buffers[4 + 7 * args->instances]);
+        result = pt_gl_bind_texture(d, 1, buffers[4 + 6 * args->instances]);
     for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)
         result = blend_band(d, args, buffers, y, y + rows < height ? y + rows : height, cancel);
     return result;
@@ -214,15 +211,15 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
 int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
               const atomic_int *cancel)
 {
-    // positions and ids are bound in parts, which here would be too large at once
+    // positions are bound in parts, which here would be too large at once
     static struct pt_buffer none;
     struct pt_buffer *rest[16];
     for (uint32_t i = 0; i < count; i++)
-        rest[i] = i == 4 || i == 5 ? &none : buffers[i];
+        rest[i] = i == 4 ? &none : buffers[i];
     int result = pt_gl_kernel_program(d, PT_KERNEL_lit, 0, "");
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, PT_KERNEL_lit, argument_size, rest, count);
-    struct instance_buffers b = {PT_KERNEL_lit, 4, buffers[3], buffers[4], buffers[5], buffers[6]};
+    struct instance_buffers b = {PT_KERNEL_lit, 4, buffers[3], buffers[4], buffers[5]};
     return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
 }
 
@@ -234,6 +231,6 @@ int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *c
     int result = pt_gl_kernel_program(d, PT_KERNEL_sift, 0, "");
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, PT_KERNEL_sift, argument_size, rest, count);
-    struct instance_buffers b = {PT_KERNEL_sift, 1, buffers[0], buffers[1], NULL, NULL};
+    struct instance_buffers b = {PT_KERNEL_sift, 1, buffers[0], buffers[1], NULL};
     return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
 }

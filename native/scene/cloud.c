@@ -89,12 +89,15 @@ struct build {
     uint32_t chunk_room;       // chunks that the arrays have room for
     double box_min[3], box_max[3];
     struct block {
-        uint32_t drawn, offset, translucent;
-        float radius_most;
-        uint64_t invalid_positions, invalid_normals, invalid_colors;
+        uint32_t drawn, offset;
+        uint64_t invalid_positions;
         double box_min[3], box_max[3];
     } *blocks;
     uint32_t block_count;
+    struct tally { // of the points of a chunk
+        uint32_t invalid_normals, invalid_colors, translucent;
+        float radius_most;
+    } *tallies;
     atomic_uint chunks_done;
     double cell[3], cell_min[3]; // of the Morton grid being coded
 };
@@ -295,37 +298,37 @@ uint32_t pt_chunk_prefix(const struct pt_chunk *chunk, uint32_t strata)
 }
 
 // Slot order of `count` Morton-ordered points: every 32nd, then the rest of every 16th, ... Each stratum is in Morton order.
-static void stratify(const uint64_t *words, uint32_t count, uint32_t *ids)
+static void stratify(const uint64_t *words, uint32_t count, uint32_t *order)
 {
     uint32_t slot = 0;
     for (uint32_t stratum = 1; stratum <= PT_STRATA; stratum++) {
         uint32_t stride = 1u << (PT_STRATA - stratum);
         for (uint32_t i = stratum == 1 ? 0 : stride; i < count; i += stratum == 1 ? stride : 2 * stride)
-            ids[slot++] = (uint32_t)words[i];
+            order[slot++] = (uint32_t)words[i];
     }
 }
 
 static void fill_chunk(struct build *build, struct pt_chunk *chunk, const uint64_t *words)
 {
     struct patina_cloud *cloud = build->cloud;
-    uint32_t *ids = cloud->ids + chunk->first;
+    uint32_t *order = cloud->order + chunk->first;
     float *axis[3];
     for (int k = 0; k < 3; k++)
         axis[k] = cloud->positions + 3 * (size_t)chunk->first + (size_t)k * chunk->padded;
-    stratify(words, chunk->count, ids);
+    stratify(words, chunk->count, order);
 
     double box_min[3], box_max[3], p[3];
     box_reset(box_min, box_max);
     for (uint32_t i = 0; i < chunk->count; i++) {
-        position(build, ids[i], p);
+        position(build, order[i], p);
         box_add(box_min, box_max, p, p);
     }
     for (int k = 0; k < 3; k++) // exact where the coordinates' spread leaves a bit free: see the 5e6 m case
         chunk->origin[k] = box_min[k] + 0.5 * (box_max[k] - box_min[k]);
     for (uint32_t i = 0; i < chunk->padded; i++) {
         if (i >= chunk->count)
-            ids[i] = ids[chunk->count - 1];
-        position(build, ids[i], p);
+            order[i] = order[chunk->count - 1];
+        position(build, order[i], p);
         for (int k = 0; k < 3; k++) {
             float offset = (float)(p[k] - chunk->origin[k]);
             axis[k][i] = offset;
@@ -393,37 +396,38 @@ static uint32_t class_of_spacing(double spacing, double base) // rounded up: a l
 // ---- normals -------------------------------------------------------------------------------------------------------
 
 // Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
-static void surface_chunk(struct build *build, struct pt_chunk *chunk)
+static void surface_chunk(struct build *build, uint32_t index)
 {
     struct patina_cloud *cloud = build->cloud;
-    const uint32_t *ids = cloud->ids + chunk->first;
+    struct pt_chunk *chunk = &cloud->chunks[index];
+    const uint32_t *order = cloud->order + chunk->first;
+    uint32_t *surface = cloud->surface + chunk->first;
     uint32_t class = class_of_spacing((double)chunk->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
     double axis[3] = { 0.0, 0.0, 0.0 }, n[3];
-    int all = build->desc.normal.data != NULL;
     for (uint32_t i = 0; i < chunk->count; i++) {
         uint32_t bits = PT_NORMAL_NONE;
-        if (build->desc.normal.data) {
-            if (read_normal(&build->desc.normal, ids[i], n)) {
-                bits = pt_encode_normal(n);
-                pt_decode_normal(bits, n);
-                for (int k = 0; k < 3; k++)
-                    axis[k] += n[k];
-            } else {
-                all = 0;
-            }
+        if (build->desc.normal.data && read_normal(&build->desc.normal, order[i], n)) {
+            bits = pt_encode_normal(n);
+            pt_decode_normal(bits, n);
+            for (int k = 0; k < 3; k++)
+                axis[k] += n[k];
+        } else {
+            build->tallies[index].invalid_normals++;
         }
-        cloud->surface[ids[i]] = bits | class;
+        surface[i] = bits | class;
     }
+    for (uint32_t i = chunk->count; i < chunk->padded; i++)
+        surface[i] = surface[chunk->count - 1];
     double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]), cosine = 1.0;
     chunk->cone_cosine = -2.0f;
-    if (!all || !(length > 0.0))
+    if (build->tallies[index].invalid_normals || !(length > 0.0))
         return;
     for (int k = 0; k < 3; k++) {
         axis[k] /= length;
         chunk->cone_axis[k] = (float)axis[k];
     }
     for (uint32_t i = 0; i < chunk->count; i++) {
-        pt_decode_normal(cloud->surface[ids[i]] & PT_NORMAL_BITS, n);
+        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
         cosine = fmin(cosine, n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2]);
     }
     chunk->cone_cosine = (float)(cosine - 1e-6);
@@ -434,10 +438,10 @@ static void surface_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
     struct build *build = context;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++)
-        surface_chunk(build, &build->cloud->chunks[c]);
+        surface_chunk(build, c);
 }
 
-// ---- attributes in file order ----------------------------------------------------------------------------------------
+// ---- other attributes ----------------------------------------------------------------------------------------------------
 
 #define MOST_COLOR 65504.0f
 
@@ -456,51 +460,59 @@ static void read_color(const patina_array *array, uint64_t index, float rgb[3])
     }
 }
 
-static void attribute_blocks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+// Returns whether the colour is one.
+static int take_color(struct patina_cloud *cloud, const patina_array *color, uint32_t slot)
+{
+    if (cloud->color_format == PT_COLOR_SRGB8) {
+        memcpy((uint8_t *)cloud->colors + 3 * (size_t)slot, element(color, cloud->order[slot]), 3);
+        return 1;
+    }
+    float *rgb = (float *)cloud->colors + 3 * (size_t)slot;
+    int valid = 1;
+    read_color(color, cloud->order[slot], rgb);
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(rgb[k])) {
+            rgb[k] = 0.0f;
+            valid = 0;
+        } else { // sums of lit neighbours must stay finite, and Blender's half floats too
+            rgb[k] = fmaxf(fminf(rgb[k], MOST_COLOR), -MOST_COLOR);
+        }
+    return valid;
+}
+
+static void attribute_chunk(struct build *build, uint32_t index)
+{
+    struct patina_cloud *cloud = build->cloud;
+    const struct pt_chunk *chunk = &cloud->chunks[index];
+    struct tally *tally = &build->tallies[index];
+    for (uint32_t i = 0; i < chunk->padded; i++) {
+        const uint32_t slot = chunk->first + i, from = cloud->order[slot];
+        if (build->desc.opacity.data && cloud->opacities) {
+            cloud->opacities[slot] = read_opacity(&build->desc.opacity, from);
+            tally->translucent |= cloud->opacities[slot] < 255;
+        }
+        if (build->desc.radius.data && cloud->radii) {
+            cloud->radii[slot] = read_radius(&build->desc.radius, from);
+            tally->radius_most = fmaxf(tally->radius_most, cloud->radii[slot]);
+        }
+        if (cloud->color_format)
+            tally->invalid_colors += !take_color(cloud, &build->desc.color, slot) && i < chunk->count;
+    }
+}
+
+static void attribute_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct build *build = context;
-    struct patina_cloud *cloud = build->cloud;
-    const patina_array *color = &build->desc.color;
     (void)thread;
-    for (uint32_t b = begin; b < end && !pt_progress_cancelled(build->progress); b++) {
-        uint64_t first = (uint64_t)b * BLOCK_POINTS;
-        uint64_t last = first + BLOCK_POINTS < build->desc.count ? first + BLOCK_POINTS : build->desc.count;
-        for (uint64_t i = first; i < last; i++) {
-            double n[3];
-            if (build->desc.opacity.data && cloud->opacities) {
-                cloud->opacities[i] = read_opacity(&build->desc.opacity, i);
-                build->blocks[b].translucent |= cloud->opacities[i] < 255;
-            }
-            if (cloud->radii) {
-                cloud->radii[i] = read_radius(&build->desc.radius, i);
-                build->blocks[b].radius_most = fmaxf(build->blocks[b].radius_most, cloud->radii[i]);
-            }
-            if (build->desc.normal.data)
-                build->blocks[b].invalid_normals += !read_normal(&build->desc.normal, i, n);
-            if (cloud->color_format == PT_COLOR_SRGB8) {
-                memcpy((uint8_t *)cloud->colors + 3 * i, element(color, i), 3);
-            } else if (cloud->color_format == PT_COLOR_FLOAT) {
-                float *rgb = (float *)cloud->colors + 3 * i;
-                int valid = 1;
-                read_color(color, i, rgb);
-                for (int k = 0; k < 3; k++)
-                    if (!isfinite(rgb[k])) {
-                        rgb[k] = 0.0f;
-                        valid = 0;
-                    } else { // sums of lit neighbours must stay finite, and Blender's half floats too
-                        rgb[k] = fmaxf(fminf(rgb[k], MOST_COLOR), -MOST_COLOR);
-                    }
-                build->blocks[b].invalid_colors += !valid;
-            }
-        }
-    }
+    for (uint32_t c = begin; c < end && !pt_progress_cancelled(build->progress); c++)
+        attribute_chunk(build, c);
 }
 
 // ---- create --------------------------------------------------------------------------------------------------------
 
 static size_t color_bytes(const struct patina_cloud *cloud)
 {
-    return cloud->info.count * pt_color_size(cloud->color_format) + 4; // kernels read bytes as words
+    return cloud->slots * pt_color_size(cloud->color_format) + 4; // kernels read bytes as words
 }
 
 static int add_chunk(struct build *build, uint32_t begin, uint32_t count)
@@ -535,13 +547,13 @@ static int cut_uneven(struct build *build, uint32_t begin, uint32_t count)
     return error ? error : cut_uneven(build, begin + half, count - half);
 }
 
-static size_t opacity_bytes(const struct patina_cloud *cloud) { return cloud->info.count + 4; } // kernels read words
+static size_t opacity_bytes(const struct patina_cloud *cloud) { return cloud->slots + 4; } // kernels read words
 
 // An array of ones says nothing.
 static void drop_opaque(struct patina_cloud *cloud, const struct build *build)
 {
-    for (uint32_t b = 0; b < build->block_count; b++)
-        if (build->blocks[b].translucent)
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (build->tallies[c].translucent)
             return;
     if (cloud->opacities)
         cloud->info.bytes -= opacity_bytes(cloud);
@@ -567,19 +579,24 @@ static int cut_chunks(struct build *build)
     return PATINA_OK;
 }
 
-static int allocate(struct patina_cloud *cloud)
+static int allocate(struct build *build)
 {
+    struct patina_cloud *cloud = build->cloud;
+    if (cloud->slots > 0x7FFFFFFF) // gathers take signed indices
+        return PATINA_ERROR_TOO_MANY_POINTS;
+    build->tallies = calloc(cloud->chunk_count + 1, sizeof *build->tallies);
     cloud->positions = pt_pages_alloc(cloud->slots * 12);
-    cloud->ids = pt_pages_alloc(cloud->slots * 4);
-    cloud->surface = pt_pages_alloc(cloud->info.count * 4);
+    cloud->order = pt_pages_alloc(cloud->slots * 4);
+    cloud->surface = pt_pages_alloc(cloud->slots * 4);
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
     cloud->opacities = cloud->info.has_opacities ? pt_pages_alloc(opacity_bytes(cloud)) : NULL;
-    cloud->radii = cloud->info.has_radii ? pt_pages_alloc(cloud->info.count * 4) : NULL;
-    if (!cloud->positions || !cloud->ids || !cloud->surface || (cloud->color_format && !cloud->colors) ||
-        (cloud->info.has_opacities && !cloud->opacities) || (cloud->info.has_radii && !cloud->radii))
+    cloud->radii = cloud->info.has_radii ? pt_pages_alloc(cloud->slots * 4) : NULL;
+    if (!build->tallies || !cloud->positions || !cloud->order || !cloud->surface ||
+        (cloud->color_format && !cloud->colors) || (cloud->info.has_opacities && !cloud->opacities) ||
+        (cloud->info.has_radii && !cloud->radii))
         return PATINA_ERROR_MEMORY;
-    cloud->info.bytes = cloud->slots * 16 + cloud->info.count * 4 + (cloud->colors ? color_bytes(cloud) : 0) +
-                        (cloud->opacities ? opacity_bytes(cloud) : 0) + (cloud->radii ? cloud->info.count * 4 : 0) + cloud->chunk_count * sizeof *cloud->chunks;
+    cloud->info.bytes = cloud->slots * (cloud->radii ? 24 : 20) + (cloud->colors ? color_bytes(cloud) : 0) +
+                        (cloud->opacities ? opacity_bytes(cloud) : 0) + cloud->chunk_count * sizeof *cloud->chunks;
     return PATINA_OK;
 }
 
@@ -601,26 +618,25 @@ static int build_cloud(struct build *build)
     if (pt_progress_cancelled(build->progress))
         return PATINA_ERROR_CANCELLED;
     int error = sort_points(build);
-    if (error || (error = cut_chunks(build)) || (error = allocate(cloud)))
+    if (error || (error = cut_chunks(build)) || (error = allocate(build)))
         return error;
     pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
     if ((error = settle_spacing(cloud)))
         return error;
-    for (uint64_t i = 0; i < cloud->info.count && build->drawn != cloud->info.count; i++)
-        cloud->surface[i] = PT_NORMAL_NONE; // points that are not drawn have a defined word too
     pt_parallel(build->pool, cloud->chunk_count, 1, surface_chunks, build);
     pt_progress_set(build->progress, 0.9);
-    pt_parallel(build->pool, build->block_count, 1, attribute_blocks, build);
+    pt_parallel(build->pool, cloud->chunk_count, 1, attribute_chunks, build);
     if (pt_progress_cancelled(build->progress))
         return PATINA_ERROR_CANCELLED;
     drop_opaque(cloud, build);
     if ((error = pt_cloud_take_values(cloud, &build->desc)))
         return error;
-    for (uint32_t b = 0; b < build->block_count; b++) {
+    for (uint32_t b = 0; b < build->block_count; b++)
         cloud->info.invalid_positions += build->blocks[b].invalid_positions;
-        cloud->info.invalid_normals += build->blocks[b].invalid_normals;
-        cloud->info.radius_most = fmaxf(cloud->info.radius_most, build->blocks[b].radius_most);
-        cloud->info.invalid_colors += build->blocks[b].invalid_colors;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        cloud->info.invalid_normals += cloud->info.has_normals ? build->tallies[c].invalid_normals : 0;
+        cloud->info.radius_most = fmaxf(cloud->info.radius_most, build->tallies[c].radius_most);
+        cloud->info.invalid_colors += build->tallies[c].invalid_colors;
     }
     memcpy(cloud->info.box_min, build->box_min, sizeof build->box_min);
     memcpy(cloud->info.box_max, build->box_max, sizeof build->box_max);
@@ -691,6 +707,7 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
     pt_pages_free(build.words, (size_t)build.drawn * sizeof *build.words);
     pt_pages_free(build.scratch, (size_t)build.drawn * sizeof *build.scratch);
     free(build.blocks);
+    free(build.tallies);
     free(build.cells);
     free(build.begins);
     pt_pool_destroy(build.pool);
@@ -701,8 +718,9 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
             free(cloud);
             free(alive);
         }
-        return error == PATINA_ERROR_CANCELLED
-                   ? pt_fail(NULL, error, "building the cloud was cancelled")
+        return error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "building the cloud was cancelled")
+               : error == PATINA_ERROR_TOO_MANY_POINTS
+                   ? pt_fail(NULL, error, "a cloud of %llu points: too many, split it", (unsigned long long)desc->count)
                    : pt_fail(NULL, error, "building a cloud of %llu points: out of memory",
                              (unsigned long long)desc->count);
     }
@@ -717,21 +735,20 @@ static int replace_colors(struct build *build)
     size_t old_bytes = color_bytes(cloud);
     enum pt_color_format old_format = cloud->color_format;
     void *old = cloud->colors;
-    build->block_count = (uint32_t)((cloud->info.count + BLOCK_POINTS - 1) / BLOCK_POINTS);
-    build->blocks = calloc(build->block_count ? build->block_count : 1, sizeof *build->blocks);
+    build->tallies = calloc(cloud->chunk_count + 1, sizeof *build->tallies);
     build->pool = pt_pool_create(0, 0);
     cloud->color_format = color_format(&build->desc.color);
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
-    if (!build->blocks || !build->pool || (cloud->color_format && !cloud->colors)) {
+    if (!build->tallies || !build->pool || (cloud->color_format && !cloud->colors)) {
         pt_pages_free(cloud->colors, color_bytes(cloud));
         cloud->color_format = old_format;
         cloud->colors = old;
         return PATINA_ERROR_MEMORY;
     }
-    pt_parallel(build->pool, build->block_count, 1, attribute_blocks, build);
+    pt_parallel(build->pool, cloud->chunk_count, 1, attribute_chunks, build);
     cloud->info.invalid_colors = 0;
-    for (uint32_t b = 0; b < build->block_count; b++)
-        cloud->info.invalid_colors += build->blocks[b].invalid_colors;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        cloud->info.invalid_colors += build->tallies[c].invalid_colors;
     cloud->info.bytes += (cloud->colors ? color_bytes(cloud) : 0) - (old ? old_bytes : 0);
     cloud->info.has_colors = cloud->color_format != PT_COLOR_NONE;
     atomic_fetch_add(&cloud->alive->colors, 1);
@@ -750,7 +767,7 @@ int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
         return pt_fail_again(&cloud->handle, error);
     error = replace_colors(&build);
     pt_pool_destroy(build.pool);
-    free(build.blocks);
+    free(build.tallies);
     return error ? pt_fail(&cloud->handle, error, "new colours of %llu points: out of memory",
                            (unsigned long long)cloud->info.count)
                  : PATINA_OK;
@@ -767,11 +784,11 @@ void patina_cloud_destroy(patina_cloud *cloud)
     if (!cloud)
         return;
     pt_pages_free(cloud->positions, cloud->slots * 12);
-    pt_pages_free(cloud->ids, cloud->slots * 4);
-    pt_pages_free(cloud->surface, cloud->info.count * 4);
+    pt_pages_free(cloud->order, cloud->slots * 4);
+    pt_pages_free(cloud->surface, cloud->slots * 4);
     pt_pages_free(cloud->colors, color_bytes(cloud));
     pt_pages_free(cloud->opacities, opacity_bytes(cloud));
-    pt_pages_free(cloud->radii, cloud->info.count * 4);
+    pt_pages_free(cloud->radii, cloud->slots * 4);
     pt_pages_free(cloud->scalars, pt_scalar_bytes(cloud));
     pt_pages_free(cloud->classes, pt_class_bytes(cloud));
     free(cloud->chunks);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A cloud: chunks of Morton neighbours. Positions lie in chunk order, attributes in file order (DESIGN rule 5).
+// A cloud: chunks of Morton neighbours (DESIGN rule 5). Everything lies in chunk order, so that what a picture needs at a
+// time lies together; a point's number is its slot. The caller's own order is known at the doors alone (numbering.h).
 #ifndef PT_CLOUD_H
 #define PT_CLOUD_H
 
@@ -44,12 +45,12 @@ struct patina_cloud {
     uint32_t chunk_count;
     struct pt_chunk *chunks;
     float *positions;  // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
-    uint32_t *ids;     // slots: index in file order
-    uint32_t *surface; // count: octahedral normal and spacing class (kernel_args.h)
-    void *colors;      // count x 3 uint8 (sRGB) or float (linear), or NULL
-    uint8_t *opacities; // count, or NULL where every point is opaque
-    float *radii;       // count, object units, or NULL
-    float *scalars;     // count, or NULL
+    uint32_t *order;   // slots: index in the caller's arrays
+    uint32_t *surface; // slots: octahedral normal and spacing class (kernel_args.h)
+    void *colors;      // slots x 3 uint8 (sRGB) or float (linear), or NULL
+    uint8_t *opacities; // slots, or NULL where every point is opaque
+    float *radii;       // slots, object units, or NULL
+    float *scalars;     // slots, or NULL
     uint8_t *classes;   // slots, or NULL
     uint64_t class_hash;
     enum pt_color_format color_format;
@@ -69,13 +70,13 @@ void pt_decode_normal(uint32_t word, double n[3]);
 // Local spacing by sampled nearest neighbours among the `count` points x, y, z.
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count);
 
-// Scalars and classes: cloud_values.c. They are taken once chunks and ids stand.
+// Scalars and classes: cloud_values.c. They are taken once chunks and their order stand.
 int pt_check_values(patina_array *scalar, patina_array *classes);
 int pt_cloud_take_values(struct patina_cloud *cloud, const patina_cloud_desc *desc);
 size_t pt_scalar_bytes(const struct patina_cloud *cloud);
 size_t pt_class_bytes(const struct patina_cloud *cloud);
 
-// Of positions, ids, normals and spacings; never 0. Made at the first call, which reads them all: only shadows ask. Any thread.
+// Of positions, normals, spacings and opacities, whatever order they came in; never 0. Made at the first call, which reads them all: only shadows ask. Any thread.
 uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);
 
 void pt_alive_release(struct pt_alive *alive);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A built cloud as a file (DESIGN rule 5): its arrays as they lie in memory, each from a multiple of SECTION bytes on, so
-// that opening it maps them and reads nothing but chunks and ids. A cache for this machine's kind: another byte order,
+// that opening it maps them and reads nothing but chunks and their order. A cache for this machine's kind: another byte order,
 // version or struct is another file, and the caller builds it anew.
 #include "cloud.h"
 #include "fingerprint.h"
@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTION = 1 << 16, VERSION = 4, SECTIONS = 9 };
+enum { SECTION = 1 << 16, VERSION = 5, SECTIONS = 9 };
 static const char magic[8] = "patina\n\x1a";
 
 struct header {
@@ -48,15 +48,15 @@ static uint64_t round_section(uint64_t size)
 
 static void list_sections(struct patina_cloud *cloud, struct section sections[SECTIONS])
 {
-    uint64_t count = cloud->info.count;
+    uint64_t slots = cloud->slots;
     const struct section list[SECTIONS] = {
         {(void **)&cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks},
-        {(void **)&cloud->positions, cloud->slots * 12},
-        {(void **)&cloud->ids, cloud->slots * 4},
-        {(void **)&cloud->surface, count * 4},
-        {&cloud->colors, cloud->color_format ? count * pt_color_size(cloud->color_format) + 4 : 0},
-        {(void **)&cloud->opacities, cloud->info.has_opacities ? count + 4 : 0},
-        {(void **)&cloud->radii, cloud->info.has_radii ? count * 4 : 0},
+        {(void **)&cloud->positions, slots * 12},
+        {(void **)&cloud->order, slots * 4},
+        {(void **)&cloud->surface, slots * 4},
+        {&cloud->colors, cloud->color_format ? slots * pt_color_size(cloud->color_format) + 4 : 0},
+        {(void **)&cloud->opacities, cloud->info.has_opacities ? slots + 4 : 0},
+        {(void **)&cloud->radii, cloud->info.has_radii ? slots * 4 : 0},
         {(void **)&cloud->scalars, cloud->info.has_scalars ? pt_scalar_bytes(cloud) : 0},
         {(void **)&cloud->classes, cloud->info.has_classes ? pt_class_bytes(cloud) : 0},
     };
@@ -140,7 +140,7 @@ static int refuse(const char *path, const char *what)
     return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: %s", path, what);
 }
 
-// What kernels trust: chunks within the slots, ids within the points.
+// What is trusted: chunks within the slots, and each slot's point among the caller's.
 static int check_cloud(const char *path, const struct patina_cloud *cloud)
 {
     uint64_t next = 0, drawn = 0;
@@ -158,7 +158,7 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
     }
     uint32_t most = 0;
     for (uint64_t i = 0; i < cloud->slots; i++)
-        most = cloud->ids[i] > most ? cloud->ids[i] : most;
+        most = cloud->order[i] > most ? cloud->order[i] : most;
     if (next != cloud->slots || drawn != cloud->info.drawn || (cloud->slots && most >= cloud->info.count))
         return refuse(path, "its chunks do not hold its points");
     return PATINA_OK;

@@ -61,7 +61,7 @@ static float read_value(const patina_array *array, uint64_t index)
 
 // ---- scalars -------------------------------------------------------------------------------------------------------------
 
-size_t pt_scalar_bytes(const struct patina_cloud *cloud) { return cloud->info.count * sizeof *cloud->scalars; }
+size_t pt_scalar_bytes(const struct patina_cloud *cloud) { return cloud->slots * sizeof *cloud->scalars; }
 
 static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
 {
@@ -70,8 +70,8 @@ static int take_scalars(struct patina_cloud *cloud, const patina_array *scalar)
     if (scalar->data && size && !values)
         return PATINA_ERROR_MEMORY;
     float least = INFINITY, most = -INFINITY;
-    for (uint64_t i = 0; values && i < cloud->info.count; i++) {
-        values[i] = read_value(scalar, i);
+    for (uint64_t i = 0; values && i < cloud->slots; i++) {
+        values[i] = read_value(scalar, cloud->order[i]);
         least = isfinite(values[i]) ? fminf(least, values[i]) : least;
         most = isfinite(values[i]) ? fmaxf(most, values[i]) : most;
     }
@@ -110,7 +110,7 @@ int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float ran
     if (!cloud || !range || !(share >= 0.0 && share < 0.5))
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_scalar_range: bad arguments");
     size_t count = 0;
-    for (uint64_t i = 0; cloud->scalars && i < cloud->info.count; i++)
+    for (uint64_t i = 0; cloud->scalars && i < cloud->slots; i++) // those that repeat a chunk's last are too few to show
         count += isfinite(cloud->scalars[i]) != 0;
     if (!count)
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "patina_cloud_scalar_range: no point has a finite scalar");
@@ -122,7 +122,7 @@ int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float ran
     float *values = malloc((count / step + 1) * sizeof *values);
     if (!values)
         return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "patina_cloud_scalar_range: out of memory");
-    for (uint64_t i = 0; i < cloud->info.count; i++)
+    for (uint64_t i = 0; i < cloud->slots; i++)
         if (isfinite(cloud->scalars[i]) && seen++ % step == 0)
             values[taken++] = cloud->scalars[i];
     qsort(values, taken, sizeof *values, compare_floats);
@@ -148,7 +148,7 @@ static int take_classes(struct patina_cloud *cloud, const patina_array *classes)
         struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t i = 0; i < chunk->padded; i++) {
             const uint32_t slot = chunk->first + i;
-            uint8_t class = *((const uint8_t *)classes->data + cloud->ids[slot] * classes->stride);
+            uint8_t class = *((const uint8_t *)classes->data + cloud->order[slot] * classes->stride);
             cloud->classes[slot] = class;
             chunk->classes[class / 32] |= 1u << class % 32;
         }

@@ -36,15 +36,13 @@ uint64_t pt_fingerprint(uint64_t seed, const void *data, size_t size)
 static uint64_t fingerprint_of(const struct patina_cloud *cloud)
 {
     uint64_t hash = pt_fingerprint(cloud->info.count, cloud->positions, cloud->slots * 12);
-    hash = pt_fingerprint(hash, cloud->ids, cloud->slots * 4);
+    hash = pt_fingerprint(hash, cloud->surface, cloud->slots * 4);
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         hash = pt_fingerprint(hash, chunk->origin, sizeof chunk->origin);
-        for (uint32_t i = 0; i < chunk->count; i++)
-            hash = mix(hash, cloud->surface[cloud->ids[chunk->first + i]]);
     }
     if (cloud->opacities)
-        hash = pt_fingerprint(hash, cloud->opacities, cloud->info.count);
+        hash = pt_fingerprint(hash, cloud->opacities, cloud->slots);
     return hash;
 }
 

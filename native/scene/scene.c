@@ -171,7 +171,7 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     if (style)
         checked = *style;
     int error = check_style(scene, &checked, cloud);
-    if (error || (error = too_many(scene, cloud->info.count)))
+    if (error || (error = too_many(scene, cloud->slots)))
         return error;
     void *grown = grow(scene->instances, scene->instance_count, &scene->instance_room, sizeof *scene->instances);
     if (!grown)
@@ -182,7 +182,7 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
                        scene->instance_count);
     scene->instances[scene->instance_count++] =
         (struct pt_instance){ .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points };
-    scene->points += cloud->info.count;
+    scene->points += cloud->slots;
     return PATINA_OK;
 }
 

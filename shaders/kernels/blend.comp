@@ -16,10 +16,10 @@ layout(local_size_x = 32, local_size_y = 8) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { blend_args args; disc_args discs[]; };
 layout(std430, binding = 1) buffer sums_block { uint sums[]; };
-layout(std430, binding = 7) readonly buffer colors_block { uint point_colors[]; };
-layout(std430, binding = 8) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
-layout(std430, binding = 9) buffer normal_block { vec4 normal[]; };
-layout(std430, binding = 10) writeonly buffer albedo_block { vec4 albedo[]; };
+layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; };
+layout(std430, binding = 7) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
+layout(std430, binding = 8) buffer normal_block { vec4 normal[]; };
+layout(std430, binding = 9) writeonly buffer albedo_block { vec4 albedo[]; };
 
 layout(location = 3) uniform int band_first;
 layout(location = 4) uniform int band_end;

@@ -11,16 +11,15 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer arguments_block { lit_args args; };
 layout(std430, binding = 4) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = 5) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = 6) readonly buffer ids_block { uint ids[]; };
-layout(std430, binding = 7) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 8) readonly buffer marks_block { uint marks[]; };
-layout(std430, binding = 9) buffer shadows_block { uint words[]; };
-layout(std430, binding = 10) buffer differs_block { uint differs[]; };
+layout(std430, binding = 6) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = 7) readonly buffer marks_block { uint marks[]; };
+layout(std430, binding = 8) buffer shadows_block { uint words[]; };
+layout(std430, binding = 9) buffer differs_block { uint differs[]; };
 
-layout(std430, binding = 11) readonly buffer opacities_block { uint opacities[]; };
+layout(std430, binding = 10) readonly buffer opacities_block { uint opacities[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
+layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
 
 bool on_map(view_args view, int x, int y) { return x >= 0 && y >= 0 && x < int(view.width) && y < int(view.height); }
 
@@ -151,7 +150,7 @@ void main()
     uint base = chunk.first - first_slot;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
-        uint id = ids[base + i];
+        uint id = chunk.first + i;
         if (args.marked != 0u && (marks[id >> 2] >> 8u * (id & 3u) & 255u) == 0u)
             continue;
         uint pixel;

@@ -21,13 +21,12 @@ layout(std430, binding = 1) buffer keys_block { uint keys[]; }; // two words a p
 #endif
 layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = 3) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = 4) readonly buffer ids_block { uint ids[]; };
-layout(std430, binding = 5) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 6) readonly buffer limit_block { float limit[]; };
-layout(std430, binding = 7) readonly buffer drawn_block { uint drawn[]; };
+layout(std430, binding = 4) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = 5) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = 6) readonly buffer drawn_block { uint drawn[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
+layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
 
 bool faces_away(uint word, vec4 eye, vec3 p)
 {
@@ -85,12 +84,9 @@ void main()
             continue;
 #endif
         // 4. back faces, then the least key
-        uint id = 0u;
-        if (cull || PASS != 0) {
-            id = ids[base + i];
-            if (cull && faces_away(surface[id], eye, p))
-                continue;
-        }
+        uint id = chunk.first + i;
+        if (cull && faces_away(surface[id], eye, p))
+            continue;
 #if PASS == 0
         atomicMin(keys[2u * pixel + 1u], z_bits);
 #elif PASS == 1

@@ -17,7 +17,7 @@ layout(std430, binding = 1) buffer keys_block { uint64_t keys[]; };
 #else
 layout(std430, binding = 1) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
 #endif
-layout(std430, binding = 7) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = 6) readonly buffer limit_block { float limit[]; };
 
 #include "lib/disc.glsl"
 

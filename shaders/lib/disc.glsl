@@ -8,14 +8,13 @@
 #include "lib/planes.glsl"
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
-layout(location = 1) uniform uint first_slot;  // where the bound parts of positions and ids begin
+layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
 layout(location = 2) uniform uint instance;    // whose points these are
 
 layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; };
 layout(std430, binding = 3) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = 4) readonly buffer ids_block { uint ids[]; };
-layout(std430, binding = 5) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 6) readonly buffer radii_block { float radii[]; };
+layout(std430, binding = 4) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = 5) readonly buffer radii_block { float radii[]; };
 
 struct disc {
     float x, y, z, radius;
@@ -150,7 +149,7 @@ bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
     d.x = x;
     d.y = y;
     d.z = z;
-    d.id = ids[base + slot];
+    d.id = chunk.first + slot;
     uint word = surface[d.id];
     if (chunk.cull != 0u && (word & PT_NORMAL_BITS) != PT_NORMAL_NONE) {
         precise vec3 towards = vec3(chunk.eye[0], chunk.eye[1], chunk.eye[2]) - chunk.eye[3] * p;

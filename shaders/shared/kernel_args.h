@@ -110,7 +110,7 @@ struct chunk_view {
     float row[9];   // x row, y row, z row
     float hi[3], lo[3];
     float eye[4];   // back-face test: n . (eye.xyz - eye.w p) <= 0 is culled; object units, relative to the chunk's origin
-    uint32_t first; // first slot: ids at first, positions at 3 first: x[padded], y[padded], z[padded]
+    uint32_t first; // first slot, and number of its point; positions at 3 first: x[padded], y[padded], z[padded]
     uint32_t count, padded;
     uint32_t cull;  // 1: test each point's normal
     uint32_t id_base;

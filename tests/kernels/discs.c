@@ -10,7 +10,7 @@ void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene
     const struct cloud *cloud = &scene->points.clouds[instance];
     struct disc_args *discs = &scene->discs[instance];
     *discs = (struct disc_args){.instance = {.id_base = cloud->chunks[0].id_base,
-                                             .id_count = cloud->points,
+                                             .id_count = cloud->slots,
                                              .has_normals = has_normals != 0,
                                              .opacity = 1.0f},
                                 .has_radii = radius == 0.0f,
@@ -20,8 +20,8 @@ void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene
         discs->instance.normal_matrix[k] = (float)camera->rotation[k];
     for (int k = 0; k < PT_SPACINGS; k++)
         discs->instance.spacing[k] = (float)(largest * k / PT_SPACINGS);
-    scene->radii[instance] = harness_alloc(h, 4 * (size_t)cloud->points);
-    for (uint32_t i = 0; i < cloud->points; i++)
+    scene->radii[instance] = harness_alloc(h, 4 * (size_t)cloud->slots);
+    for (uint32_t i = 0; i < cloud->slots; i++)
         scene->radii[instance][i] = rng_below(rng, 8) ? (float)rng_range(rng, 0.0, largest) : 0.0f;
 }
 
@@ -63,9 +63,8 @@ struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
         points_pad(cloud);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-        buffers[n++] = harness_buffer(h, cloud->ids, 4 * (size_t)cloud->slots);
-        buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->points);
-        buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->points);
+        buffers[n++] = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
+        buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
     }
     const struct splat_args splat = {.view = points->view, .instances = points->count, .behind = points->limit != NULL};
     if (points->limit)
@@ -86,13 +85,13 @@ struct ref_disc *discs_reference(struct harness *h, const struct disc_scene *sce
 {
     uint32_t total = 0, n = 0;
     for (uint32_t i = 0; i < scene->points.count; i++)
-        total += scene->points.clouds[i].points;
+        total += scene->points.clouds[i].slots;
     struct ref_disc *discs = harness_alloc(h, (total + 1) * sizeof *discs);
     for (uint32_t i = 0; i < scene->points.count; i++) {
         const struct cloud *cloud = &scene->points.clouds[i];
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
             for (uint32_t s = 0; s < cloud->chunks[c].count; s++)
-                discs[n++] = ref_disc(&scene->points.view, &scene->discs[i], &cloud->chunks[c], cloud->positions, cloud->ids,
+                discs[n++] = ref_disc(&scene->points.view, &scene->discs[i], &cloud->chunks[c], cloud->positions,
                                       cloud->surface, scene->radii[i], s);
     }
     qsort(discs, n, sizeof *discs, by_id);

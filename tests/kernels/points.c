@@ -54,21 +54,11 @@ struct cloud *points_add_cloud(struct harness *h, struct rng *rng, struct scene 
         chunk->cull = cull ? 1 : 0;
         chunk->id_base = id_base;
         cloud->slots += chunk->padded;
-        cloud->points += sizes[c];
     }
     cloud->positions = harness_alloc(h, 12 * (size_t)cloud->slots);
-    cloud->ids = harness_alloc(h, 4 * (size_t)cloud->slots);
-    cloud->surface = harness_alloc(h, 4 * (size_t)cloud->points);
-    uint32_t *order = harness_alloc(h, 4 * (size_t)cloud->points), next = 0;
-    for (uint32_t i = 0; i < cloud->points; i++) {
-        uint32_t j = rng_below(rng, i + 1);
-        order[i] = order[j];
-        order[j] = i;
+    cloud->surface = harness_alloc(h, 4 * (size_t)cloud->slots);
+    for (uint32_t i = 0; i < cloud->slots; i++)
         cloud->surface[i] = rng_below(rng, 8) ? (uint32_t)rng_next(rng) : PT_NORMAL_NONE;
-    }
-    for (uint32_t c = 0; c < count; c++)
-        for (uint32_t i = 0; i < sizes[c]; i++)
-            cloud->ids[cloud->chunks[c].first + i] = order[next++];
     return cloud;
 }
 
@@ -93,7 +83,7 @@ void points_pad(struct cloud *cloud)
         for (uint32_t i = chunk->count; i < chunk->padded; i++) {
             for (int axis = 0; axis < 3; axis++)
                 *points_coordinate(cloud, c, i, axis) = *points_coordinate(cloud, c, chunk->count - 1, axis);
-            cloud->ids[chunk->first + i] = cloud->ids[chunk->first + chunk->count - 1];
+            cloud->surface[chunk->first + i] = cloud->surface[chunk->first + chunk->count - 1];
         }
     }
 }

@@ -9,9 +9,9 @@ enum { MOST_INSTANCES = 4, POINTS_LANES = 16 };
 
 struct cloud {
     struct chunk_view *chunks;
-    uint32_t chunk_count, slots, points;
+    uint32_t chunk_count, slots;
     float *positions;
-    uint32_t *ids, *surface;
+    uint32_t *surface;
 };
 
 struct scene {

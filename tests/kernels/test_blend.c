@@ -26,7 +26,7 @@ static struct paint paint(struct harness *h, struct rng *rng, struct disc_scene 
     struct paint out = {.colors = {NULL}};
     for (uint32_t i = 0; i < scene->points.count; i++) {
         struct instance_args *args = &scene->discs[i].instance;
-        const size_t count = scene->points.clouds[i].points;
+        const size_t count = scene->points.clouds[i].slots;
         args->color_format = (i + 1) % 3;
         args->opacity = i ? 0.7f : 1.0f;
         args->has_opacities = i == 2;
@@ -82,16 +82,15 @@ static struct planes run(struct harness *h, struct disc_scene *scene, const stru
     buffers[n++] = albedo;
     for (uint32_t i = 0; i < points->count; i++) {
         const struct cloud *cloud = &points->clouds[i];
-        struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->points);
+        struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
         const struct surface_args of_pixels = {.view = points->view, .instance = scene->discs[i].instance};
         HARNESS_RUN(h, surface, &of_pixels, keys, surface, zero, deff, from);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
-        buffers[n++] = harness_buffer(h, cloud->ids, 4 * (size_t)cloud->slots);
         buffers[n++] = surface;
-        buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->points);
+        buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
         buffers[n++] = harness_buffer(h, paint->colors[i], paint->color_bytes[i]);
-        buffers[n++] = harness_buffer(h, paint->opacities[i], cloud->points + 4);
+        buffers[n++] = harness_buffer(h, paint->opacities[i], cloud->slots + 4);
     }
     const struct blend_args blend = {.view = points->view, .instances = points->count};
     memcpy(args, &blend, head);
@@ -195,7 +194,7 @@ static void sheet(struct harness *h)
             *points_coordinate(cloud, c, i, 0) = (float)rng_range(&rng, -2.0, 2.0);
             *points_coordinate(cloud, c, i, 1) = (float)rng_range(&rng, -2.0, 2.0);
         }
-    for (uint32_t i = 0; i < cloud->points; i++)
+    for (uint32_t i = 0; i < cloud->slots; i++)
         cloud->surface[i] = 4095u | 4095u << 13;
     discs_describe(h, &rng, &scene, 0, &camera, 0.2f, 0.0, 1);
     struct paint colors = paint(h, &rng, &scene);
@@ -220,14 +219,14 @@ static void overflow(struct harness *h)
     struct camera camera = points_look(&rng, &scene.points.view, 60.0, 4.0);
     camera.shift[0] = camera.shift[1] = 0.0;
     struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 4, 0, 0);
-    for (uint32_t i = 0; i < cloud->points; i++)
+    for (uint32_t i = 0; i < cloud->slots; i++)
         cloud->surface[i] = PT_NORMAL_NONE;
     discs_describe(h, &rng, &scene, 0, &camera, 0.05f, 0.0, 0);
     scene.discs[0].instance.color_format = 2;
-    struct paint colors = {.color_bytes = {12 * (size_t)cloud->points + 4}};
+    struct paint colors = {.color_bytes = {12 * (size_t)cloud->slots + 4}};
     colors.colors[0] = harness_alloc(h, colors.color_bytes[0]);
-    colors.opacities[0] = harness_alloc(h, cloud->points + 4);
-    for (uint32_t i = 0; i < cloud->points; i++) {
+    colors.opacities[0] = harness_alloc(h, cloud->slots + 4);
+    for (uint32_t i = 0; i < cloud->slots; i++) {
         float *rgb = (float *)colors.colors[0] + 3 * (size_t)i;
         rgb[0] = 4000.0f;
         rgb[1] = i % 2 ? -3000.0f : 1000.0f;

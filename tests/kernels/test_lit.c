@@ -12,7 +12,7 @@ struct setup {
     struct lit_args args;
     struct chunk_view chunks[CHUNKS];
     float *positions;
-    uint32_t *ids, *surface, *words;
+    uint32_t *surface, *words;
     uint8_t *marks, *opacities; // opacities: of the map's points
 };
 
@@ -61,19 +61,14 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
     for (int i = 0; i < 9; i++)
         s.args.instance.normal_matrix[i] = (float)rng_range(rng, -1.0, 1.0);
     s.positions = harness_alloc(h, SLOTS * 12);
-    s.ids = harness_alloc(h, SLOTS * 4);
-    s.surface = harness_alloc(h, POINTS * 4);
-    s.words = harness_alloc(h, (POINTS + 7) * 4);
-    s.marks = harness_alloc(h, POINTS);
+    s.surface = harness_alloc(h, SLOTS * 4);
+    s.words = harness_alloc(h, (SLOTS + 7) * 4);
+    s.marks = harness_alloc(h, SLOTS);
     s.opacities = harness_alloc(h, s.map.count + 4);
     for (size_t i = 0; i < s.map.count; i++)
         s.opacities[i] = (uint8_t)rng_next(rng);
     s.args.caster = s.map.id_base;
-    uint32_t *order = harness_alloc(h, POINTS * 4), next = 0;
-    for (uint32_t i = 0; i < POINTS; i++) {
-        uint32_t j = rng_below(rng, i + 1);
-        order[i] = order[j];
-        order[j] = i;
+    for (uint32_t i = 0; i < SLOTS; i++) {
         s.surface[i] = (uint32_t)rng_next(rng) | (rng_below(rng, 10) ? 0 : PT_NORMAL_NONE);
         s.marks[i] = (uint8_t)rng_below(rng, 2);
     }
@@ -81,7 +76,6 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
         s.chunks[c] = (struct chunk_view){.first = 1024 * c, .count = POINTS / CHUNKS, .padded = 1008};
         set_chunk(&s.map.view, &s.chunks[c]);
         for (uint32_t i = 0; i < s.chunks[c].count; i++) {
-            s.ids[s.chunks[c].first + i] = order[next++];
             place(rng, &s, c, i);
         }
     }
@@ -97,25 +91,25 @@ static void check(struct harness *h, const struct setup *s, uint32_t base, doubl
     struct pt_buffer *keys = harness_buffer(h, s->map.keys, count * 8), *from = harness_buffer(h, s->map.from, count * 4);
     struct pt_buffer *deff = harness_buffer(h, s->map.deff, count * 4);
     struct pt_buffer *chunks = harness_buffer(h, s->chunks, sizeof s->chunks);
-    struct pt_buffer *positions = harness_buffer(h, s->positions, SLOTS * 12), *ids = harness_buffer(h, s->ids, SLOTS * 4);
-    struct pt_buffer *surface = harness_buffer(h, s->surface, POINTS * 4), *marks = harness_buffer(h, s->marks, POINTS);
-    struct pt_buffer *words = harness_buffer(h, s->words, (POINTS + 7) * 4), *flag = harness_buffer(h, &differs, 4);
+    struct pt_buffer *positions = harness_buffer(h, s->positions, SLOTS * 12);
+    struct pt_buffer *surface = harness_buffer(h, s->surface, SLOTS * 4), *marks = harness_buffer(h, s->marks, SLOTS);
+    struct pt_buffer *words = harness_buffer(h, s->words, (SLOTS + 7) * 4), *flag = harness_buffer(h, &differs, 4);
     struct pt_buffer *opacities = harness_buffer(h, s->opacities, count + 4);
-    HARNESS_RUN(h, lit, &args, keys, from, deff, chunks, positions, ids, surface, marks, words, flag, opacities);
+    HARNESS_RUN(h, lit, &args, keys, from, deff, chunks, positions, surface, marks, words, flag, opacities);
     const uint32_t *got = harness_read(h, words), *got_flag = harness_read(h, flag);
-    harness_same(h, "words", got, POINTS + 7, 4, 1, POINTS + 7);
+    harness_same(h, "words", got, SLOTS + 7, 4, 1, SLOTS + 7);
     struct ref_planes planes = picture_planes(&s->map);
     planes.surface = s->surface;
     planes.opacities = s->opacities;
     for (uint32_t c = 0; c < CHUNKS; c++)
         for (uint32_t i = 0; i < s->chunks[c].count; i++) {
-            uint32_t id = s->ids[s->chunks[c].first + i], word = s->words[base + id];
+            uint32_t id = s->chunks[c].first + i, word = s->words[base + id];
             if (args.marked && !s->marks[id]) {
                 if (got[base + id] != word)
                     harness_fail(h, "unmarked", (int)id, 0, "was tested");
                 continue;
             }
-            enum ref_truth truth = ref_lit(&args, &planes, &s->chunks[c], s->positions, s->ids, i);
+            enum ref_truth truth = ref_lit(&args, &planes, &s->chunks[c], s->positions, i);
             struct lit_args own = args;
             if (!ref_lit_loss(&args, &planes, &s->chunks[c], s->positions, i, &own.loss)) {
                 open++;
@@ -184,7 +178,7 @@ static void samples(struct harness *h)
             s.args.close = mode == 1;
             s.args.samples = 5;
             s.args.compare = 1;
-            for (uint32_t k = 0; k < POINTS + 7; k++)
+            for (uint32_t k = 0; k < SLOTS + 7; k++)
                 s.words[k] = rng_below(&rng, 4 * 255 + 1) | (mode ? rng_below(&rng, 256) << PT_SHADOW_SHIFT : 0);
             check(h, &s, 0, TOL_UNSURE_SHARE);
         }
@@ -215,7 +209,7 @@ static void agreement(struct harness *h)
         memset(s.args.window, 0, sizeof s.args.window); // everything is lit
         s.args.samples = 4;
         s.args.compare = 1;
-        s.words[POINTS / 2] = odd ? 255 : 0;
+        s.words[SLOTS / 2] = odd ? 255 : 0;
         check(h, &s, 0, TOL_UNSURE_SHARE);
     }
 }
@@ -224,7 +218,7 @@ static void agreement(struct harness *h)
 static void sanity(struct harness *h)
 {
     uint64_t keys[9];
-    uint32_t from[9], id = 0, surface = PT_NORMAL_NONE;
+    uint32_t from[9], surface = PT_NORMAL_NONE;
     float deff[9], positions[3 * 16] = {0};
     struct lit_args args = {.view = {.width = 3, .height = 3, .ray_x0 = -1.5f, .ray_xs = 1.0f, .ray_y0 = -1.5f, .ray_ys = 1.0f, .footprint = 1e-3f},
                             .loss = 255, .alone = 1, .window = {0, 0, 3, 3}, .samples = 1};
@@ -238,33 +232,33 @@ static void sanity(struct harness *h)
     set_chunk(&args.view, &chunk);
     struct ref_planes planes = {.keys = keys, .from = from, .deff = deff, .surface = &surface};
     positions[32] = -2.45f; // within what the map's own surface allows
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -2.55f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
     keys[0] = ref_key(2.2f, 0); // one neighbour is farther
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     keys[0] = REF_EMPTY_KEY; // the surface ends there: 20 times 0.2
     positions[32] = -5.95f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -6.05f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
     keys[0] = ref_key(2.2f, 0);
     positions[32] = -2.55f;
     args.instance.has_normals = 1;
     surface = 4095u | 4095u << 13; // towards the light: 0.2
     for (int k = 0; k < 9; k += 4)
         args.instance.normal_matrix[k] = 1.0f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
     positions[32] = -2.19f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -1.0f;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     positions[32] = -2.55f;
     for (uint32_t i = 0; i < 9; i++)
         keys[i] = i == 4 ? keys[i] : REF_EMPTY_KEY;
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     keys[3] = keys[5] = keys[4];
-    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, &id, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
     args.loss = 128;
     HARNESS_CHECK(h, ref_shadow_word(&args, 255, 1) == 255 + 128 && ref_shadow_word(&args, 255, 0) == 255);
 }
@@ -283,7 +277,7 @@ static void two_ways(struct harness *h)
             planes.surface = s.surface;
             s.args.instance.has_normals = normals;
             uint64_t *nearest = harness_alloc(h, s.map.count * 8);
-            uint8_t *marked = harness_alloc(h, POINTS);
+            uint8_t *marked = harness_alloc(h, SLOTS);
             uint32_t rounds = 0, found = 1, lit = 0, dark = 0;
             for (; found; rounds++) {
                 found = 0;
@@ -291,10 +285,10 @@ static void two_ways(struct harness *h)
                     nearest[i] = REF_EMPTY_KEY;
                 for (uint32_t c = 0; c < CHUNKS; c++)
                     for (uint32_t i = 0; i < s.chunks[c].count; i++) {
-                        uint32_t id = s.ids[s.chunks[c].first + i];
+                        uint32_t id = s.chunks[c].first + i;
                         struct ref_place place = ref_place(&s.args.view, &s.chunks[c], s.positions, i);
                         // what the map does not reach is discarded, what is marked left out
-                        if (marked[id] || !place.known || ref_lit(&s.args, &planes, &s.chunks[c], s.positions, s.ids, i) != REF_NO)
+                        if (marked[id] || !place.known || ref_lit(&s.args, &planes, &s.chunks[c], s.positions, i) != REF_NO)
                             continue;
                         double x = floor(0.5 * (place.x.lo + place.x.hi)), y = floor(0.5 * (place.y.lo + place.y.hi));
                         x -= s.args.view.origin_x;
@@ -312,9 +306,9 @@ static void two_ways(struct harness *h)
             }
             for (uint32_t c = 0; c < CHUNKS; c++)
                 for (uint32_t i = 0; i < s.chunks[c].count; i++) {
-                    uint32_t id = s.ids[s.chunks[c].first + i];
+                    uint32_t id = s.chunks[c].first + i;
                     struct ref_place place = ref_place(&s.args.view, &s.chunks[c], s.positions, i);
-                    int is_lit = ref_lit(&s.args, &planes, &s.chunks[c], s.positions, s.ids, i) == REF_NO;
+                    int is_lit = ref_lit(&s.args, &planes, &s.chunks[c], s.positions, i) == REF_NO;
                     lit += (uint32_t)is_lit;
                     dark += (uint32_t)!is_lit;
                     if (place.known && is_lit != marked[id])

@@ -82,14 +82,14 @@ static enum ref_truth supported(const struct view_args *view, const uint64_t *ke
 }
 
 enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
-                       const float *positions, const uint32_t *ids, uint32_t slot)
+                       const float *positions, uint32_t slot)
 {
     const struct view_args *view = &args->view;
     struct ref_place place = ref_place(view, chunk, positions, slot);
     if (!place.known || place.z.hi < view->z_near)
         return REF_NO;
     int unsure = place.z.lo < view->z_near, shadowed = 0, lit = 0, has_normal;
-    uint32_t word = planes->surface[ids[chunk->first + slot]];
+    uint32_t word = planes->surface[chunk->first + slot];
     struct ref_range own = layer_distance(args, &place, word, &has_normal);
     for (double py = floor(place.y.lo); py <= floor(place.y.hi); py++)
         for (double px = floor(place.x.lo); px <= floor(place.x.hi); px++) {

@@ -77,9 +77,9 @@ struct ref_splat {
     int x0, y0, x1, y1;
     struct ref_range z;
 };
-// positions, ids: of the instance; surface: by ids. slot counts from the chunk's first.
+// positions, surface: of the instance. slot counts from the chunk's first; with that, it is the point's id.
 struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
-                             const uint32_t *ids, const uint32_t *surface, uint32_t slot);
+                             const uint32_t *surface, uint32_t slot);
 
 // Where a point is on screen, in pixels of the full picture.
 struct ref_place {
@@ -120,7 +120,7 @@ struct ref_disc {
     double normal_error, radius;
 };
 struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
-                         const float *positions, const uint32_t *ids, const uint32_t *surface, const float *radii,
+                         const float *positions, const uint32_t *surface, const float *radii,
                          uint32_t slot);
 // Whether it covers a pixel of the plane, how deep, and at which squared share of its radius from its middle.
 struct ref_met {
@@ -216,7 +216,7 @@ float ref_limit(const struct limit_args *args, const struct ref_planes *planes, 
 
 // Is the point of this slot in shadow? planes: of the light's map.
 enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
-                       const float *positions, const uint32_t *ids, uint32_t slot);
+                       const float *positions, uint32_t slot);
 // What the map takes of 255 from that point, if it is in its shadow. 0: float32 may find the point at another texel.
 int ref_lit_loss(const struct lit_args *args, const struct ref_planes *planes, const struct chunk_view *chunk,
                  const float *positions, uint32_t slot, uint32_t *loss);

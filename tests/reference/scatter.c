@@ -76,11 +76,11 @@ struct ref_place ref_place(const struct view_args *view, const struct chunk_view
 }
 
 struct ref_splat ref_scatter(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
-                             const uint32_t *ids, const uint32_t *surface, uint32_t slot)
+                             const uint32_t *surface, uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
     double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]};
-    uint32_t id = ids[chunk->first + slot];
+    uint32_t id = chunk->first + slot;
     struct ref_splat splat = {.id = chunk->id_base + id};
     double ex, ey, ez;
     double x = project(chunk, 0, p, &ex), y = project(chunk, 1, p, &ey), z = project(chunk, 2, p, &ez);

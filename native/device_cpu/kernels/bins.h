@@ -25,7 +25,7 @@ struct pt_bins {
     const struct view_args *view;
     const struct disc_args *discs; // an instance each
     const uint32_t *drawn;         // bits of sifted chunks
-    uint32_t instances, first, stride; // buffers of instance i start at first + i stride: chunks, positions, ids, surface, radii
+    uint32_t instances, first, stride; // buffers of instance i start at first + i stride: chunks, positions, surface, radii
     uint32_t columns, rows, bins;      // tiles, and one for the large
     uint32_t *begins;                  // first chunk of each instance in the list of all chunks
     uint32_t *heads;                   // by thread and bin: the block filled last
@@ -48,9 +48,8 @@ static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, ui
                                     &bins->discs[i],
                                     view,
                                     (const float *)pt_cpu_data(bins->call, at + 1) + 3 * (size_t)view->first,
-                                    (const uint32_t *)pt_cpu_data(bins->call, at + 2) + view->first,
-                                    pt_cpu_data(bins->call, at + 3),
-                                    pt_cpu_data(bins->call, at + 4) };
+                                    pt_cpu_data(bins->call, at + 2),
+                                    pt_cpu_data(bins->call, at + 3) };
 }
 
 static inline void pt_bin_put(struct pt_bins *bins, uint32_t *heads, uint32_t bin, uint32_t entry, uint32_t word)
@@ -90,14 +89,11 @@ static void pt_bin_chunk(struct pt_bins *bins, uint32_t *heads, const struct pt_
         int32_t box[4][PT_LANES];
         uint32_t words[PT_LANES];
         vf p[3];
-        // surface words lie in file order, each may be a cache miss: they are asked for ahead
-        for (uint32_t k = i + 8 * PT_LANES; k < i + 9 * PT_LANES && k < count; k++)
-            __builtin_prefetch(source->surface + source->ids[k]);
         for (uint32_t k = 0; k < 3; k++)
             p[k] = vf_load(source->positions + (size_t)k * source->chunk->padded + i);
         pt_disc_project(source, p, vm_first(pt_lanes_left(i, count)), &discs);
-        discs.id = vi_load(source->ids + i);
-        vi word = vi_gather(source->surface, discs.id, discs.drawn);
+        discs.id = vi_add(vi_set(source->chunk->first + i), vi_lanes());
+        vi word = vi_load(source->surface + source->chunk->first + i);
         pt_disc_cull(source, p, word, &discs);
         pt_disc_size(source, word, &discs);
         uint32_t drawn = vm_bits(discs.drawn);
@@ -162,14 +158,14 @@ static inline int pt_bins_fill(struct pt_bins *bins)
 // What is done with PT_LANES discs of an instance.
 typedef void pt_bin_work(void *context, uint32_t instance, const struct pt_discs *discs);
 
-// Asks for what the discs of a block are looked up by: colours lie in file order, each is a cache miss of its own.
+// Asks for what the discs of a block are looked up by: each colour is a cache miss of its own.
 static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_block *block, uint32_t instance, int colors)
 {
     for (uint32_t i = 0; i < block->count && colors; i++) {
         const struct pt_disc_source source = pt_bin_source(bins, block->entries[i] >> PT_BIN_CHUNK_SHIFT, &instance);
-        const char *color = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 5);
+        const char *color = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 4);
         const uint32_t slot = block->entries[i] & ((1u << PT_BIN_CHUNK_SHIFT) - 1);
-        __builtin_prefetch(color + (size_t)pt_color_bytes[source.args->instance.color_format] * source.ids[slot]);
+        __builtin_prefetch(color + (size_t)pt_color_bytes[source.args->instance.color_format] * (source.chunk->first + slot));
     }
 }
 
@@ -196,7 +192,7 @@ static inline __attribute__((always_inline)) void pt_bin_walk(const struct pt_bi
                 for (uint32_t k = 0; k < 3; k++)
                     p[k] = vf_gather(source.positions + (size_t)k * source.chunk->padded, slot, vm_first(next - i));
                 pt_disc_project(&source, p, vm_first(next - i), &discs);
-                discs.id = vi_gather(source.ids, slot, vm_first(next - i));
+                discs.id = vi_add(slot, vi_set(source.chunk->first));
                 pt_disc_size(&source, word, &discs);
                 pt_disc_shape(&source, word, &discs);
                 pt_disc_tighten(bins->view, &discs);

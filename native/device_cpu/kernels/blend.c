@@ -45,11 +45,11 @@ static inline void set_terms(const struct pt_bins *bins, uint32_t instance, cons
 {
     const struct instance_args *args = &bins->discs[instance].instance;
     const uint32_t at = bins->first + instance * bins->stride;
-    const void *colors = pt_cpu_data(bins->call, at + 5);
+    const void *colors = pt_cpu_data(bins->call, at + 4);
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     vf color[4], normal[4], largest = scale;
     pt_albedo(args, colors, discs->id, 0, discs->drawn, color);
-    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 6), discs->id, 0, discs->drawn) * scale;
+    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 5), discs->id, 0, discs->drawn) * scale;
     for (int k = 0; k < 3; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
         largest = vf_max(largest, vf_abs(color[k]));
@@ -253,10 +253,10 @@ int PT_KERNEL_ENTRY(blend)(const struct pt_cpu_call *call)
     struct pt_bins bins = { .call = call,
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
-                            .drawn = args->sifted ? pt_cpu_data(call, 4 + 7 * args->instances) : NULL,
+                            .drawn = args->sifted ? pt_cpu_data(call, 4 + 6 * args->instances) : NULL,
                             .instances = args->instances,
                             .first = 4,
-                            .stride = 7 };
+                            .stride = 6 };
     int error = pt_bins_fill(&bins);
     if (error)
         return error;

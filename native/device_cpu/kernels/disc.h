@@ -29,7 +29,6 @@ struct pt_disc_source {
     const struct disc_args *args;
     const struct chunk_view *chunk;
     const float *positions; // of the chunk
-    const uint32_t *ids;    // of the chunk
     const uint32_t *surface;
     const float *radii;
 };

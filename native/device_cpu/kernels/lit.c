@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // lit: points against the filled map of a light. [D 6], SPEC 4; twin of shaders/kernels/lit.comp
 //
-// Words of a cloud's points belong to one chunk each, so threads never meet. Surface words lie in file order, a cache miss
-// each: only points well behind the map are asked for theirs, and lit points are not written at all.
+// Words of a cloud's points belong to one chunk each, so threads never meet. Lit points are not written at all.
 #include "device_cpu/rows.h"
 
 struct lit {
@@ -10,11 +9,11 @@ struct lit {
     struct lit_args args; // with the wider texel
 };
 
-// Points of a chunk that may be in shadow wait for their surface words, which are fetched meanwhile.
-enum { BLOCK = 8, QUEUE = BLOCK * PT_LANES };
+// Slots of a chunk's points that may be in shadow: few of a block are, and they are tested side by side.
+enum { BLOCK = 128 };
 
 struct queue {
-    uint32_t count, slot[QUEUE + PT_LANES], id[QUEUE + PT_LANES];
+    uint32_t count, slot[BLOCK + PT_LANES];
 };
 
 // Where PT_LANES points fall: z, pixel and texel, and which of them lie behind what the map shows there by more than their
@@ -101,7 +100,7 @@ static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm 
 {
     const struct view_args *view = &lit->args.view;
     const struct instance_args *instance = &lit->args.instance;
-    vi word = vi_gather(pt_cpu_data(lit->call, 6), id, lanes);
+    vi word = vi_gather(pt_cpu_data(lit->call, 5), id, lanes);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT)), n[3];
     *none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
     if (!instance->has_normals)
@@ -151,7 +150,7 @@ static inline uint32_t loss_at(const struct lit *lit, uint32_t texel)
     if (!lit->args.faint)
         return lit->args.loss;
     const uint32_t *keys = pt_cpu_data(lit->call, 0); // low words: ids
-    const uint8_t *opacities = pt_cpu_data(lit->call, 10);
+    const uint8_t *opacities = pt_cpu_data(lit->call, 9);
     return share(lit->args.loss, opacities[keys[2 * (size_t)texel] - lit->args.caster]);
 }
 
@@ -175,37 +174,30 @@ static void load_points(const float *positions, uint32_t padded, uint32_t i, vf 
         p[k] = vf_load(positions + k * (size_t)padded + i);
 }
 
-// Queues those of QUEUE slots from `first` on that have to be tested, or looked at in any case.
-static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, const float *positions, const uint32_t *ids,
-                       uint32_t first, struct queue *queue)
+// Queues those of BLOCK slots from `first` on that have to be tested, or looked at in any case.
+static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, const float *positions, uint32_t first,
+                       struct queue *queue)
 {
     const struct lit_args *args = &lit->args;
-    const uint8_t *marks = pt_cpu_data(lit->call, 7);
-    const uint32_t *surface = pt_cpu_data(lit->call, 6);
-    vm lanes[BLOCK];
-    for (uint32_t k = 0; k < BLOCK; k++) { // a tight loop of its own: marks lie in file order
-        uint32_t i = first + k * PT_LANES;
-        lanes[k] = vm_first(i < chunk->count ? pt_lanes_left(i, chunk->count) : 0);
-        if (args->marked && i < chunk->count) {
-            vi mark = vi_and(vi_gather_bytes(marks, vi_load(ids + i), lanes[k]), vi_set(255));
-            lanes[k] = vm_and(lanes[k], vm_not(vi_eq(mark, vi_set(0))));
+    const uint8_t *marks = (const uint8_t *)pt_cpu_data(lit->call, 6) + chunk->first;
+    const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
+    uint32_t count = 0;
+    for (uint32_t i = first; i < last; i += PT_LANES) {
+        vm lanes = vm_first(pt_lanes_left(i, last));
+        vi slot = vi_add(vi_set(i), vi_lanes());
+        if (args->marked) {
+            vi mark = vi_and(vi_gather_bytes(marks, slot, lanes), vi_set(255));
+            lanes = vm_and(lanes, vm_not(vi_eq(mark, vi_set(0))));
         }
-    }
-    queue->count = 0;
-    for (uint32_t k = 0; k < BLOCK; k++) {
-        uint32_t i = first + k * PT_LANES, left = vm_bits(lanes[k]);
-        vf p[3];
-        if (left && !args->close && !args->compare) { // else lit points have to be looked at too
+        if (vm_bits(lanes) && !args->close && !args->compare) { // else lit points have to be looked at too
+            vf p[3];
             load_points(positions, chunk->padded, i, p);
-            left = vm_bits(fall_of(lit, chunk, p, lanes[k]).behind);
+            lanes = fall_of(lit, chunk, p, lanes).behind;
         }
-        for (; left; left &= left - 1, queue->count++) {
-            uint32_t slot = i + (uint32_t)__builtin_ctz(left);
-            queue->slot[queue->count] = slot;
-            queue->id[queue->count] = ids[slot];
-            __builtin_prefetch(surface + ids[slot]);
-        }
+        vi_pack(queue->slot + count, slot, vm_bits(lanes));
+        count += (uint32_t)__builtin_popcount(vm_bits(lanes));
     }
+    queue->count = count;
 }
 
 // Tests PT_LANES queued points from `at` on.
@@ -213,19 +205,19 @@ static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk
                            const struct queue *queue, uint32_t at)
 {
     const struct lit_args *args = &lit->args;
-    uint32_t *words = (uint32_t *)pt_cpu_data(lit->call, 8) + args->base, texels[PT_LANES], differs = 0;
+    uint32_t *words = (uint32_t *)pt_cpu_data(lit->call, 7) + args->base + chunk->first, texels[PT_LANES], differs = 0;
     vm lanes = vm_first(queue->count - at < PT_LANES ? queue->count - at : PT_LANES);
     vi slot = vi_load(queue->slot + at);
     vf p[3];
     for (uint32_t k = 0; k < 3; k++)
         p[k] = vf_gather(positions + k * (size_t)chunk->padded, slot, lanes);
     struct fall fall = fall_of(lit, chunk, p, lanes);
-    uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, vi_load(queue->id + at)) : 0;
+    uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, vi_add(slot, vi_set(chunk->first))) : 0;
     uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed;
     vi_store(texels, fall.texel, vm_first(PT_LANES));
     for (; left; left &= left - 1) {
         uint32_t k = (uint32_t)__builtin_ctz(left);
-        differs |= note(args, words + queue->id[at + k], shadowed >> k & 1u ? loss_at(lit, texels[k]) : 0);
+        differs |= note(args, words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(lit, texels[k]) : 0);
     }
     return differs;
 }
@@ -233,11 +225,10 @@ static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk
 static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
 {
     const float *positions = (const float *)pt_cpu_data(lit->call, 4) + 3 * (size_t)chunk->first;
-    const uint32_t *ids = (const uint32_t *)pt_cpu_data(lit->call, 5) + chunk->first;
     uint32_t differs = 0;
     struct queue queue;
-    for (uint32_t first = 0; first < chunk->count; first += QUEUE) {
-        fill_queue(lit, chunk, positions, ids, first, &queue);
+    for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
+        fill_queue(lit, chunk, positions, first, &queue);
         for (uint32_t at = 0; at < queue.count; at += PT_LANES)
             differs |= lit_points(lit, chunk, positions, &queue, at);
     }
@@ -253,7 +244,7 @@ static void lit_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thr
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(lit->call); c++)
         differs |= lit_chunk(lit, &chunks[c]);
     if (differs && lit->args.compare)
-        __atomic_store_n((uint32_t *)pt_cpu_data(lit->call, 9), 1, __ATOMIC_RELAXED);
+        __atomic_store_n((uint32_t *)pt_cpu_data(lit->call, 8), 1, __ATOMIC_RELAXED);
 }
 
 int PT_KERNEL_ENTRY(lit)(const struct pt_cpu_call *call)

@@ -65,8 +65,7 @@ static struct window window_of(const struct view_args *view)
 
 // 1. Points [first, last) of the chunk: those in view that are nearer than what their pixel holds wait.
 static inline void project(const struct view_args *view, const struct window *w, const struct chunk_view *chunk,
-                           const float *positions, const uint32_t *ids, uint32_t first, uint32_t last, struct target target,
-                           struct waiting *waiting)
+                           const float *positions, uint32_t first, uint32_t last, struct target target, struct waiting *waiting)
 {
     uint32_t count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
@@ -96,7 +95,7 @@ static inline void project(const struct view_args *view, const struct window *w,
         uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z_bits))));
         vi_pack(waiting->pixel + count, pixel, nearer);
         vi_pack(waiting->z + count, z_bits, nearer);
-        vi_pack(waiting->id + count, vi_load(ids + i), nearer);
+        vi_pack(waiting->id + count, vi_add(vi_set(chunk->first + i), vi_lanes()), nearer);
         if (chunk->cull) {
             pack_float(waiting->position[0] + count, px, nearer);
             pack_float(waiting->position[1] + count, py, nearer);
@@ -131,17 +130,14 @@ static inline void cull(const struct chunk_view *chunk, const uint32_t *surface,
 }
 
 static void scatter_chunk(const struct view_args *view, const struct chunk_view *chunk, const float *all_positions,
-                          const uint32_t *all_ids, const uint32_t *surface, struct target target)
+                          const uint32_t *surface, struct target target)
 {
     const float *positions = all_positions + 3 * (size_t)chunk->first;
-    const uint32_t *ids = all_ids + chunk->first;
     const struct window window = window_of(view);
     struct waiting waiting;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
         uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-        project(view, &window, chunk, positions, ids, first, last, target, &waiting);
-        for (uint32_t i = 0; chunk->cull && i < waiting.count; i++)
-            __builtin_prefetch(surface + waiting.id[i]);
+        project(view, &window, chunk, positions, first, last, target, &waiting);
         if (chunk->cull)
             cull(chunk, surface, &waiting);
         for (uint32_t i = 0; i < waiting.count; i++)
@@ -155,17 +151,17 @@ static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
     const struct pt_cpu_call *call = scatter->call;
     const struct scatter_args *args = call->arguments;
     const struct target target = { .keys = pt_cpu_data(call, 0),
-                                   .limit = args->behind ? pt_cpu_data(call, 1 + 4 * args->instances) : NULL,
-                                   .drawn = args->sifted ? pt_cpu_data(call, 1 + 4 * args->instances + args->behind) : NULL,
+                                   .limit = args->behind ? pt_cpu_data(call, 1 + 3 * args->instances) : NULL,
+                                   .drawn = args->sifted ? pt_cpu_data(call, 1 + 3 * args->instances + args->behind) : NULL,
                                    .shared = pt_pool_threads(call->pool) > 1 };
     uint32_t instance = 0;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(call); c++) {
         while (c >= scatter->begins[instance + 1])
             instance++;
-        const struct chunk_view *chunks = pt_cpu_data(call, 1 + 4 * instance);
-        scatter_chunk(scatter->view, &chunks[c - scatter->begins[instance]], pt_cpu_data(call, 2 + 4 * instance),
-                      pt_cpu_data(call, 3 + 4 * instance), pt_cpu_data(call, 4 + 4 * instance), target);
+        const struct chunk_view *chunks = pt_cpu_data(call, 1 + 3 * instance);
+        scatter_chunk(scatter->view, &chunks[c - scatter->begins[instance]], pt_cpu_data(call, 2 + 3 * instance),
+                      pt_cpu_data(call, 3 + 3 * instance), target);
     }
 }
 
@@ -177,7 +173,7 @@ int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
         return PATINA_ERROR_MEMORY;
     begins[0] = 0;
     for (uint32_t i = 0; i < args->instances; i++)
-        begins[i + 1] = begins[i] + (uint32_t)(call->buffers[1 + 4 * i]->size / sizeof(struct chunk_view));
+        begins[i + 1] = begins[i] + (uint32_t)(call->buffers[1 + 3 * i]->size / sizeof(struct chunk_view));
     struct scatter scatter = { call, &args->view, begins };
     pt_parallel(call->pool, begins[args->instances], 4, scatter_chunks, &scatter);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;

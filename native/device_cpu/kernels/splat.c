@@ -56,7 +56,7 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
 {
     const struct pt_bins *bins = context;
     const struct splat_args *args = bins->call->arguments;
-    const float *limit = args->behind ? pt_cpu_data(bins->call, 1 + 5 * args->instances) : NULL;
+    const float *limit = args->behind ? pt_cpu_data(bins->call, 1 + 4 * args->instances) : NULL;
     const uint32_t large = bins->bins - 1;
     struct tile tile;
     (void)thread;
@@ -78,10 +78,10 @@ int PT_KERNEL_ENTRY(splat)(const struct pt_cpu_call *call)
     struct pt_bins bins = { .call = call,
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
-                            .drawn = args->sifted ? pt_cpu_data(call, 1 + 5 * args->instances + args->behind) : NULL,
+                            .drawn = args->sifted ? pt_cpu_data(call, 1 + 4 * args->instances + args->behind) : NULL,
                             .instances = args->instances,
                             .first = 1,
-                            .stride = 5 };
+                            .stride = 4 };
     int error = pt_bins_fill(&bins);
     if (error)
         return error;

@@ -49,7 +49,7 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     vi_store(from + at, vi_add(vi_set((uint32_t)at), vi_lanes()), ours);
 }
 
-// Words lie in file order, each may be a cache miss: a tight loop gathers those of a block, so that many are under way.
+// Words are fetched at random: a tight loop gathers those of a block, so that many are under way at a time.
 enum { BLOCK = 16 };
 
 static void surface_row(void *context, uint32_t y)
