@@ -57,7 +57,7 @@ int patina_scene_clear(patina_scene *scene)
     for (uint32_t i = 0; i < scene->instance_count; i++)
         free((void *)scene->instances[i].style.ramp);
     scene->instance_count = scene->light_count = scene->mesh_count = scene->clip_count = 0;
-    scene->points = scene->triangles = 0;
+    scene->points = scene->given = scene->triangles = 0;
     return PATINA_OK;
 }
 
@@ -110,13 +110,16 @@ static void default_grey(float color[3])
         color[0] = color[1] = color[2] = 0.8f;
 }
 
-static int too_many(const patina_scene *scene, uint64_t more)
+// slots, count: of what is to be added; a triangle is one of either.
+static int too_many(const patina_scene *scene, uint64_t slots, uint64_t count)
 {
-    if (scene->points + scene->triangles + more <= 0xFFFFFFFEull)
+    const uint64_t inside = scene->points + scene->triangles + slots, outside = scene->given + scene->triangles + count;
+    const uint64_t most = inside > outside ? inside : outside;
+    if (most <= 0xFFFFFFFEull)
         return PATINA_OK;
     return pt_fail(&scene->handle, PATINA_ERROR_TOO_MANY_POINTS,
                    "the scene would hold %llu points and triangles with this instance; ids end at 4294967294",
-                   (unsigned long long)(scene->points + scene->triangles + more));
+                   (unsigned long long)most);
 }
 
 static int check_style(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
@@ -171,7 +174,7 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     if (style)
         checked = *style;
     int error = check_style(scene, &checked, cloud);
-    if (error || (error = too_many(scene, cloud->slots)))
+    if (error || (error = too_many(scene, cloud->slots, cloud->info.count)))
         return error;
     void *grown = grow(scene->instances, scene->instance_count, &scene->instance_room, sizeof *scene->instances);
     if (!grown)
@@ -183,6 +186,7 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     scene->instances[scene->instance_count++] =
         (struct pt_instance){ .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points };
     scene->points += cloud->slots;
+    scene->given += cloud->info.count;
     return PATINA_OK;
 }
 
@@ -202,7 +206,7 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
     if (checked.shadow_off & ~(uint32_t)(PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE))
         return fail(scene, "mesh style: shadow_off has unknown bits");
     default_grey(checked.color);
-    int error = too_many(scene, mesh->info.triangle_count);
+    int error = too_many(scene, mesh->info.triangle_count, mesh->info.triangle_count);
     if (error)
         return error;
     void *grown = grow(scene->meshes, scene->mesh_count, &scene->mesh_room, sizeof *scene->meshes);

@@ -28,7 +28,8 @@ struct patina_scene {
     uint64_t triangles; // of all meshes
     patina_clip *clips; // defaults made explicit
     uint32_t clip_count, clip_room;
-    uint64_t points; // of all instances
+    uint64_t points; // of all instances: slots, which ids count
+    uint64_t given;  // of all instances, as callers count them
     patina_camera camera;
     int has_camera;
     patina_settings settings; // defaults made explicit

@@ -174,7 +174,7 @@ typedef struct patina_cloud_info {
     double box_min[3], box_max[3]; // over the drawn points; an empty cloud has min > max
     double spacing;          // median over chunks of the local spacing (about 1/sqrt(points per area)), object units
     double spacing_min, spacing_max;
-    uint64_t invalid_positions, invalid_normals, invalid_colors; // NaN/Inf (normals: or zero)
+    uint64_t invalid_positions, invalid_normals, invalid_colors; // NaN/Inf (normals: or zero); the last two of drawn points
     uint32_t has_normals, has_colors, has_opacities;
     double origin[3];
     double layer_distance;   // automatic d~: what d_min = 0 stands for at the median spacing, object units. Each chunk
