@@ -143,7 +143,8 @@ static void test_lazy_is_whole(void **state)
         struct stage stage = stage_lit();
         patina_frame *frame = frame_on(device), *lazy = frame_on(device);
         patina_frame_stats stats = render(frame, &stage);
-        assert_true(stats.shadow_maps > 3 * 3 && stats.shadow_width > 16 && stats.shadow_bytes == 3 * 4 * (TORUS + FLOOR));
+        assert_true(stats.shadow_maps > 3 * 3 && stats.shadow_width > 16);
+        assert_in_range(stats.shadow_bytes, 3 * 4 * (TORUS + FLOOR), 3 * 4 * 1.01 * (TORUS + FLOOR)); // chunks end with a vector
         struct picture first = picture_read(frame);
         assert_int_equal(render(frame, &stage).shadow_maps, 0);
         struct picture kept = picture_read(frame);
@@ -486,7 +487,7 @@ static void test_files(void **state)
     spoil(path, bad, 0, 0);
     refuse(other, &stage, bad, "no file of shadow");
     spoil(path, bad, 8, 0);
-    refuse(other, &stage, bad, "of version 3");
+    refuse(other, &stage, bad, "of version 2");
     stage.settings.shadow_samples = 4;
     CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
     refuse(other, &stage, path, "baked with 3 samples, the scene asks for 4");
