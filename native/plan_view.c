@@ -159,12 +159,13 @@ static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chun
         pt_apply(rows, p, q);
         for (int k = 0; k < 3; k++)
             q[k] += translation[k];
-        z_min = fmin(z_min, q[2]);
-        z_max = fmax(z_max, q[2]);
+        z_min = q[2] < z_min ? q[2] : z_min; // as fmin and fmax would, which are calls
+        z_max = q[2] > z_max ? q[2] : z_max;
         double w = camera->orthographic ? 1.0 : q[2];
         for (int k = 0; k < 2 && w > 0.0; k++) {
-            rect[k] = fmin(rect[k], q[k] / w - 1.0);
-            rect[2 + k] = fmax(rect[2 + k], q[k] / w + 1.0);
+            double at = q[k] / w;
+            rect[k] = at - 1.0 < rect[k] ? at - 1.0 : rect[k];
+            rect[2 + k] = at + 1.0 > rect[2 + k] ? at + 1.0 : rect[2 + k];
         }
     }
     double error[3], slop; // what float32 may move a point by: where |R p| is large beside the sum, more than a pixel

@@ -79,10 +79,47 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
 
 // ---- 1. colours and normals -------------------------------------------------------------------------------------------------
 
+// Colours and shadows of points are fetched at random, with large clouds each is a cache miss of its own: ask for those of a
+// row that is shaded later. 10M points: 4.4 ms in place of 6.3.
+static void ask_for_colors(const struct finish *finish, int32_t y)
+{
+    const struct view_args *view = finish->planes.view;
+    for (uint32_t i = 0; i < finish->shade_count; i++) {
+        const struct shade_args *args = finish->shades[i].call.arguments;
+        const char *colors = pt_cpu_data(&finish->shades[i].call, 4);
+        const size_t size = pt_color_bytes[args->instance.color_format];
+        const uint32_t *words[PT_MAX_LIGHTS];
+        uint32_t casting = 0;
+        for (uint32_t l = 0; l < args->light_count; l++)
+            if (args->lights[l].shadow)
+                words[casting++] = (const uint32_t *)pt_cpu_data(&finish->shades[i].call, 8) +
+                                   (size_t)(args->lights[l].shadow - 1) * args->instance.id_count;
+        for (uint32_t x = 0; (size || casting) && x < view->width; x += PT_LANES) {
+            size_t at = (size_t)y * view->width + x;
+            vi id;
+            vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, view->width), &id);
+            uint32_t ids[PT_LANES], bits = vm_bits(ours);
+            if (!bits)
+                continue;
+            vi_store(ids, id, vm_first(PT_LANES));
+            bits &= ~vm_bits(pt_filled(pt_source(&finish->planes, at), at, ours));
+            for (; bits; bits &= bits - 1) {
+                uint32_t point = ids[__builtin_ctz(bits)];
+                if (size)
+                    __builtin_prefetch(colors + size * point, 0, 1); // into the second level
+                for (uint32_t l = 0; l < casting; l++)
+                    __builtin_prefetch(words[l] + point, 0, 1);
+            }
+        }
+    }
+}
+
 static void see(const struct finish *finish, struct walk *walk, int32_t y)
 {
     walk->any[seen_slot(finish, y)] = pt_see_row(&finish->planes, y, finish->reach ? PT_BLEND_FILLED : 1.0f,
                                                  finish->with_normals, seen_row(finish, walk, y));
+    if (anything(finish, walk, y))
+        ask_for_colors(finish, y);
 }
 
 // Opacity into the row's colours.

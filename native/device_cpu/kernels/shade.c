@@ -27,7 +27,13 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
     const struct shade_args *args = shade->args;
     const uint32_t *rect = args->view.rect;
     float *shading = pt_cpu_data(shade->call, 5), *colors = pt_cpu_data(shade->call, 6), *arrived = pt_cpu_data(shade->call, 9);
+    const uint64_t *keys = shade->planes.keys + (size_t)y * args->view.width;
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
+        if (args->instance.color_format)
+            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 4),
+                           pt_color_bytes[args->instance.color_format]);
+        if (args->instance.has_opacities)
+            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 7), 1);
         size_t at = (size_t)y * args->view.width + x;
         vf color[4], normal[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
         vi id;
