@@ -204,6 +204,82 @@ static void test_plan(void **state)
     patina_device_destroy(device);
 }
 
+// ---- numbers of points ---------------------------------------------------------------------------------------------
+
+enum { NUMBERED = 5000, GRID = 64 };
+
+// A cloud whose point i lies in the pixel i of a grid, row by row, given in a shuffled order; every seventh is no point.
+static patina_cloud *numbered_cloud(uint32_t *given, uint32_t seed)
+{
+    float *position = malloc(3 * NUMBERED * sizeof *position);
+    uint32_t random = seed;
+    assert_non_null(position);
+    for (uint32_t i = 0; i < NUMBERED; i++) {
+        uint32_t j = (random = random * 1664525u + 1013904223u) >> 8;
+        given[i] = given[j % (i + 1)];
+        given[j % (i + 1)] = i;
+    }
+    for (uint32_t i = 0; i < NUMBERED; i++) { // points beyond the grid's 4096 pixels are out of view
+        position[3 * i] = given[i] % 7 == 3 ? NAN : (float)(given[i] % GRID) + 0.5f;
+        position[3 * i + 1] = (float)(given[i] / GRID) + 0.5f;
+        position[3 * i + 2] = 0.0f;
+    }
+    patina_cloud_desc desc = {.struct_size = sizeof desc, .count = NUMBERED};
+    desc.position = (patina_array){.data = position, .type = PATINA_FLOAT32, .components = 3};
+    patina_cloud *cloud = NULL;
+    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
+    free(position);
+    return cloud;
+}
+
+// Keys name points as their callers count them, through every instance, whatever order the library keeps them in.
+static void test_callers_numbers(void **state)
+{
+    (void)state;
+    static uint32_t given[2][NUMBERED];
+    const double eye[3] = {GRID, 0.5 * GRID, 5.0}, target[3] = {GRID, 0.5 * GRID, 0.0};
+    const double beside[16] = {1, 0, 0, GRID, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    patina_camera camera = camera_orthographic(eye, target, GRID, 2 * GRID, GRID, 0.1, 10.0);
+    patina_settings settings = settings_default(2 * GRID, GRID);
+    settings.fill = PATINA_FILL_OFF;
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        patina_device *device = support_device_open(support_device_name(k), 0, 0);
+        if (!device)
+            continue;
+        patina_cloud *clouds[2] = {numbered_cloud(given[0], 1), numbered_cloud(given[1], 2)};
+        patina_scene *scene = scene_of(clouds[0], NULL);
+        patina_cloud_style style = {.struct_size = sizeof style};
+        memcpy(style.world_from_object, beside, sizeof beside);
+        CHECK(patina_scene_add_cloud(scene, clouds[1], &style), scene);
+        struct picture picture = picture_render(device, scene, &camera, &settings);
+        uint64_t seen = 0;
+        for (uint32_t i = 0; i < 2 * GRID * GRID; i++) {
+            if (picture.keys[i] == KEY_EMPTY)
+                continue;
+            const uint32_t x = i % (2 * GRID), y = i / (2 * GRID), id = key_id(picture.keys[i]), second = x >= GRID;
+            assert_in_range(id, second * NUMBERED, second * NUMBERED + NUMBERED - 1);
+            assert_int_equal(given[second][id % NUMBERED], y * GRID + x % GRID);
+            seen++;
+        }
+        assert_in_range(seen, 2 * GRID * GRID * 5 / 7, 2 * GRID * GRID);
+        picture_free(&picture);
+
+        patina_frame *frame = NULL;
+        CHECK(patina_frame_create(device, &frame), device);
+        CHECK(patina_frame_render(frame, scene), frame);
+        patina_scene_destroy(scene);
+        patina_cloud_destroy(clouds[0]);
+        uint64_t *keys = malloc(2 * GRID * GRID * sizeof *keys);
+        assert_non_null(keys);
+        assert_int_equal(patina_frame_read_keys(frame, keys, 2 * GRID * GRID * sizeof *keys), PATINA_ERROR_EMPTY);
+        assert_non_null(strstr(support_message(frame), "destroyed"));
+        free(keys);
+        patina_frame_destroy(frame);
+        patina_cloud_destroy(clouds[1]);
+        patina_device_destroy(device);
+    }
+}
+
 // ---- cancel and failure --------------------------------------------------------------------------------------------
 
 static void test_cancel_keeps_the_picture(void **state)
@@ -443,6 +519,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_statistics),
         cmocka_unit_test(test_plan),
+        cmocka_unit_test(test_callers_numbers),
         cmocka_unit_test(test_cancel_keeps_the_picture),
         cmocka_unit_test(test_cancel_while_running),
         cmocka_unit_test(test_memory_cap),

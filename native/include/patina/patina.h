@@ -572,7 +572,7 @@ PATINA_API int patina_frame_read(const patina_frame *frame, uint32_t pass, float
 // nothing (0, depth +inf). Like keys they are gone after a render that failed or was cancelled (PATINA_ERROR_EMPTY).
 PATINA_API int patina_frame_read_layer(const patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 // The visibility keys of the first layer, width * height uint64: float_bits(z) << 32 | id. Unlike the passes they are gone
-// after a render that failed or was cancelled (PATINA_ERROR_EMPTY).
+// after a render that failed or was cancelled, and with a cloud that they show (PATINA_ERROR_EMPTY).
 PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys, size_t size);
 // ---- shadow textures: kept by the frame while points, casters, lights' places and sizes, samples and resolution stay; lights'
 // power and colour, and lights and clouds that move together, change nothing. `light` counts the lights that cast.
@@ -581,7 +581,7 @@ PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys,
 // Blocks; patina_frame_cancel stops it. PATINA_ERROR_EMPTY when no light casts.
 PATINA_API int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene);
 // Copies the share of a light that arrives at each point, 0..1, in file order: count floats, size in bytes must fit exactly.
-// After a lazy render only the points that the picture showed say something; the others are 1.
+// After a lazy render only the points that the picture showed say something; the others are 1. Gone with the cloud.
 PATINA_API int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size);
 // Writes the frame's whole textures to a file, 1, 2 or 4 bytes a point and light, with what they depend on and a checksum.
 PATINA_API int patina_frame_save_shadows(const patina_frame *frame, const char *path);
