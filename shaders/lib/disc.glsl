@@ -18,7 +18,9 @@ layout(std430, binding = 5) readonly buffer radii_block { float radii[]; };
 
 struct disc {
     float x, y, z, radius;
+    vec2 reach; // of the ball around, pixels
     float gx, gy, e, f, g;
+    bool gentle;
     ivec4 box; // x0, y0, x1, y1, both ends included
     ivec2 own;
     vec3 n;
@@ -64,6 +66,7 @@ bool disc_box(view_args view, inout disc d)
         precise float pixels = 1.001 * pt_rcp(size);
         reach = reach * pixels;
         reach = around ? PT_DISC_FAR : reach;
+        d.reach[k] = reach;
         precise float begin = (at - reach) + 0.5, end = (at + reach) - 0.5;
         float own = floor(at), first = floor(pt_clamp_far(begin)), last = floor(pt_clamp_far(end));
         first = pt_max(pt_min(first, own), lower);
@@ -125,6 +128,8 @@ void disc_shape(view_args view, uint word, inout disc d)
     d.e = flat_disc ? e : 1e20;
     d.f = flat_disc ? f : 0.0;
     d.g = flat_disc ? g : 1e20;
+    precise float steep = pt_abs(d.gx) * (d.reach.x + 1.0) + pt_abs(d.gy) * (d.reach.y + 1.0);
+    d.gentle = steep <= PT_DISC_GENTLE;
 }
 
 // 1. The disc of a chunk's point; false: it is not drawn.
@@ -172,9 +177,10 @@ bool disc_pixel(view_args view, disc d, int x, int y, out float depth, out float
     precise float ellipse = (d.e * dx + d.f * dy) * dx + (d.g * dy) * dy, z = d.z + slope;
     bool covered = true;
     if (view.perspective != 0u) {
-        precise float q = 1.0 + slope;
-        covered = PT_DISC_LEAST <= q;
-        float inverse = pt_rcp(q);
+        precise float q = 1.0 + slope, inverse = (1.0 - slope) * (1.0 + slope * slope);
+        covered = d.gentle || PT_DISC_LEAST <= q;
+        if (!d.gentle)
+            inverse = pt_rcp(q);
         z = d.z * inverse;
         ellipse = ellipse * (inverse * inverse);
     }
@@ -194,10 +200,9 @@ float disc_weight(view_args view, disc d, int x, int y, float square, bool besid
         precise float pixel = (dx * dx + dy * dy) * 2.0;
         square = beside ? pixel : pt_min(pixel, square);
     }
-    precise float w = 0.25565624 * square - 1.03321445;
-    w = w * square + 1.90144324;
-    w = w * square - 1.98814547;
-    w = w * square + 0.99976468;
+    precise float two = square * square;
+    precise float high = 0.25565624 * two + (1.90144324 - 1.03321445 * square);
+    precise float w = high * two + (0.99976468 - 1.98814547 * square);
     return w;
 }
 

@@ -10,195 +10,298 @@
 #include <stdatomic.h>
 
 enum {
-    PT_DISC_LARGE = 16,      // a disc over more tiles than this goes to a bin that every tile looks through
-    PT_BIN_ENTRIES = 63,
-    PT_BIN_CHUNK_SHIFT = 12, // an entry: chunk of the list of all chunks, slot in the chunk
+    PT_DISC_LARGE = 16, // a disc over more tiles than this goes to a bin that every tile looks through
+    PT_BIN_DISCS = 31,
+    PT_BIN_SHIFT = 5,
+    PT_BIN_SHARE = 32, // blocks that a thread takes at once
 };
 #define PT_BIN_NONE 0xFFFFFFFFu
 
+// Discs: what a walk would else look up again, each number a cache miss.
 struct pt_bin_block {
-    uint32_t before, count, entries[PT_BIN_ENTRIES], words[PT_BIN_ENTRIES]; // and their surface words
+    uint32_t before; // as a head; all that were filled before are full
+    uint32_t word[PT_BIN_DISCS];
+    float place[PT_BIN_DISCS][4]; // x, y, z, and the bits of the id
+    uint32_t nothing[4];
+};
+
+struct pt_bin_thread {
+    uint32_t next, end; // blocks that it may fill
+    uint32_t nothing[14];
 };
 
 struct pt_bins {
     const struct pt_cpu_call *call;
     const struct view_args *view;
-    const struct disc_args *discs; // an instance each
-    const uint32_t *drawn;         // bits of sifted chunks
+    const struct disc_args *discs;     // an instance each
+    const uint32_t *drawn;             // bits of sifted chunks
     uint32_t instances, first, stride; // buffers of instance i start at first + i stride: chunks, positions, surface, radii
     uint32_t columns, rows, bins;      // tiles, and one for the large
-    uint32_t *begins;                  // first chunk of each instance in the list of all chunks
-    uint32_t *heads;                   // by thread and bin: the block filled last
+    uint32_t *heads;                   // by thread and bin: the block filled last << PT_BIN_SHIFT | discs in it
     struct pt_bin_block *blocks;
     uint32_t room;
     _Atomic uint32_t used;
+    // while they are filled
+    uint32_t *begins; // first chunk of each instance in the list of all chunks
+    struct pt_bin_thread *threads;
 };
+
+// ---- filling -------------------------------------------------------------------------------------------------------------
 
 static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, uint32_t chunk, uint32_t *instance)
 {
-    uint32_t i = *instance;
-    while (chunk < bins->begins[i])
-        i--;
-    while (chunk >= bins->begins[i + 1])
-        i++;
-    *instance = i;
-    const uint32_t at = bins->first + i * bins->stride;
-    const struct chunk_view *view = (const struct chunk_view *)pt_cpu_data(bins->call, at) + (chunk - bins->begins[i]);
+    while (chunk >= bins->begins[*instance + 1])
+        ++*instance;
+    const uint32_t at = bins->first + *instance * bins->stride;
+    const struct chunk_view *view = (const struct chunk_view *)pt_cpu_data(bins->call, at) + (chunk - bins->begins[*instance]);
     return (struct pt_disc_source){ bins->view,
-                                    &bins->discs[i],
+                                    &bins->discs[*instance],
                                     view,
                                     (const float *)pt_cpu_data(bins->call, at + 1) + 3 * (size_t)view->first,
-                                    pt_cpu_data(bins->call, at + 2),
+                                    (const uint32_t *)pt_cpu_data(bins->call, at + 2) + view->first,
                                     pt_cpu_data(bins->call, at + 3) };
 }
 
-static inline void pt_bin_put(struct pt_bins *bins, uint32_t *heads, uint32_t bin, uint32_t entry, uint32_t word)
+// Opens a block after the full one that ends at `head`; NULL when there is no room: it is counted, all will be done again.
+static inline struct pt_bin_block *pt_bin_open(struct pt_bins *bins, struct pt_bin_thread *thread, uint32_t *head)
 {
-    uint32_t head = heads[bin];
-    if (head == PT_BIN_NONE || bins->blocks[head].count == PT_BIN_ENTRIES) {
-        uint32_t block = atomic_fetch_add_explicit(&bins->used, 1, memory_order_relaxed);
-        if (block >= bins->room)
-            return; // counted: it will be done again with more room
-        bins->blocks[block].before = head;
-        bins->blocks[block].count = 0;
-        heads[bin] = head = block;
+    if (thread->next == thread->end) {
+        thread->next = atomic_fetch_add_explicit(&bins->used, PT_BIN_SHARE, memory_order_relaxed);
+        thread->end = thread->next + PT_BIN_SHARE;
     }
-    struct pt_bin_block *block = &bins->blocks[head];
-    block->words[block->count] = word;
-    block->entries[block->count++] = entry;
+    const uint32_t next = thread->next++;
+    if (next >= bins->room)
+        return NULL;
+    bins->blocks[next].before = *head;
+    *head = next << PT_BIN_SHIFT;
+    return bins->blocks + next;
 }
 
-static inline void pt_bin_disc(struct pt_bins *bins, uint32_t *heads, const int32_t box[4], uint32_t entry, uint32_t word)
+static inline void pt_bin_put(struct pt_bins *bins, struct pt_bin_thread *thread, uint32_t *head, const float place[4], uint32_t word)
 {
-    uint32_t x0 = (uint32_t)box[0] / PT_DISC_TILE, y0 = (uint32_t)box[1] / PT_DISC_TILE;
-    uint32_t x1 = (uint32_t)box[2] / PT_DISC_TILE, y1 = (uint32_t)box[3] / PT_DISC_TILE;
-    if ((uint64_t)(x1 - x0 + 1) * (y1 - y0 + 1) > PT_DISC_LARGE) {
-        pt_bin_put(bins, heads, bins->bins - 1, entry, word);
+    struct pt_bin_block *block = bins->blocks + (*head >> PT_BIN_SHIFT);
+    if (*head % (1u << PT_BIN_SHIFT) == PT_BIN_DISCS && !(block = pt_bin_open(bins, thread, head))) // full, or none yet
         return;
-    }
-    for (uint32_t y = y0; y <= y1; y++)
-        for (uint32_t x = x0; x <= x1; x++)
-            pt_bin_put(bins, heads, y * bins->columns + x, entry, word);
+    const uint32_t at = (*head)++ % (1u << PT_BIN_SHIFT);
+    memcpy(block->place[at], place, 16);
+    block->word[at] = word;
 }
 
-static void pt_bin_chunk(struct pt_bins *bins, uint32_t *heads, const struct pt_disc_source *source, uint32_t c)
+enum { PT_BIN_BATCH = 256 }; // points that are looked at before the first of their discs is put into its bin
+
+// Some discs of an instance, and the tiles that their boxes touch.
+struct pt_bin_batch {
+    float places[PT_BIN_BATCH][4];
+    uint32_t words[PT_BIN_BATCH], bins[PT_BIN_BATCH]; // bins: the first
+    uint32_t columns[PT_BIN_BATCH], rows[PT_BIN_BATCH]; // of tiles, less one
+    uint32_t drawn[PT_BIN_BATCH / PT_LANES], wide[PT_BIN_BATCH / PT_LANES]; // wide: over several tiles
+};
+
+static inline void pt_bin_list(const struct pt_bins *bins, struct pt_bin_batch *batch, uint32_t at, const struct pt_discs *discs,
+                               vi id, vi word, uint32_t drawn)
 {
-    const uint32_t count = source->chunk->count;
-    for (uint32_t i = 0; i < count; i += PT_LANES) {
+    const vm all = vm_first(PT_LANES);
+    const vf place[4] = { discs->x, discs->y, discs->z, vi_float(id) };
+    vi tiles[4];
+    for (int k = 0; k < 4; k++)
+        tiles[k] = vi_shr(discs->box[k], PT_DISC_TILE_SHIFT);
+    const vi columns = vi_sub(tiles[2], tiles[0]), rows = vi_sub(tiles[3], tiles[1]);
+    vf_store4(batch->places[at], place, vm_bits(all));
+    vi_store(batch->words + at, word, all);
+    vi_store(batch->bins + at, vi_add(vi_mul(tiles[1], vi_set(bins->columns)), tiles[0]), all);
+    vi_store(batch->columns + at, columns, all);
+    vi_store(batch->rows + at, rows, all);
+    batch->wide[at / PT_LANES] = drawn & ~vm_bits(vi_eq(vi_or(columns, rows), vi_set(0)));
+    batch->drawn[at / PT_LANES] = drawn;
+}
+
+static void pt_bin_batch(struct pt_bins *bins, uint32_t thread, const struct pt_bin_batch *batch, uint32_t count)
+{
+    struct pt_bin_thread *own = bins->threads + thread;
+    uint32_t *heads = bins->heads + (size_t)thread * bins->bins;
+    for (uint32_t at = 0; at < count; at += PT_LANES) {
+        for (uint32_t drawn = batch->drawn[at / PT_LANES] & ~batch->wide[at / PT_LANES]; drawn; drawn &= drawn - 1) {
+            const uint32_t i = at + (uint32_t)__builtin_ctz(drawn);
+            pt_bin_put(bins, own, heads + batch->bins[i], batch->places[i], batch->words[i]);
+        }
+        for (uint32_t drawn = batch->wide[at / PT_LANES]; drawn; drawn &= drawn - 1) {
+            const uint32_t i = at + (uint32_t)__builtin_ctz(drawn);
+            if ((batch->columns[i] + 1) * (uint64_t)(batch->rows[i] + 1) > PT_DISC_LARGE) {
+                pt_bin_put(bins, own, heads + bins->bins - 1, batch->places[i], batch->words[i]);
+                continue;
+            }
+            for (uint32_t y = 0; y <= batch->rows[i]; y++)
+                for (uint32_t x = 0; x <= batch->columns[i]; x++)
+                    pt_bin_put(bins, own, heads + batch->bins[i] + y * bins->columns + x, batch->places[i], batch->words[i]);
+        }
+    }
+}
+
+static void pt_bin_chunk(struct pt_bins *bins, uint32_t thread, const struct pt_disc_source *source)
+{
+    const struct chunk_view *chunk = source->chunk;
+    struct pt_bin_batch batch;
+    for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
         struct pt_discs discs;
-        int32_t box[4][PT_LANES];
-        uint32_t words[PT_LANES];
         vf p[3];
         for (uint32_t k = 0; k < 3; k++)
-            p[k] = vf_load(source->positions + (size_t)k * source->chunk->padded + i);
-        pt_disc_project(source, p, vm_first(pt_lanes_left(i, count)), &discs);
-        discs.id = vi_add(vi_set(source->chunk->first + i), vi_lanes());
-        vi word = vi_load(source->surface + source->chunk->first + i);
+            p[k] = vf_load(source->positions + (size_t)k * chunk->padded + i);
+        pt_disc_project(source, p, vm_first(pt_lanes_left(i, chunk->count)), &discs);
+        discs.id = vi_add(vi_set(chunk->first + i), vi_lanes());
+        vi word = vi_load(source->surface + i);
         pt_disc_cull(source, p, word, &discs);
-        pt_disc_size(source, word, &discs);
+        discs.radius = pt_disc_radius(source->args, source->radii, discs.id, word, discs.drawn);
+        pt_disc_reach(source->view, &discs);
+        pt_disc_box(source->view, discs.reach, &discs);
         uint32_t drawn = vm_bits(discs.drawn);
-        if (source->chunk->sifted)
-            drawn &= bins->drawn[source->chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD;
-        if (!drawn)
-            continue;
-        for (int k = 0; k < 4; k++)
-            vi_store(box[k], discs.box[k], vm_first(PT_LANES));
-        vi_store(words, word, vm_first(PT_LANES));
-        for (; drawn; drawn &= drawn - 1) {
-            uint32_t k = (uint32_t)__builtin_ctz(drawn);
-            const int32_t one[4] = { box[0][k], box[1][k], box[2][k], box[3][k] };
-            pt_bin_disc(bins, heads, one, c << PT_BIN_CHUNK_SHIFT | (i + k), words[k]);
-        }
+        if (chunk->sifted)
+            drawn &= bins->drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD;
+        pt_bin_list(bins, &batch, i % PT_BIN_BATCH, &discs, vi_add(discs.id, vi_set(chunk->id_base)), word, drawn);
+        if ((i + PT_LANES) % PT_BIN_BATCH == 0 || i + PT_LANES >= chunk->count)
+            pt_bin_batch(bins, thread, &batch, i % PT_BIN_BATCH + PT_LANES);
     }
 }
 
 static void pt_bin_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     struct pt_bins *bins = context;
-    uint32_t *heads = bins->heads + (size_t)thread * bins->bins, instance = 0;
+    uint32_t instance = 0;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(bins->call); c++) {
         const struct pt_disc_source source = pt_bin_source(bins, c, &instance);
-        pt_bin_chunk(bins, heads, &source, c);
+        pt_bin_chunk(bins, thread, &source);
     }
 }
 
-// Fills the bins; scratch 0 holds them. PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
-static inline int pt_bins_fill(struct pt_bins *bins)
+// Lays them out in scratch memory: struct pt_bins first, for the next call, then heads, what threads need, blocks.
+static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
 {
     const uint32_t threads = pt_pool_threads(bins->call->pool);
+    const size_t list_bytes = threads * sizeof *bins->threads, head_bytes = ((size_t)threads * bins->bins * 4 + 63) / 64 * 64;
+    const size_t begin_bytes = ((size_t)bins->instances + 1) * 4, own_bytes = (sizeof *bins + 63) / 64 * 64;
+    const size_t fixed = own_bytes + list_bytes + head_bytes + begin_bytes;
+    char *memory = pt_cpu_scratch(bins->call, PT_CPU_BINS, fixed + (size_t)blocks * sizeof *bins->blocks);
+    if (!memory)
+        return PATINA_ERROR_MEMORY;
+    const size_t room = (bins->call->scratch[PT_CPU_BINS].size - PT_SLACK - fixed) / sizeof *bins->blocks; // an earlier picture's is there still
+    bins->room = (uint32_t)(room < PT_BIN_NONE >> PT_BIN_SHIFT ? room : PT_BIN_NONE >> PT_BIN_SHIFT);
+    bins->threads = (struct pt_bin_thread *)(void *)(memory + own_bytes);
+    bins->heads = (uint32_t *)(void *)(memory + own_bytes + list_bytes);
+    bins->blocks = (struct pt_bin_block *)(void *)(memory + own_bytes + list_bytes + head_bytes);
+    bins->begins = (uint32_t *)(void *)(bins->blocks + bins->room);
+    memset(bins->threads, 0, list_bytes);
+    memset(bins->heads, 0xFF, head_bytes);
+    atomic_store(&bins->used, 0);
+    return PATINA_OK;
+}
+
+// Fills the bins. PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
+static inline int pt_bins_fill(struct pt_bins *bins)
+{
     bins->columns = (bins->view->width + PT_DISC_TILE - 1) / PT_DISC_TILE;
     bins->rows = (bins->view->height + PT_DISC_TILE - 1) / PT_DISC_TILE;
     bins->bins = bins->columns * bins->rows + 1;
-    const size_t begin_bytes = ((size_t)bins->instances + 1) * 4, head_bytes = (size_t)threads * bins->bins * 4;
-    for (uint32_t needed = 1024;;) {
-        char *memory = pt_cpu_scratch(bins->call, 0, begin_bytes + head_bytes + (size_t)needed * sizeof *bins->blocks);
-        if (!memory)
-            return PATINA_ERROR_MEMORY;
-        size_t size = bins->call->scratch[0].size - begin_bytes - head_bytes; // what an earlier picture needed is there still
-        bins->room = (uint32_t)(size / sizeof *bins->blocks < PT_BIN_NONE ? size / sizeof *bins->blocks : PT_BIN_NONE);
-        bins->blocks = (struct pt_bin_block *)(void *)memory;
-        bins->begins = (uint32_t *)(void *)(memory + (size_t)bins->room * sizeof *bins->blocks);
-        bins->heads = bins->begins + bins->instances + 1;
+    for (uint32_t needed = 1024;; needed += needed / 4) {
+        int error = pt_bins_lay_out(bins, needed);
+        if (error)
+            return error;
         bins->begins[0] = 0;
         for (uint32_t i = 0; i < bins->instances; i++)
             bins->begins[i + 1] = bins->begins[i] + (uint32_t)(bins->call->buffers[bins->first + i * bins->stride]->size /
                                                                sizeof(struct chunk_view));
-        memset(bins->heads, 0xFF, head_bytes);
-        atomic_store(&bins->used, 0);
         pt_parallel(bins->call->pool, bins->begins[bins->instances], 4, pt_bin_chunks, bins);
         if (pt_cpu_cancelled(bins->call))
             return PATINA_ERROR_CANCELLED;
         needed = atomic_load(&bins->used);
         if (needed <= bins->room)
-            return PATINA_OK;
-        needed += needed / 4;
+            break;
     }
+    memcpy(bins->call->scratch[PT_CPU_BINS].memory, bins, sizeof *bins);
+    return PATINA_OK;
 }
+
+// Takes up the bins that the same discs were filled into last.
+static inline void pt_bins_again(struct pt_bins *bins)
+{
+    const struct pt_bins *filled = bins->call->scratch[PT_CPU_BINS].memory;
+    bins->columns = filled->columns;
+    bins->rows = filled->rows;
+    bins->bins = filled->bins;
+    bins->heads = filled->heads;
+    bins->blocks = filled->blocks;
+}
+
+// ---- tiles ---------------------------------------------------------------------------------------------------------------
 
 // What is done with PT_LANES discs of an instance.
 typedef void pt_bin_work(void *context, uint32_t instance, const struct pt_discs *discs);
 
-// Asks for what the discs of a block are looked up by: each colour is a cache miss of its own.
-static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_block *block, uint32_t instance, int colors)
+// The instance that an id belongs to.
+static inline uint32_t pt_bin_instance(const struct pt_bins *bins, uint32_t id, uint32_t instance)
 {
-    for (uint32_t i = 0; i < block->count && colors; i++) {
-        const struct pt_disc_source source = pt_bin_source(bins, block->entries[i] >> PT_BIN_CHUNK_SHIFT, &instance);
-        const char *color = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 4);
-        const uint32_t slot = block->entries[i] & ((1u << PT_BIN_CHUNK_SHIFT) - 1);
-        __builtin_prefetch(color + (size_t)pt_color_bytes[source.args->instance.color_format] * (source.chunk->first + slot));
+    while (id - bins->discs[instance].instance.id_base >= bins->discs[instance].instance.id_count)
+        instance = instance + 1 < bins->instances ? instance + 1 : 0;
+    return instance;
+}
+
+static inline uint32_t pt_bin_id(const struct pt_bin_block *block, uint32_t i) { return pt_bits(block->place[i][3]); }
+
+// Asks for the block before one that was asked for, and for the colours of this one's discs.
+static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_block *block, int colors)
+{
+    const char *before = (const char *)(bins->blocks + (block->before == PT_BIN_NONE ? 0 : block->before >> PT_BIN_SHIFT));
+    for (size_t i = 0; i < sizeof *block; i += 64)
+        __builtin_prefetch(before + i);
+    for (uint32_t i = 0, instance = 0; i < PT_BIN_DISCS && colors; i++) {
+        instance = pt_bin_instance(bins, pt_bin_id(block, i), instance);
+        const struct instance_args *args = &bins->discs[instance].instance;
+        const char *of = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 4);
+        __builtin_prefetch(of + pt_color_bytes[args->color_format] * (pt_bin_id(block, i) - args->id_base));
     }
 }
 
-// Calls work for the discs of a bin, up to PT_LANES of one chunk at a time. colors: 1 where it looks those up.
+// Calls work for some discs of a block, PT_LANES from i on of those before `end` that belong to the same instance; returns
+// where the next begin.
+static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct pt_bins *bins, const struct pt_bin_block *block,
+                                                                  uint32_t i, uint32_t end, uint32_t *instance,
+                                                                  pt_bin_work *work, void *context)
+{
+    *instance = pt_bin_instance(bins, pt_bin_id(block, i), *instance);
+    const struct disc_args *args = &bins->discs[*instance];
+    const uint32_t count = pt_lanes_left(i, end);
+    const vi word = vi_load(block->word + i);
+    struct pt_discs discs;
+    vf place[4];
+    vf_load4(block->place[i], place);
+    discs.x = place[0];
+    discs.y = place[1];
+    discs.z = place[2];
+    discs.id = vi_sub(vf_bits(place[3]), vi_set(args->instance.id_base));
+    const uint32_t others = vm_bits(vm_and(vm_first(count), vm_not(vi_lt_unsigned(discs.id, vi_set(args->instance.id_count)))));
+    const uint32_t taken = others ? (uint32_t)__builtin_ctz(others) : count;
+    discs.drawn = vm_first(taken);
+    discs.radius = pt_disc_radius(args, pt_cpu_data(bins->call, bins->first + *instance * bins->stride + 3), discs.id, word, discs.drawn);
+    pt_disc_reach(bins->view, &discs);
+    pt_disc_shape(bins->view, args, word, &discs);
+    pt_disc_tight_box(bins->view, &discs);
+    work(context, *instance, &discs);
+    return i + taken;
+}
+
+// Calls work for the discs of a bin, up to PT_LANES at a time. colors: 1 where it looks those up.
 static inline __attribute__((always_inline)) void pt_bin_walk(const struct pt_bins *bins, uint32_t bin, int colors,
                                                               pt_bin_work *work, void *context)
 {
     uint32_t instance = 0;
-    for (uint32_t thread = 0; thread < pt_pool_threads(bins->call->pool); thread++)
-        for (uint32_t b = bins->heads[(size_t)thread * bins->bins + bin]; b != PT_BIN_NONE; b = bins->blocks[b].before) {
-            const struct pt_bin_block *block = &bins->blocks[b];
-            const uint32_t *entries = block->entries;
+    for (uint32_t thread = 0; thread < pt_pool_threads(bins->call->pool); thread++) {
+        const struct pt_bin_block *block;
+        for (uint32_t head = bins->heads[(size_t)thread * bins->bins + bin]; head != PT_BIN_NONE; head = block->before) {
+            block = bins->blocks + (head >> PT_BIN_SHIFT);
             if (block->before != PT_BIN_NONE)
-                pt_bin_ask(bins, &bins->blocks[block->before], instance, colors);
-            for (uint32_t i = 0, next; i < block->count; i = next) {
-                const uint32_t chunk = entries[i] >> PT_BIN_CHUNK_SHIFT;
-                for (next = i + 1; next < block->count && next - i < PT_LANES && entries[next] >> PT_BIN_CHUNK_SHIFT == chunk;)
-                    next++;
-                const struct pt_disc_source source = pt_bin_source(bins, chunk, &instance);
-                const vi slot = vi_and(vi_load(entries + i), vi_set((1u << PT_BIN_CHUNK_SHIFT) - 1));
-                const vi word = vi_load(block->words + i);
-                struct pt_discs discs;
-                vf p[3];
-                for (uint32_t k = 0; k < 3; k++)
-                    p[k] = vf_gather(source.positions + (size_t)k * source.chunk->padded, slot, vm_first(next - i));
-                pt_disc_project(&source, p, vm_first(next - i), &discs);
-                discs.id = vi_add(slot, vi_set(source.chunk->first));
-                pt_disc_size(&source, word, &discs);
-                pt_disc_shape(&source, word, &discs);
-                pt_disc_tighten(bins->view, &discs);
-                work(context, instance, &discs);
-            }
+                pt_bin_ask(bins, bins->blocks + (block->before >> PT_BIN_SHIFT), colors);
+            for (uint32_t i = 0, end = head % (1u << PT_BIN_SHIFT); i < end;)
+                i = pt_bin_some(bins, block, i, end, &instance, work, context);
         }
+    }
 }
 
 // A tile's pixels in the window.

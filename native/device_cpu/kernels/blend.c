@@ -25,15 +25,16 @@ struct place {
 
 struct tile {
     const struct pt_bins *bins;
-    struct pt_disc_tile at;
-    float nearest[TILE_PIXELS], farthest[TILE_PIXELS];
+    // depth of the nearest disc; how far behind it others count, as a difference of bits: no depth is negative
+    float nearest[TILE_PIXELS + PT_PATCH_BEYOND], behind[TILE_PIXELS + PT_PATCH_BEYOND];
     uint32_t id[TILE_PIXELS];
     struct place own[TILE_PIXELS]; // where the nearest disc's point fell
     float left;                    // that the sums can take
     int emptied;
-    int32_t sums[TILE_PIXELS][SUMS];
+    _Alignas(64) int32_t sums[TILE_PIXELS + PT_PATCH_COLUMNS][SUMS];
     int64_t wide[TILE_PIXELS][SUMS];
     // of the discs at hand
+    struct pt_patches patches;
     struct terms terms;
     uint32_t ids[PT_LANES];
     struct place places[PT_LANES];
@@ -72,21 +73,43 @@ static void empty_sums(struct tile *tile)
     tile->left = SUM_ROOM;
 }
 
-static inline void add_up(void *context, uint32_t covered, const struct pt_disc_pixels *pixels)
+// Patches that show nothing are sorted out first.
+static void add_up(void *context, struct pt_patches *list)
 {
     struct tile *tile = context;
-    for (; covered; covered &= covered - 1) {
-        const int k = __builtin_ctz(covered);
-        const uint32_t at = pixels->index[k];
-        const float z = pt_float(pixels->z[k]);
-        if (!(tile->nearest[at] <= z && z <= tile->farthest[at]))
-            continue;
-        tile->own[at] = tile->id[at] == tile->ids[k] ? tile->places[k] : tile->own[at];
+    _Alignas(64) float weights[PT_PATCHES][PT_LANES];
+    struct {
+        uint32_t patch, nearest; // nearest: pixels where nothing lies before the disc
+    } adds[PT_PATCHES];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < list->count; i++) {
+        const struct pt_patch *patch = &list->patches[i];
+        const struct pt_shown shown = pt_patch_show(list, patch);
+        const vi behind = vi_sub(vf_bits(shown.z), vf_bits(pt_patch_load(tile->nearest + patch->at)));
+        const vi most = vf_bits(pt_patch_load(tile->behind + patch->at));
+        const vm taken = vm_and(shown.covered, vm_not(vi_lt_unsigned(most, behind)));
+        vf_store(weights[count], vf_select(taken, pt_shown_weight(&shown), vf_zero()), vm_first(PT_LANES));
+        adds[count].patch = i;
+        adds[count].nearest = vm_bits(vm_and(taken, vi_eq(behind, vi_set(0))));
+        count += vm_bits(taken) != 0;
+    }
+    for (uint32_t k = 0; k < count; k++) {
+        const struct pt_patch patch = list->patches[adds[k].patch];
         vf_four color, normal;
-        memcpy(&color, tile->terms.color[k], 16);
-        memcpy(&normal, tile->terms.normal[k], 16);
-        vf_eight terms = __builtin_shufflevector(color, normal, 0, 1, 2, 3, 4, 5, 6, 7);
-        *(vi_eight *)(void *)tile->sums[at] += __builtin_convertvector(terms * pixels->weight[k], vi_eight);
+        memcpy(&color, tile->terms.color[patch.disc], 16);
+        memcpy(&normal, tile->terms.normal[patch.disc], 16);
+        const vf_eight terms = __builtin_shufflevector(color, normal, 0, 1, 2, 3, 4, 5, 6, 7);
+        for (uint32_t j = 0; j < patch.rows; j++) {
+            vi_eight *sums = (vi_eight *)(void *)tile->sums[patch.at + j * PT_DISC_TILE];
+            const float *weight = weights[k] + j * PT_PATCH_COLUMNS;
+            for (uint32_t i = 0; i < PT_PATCH_COLUMNS; i++) // what is not taken adds nothing: not worth a branch
+                sums[i] += __builtin_convertvector(terms * weight[i], vi_eight);
+        }
+        for (uint32_t bits = adds[k].nearest; bits; bits &= bits - 1) {
+            const uint32_t pixel = pt_patch_pixel(patch.at, (uint32_t)__builtin_ctz(bits));
+            if (tile->id[pixel] == tile->ids[patch.disc])
+                tile->own[pixel] = tile->places[patch.disc];
+        }
     }
 }
 
@@ -101,6 +124,7 @@ static inline void take_room(struct tile *tile, float size)
 static inline void draw(void *context, uint32_t instance, const struct pt_discs *discs)
 {
     struct tile *tile = context;
+    struct pt_discs some = *discs;
     vi places[2];
     float size = 0.0f;
     set_terms(tile->bins, instance, discs, &tile->terms);
@@ -110,16 +134,11 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
     vi_zip(discs->column, discs->row, places);
     vi_store(tile->places, places[0], vm_first(PT_LANES));
     vi_store((uint32_t *)(void *)tile->places + PT_LANES, places[1], vm_first(PT_LANES));
-    if (size <= SUM_ROOM) {
-        take_room(tile, size);
-        pt_disc_draw(tile->bins->view, discs, &tile->at, 1, add_up, tile);
-        return;
-    }
-    for (uint32_t i = 0; i < PT_LANES; i++) { // so bright that they have room one by one only
-        struct pt_discs one = *discs;
-        one.drawn = vm_and(discs->drawn, vm_of_bits(1u << i));
-        take_room(tile, tile->terms.most[i] + 1.0f);
-        pt_disc_draw(tile->bins->view, &one, &tile->at, 1, add_up, tile);
+    const uint32_t each = size <= SUM_ROOM ? PT_LANES : 1; // so bright that they have room one by one only
+    for (uint32_t i = 0; i < PT_LANES; i += each) {
+        some.drawn = vm_and(discs->drawn, vm_of_bits(((1u << each) - 1) << i));
+        take_room(tile, each > 1 ? size : tile->terms.most[i] + 1.0f);
+        pt_patches_draw(&tile->patches, &some, add_up, tile);
     }
 }
 
@@ -129,14 +148,14 @@ static int load(struct tile *tile, const uint64_t *keys, const float *deff)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     int any = 0;
-    for (int32_t y = 0; y < tile->at.height; y++) {
-        const size_t from = (size_t)(tile->at.y + y) * tile->bins->view->width + (size_t)tile->at.x;
+    for (int32_t y = 0; y < tile->patches.tile.height; y++) {
+        const size_t from = (size_t)(tile->patches.tile.y + y) * tile->bins->view->width + (size_t)tile->patches.tile.x;
         const uint32_t to = (uint32_t)y * PT_DISC_TILE;
-        for (uint32_t x = 0; x < (uint32_t)tile->at.width; x += PT_LANES) { // tiles are whole vectors wide
+        for (uint32_t x = 0; x < (uint32_t)tile->patches.tile.width; x += PT_LANES) { // tiles are whole vectors wide
             vf z = vi_float(vi_load_z(keys + from + x));
-            any |= vm_bits(vm_and(vf_lt(z, empty), vm_first(pt_lanes_left(x, (uint32_t)tile->at.width)))) != 0;
+            any |= vm_bits(vm_and(vf_lt(z, empty), vm_first(pt_lanes_left(x, (uint32_t)tile->patches.tile.width)))) != 0;
             vf_store(tile->nearest + to + x, z, vm_first(PT_LANES));
-            vf_store(tile->farthest + to + x, z + vf_load(deff + from + x), vm_first(PT_LANES));
+            vi_store(tile->behind + to + x, vi_sub(vf_bits(z + vf_load(deff + from + x)), vf_bits(z)), vm_first(PT_LANES));
             vi_store(tile->id + to + x, vi_load_id(keys + from + x), vm_first(PT_LANES));
         }
     }
@@ -200,12 +219,12 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
 {
     const struct pt_bins *bins = tile->bins;
     const vf zero = vf_zero(), one = vf_set(1.0f);
-    for (int32_t y = 0; y < tile->at.height; y++)
-        for (uint32_t x = 0; x < (uint32_t)tile->at.width; x += PT_LANES) {
-            const uint32_t px = (uint32_t)tile->at.x + x, py = (uint32_t)(tile->at.y + y);
+    for (int32_t y = 0; y < tile->patches.tile.height; y++)
+        for (uint32_t x = 0; x < (uint32_t)tile->patches.tile.width; x += PT_LANES) {
+            const uint32_t px = (uint32_t)tile->patches.tile.x + x, py = (uint32_t)(tile->patches.tile.y + y);
             const size_t at = (size_t)py * bins->view->width + px;
             const uint32_t pixel = (uint32_t)y * PT_DISC_TILE + x;
-            const uint32_t count = pt_lanes_left(x, (uint32_t)tile->at.width);
+            const uint32_t count = pt_lanes_left(x, (uint32_t)tile->patches.tile.width);
             vm some = vm_and(vm_first(count), vf_lt(vf_load(tile->nearest + pixel), vf_set(pt_float(PT_KEY_EMPTY_Z))));
             if (!vm_bits(some))
                 continue;
@@ -235,7 +254,7 @@ static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t th
     struct tile *tile = (struct tile *)bins->call->scratch[1].memory + thread;
     tile->bins = bins;
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
-        tile->at = pt_bin_tile(bins, t);
+        pt_patches_turn(&tile->patches, bins->view, pt_bin_tile(bins, t));
         if (!load(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 1)))
             continue;
         memset(tile->sums, 0, sizeof tile->sums);
@@ -253,13 +272,10 @@ int PT_KERNEL_ENTRY(blend)(const struct pt_cpu_call *call)
     struct pt_bins bins = { .call = call,
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
-                            .drawn = args->sifted ? pt_cpu_data(call, 4 + 6 * args->instances) : NULL,
                             .instances = args->instances,
                             .first = 4,
                             .stride = 6 };
-    int error = pt_bins_fill(&bins);
-    if (error)
-        return error;
+    pt_bins_again(&bins);
     if (!pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * sizeof(struct tile)))
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, bins.bins - 1, 1, blend_tiles, &bins);

@@ -13,8 +13,9 @@
 
 // PT_LANES of them.
 struct pt_discs {
-    vf x, y, z, radius;
+    vf x, y, z, radius, reach[2]; // reach: of the ball around, pixels
     vf gx, gy, e, f, g;
+    vm gentle; // the plane's slope is so small that 1 / q may be had by two terms
     vi box[4];      // x0, y0, x1, y1: pixels of the window that they may cover, both ends included
     vi column, row; // that they fall into; not always in the window
     vi id;          // in their cloud
@@ -22,14 +23,14 @@ struct pt_discs {
     vm drawn;
 };
 
-enum { PT_DISC_TILE = 64 }; // pixels
+enum { PT_DISC_TILE_SHIFT = 6, PT_DISC_TILE = 1 << PT_DISC_TILE_SHIFT }; // pixels
 
 struct pt_disc_source {
     const struct view_args *view;
     const struct disc_args *args;
     const struct chunk_view *chunk;
-    const float *positions; // of the chunk
-    const uint32_t *surface;
+    const float *positions;  // of the chunk
+    const uint32_t *surface; // of the chunk
     const float *radii;
 };
 
@@ -38,21 +39,18 @@ static inline vf pt_clamp_far(vf x) { return vf_min(vf_max(x, vf_set(-PT_DISC_FA
 // Radii, world units; below PT_DISC_LEAST: none.
 static inline vf pt_disc_radius(const struct disc_args *args, const float *radii, vi id, vi word, vm lanes)
 {
-    if (args->radius > 0.0f)
-        return vf_set(args->radius);
-    if (args->has_radii)
-        return vf_min(vf_gather(radii, id, lanes) * vf_set(args->radius_scale), vf_set(PT_DISC_MOST));
-    return vf_gather(args->instance.spacing, vi_shr(word, PT_SPACING_SHIFT), lanes) * vf_set(PT_DISC_SPACINGS);
+    vf radius = vf_set(args->radius);
+    if (!(args->radius > 0.0f) && args->has_radii)
+        radius = vf_min(vf_gather(radii, id, lanes) * vf_set(args->radius_scale), vf_set(PT_DISC_MOST));
+    else if (!(args->radius > 0.0f))
+        radius = vf_look_up(args->instance.spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT)) * vf_set(PT_DISC_SPACINGS);
+    return vf_select(vf_le(vf_set(PT_DISC_LEAST), radius), radius, vf_zero());
 }
 
-// 2. box: of the ball around the disc, not beyond the window. Lanes without one are taken out of drawn.
-static inline void pt_disc_box(const struct view_args *view, struct pt_discs *d)
+// 2. The ball around the disc: how many pixels it reaches to the sides.
+static inline void pt_disc_reach(const struct view_args *view, struct pt_discs *d)
 {
-    const vf half = vf_set(0.5f), one = vf_set(1.0f);
-    const vf lower[2] = { vf_set((float)view->origin_x), vf_set((float)view->origin_y) };
-    const vf upper[2] = { vf_set((float)(view->origin_x + (int32_t)view->width - 1)),
-                          vf_set((float)(view->origin_y + (int32_t)view->height - 1)) };
-    const vf at[2] = { d->x, d->y };
+    const vf one = vf_set(1.0f), at[2] = { d->x, d->y };
     const float start[2] = { view->ray_x0, view->ray_y0 }, step[2] = { view->ray_xs, view->ray_ys };
     vf before = one; // of the ball's nearest point: the camera's plane lies beyond it
     vm around = vm_of_bits(0);
@@ -67,16 +65,25 @@ static inline void pt_disc_box(const struct view_args *view, struct pt_discs *d)
             vf slope = vf_set(start[k]) + vf_set(step[k]) * at[k], square = slope * slope + one;
             reach = (reach * (square * vf_rsqrt(square))) * before;
         }
-        reach = vf_select(around, vf_set(PT_DISC_FAR), reach * vf_set(1.001f * pt_rcp(step[k])));
-        vf own = vf_floor(at[k]), first = vf_floor(pt_clamp_far((at[k] - reach) + half)),
-           last = vf_floor(pt_clamp_far((at[k] + reach) - half));
-        first = vf_max(vf_min(first, own), lower[k]);
-        last = vf_min(vf_max(last, own), upper[k]);
+        d->reach[k] = vf_select(around, vf_set(PT_DISC_FAR), reach * vf_set(1.001f * pt_rcp(step[k])));
+    }
+}
+
+// The box of what reaches so far, not beyond the window. Lanes without one are taken out of drawn.
+static inline void pt_disc_box(const struct view_args *view, const vf reach[2], struct pt_discs *d)
+{
+    const vf half = vf_set(0.5f), at[2] = { d->x, d->y };
+    const int32_t origin[2] = { view->origin_x, view->origin_y };
+    const uint32_t size[2] = { view->width, view->height };
+    for (int k = 0; k < 2; k++) {
+        vf own = vf_floor(at[k]), first = vf_floor(pt_clamp_far((at[k] - reach[k]) + half)),
+           last = vf_floor(pt_clamp_far((at[k] + reach[k]) - half));
+        first = vf_max(vf_min(first, own), vf_set((float)origin[k]));
+        last = vf_min(vf_max(last, own), vf_set((float)(origin[k] + (int32_t)size[k] - 1)));
         d->drawn = vm_and(d->drawn, vf_le(first, last));
-        vi origin = vi_set((uint32_t)(k ? view->origin_y : view->origin_x));
-        d->box[k] = vi_sub(vf_int(first), origin);
-        d->box[2 + k] = vi_sub(vf_int(last), origin);
-        *(k ? &d->row : &d->column) = vi_sub(vf_int(own), origin);
+        d->box[k] = vi_sub(vf_int(first), vi_set((uint32_t)origin[k]));
+        d->box[2 + k] = vi_sub(vf_int(last), vi_set((uint32_t)origin[k]));
+        *(k ? &d->row : &d->column) = vi_sub(vf_int(own), vi_set((uint32_t)origin[k]));
     }
 }
 
@@ -112,18 +119,9 @@ static inline void pt_disc_cull(const struct pt_disc_source *s, const vf p[3], v
     d->drawn = vm_and(d->drawn, vm_not(vm_and(away, vm_not(none))));
 }
 
-// Radius and box, by the surface words.
-static inline void pt_disc_size(const struct pt_disc_source *s, vi word, struct pt_discs *d)
-{
-    d->radius = pt_disc_radius(s->args, s->radii, d->id, word, d->drawn);
-    d->radius = vf_select(vf_le(vf_set(PT_DISC_LEAST), d->radius), d->radius, vf_zero());
-    pt_disc_box(s->view, d);
-}
-
 // 3. plane and ellipse
-static inline void pt_disc_shape(const struct pt_disc_source *s, vi word, struct pt_discs *d)
+static inline void pt_disc_shape(const struct view_args *view, const struct disc_args *args, vi word, struct pt_discs *d)
 {
-    const struct view_args *view = s->view;
     const vf zero = vf_zero(), one = vf_set(1.0f), xs = vf_set(view->ray_xs), ys = vf_set(view->ray_ys);
     vf u = zero, v = zero, n[3] = { zero, zero, one };
     vm none = vm_first(PT_LANES);
@@ -132,9 +130,9 @@ static inline void pt_disc_shape(const struct pt_disc_source *s, vi word, struct
         v = vf_set(view->ray_y0) + ys * d->y;
     }
     // the normal; without one: that of the picture
-    if (s->args->instance.has_normals) {
+    if (args->instance.has_normals) {
         vf own[3];
-        vf_view_normal(&s->args->instance, word, own);
+        vf_view_normal(&args->instance, word, own);
         vf square = (own[0] * own[0] + own[1] * own[1]) + own[2] * own[2];
         none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
         none = vm_or(none, vm_not(vf_le(vf_set(1e-30f), square)));
@@ -172,32 +170,25 @@ static inline void pt_disc_shape(const struct pt_disc_source *s, vi word, struct
     d->e = vf_select(flat, d->e, vf_set(1e20f));
     d->f = vf_select(flat, d->f, zero);
     d->g = vf_select(flat, d->g, vf_set(1e20f));
+    d->gentle = vf_le(vf_abs(d->gx) * (d->reach[0] + one) + vf_abs(d->gy) * (d->reach[1] + one), vf_set(PT_DISC_GENTLE));
 }
 
-// 4. The ellipse's own box, which is smaller, where it is no needle and its middle lies in the window: within q of
-// e dx^2 + f dx dy + g dy^2 = q^2, for the greatest q there is. Leaves out no pixel that is covered.
-static inline void pt_disc_tighten(const struct view_args *view, struct pt_discs *d)
+// 4. The ellipse's own box, which is smaller, where it is no needle: within q of e dx^2 + f dx dy + g dy^2 = q^2, for the
+// greatest q that the ball has. Leaves out no pixel that is covered.
+static inline void pt_disc_tight_box(const struct view_args *view, struct pt_discs *d)
 {
-    const vf half = vf_set(0.5f), one = vf_set(1.0f), slack = vf_set(0.02f);
+    const vf one = vf_set(1.0f), size[2] = { d->g, d->e };
     const vf determinant = d->e * d->g - (d->f * d->f) * vf_set(0.25f);
     const vf inverse = vf_rcp(vf_max(determinant, vf_set(1e-30f)));
-    const vf at[2] = { d->x, d->y }, size[2] = { d->g, d->e };
-    vm round = vm_and(vf_le((d->e * d->g) * vf_set(1e-3f), determinant), vf_le(vf_set(1e-30f), determinant));
-    vf first[2], last[2], own[2], most = one;
+    const vm round = vm_and(vf_le((d->e * d->g) * vf_set(1e-3f), determinant), vf_le(vf_set(1e-30f), determinant));
+    const vf most = (one + vf_abs(d->gx) * (d->reach[0] + one)) + vf_abs(d->gy) * (d->reach[1] + one);
+    vf reach[2];
     for (int k = 0; k < 2; k++) {
-        first[k] = vi_convert(d->box[k]);
-        last[k] = vi_convert(d->box[2 + k]);
-        own[k] = vi_convert(k ? d->row : d->column);
-        round = vm_and(round, vm_and(vf_le(first[k], own[k]), vf_le(own[k], last[k])));
-        most = most + vf_abs(k ? d->gy : d->gx) * ((last[k] - first[k]) + one);
+        const vf square = vf_max(size[k] * inverse, vf_set(1e-12f));
+        const vf own = (square * vf_rsqrt(square)) * (most * vf_set(1.001f)) + vf_set(0.02f);
+        reach[k] = vf_select(round, vf_min(own, d->reach[k]), d->reach[k]);
     }
-    for (int k = 0; k < 2; k++) {
-        const vf square = vf_max(size[k] * inverse, vf_set(1e-12f)), origin = vf_set((float)(k ? view->origin_y : view->origin_x));
-        const vf reach = pt_clamp_far((square * vf_rsqrt(square)) * (most * vf_set(1.001f)) + slack);
-        const vf begin = vf_floor((at[k] - reach) + half) - origin, end = vf_floor((at[k] + reach) - half) - origin;
-        d->box[k] = vi_select(round, vf_int(vf_min(vf_max(first[k], begin), own[k])), d->box[k]);
-        d->box[2 + k] = vi_select(round, vf_int(vf_max(vf_min(last[k], end), own[k])), d->box[2 + k]);
-    }
+    pt_disc_box(view, reach, d);
 }
 
 // A part of the window: first column and row, and how many.
@@ -205,95 +196,220 @@ struct pt_disc_tile {
     int32_t x, y, width, height;
 };
 
-// What discs show of one pixel each.
-struct pt_disc_pixels {
-    uint32_t index[PT_LANES]; // of the pixel in the tile, rows of PT_DISC_TILE
-    uint32_t z[PT_LANES];     // its depth there, bits
-    float weight[PT_LANES];
+// Pixels are looked at PT_LANES at a time, of one disc: rows of eight, as wide as most discs. These patches are listed first and
+// seen then, so that no branch waits for their arithmetic.
+enum {
+    PT_PATCH_COLUMNS = PT_LANES < 8 ? PT_LANES : 8,
+    PT_PATCH_ROWS = PT_LANES / PT_PATCH_COLUMNS,
+    PT_PATCH_BEYOND = (PT_PATCH_ROWS - 1) * PT_DISC_TILE + PT_PATCH_COLUMNS, // pixels after a tile's that may be read
+    PT_PATCHES = 64,
 };
 
-typedef void pt_disc_work(void *context, uint32_t covered, const struct pt_disc_pixels *pixels);
+struct pt_patch {
+    uint16_t at;                 // first pixel in the tile, rows of PT_DISC_TILE
+    uint16_t box;                // those of the disc's box, a bit a lane
+    uint8_t disc, rows; // the lane that it has among its like; rows of the box here
+};
 
-// The greatest of some lanes.
-static inline uint32_t pt_most_of(vi value, uint32_t lanes)
-{
-    uint32_t each[PT_LANES], most = 0;
-    vi_store(each, value, vm_first(PT_LANES));
-    for (; lanes; lanes &= lanes - 1)
-        most = each[__builtin_ctz(lanes)] > most ? each[__builtin_ctz(lanes)] : most;
-    return most;
-}
+// Discs, their numbers one by one, and their patches.
+struct pt_patches {
+    const struct view_args *view;
+    struct pt_disc_tile tile;
+    float columns[PT_DISC_TILE + PT_PATCH_COLUMNS]; // middles of pixels: halves are exact
+    float rows[PT_DISC_TILE + PT_PATCH_ROWS][PT_PATCH_COLUMNS];
+    float x[PT_LANES], y[PT_LANES], z[PT_LANES], gx[PT_LANES], gy[PT_LANES], e[PT_LANES], f[PT_LANES], g[PT_LANES];
+    uint32_t x0[PT_LANES], y0[PT_LANES], x1[PT_LANES], y1[PT_LANES]; // boxes in the tile
+    uint32_t column[PT_LANES], row[PT_LANES];                        // own pixels in the tile, if they lie there
+    uint32_t small, ends, gentle; // those that may miss or hardly fill their own pixel; that may pass the ends of the view
+    uint32_t count;
+    struct pt_patch patches[PT_PATCHES];
+};
+
+// What a disc shows of a patch.
+struct pt_shown {
+    vm covered;
+    vf z;              // depth there; -0 counts as 0
+    vf dx, dy, square; // from the disc's middle, pixels; squared radii
+    vm own, beside;    // of a small disc: the pixel that its point falls into, and that if the disc lies beside it
+};
 
 static inline vi pt_lesser(vi a, vi b) { return vi_select(vi_lt_unsigned(a, b), a, b); }
 
-// Calls work for the pixels of a tile that the discs cover: one disc a lane, all of them a step to the right or up at a time.
-// (They are a few pixels wide: lanes along a row would idle, and what is done with a pixel comes one at a time anyway.)
-// weigh: 1 with weights, exp(-2 s) within 2.4e-4, s squared distance over radius squared; in its own pixel a disc is a pixel
-// wide at least.
-static inline __attribute__((always_inline)) void pt_disc_draw(const struct view_args *view, const struct pt_discs *d,
-                                                               const struct pt_disc_tile *tile, int weigh, pt_disc_work *work,
-                                                               void *context)
+// Turns to another tile.
+static inline void pt_patches_turn(struct pt_patches *out, const struct view_args *view, struct pt_disc_tile tile)
 {
-    const vf half = vf_set(0.5f), one = vf_set(1.0f), two = vf_set(2.0f), least = vf_set(PT_DISC_LEAST);
-    const vf z_near = vf_set(view->z_near), z_far = vf_set(view->z_far);
-    const vi tile_x = vi_set((uint32_t)tile->x), tile_y = vi_set((uint32_t)tile->y), next = vi_set(1);
-    // boxes within the tile
+    out->view = view;
+    out->tile = tile;
+    for (int32_t i = 0; i < PT_DISC_TILE + PT_PATCH_COLUMNS; i++)
+        out->columns[i] = (float)(view->origin_x + tile.x + i) + 0.5f;
+    for (int32_t i = 0; i < PT_DISC_TILE + PT_PATCH_ROWS; i++)
+        for (int k = 0; k < PT_PATCH_COLUMNS; k++)
+            out->rows[i][k] = (float)(view->origin_y + tile.y + i) + 0.5f;
+}
+
+// Takes down PT_LANES discs; returns those with pixels in the tile.
+static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_discs *d)
+{
+    const struct view_args *view = out->view;
+    const vm all = vm_first(PT_LANES);
+    // in its own pixel, less than 0.71 from its middle, a disc with e dx^2 + f dx dy + g dy^2 <= 1.9 (dx^2 + dy^2) and q > 0.99
+    // lies over the middle, and the weight is its own
+    const vf steep = vf_max(d->e, d->g) + vf_abs(d->f) * vf_set(0.5f), slope = vf_abs(d->gx) + vf_abs(d->gy);
+    const vi tile_x = vi_set((uint32_t)out->tile.x), tile_y = vi_set((uint32_t)out->tile.y), next = vi_set(1);
     const vi x0 = vi_select(vi_lt_unsigned(d->box[0], tile_x), tile_x, d->box[0]);
     const vi y0 = vi_select(vi_lt_unsigned(d->box[1], tile_y), tile_y, d->box[1]);
-    const vi x1 = pt_lesser(vi_add(d->box[2], next), vi_set((uint32_t)(tile->x + tile->width)));
-    const vi y1 = pt_lesser(vi_add(d->box[3], next), vi_set((uint32_t)(tile->y + tile->height)));
-    const vm inside = vm_and(d->drawn, vm_and(vi_lt_unsigned(x0, x1), vi_lt_unsigned(y0, y1)));
-    const uint32_t lanes = vm_bits(inside);
-    const vi columns = vi_sub(x1, x0), rows = vi_sub(y1, y0), own_column = vi_sub(d->column, x0), own_row = vi_sub(d->row, y0);
-    const uint32_t most_columns = pt_most_of(columns, lanes), most_rows = pt_most_of(rows, lanes);
-    // halves of pixels are exact: the window's corner, then a step at a time
-    const vf first_x = vi_convert(vi_add(vi_set((uint32_t)view->origin_x), x0)) + half;
-    vf py = vi_convert(vi_add(vi_set((uint32_t)view->origin_y), y0)) + half;
-    vi row = vi_add(vi_mul(vi_sub(y0, tile_y), vi_set(PT_DISC_TILE)), vi_sub(x0, tile_x));
-    // discs that may pass the ends of the view
+    const vi x1 = pt_lesser(vi_add(d->box[2], next), vi_set((uint32_t)(out->tile.x + out->tile.width)));
+    const vi y1 = pt_lesser(vi_add(d->box[3], next), vi_set((uint32_t)(out->tile.y + out->tile.height)));
     const vf reach = d->radius * vf_set(1.01f);
-    const int ends = (vm_bits(vm_and(vf_le(z_near, d->z - reach), vf_le(d->z + reach, z_far))) & lanes) != lanes;
-    struct pt_disc_pixels pixels;
-    for (uint32_t j = 0; j < most_rows; j++, py = py + one, row = vi_add(row, vi_set(PT_DISC_TILE))) {
-        const vm in_rows = vm_and(inside, vi_lt_unsigned(vi_set(j), rows)), in_own = vm_and(in_rows, vi_eq(own_row, vi_set(j)));
-        const vf dy = py - d->y, rise = d->gy * dy, cross = d->f * dy, along = (d->g * dy) * dy;
-        vf px = first_x;
-        for (uint32_t i = 0; i < most_columns; i++, px = px + one) {
-            const vm lane = vm_and(in_rows, vi_lt_unsigned(vi_set(i), columns)), own = vm_and(lane, vm_and(in_own, vi_eq(own_column, vi_set(i))));
-            const vf dx = px - d->x, slope = d->gx * dx + rise;
-            vf square = (d->e * dx + cross) * dx + along, z = d->z + slope;
-            vm covered = lane;
-            if (view->perspective) {
-                const vf q = one + slope, inverse = vf_rcp(q);
-                covered = vm_and(covered, vf_le(least, q));
-                z = d->z * inverse;
-                square = square * (inverse * inverse);
-            }
-            covered = vm_and(covered, vf_le(square, one));
-            const vm beside = vm_and(own, vm_not(covered)); // covered by the point alone
-            z = vf_select(beside, d->z, z);
-            covered = vm_or(covered, beside);
-            if (ends)
-                covered = vm_and(covered, vm_and(vf_le(z_near, z), vf_le(z, z_far)));
-            const uint32_t bits = vm_bits(covered);
-            if (!bits)
-                continue;
-            vi_store(pixels.index, vi_add(row, vi_set(i)), vm_first(PT_LANES));
-            vi_store(pixels.z, vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), vm_first(PT_LANES)); // the sign bit of -0 is dropped
-            if (weigh) {
-                if (vm_bits(own)) {
-                    const vf pixel = (dx * dx + dy * dy) * two;
-                    square = vf_select(own, vf_select(beside, pixel, vf_min(pixel, square)), square);
-                }
-                vf w = vf_set(0.25565624f) * square - vf_set(1.03321445f);
-                w = w * square + vf_set(1.90144324f);
-                w = w * square - vf_set(1.98814547f);
-                w = w * square + vf_set(0.99976468f);
-                vf_store(pixels.weight, w, vm_first(PT_LANES));
-            }
-            work(context, bits, &pixels);
+    const vm within = vm_and(vf_le(vf_set(view->z_near), d->z - reach), vf_le(d->z + reach, vf_set(view->z_far)));
+    out->ends = ~vm_bits(within);
+    out->gentle = vm_bits(d->gentle);
+    out->small = ~vm_bits(vm_and(vf_le(steep, vf_set(1.9f)), vf_le(slope, vf_set(0.02f))));
+    vf_store(out->x, d->x, all);
+    vf_store(out->y, d->y, all);
+    vf_store(out->z, d->z, all);
+    vf_store(out->gx, d->gx, all);
+    vf_store(out->gy, d->gy, all);
+    vf_store(out->e, d->e, all);
+    vf_store(out->f, d->f, all);
+    vf_store(out->g, d->g, all);
+    vi_store(out->x0, vi_sub(x0, tile_x), all);
+    vi_store(out->y0, vi_sub(y0, tile_y), all);
+    vi_store(out->x1, vi_sub(x1, tile_x), all);
+    vi_store(out->y1, vi_sub(y1, tile_y), all);
+    vi_store(out->column, vi_sub(d->column, tile_x), all);
+    vi_store(out->row, vi_sub(d->row, tile_y), all);
+    return vm_bits(vm_and(d->drawn, vm_and(vi_lt_unsigned(x0, x1), vi_lt_unsigned(y0, y1))));
+}
+
+typedef void pt_patches_work(void *context, struct pt_patches *list);
+
+// Lists a patch that begins at (x, y).
+static inline struct pt_patch pt_patch_at(uint32_t disc, uint32_t x, uint32_t y, uint32_t x1, uint32_t y1)
+{
+    const uint32_t columns = x1 - x < PT_PATCH_COLUMNS ? x1 - x : PT_PATCH_COLUMNS;
+    const uint32_t rows = y1 - y < PT_PATCH_ROWS ? y1 - y : PT_PATCH_ROWS;
+    const uint32_t box = (((1u << columns) - 1) * 0x101u) & ((1u << rows * PT_PATCH_COLUMNS) - 1);
+    return (struct pt_patch){ (uint16_t)(y * PT_DISC_TILE + x), (uint16_t)box, (uint8_t)disc, (uint8_t)rows };
+}
+
+// Calls work for the patches of a tile that the discs may cover, up to PT_PATCHES at a time.
+static inline void pt_patches_draw(struct pt_patches *list, const struct pt_discs *discs, pt_patches_work *work, void *context)
+{
+    list->count = 0;
+    for (uint32_t lanes = pt_patches_begin(list, discs); lanes; lanes &= lanes - 1) {
+        const uint32_t k = (uint32_t)__builtin_ctz(lanes), x0 = list->x0[k], x1 = list->x1[k], y0 = list->y0[k], y1 = list->y1[k];
+        if (list->count > PT_PATCHES - 4) {
+            work(context, list);
+            list->count = 0;
         }
+        if (x1 - x0 <= PT_PATCH_COLUMNS && y1 - y0 <= 4 * PT_PATCH_ROWS) { // most: four at once, those beyond the box are not counted
+            for (uint32_t i = 0; i < 4; i++)
+                list->patches[list->count + i] = pt_patch_at(k, x0, y0 + i * PT_PATCH_ROWS, x1, y1);
+            list->count += (y1 - y0 + PT_PATCH_ROWS - 1) / PT_PATCH_ROWS;
+            continue;
+        }
+        for (uint32_t x = x0; x < x1; x += PT_PATCH_COLUMNS)
+            for (uint32_t y = y0; y < y1; y += PT_PATCH_ROWS) {
+                if (list->count == PT_PATCHES) {
+                    work(context, list);
+                    list->count = 0;
+                }
+                list->patches[list->count++] = pt_patch_at(k, x, y, x1, y1);
+            }
     }
+    work(context, list);
+}
+
+// The middles of a patch's pixels, from the lists of them.
+static inline vf pt_patch_columns(const float *p)
+{
+#if defined(PT_ISA_AVX512)
+    return _mm512_broadcast_f32x8(_mm256_loadu_ps(p));
+#else
+    return vf_load(p);
+#endif
+}
+
+// The lane of a small disc's own pixel.
+static inline vm pt_patch_own(const struct pt_patches *list, const struct pt_patch *patch)
+{
+    const uint32_t column = list->column[patch->disc] - patch->at % PT_DISC_TILE, row = list->row[patch->disc] - patch->at / PT_DISC_TILE;
+    return vm_of_bits(column < PT_PATCH_COLUMNS && row < PT_PATCH_ROWS ? patch->box & 1u << (row * PT_PATCH_COLUMNS + column) : 0);
+}
+
+// Every pixel of a patch against its disc.
+static inline struct pt_shown pt_patch_show(const struct pt_patches *list, const struct pt_patch *patch)
+{
+    const struct view_args *view = list->view;
+    const uint32_t k = patch->disc;
+    const vf one = vf_set(1.0f), z = vf_set(list->z[k]);
+    struct pt_shown out = { .dx = pt_patch_columns(list->columns + patch->at % PT_DISC_TILE) - vf_set(list->x[k]),
+                            .dy = vf_load(list->rows[patch->at / PT_DISC_TILE]) - vf_set(list->y[k]) };
+    const vf slope = vf_set(list->gx[k]) * out.dx + vf_set(list->gy[k]) * out.dy;
+    out.square = (vf_set(list->e[k]) * out.dx + vf_set(list->f[k]) * out.dy) * out.dx + (vf_set(list->g[k]) * out.dy) * out.dy;
+    out.covered = vm_of_bits(patch->box);
+    if (view->perspective) {
+        vf inverse = (one - slope) * (one + slope * slope);
+        if (!(list->gentle >> k & 1u)) {
+            out.covered = vm_and(out.covered, vf_le(vf_set(PT_DISC_LEAST), one + slope));
+            inverse = vf_rcp(one + slope);
+        }
+        out.z = z * inverse;
+        out.square = out.square * (inverse * inverse);
+    } else {
+        out.z = z + slope;
+    }
+    out.covered = vm_and(out.covered, vf_le(out.square, one));
+    out.own = out.beside = vm_of_bits(0);
+    if (list->small >> k & 1u) {
+        out.own = pt_patch_own(list, patch);
+        out.beside = vm_and(out.own, vm_not(out.covered)); // covered by the point alone
+        out.z = vf_select(out.beside, z, out.z);
+        out.covered = vm_or(out.covered, out.beside);
+    }
+    if (list->ends >> k & 1u)
+        out.covered = vm_and(out.covered, vm_and(vf_le(vf_set(view->z_near), out.z), vf_le(out.z, vf_set(view->z_far))));
+    out.z = vf_abs(out.z); // the sign bit of -0 is dropped
+    return out;
+}
+
+// exp(-2 s) within 2.4e-4, s squared distance over radius squared; in its own pixel a disc is a pixel wide at least.
+static inline vf pt_shown_weight(const struct pt_shown *shown)
+{
+    vf s = shown->square;
+    if (vm_bits(shown->own)) {
+        const vf pixel = (shown->dx * shown->dx + shown->dy * shown->dy) * vf_set(2.0f);
+        s = vf_select(shown->own, vf_select(shown->beside, pixel, vf_min(pixel, s)), s);
+    }
+    const vf two = s * s;
+    const vf high = vf_set(0.25565624f) * two + (vf_set(1.90144324f) - vf_set(1.03321445f) * s);
+    return high * two + (vf_set(0.99976468f) - vf_set(1.98814547f) * s);
+}
+
+// The pixels of a patch from `at` on, of a tile's floats and of the depths in its keys.
+static inline vf pt_patch_load(const float *p)
+{
+#if defined(PT_ISA_AVX512)
+    return _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_loadu_ps(p)), _mm256_loadu_ps(p + PT_DISC_TILE), 1);
+#else
+    return vf_load(p);
+#endif
+}
+
+static inline vf pt_patch_z(const uint64_t *keys)
+{
+#if PT_LANES == 1
+    return vi_float(vi_load_z(keys));
+#else
+    return vi_float(vi_odds(vi_load(keys), vi_load(keys + (PT_PATCH_ROWS > 1 ? PT_DISC_TILE : PT_LANES / 2))));
+#endif
+}
+
+// Where a patch's lane lies in the tile.
+static inline uint32_t pt_patch_pixel(uint32_t at, uint32_t lane)
+{
+    return at + lane / PT_PATCH_COLUMNS * PT_DISC_TILE + lane % PT_PATCH_COLUMNS;
 }
 
 #endif

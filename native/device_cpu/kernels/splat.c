@@ -8,22 +8,41 @@ enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE };
 
 struct tile {
     const struct pt_bins *bins;
-    struct pt_disc_tile at;
-    uint64_t keys[TILE_PIXELS];
-    float limit[TILE_PIXELS]; // only what lies beyond counts
-    uint32_t ids[PT_LANES];   // of the discs at hand
+    uint64_t keys[TILE_PIXELS + PT_PATCH_BEYOND];
+    float limit[TILE_PIXELS + PT_PATCH_BEYOND]; // only what lies beyond counts
     int limited;
+    struct pt_patches patches;
+    uint32_t ids[PT_LANES]; // of the discs at hand
 };
 
-static inline void take_least(void *context, uint32_t covered, const struct pt_disc_pixels *pixels)
+// Takes the least keys. Patches that change nothing are sorted out first, all of them before any pixel is written.
+static void take_least(void *context, struct pt_patches *list)
 {
     struct tile *tile = context;
-    for (; covered; covered &= covered - 1) {
-        const int k = __builtin_ctz(covered);
-        uint64_t key = (uint64_t)pixels->z[k] << 32 | tile->ids[k], *at = &tile->keys[pixels->index[k]];
-        if (tile->limited && !(tile->limit[pixels->index[k]] < pt_float(pixels->z[k])))
-            continue;
-        *at = key < *at ? key : *at;
+    _Alignas(64) uint32_t z[PT_PATCHES][PT_LANES];
+    struct {
+        uint32_t patch, nearer;
+    } takes[PT_PATCHES];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < list->count; i++) {
+        const struct pt_patch *patch = &list->patches[i];
+        const struct pt_shown shown = pt_patch_show(list, patch);
+        vm nearer = vm_and(shown.covered, vf_le(shown.z, pt_patch_z(tile->keys + patch->at)));
+        if (tile->limited)
+            nearer = vm_and(nearer, vf_lt(pt_patch_load(tile->limit + patch->at), shown.z));
+        vi_store(z[count], vf_bits(shown.z), vm_first(PT_LANES));
+        takes[count].patch = i;
+        takes[count].nearer = vm_bits(nearer);
+        count += vm_bits(nearer) != 0;
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        const struct pt_patch *patch = &list->patches[takes[i].patch];
+        const uint32_t id = tile->ids[patch->disc];
+        for (uint32_t bits = takes[i].nearer; bits; bits &= bits - 1) {
+            const uint32_t lane = (uint32_t)__builtin_ctz(bits);
+            uint64_t key = (uint64_t)z[i][lane] << 32 | id, *at = &tile->keys[pt_patch_pixel(patch->at, lane)];
+            *at = key < *at ? key : *at; // of equal depths the least id
+        }
     }
 }
 
@@ -31,25 +50,25 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
 {
     struct tile *tile = context;
     vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)), vm_first(PT_LANES));
-    pt_disc_draw(tile->bins->view, discs, &tile->at, 0, take_least, tile);
+    pt_patches_draw(&tile->patches, discs, take_least, tile);
 }
 
 static void load(struct tile *tile, const uint64_t *keys, const float *limit)
 {
-    for (int32_t y = 0; y < tile->at.height; y++) {
-        const size_t from = (size_t)(tile->at.y + y) * tile->bins->view->width + (size_t)tile->at.x;
-        memcpy(tile->keys + y * PT_DISC_TILE, keys + from, (size_t)tile->at.width * 8);
+    for (int32_t y = 0; y < tile->patches.tile.height; y++) {
+        const size_t from = (size_t)(tile->patches.tile.y + y) * tile->bins->view->width + (size_t)tile->patches.tile.x;
+        memcpy(tile->keys + y * PT_DISC_TILE, keys + from, (size_t)tile->patches.tile.width * 8);
         if (limit)
-            memcpy(tile->limit + y * PT_DISC_TILE, limit + from, (size_t)tile->at.width * 4);
+            memcpy(tile->limit + y * PT_DISC_TILE, limit + from, (size_t)tile->patches.tile.width * 4);
     }
     tile->limited = limit != NULL;
 }
 
 static void save(const struct tile *tile, uint64_t *keys)
 {
-    for (int32_t y = 0; y < tile->at.height; y++)
-        memcpy(keys + (size_t)(tile->at.y + y) * tile->bins->view->width + (size_t)tile->at.x, tile->keys + y * PT_DISC_TILE,
-               (size_t)tile->at.width * 8);
+    for (int32_t y = 0; y < tile->patches.tile.height; y++)
+        memcpy(keys + (size_t)(tile->patches.tile.y + y) * tile->bins->view->width + (size_t)tile->patches.tile.x, tile->keys + y * PT_DISC_TILE,
+               (size_t)tile->patches.tile.width * 8);
 }
 
 static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -64,7 +83,7 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
         if (pt_bin_empty(bins, t) && pt_bin_empty(bins, large))
             continue;
-        tile.at = pt_bin_tile(bins, t);
+        pt_patches_turn(&tile.patches, bins->view, pt_bin_tile(bins, t));
         load(&tile, pt_cpu_data(bins->call, 0), limit);
         pt_bin_walk(bins, t, 0, draw, &tile);
         pt_bin_walk(bins, large, 0, draw, &tile);
