@@ -108,7 +108,6 @@ struct pt_plan_light {
     uint32_t cube;     // six maps a sample instead of one
     uint32_t capped;   // its texels are wider than the points' spacing asks for
     double texel;      // width of a texel: at distance 1, or of suns anywhere
-    uint32_t width, height; // of its first map
     double axes[9];    // of its maps (not of a cube's): rows x, y, z, looks down -z
     char reason[128];
 };
@@ -210,8 +209,9 @@ int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behi
 
 // Lists plan->lights.
 void pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
-// What the maps of light i are like, and its reason: before they are drawn or told of. Lights whose textures are kept need none.
+// What the maps of light i are like: before they are drawn. Lights whose textures are kept need none.
 int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i);
+int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i); // the same, told in its reason
 int pt_receives(const struct pt_instance *instance); // shadows, at all
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
 int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: its points have opacities of their own

@@ -462,30 +462,29 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
 
 int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i)
 {
+    aim(scene, &plan->lights[i]);
+    return choose_texel(scene, &plan->lights[i]);
+}
+
+int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i)
+{
     static const char *const names[] = { "", "sun", "point light", "spot", "area light" };
     struct pt_plan_light *planned = &plan->lights[i];
-    const patina_light_desc *light = planned->light;
-    aim(scene, planned);
-    int error = choose_texel(scene, planned);
-    if (error)
-        return error;
     struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (2 * scene->instance_count + 1) * sizeof *groups);
     struct pt_instance *instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *instances);
     struct pt_mesh_instance *meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *meshes);
-    if (!groups || !instances || !meshes)
+    if (!groups || !instances || !meshes || pt_plan_light_map(scene, plan, i))
         return PATINA_ERROR_MEMORY;
-    struct patina_scene view = { 0 };
+    struct patina_scene view = { 0 }; // its first map
     double window[4];
-    uint32_t count = pt_shadow_groups(scene, groups);
-    for (uint32_t face = 0; face < (planned->cube ? 6u : 1u) && !planned->width && count; face++)
-        if (pt_light_scene(scene, planned, &groups[0], 0, face, instances, meshes, &view, window)) {
-            planned->width = view.settings.width;
-            planned->height = view.settings.height;
-        }
-    snprintf(planned->reason, sizeof planned->reason, "%s, %s%u sample%s, %s %u x %u texels, %s", names[light->type],
+    uint32_t count = pt_shadow_groups(scene, groups), faces = planned->cube ? 6 : 1;
+    for (uint32_t face = 0; face < faces && count; face++)
+        if (pt_light_scene(scene, planned, &groups[0], 0, face, instances, meshes, &view, window))
+            break;
+    snprintf(planned->reason, sizeof planned->reason, "%s, %s%u sample%s, %s %u x %u texels, %s", names[planned->light->type],
              planned->samples > 1 && scene->settings.shadow_error > 0.0f ? "to the error target, at most " : "",
              planned->samples, planned->samples > 1 ? "s" : "", planned->cube ? "six maps of" : "a map of",
-             planned->width, planned->height, planned->capped ? "as fine as is allowed" : "a point a texel");
+             view.settings.width, view.settings.height, planned->capped ? "as fine as is allowed" : "as fine as its points");
     return PATINA_OK;
 }
 
