@@ -25,7 +25,7 @@ NORMAL_NAME = "Normal"
 WHOLE = np.int8 if bpy.app.version >= (4, 2, 0) else np.int32
 
 
-# ending → module with read(path, filter, progress), steps(path, progress) and preview(path)
+# ending → module with read(path, filter, progress), steps(path, filter, progress) and preview(path)
 FORMATS = {".ply": library, ".xyz": library, ".txt": library, ".csv": library, ".asc": library, ".pts": library,
            ".ptx": library, ".las": las, ".laz": las, ".e57": e57, ".pcd": pcd, ".conf": conf}
 
@@ -38,9 +38,9 @@ def reader(path: Path) -> ModuleType:
     return module
 
 
-def steps(path: Path, progress: Progress) -> Steps[PointFile]:
-    """All points of a file, read in steps. PatinaError when it cannot be read."""
-    return (yield from reader(path).steps(path, progress))
+def steps(path: Path, wanted: Filter, progress: Progress) -> Steps[PointFile]:
+    """A file's points, read in steps. PatinaError when it cannot be read."""
+    return (yield from reader(path).steps(path, wanted, progress))
 
 
 def preview(path: Path) -> list[str]:

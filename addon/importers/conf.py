@@ -50,18 +50,14 @@ def rotation(q: np.ndarray) -> np.ndarray:
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
-    return jobs.finish(_steps(path, wanted, progress))
+    return jobs.finish(steps(path, wanted, progress))
 
 
-def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
-    """The same without a filter, in steps."""
-    return _steps(path, Filter(), progress)
-
-
-def _steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same in steps."""
     scans, parts, done = _scans(path), [], 0
     for index, (name, place) in enumerate(scans):
-        scan = yield from library.steps(path.parent / name, progress.part(index, len(scans)))
+        scan = yield from library.steps(path.parent / name, Filter(), progress.part(index, len(scans)))
         matrix = rotation(place[3:])
         positions = (scan.positions.astype(np.float64) + scan.origin) @ matrix.T + place[:3]
         keep = wanted.mask(done, positions)

@@ -52,15 +52,11 @@ def preview(path: Path) -> list[str]:
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
-    return jobs.finish(_steps(path, wanted, progress))
+    return jobs.finish(steps(path, wanted, progress))
 
 
-def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
-    """The same without a filter, with a pause after each piece."""
-    return _steps(path, Filter(), progress)
-
-
-def _steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same with a pause after each piece."""
     file = _open(path)
     parts: list[dict[str, np.ndarray]] = []
     scanners: list[np.ndarray] = []

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import jobs, native
-from .reading import PIECE, Filter, PointFile, Progress, colors_of, origin_of
+from .reading import Filter, PointFile, Progress, colors_of, origin_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
@@ -154,30 +154,26 @@ class _Columns:
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     """Reads and filters piece by piece. PatinaError when it cannot be read."""
-    return jobs.finish(_steps(path, wanted, progress, PIECE))
+    return jobs.finish(steps(path, wanted, progress))
 
 
-def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
-    """The same without a filter, with a pause after each small piece."""
-    return _steps(path, Filter(), progress, SMALL_PIECE)
-
-
-def _steps(path: Path, wanted: Filter, progress: Progress, size: int) -> jobs.Steps[PointFile]:
+def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same with a pause after each piece."""
     try:
         header = read_header(path)
     except OSError as error:
         raise native.PatinaError(f"{path.name}: cannot be read: {error.strerror}", -3) from None
     try:
-        return (yield from _read(path, header, wanted, progress, size))
+        return (yield from _read(path, header, wanted, progress))
     except (MemoryError, OverflowError):
         raise native.PatinaError(f"{path.name}: memory is short for its {header.points:,} points", -2) from None
 
 
-def _read(path: Path, header: Header, wanted: Filter, progress: Progress, size: int) -> jobs.Steps[PointFile]:
+def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
     origin = origin_of(header.lower, header.upper, float(header.scale.min()))
     columns = _Columns(header.points)
     done = 0
-    for piece in _pieces(path, header, size):
+    for piece in _pieces(path, header, SMALL_PIECE):
         progress.step(done / max(header.points, 1))
         names = piece.dtype.names
         positions = np.empty((len(piece), 3), np.float32)

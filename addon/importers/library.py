@@ -13,11 +13,11 @@ from .reading import Filter, PointFile, Progress, scanners_of
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
     """Reads a file whole, then filters. PatinaError when it cannot be read."""
-    return jobs.finish(steps(path, progress)).filtered(wanted)
+    return jobs.finish(steps(path, wanted, progress))
 
 
-def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
-    """The same without a filter, in steps."""
+def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same in steps."""
     with progress.inner() as inner:
         task = native.File.start(str(path), inner)
     yield task
@@ -31,7 +31,7 @@ def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
             scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
             origin=file.origin,
             invalid=file.invalid_positions,
-            notes=scanners_of(scanners, file.origin))
+            notes=scanners_of(scanners, file.origin)).filtered(wanted)
 
 
 def _scanners(path: Path) -> list[list[float]]:

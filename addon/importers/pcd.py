@@ -64,15 +64,11 @@ def preview(path: Path) -> list[str]:
 
 
 def read(path: Path, wanted: Filter, progress: Progress) -> PointFile:
-    return jobs.finish(_steps(path, wanted, progress))
+    return jobs.finish(steps(path, wanted, progress))
 
 
-def steps(path: Path, progress: Progress) -> jobs.Steps[PointFile]:
-    """The same without a filter, with a pause after each piece of what takes long: text, and what is compressed."""
-    return _steps(path, Filter(), progress)
-
-
-def _steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFile]:
+    """The same with a pause after each piece of what takes long: text, and what is compressed."""
     progress.step(0.0)
     try:
         data = path.read_bytes()

@@ -88,7 +88,7 @@ class Progress:
             inner.cancel()
 
     def part(self, index: int, count: int) -> Progress:
-        """Of one of several files that are read one after the other; until the next one, or inner()."""
+        """Of one of several jobs that follow each other, files for one; until the next."""
         self.step(index / count)
         part = Progress(self._given)
         self._part = (part, 1.0 / count)
@@ -103,7 +103,7 @@ class Progress:
     @contextlib.contextmanager
     def inner(self) -> Iterator[native.Progress]:
         """For a call of the library. Stays open until this object goes, for other threads may look at it."""
-        self._native, self._part = self._given or native.Progress(), None
+        self._native = self._given or native.Progress()
         if self._cancelled:
             self._native.cancel()
         yield self._native

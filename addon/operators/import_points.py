@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import bpy
@@ -15,6 +16,9 @@ from ..importers import PointFile, origin
 from ..sync import linked, sequence
 from . import scanner
 
+TICK = 0.01  # seconds from one look at a user's import to the next
+SHARE = 0.03  # seconds that a look reads, and a step beyond
+
 _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked at last
 
 
@@ -24,6 +28,9 @@ class PATINA_OT_import_points(Operator, ImportHelper):
     bl_idname = "import_scene.patina_points"
     bl_label = "Import Points"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
+
+    _invoked = False  # by a user, not by a script
+    _steps = None  # of the import under way; Blender evaluates annotations here
 
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in importers.FORMATS), options={'HIDDEN'})
     files: CollectionProperty(type=OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
@@ -73,11 +80,57 @@ class PATINA_OT_import_points(Operator, ImportHelper):
             for line in lines:
                 column.label(text=line)
 
+    # Files are read in steps: a script waits for the last one; a user's Blender goes on between them, and Esc ends it.
+
     def execute(self, context: Context) -> set[str]:
-        if self.link:
-            return self._link(context)
-        found = [(importers.to_mesh(points), points.origin) for path in self._paths()
-                 if (points := self._read(context, path))]
+        self._progress = importers.Progress()
+        self._steps = self._link(context) if self.link else self._import(context)
+        if not self._invoked:
+            return jobs.finish(self._steps)
+        self._task = None
+        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context: Context, event: bpy.types.Event) -> set[str]:
+        """A user's import goes on at each tick of a timer; all else that he does waits for its end."""
+        if event.type == 'ESC':
+            self._progress.cancel()
+        elif event.type != 'TIMER':
+            return {'RUNNING_MODAL'}
+        done, until = set(), time.monotonic() + SHARE
+        try:
+            while time.monotonic() < until:
+                if self._task is None or self._task.done():
+                    self._task = next(self._steps)
+                else:
+                    time.sleep(0.001)
+        except StopIteration as end:
+            done = end.value
+        text = f"Reading points: {100.0 * self._progress.value():.0f} %, Esc ends it"
+        context.workspace.status_text_set(None if done else text)
+        if not done:
+            return {'RUNNING_MODAL'}
+        context.window_manager.event_timer_remove(self._timer)
+        self._invoked = False  # other settings in the panel of the last operator: that waits
+        return done
+
+    def cancel(self, context: Context) -> None:
+        """Blender ends it, or the choice of files was given up."""
+        if self._steps:
+            self._progress.cancel()
+            self._steps.close()
+            context.workspace.status_text_set(None)
+
+    def _import(self, context: Context) -> jobs.Steps[set[str]]:
+        found, paths = [], self._paths()
+        for index, path in enumerate(paths):
+            try:
+                points = yield from self._read(path, self._progress.part(index, len(paths)))
+            except native.PatinaCancelled:
+                return self._ended([mesh for mesh, _ in found])
+            if points:
+                found.append((importers.to_mesh(points), points.origin))
         if not found:
             return {'CANCELLED'}
         bpy.ops.object.select_all(action='DESELECT') if bpy.ops.object.select_all.poll() else None
@@ -87,6 +140,12 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         count = sum(len(mesh.vertices) for mesh, _ in found)
         self.report({'INFO'}, f"Imported {count:,} points from {len(found)} file{'s' * (len(found) > 1)}")
         return {'FINISHED'}
+
+    def _ended(self, meshes: list[bpy.types.Mesh]) -> set[str]:
+        for mesh in meshes:
+            bpy.data.meshes.remove(mesh)
+        self.report({'INFO'}, "Patina: nothing was imported, for it was ended before")
+        return {'CANCELLED'}
 
     def _shared_origin(self, context: Context, origins: list) -> origin.Origin | None:
         return origin.shared(context.scene, origins) if self.origin == 'SHARED' else None
@@ -101,9 +160,10 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         obj.select_set(True)
         context.view_layer.objects.active = obj
 
-    def _link(self, context: Context) -> set[str]:
+    def _link(self, context: Context) -> jobs.Steps[set[str]]:
         found: dict[Path, linked.Linked] = {}  # by the path or pattern that objects shall name
-        for path in self._paths():
+        paths = self._paths()
+        for index, path in enumerate(paths):
             name, first = self._named(path)
             if name in found:
                 continue
@@ -112,7 +172,9 @@ class PATINA_OT_import_points(Operator, ImportHelper):
                 if source is None:
                     raise native.PatinaError("there is no such file")
                 importers.reader(first)
-                found[name] = jobs.run(lambda source=source: linked.load(source), lambda: None, lambda: False)
+                found[name] = yield from linked.steps(source, self._progress.part(index, len(paths)))
+            except native.PatinaCancelled:
+                return self._ended([])
             except native.PatinaError as error:
                 self.report({'ERROR'}, f"Patina: {first.name}: {error}")
         shared = self._shared_origin(context, [item.origin for item in found.values()])
@@ -134,6 +196,7 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         return (pattern, files[min(files)]) if files else (path, path)
 
     def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
+        self._invoked = True
         if self.directory and any(item.name for item in self.files):  # dropped
             return self.execute(context)
         return super().invoke(context, event)
@@ -146,25 +209,17 @@ class PATINA_OT_import_points(Operator, ImportHelper):
     def _filter(self) -> importers.Filter:
         return importers.Filter(self.every, (tuple(self.box_min), tuple(self.box_max)) if self.use_box else None)
 
-    def _read(self, context: Context, path: Path) -> PointFile | None:
-        """A file's points, or None and a message. Reads on a worker thread and shows progress at the cursor."""
-        manager = context.window_manager
-        wanted, progress = self._filter(), importers.Progress()
-
-        def poll() -> bool:
-            manager.progress_update(progress.value())
-            return False
-
-        manager.progress_begin(0.0, 1.0)
+    def _read(self, path: Path, progress: importers.Progress) -> jobs.Steps[PointFile | None]:
+        """A file's points, or None and a message."""
+        wanted = self._filter()
         try:
-            module = importers.reader(path)
-            points = jobs.run(lambda: module.read(path, wanted, progress), progress.cancel, poll)
+            points = yield from importers.steps(path, wanted, progress)
+        except native.PatinaCancelled:
+            raise
         except native.PatinaError as error:
             text = str(error)
             self.report({'ERROR'}, f"Patina: {text}" if path.name in text else f"Patina: {path.name}: {text}")
             return None
-        finally:
-            manager.progress_end()
         if points.invalid:
             self.report({'WARNING'}, f"{path.name}: {points.invalid:,} points without a finite position are "
                                      "kept, but never drawn")

@@ -92,13 +92,13 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         return found
     except (native.PatinaError, OSError, ValueError, KeyError):
         pass  # not there yet, of another version, or damaged: it is made anew
-    points = yield from importers.steps(source.path, progress)
+    points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, 2))
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
-    with progress.inner() as inner:
+    with progress.part(1, 2).inner() as inner:
         task = native.Cloud.start(points.positions, points.normals, points.colors, None, inner, origin=offset,
                                   scalars=_column(points, source.scalar), classes=_classes(points))
     yield task

@@ -258,7 +258,7 @@ def check_in_steps(path):
     ends it."""
     whole = importers.reader(path).read(path, importers.Filter(), importers.Progress())
     progress, shares, steps = importers.Progress(), [], None
-    steps = importers.steps(path, progress)
+    steps = importers.steps(path, importers.Filter(), progress)
     try:
         while True:
             task = next(steps)
@@ -271,7 +271,7 @@ def check_in_steps(path):
     check(shares == sorted(shares) and shares[0] < 0.5 and shares[-1] <= 1.0, f"{path.name}: progress {shares}")
     check_close(found.positions, whole.positions, 0, f"{path.name} in steps")
     check(found.scalars.keys() == whole.scalars.keys() and (found.colors is None) == (whole.colors is None), "other columns")
-    steps = importers.steps(path, progress := importers.Progress())
+    steps = importers.steps(path, importers.Filter(), progress := importers.Progress())
     next(steps)
     progress.cancel()
     try:

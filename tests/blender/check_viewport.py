@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from check_combine import hide_each_other
 from check_import import import_ply as import_points
+from check_linked import dense
 from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, sphere
 from mathutils import Matrix, Quaternion
 
@@ -585,7 +586,6 @@ def test_quad_view():
 
 def test_a_changed_link_keeps_nobody_waiting():
     """A linked LAS that changed is read piece by piece; Blender goes on between them, the old picture stays."""
-    from check_linked import dense
     source = import_points(dense("changed.ply", 60000, (0, 0, 0)))[0]
     path = SCRATCH / "changed.las"
     bpy.ops.export_scene.patina_points(filepath=str(path), kind='LAS')
@@ -608,6 +608,50 @@ def test_a_changed_link_keeps_nobody_waiting():
     las.SMALL_PIECE = piece
     check(len(turns) >= 3 and set(turns) == {60000}, f"{len(turns)} turns of Blender while 20 pieces were read")
     check(not found.message, found.message)
+
+
+def invoke_import(path, **options):
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        return bpy.ops.import_scene.patina_points('INVOKE_DEFAULT', directory=str(path.parent), files=[{"name": path.name}],
+                                                  **options)
+
+
+def test_import_of_a_user():
+    """Blender goes on while a user's import reads its file in pieces; Esc ends it, and leaves nothing."""
+    from types import SimpleNamespace
+
+    from patina.operators.import_points import PATINA_OT_import_points as Import
+    new_scene()
+    path = dense("user.ply", 60000, (0, 0, 0))
+    import_points(path)
+    las_path = SCRATCH / "user.las"
+    bpy.ops.export_scene.patina_points(filepath=str(las_path), kind='LAS')
+    piece, las.SMALL_PIECE = las.SMALL_PIECE, 300
+    turns, modal = [], Import.modal
+
+    def counted(self, context, event):
+        turns.append(self._progress.value())
+        return modal(self, context, event if len(turns) < stop else SimpleNamespace(type='ESC'))
+
+    Import.modal = counted
+    try:
+        for stop, link in ((3, False), (3, True), (10 ** 9, False), (10 ** 9, True)):
+            setup()
+            turns.clear()
+            meshes = len(bpy.data.meshes)
+            check(invoke_import(las_path, link=link) == {'RUNNING_MODAL'}, "the import waits")
+            if stop == 3:
+                yield lambda: len(turns) >= 3
+                yield lambda: not any(turns[3:])
+                check(len(bpy.data.meshes) == meshes and "user" not in bpy.data.objects, "half an import was left")
+            else:
+                yield lambda: "user" in bpy.data.objects
+                yield lambda: settled(60000)
+                check(link or len(turns) >= 3, f"Blender came to its turn {len(turns)} times")
+                check(turns == sorted(turns), f"progress {turns}")
+    finally:
+        Import.modal, las.SMALL_PIECE = modal, piece
 
 
 def test_eevee_and_points_hide_each_other():
