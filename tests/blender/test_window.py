@@ -21,6 +21,7 @@ PATIENCE = 30.0  # seconds for one thing to come
 
 
 def tests():
+    import check_newcomer
     import check_viewport
     names = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     if names == ["long_session"]:
@@ -29,7 +30,7 @@ def tests():
     if names == ["figures"]:
         import figures
         yield "figures", figures.orbit_figures
-    for name, test in vars(check_viewport).items():
+    for name, test in [*vars(check_viewport).items(), *vars(check_newcomer).items()]:
         if name.startswith("test_") and (not names or any(part in name for part in names)):
             yield name.removeprefix("test_"), test
 

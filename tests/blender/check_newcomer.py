@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""README's way from the import to F12, as a newcomer goes it in the window of a fresh Blender. See test_window.py for what a
+yield means; PATINA_SCREENSHOTS names a folder that keeps the pictures."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import bpy
+import numpy as np
+from check_viewport import area, invoke_import, screenshot, shown, window_region
+from harness import REPOSITORY, SCRATCH, check, saved
+
+POINTS = int(os.environ.get("PATINA_NEWCOMER_POINTS", "20000"))
+
+
+def in_view(operator, **options):
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        return operator(**options)
+
+
+def test_newcomers_path():
+    """Delete the cube, import, choose the engine, aim the camera, pick a style, look, F12."""
+    path = SCRATCH / "relief.ply"
+    subprocess.run(["/usr/bin/python3", str(REPOSITORY / "build/relief"), str(path), str(POINTS)], check=True)
+    in_view(bpy.ops.wm.read_homefile, use_factory_startup=True, use_empty=False, app_template="", load_ui=False)
+    yield lambda: "Cube" in bpy.data.objects
+    in_view(bpy.ops.object.select_all, action='DESELECT')
+    bpy.data.objects["Cube"].select_set(True)
+    in_view(bpy.ops.object.delete)
+    check(invoke_import(path) == {'RUNNING_MODAL'}, "the import")
+    yield lambda: "relief" in bpy.data.objects
+    scene, obj = bpy.context.scene, bpy.data.objects["relief"]
+    check(obj.select_get() and bpy.context.view_layer.objects.active == obj, "the points are selected")
+    screenshot("path_1_imported")
+    scene.render.engine = 'PATINA'
+    check(in_view(bpy.ops.view3d.camera_to_view_selected) == {'FINISHED'}, "the camera")
+    editor = next(found for found in bpy.context.window.screen.areas if found.type == 'PROPERTIES')
+    editor.spaces[0].context = 'RENDER'
+    area().spaces[0].shading.type = 'RENDERED'
+    in_view(bpy.ops.view3d.view_camera)
+    scene.patina.style.chosen = "museum"
+    yield lambda: shown() and shown().shown.stats["points"] == POINTS
+    screenshot("path_2_style")
+    alpha = shown().shown.color[..., :3].max(axis=2)
+    check(0.05 < (alpha > 0.05).mean() < 0.9, f"the view shows points on {(alpha > 0.05).mean():.0%} of it")
+    bpy.ops.render.render()
+    picture = saved('PNG')
+    if "PATINA_SCREENSHOTS" in os.environ:
+        bpy.data.images['Render Result'].save_render(str(Path(os.environ["PATINA_SCREENSHOTS"]) / "path_3_f12.png"))
+    check(picture.shape[:2] == (1080, 1920), f"{picture.shape}")
+    bright = picture[..., :3].max(axis=2) > 0.2
+    rows, columns = np.nonzero(bright)
+    check(0.1 < bright.mean() < 0.8, f"F12 shows points on {bright.mean():.0%} of the picture")
+    check(abs(columns.mean() - 960) < 150 and abs(rows.mean() - 540) < 150, "the points are not in the middle")
