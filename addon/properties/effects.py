@@ -33,7 +33,7 @@ class PatinaEffectsProperties(PropertyGroup):
         name="Fog", override=_OVERRIDE, default=False, description="Points fade with their distance")
     fog_start: FloatProperty(
         name="Start", override=_OVERRIDE, default=5.0, min=0.0, subtype='DISTANCE', unit='LENGTH',
-        description="Distance from the camera, along the view, at which fog begins")
+        description="Distance from the camera at which fog begins")
     fog_end: FloatProperty(
         name="End", override=_OVERRIDE, default=25.0, min=0.0, subtype='DISTANCE', unit='LENGTH',
         description="Distance from the camera at which fog is as dense as it becomes")

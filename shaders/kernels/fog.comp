@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// fog: colours fade with depth; twin of native/device_cpu/kernels/fog.c
+// fog: colours fade with distance; twin of native/device_cpu/kernels/fog.c
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -19,7 +19,13 @@ void main()
         float z = read_z(at);
         if (z == pt_float(PT_KEY_EMPTY_Z))
             continue;
-        precise float share = pt_min(pt_max((z - start) * inverse, 0.0), 1.0) * density;
+        precise float away = z;
+        if (view.perspective != 0u) {
+            vec2 ray = pt_ray(view, int(column.x), int(y));
+            precise float square = (ray.x * ray.x + ray.y * ray.y) + 1.0;
+            away = z * (square * pt_rsqrt(square));
+        }
+        precise float share = pt_min(pt_max((away - start) * inverse, 0.0), 1.0) * density;
         vec4 c = color[at];
         precise vec3 faded = c.xyz * (1.0 - share) + veil * (share * c.w);
         color[at] = vec4(faded, c.w);

@@ -498,7 +498,8 @@ struct hatch_args {
     float axes[3 * PT_HATCH_LEVELS]; // unit, view space
 };
 
-// fog: colour (1 - s) + fog alpha s with s = density clamp((z - start) inverse, 0, 1).
+// fog: colour (1 - s) + fog alpha s with s = density clamp((d - start) inverse, 0, 1), d the distance from the eye; in orthographic
+// views z.
 struct fog_args {
     struct view_args view;
     float start, inverse, density;

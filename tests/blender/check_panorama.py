@@ -78,6 +78,18 @@ def test_within_a_ball():
     check_close(part, picture["Combined"][64:96, 64:128], 0, "a border's part")
 
 
+def test_fog_is_round():
+    """What is equally far is equally veiled, whichever face it lies on."""
+    scene = stage(256, 128)
+    scene.patina.fill = 'CLOSED'
+    positions, colors, _ = sphere(200000, 2.0, EYE)
+    add_points(positions, np.full(colors.shape, 1.0, np.float32))
+    effects = scene.patina.effects
+    effects.use_fog, effects.fog_start, effects.fog_end, effects.fog_density = True, 1.0, 3.0, 0.8
+    effects.fog_use_color, effects.fog_color = True, (0.0, 0.5, 1.0)
+    check_close(render()["Combined"][..., :3] - (0.6, 0.8, 1.0), 0.0, 0.01, "half way through the fog")
+
+
 def test_samples_and_motion():
     """The mean of samples, and what moves, in a panorama too."""
     scene = stage()

@@ -53,6 +53,15 @@ static void sanity(struct harness *h)
     picture.color[3] = 0.5f;
     HARNESS_CHECK(h, fabs(ref_fog(&args, &planes, 0, 0).color[0] - 0.3) < 1e-7);
     HARNESS_CHECK(h, ref_fog(&args, &planes, 0, 0).color[3] == 0.5);
+    // in perspective what lies aside is farther: 3, 4 and 12 are 13
+    args = args_of(&picture.view, 12.0f, 14.0f, 1.0f);
+    args.view.perspective = 1;
+    args.view.ray_x0 = 0.25f;
+    args.view.ray_y0 = 1.0f / 3.0f;
+    args.view.ray_xs = args.view.ray_ys = 0.0f;
+    picture.keys[0] = ref_key(12.0f, 1);
+    picture.color[0] = 0.0f;
+    HARNESS_CHECK(h, fabs(ref_fog(&args, &planes, 0, 0).color[0] - 0.5 * 0.5 * 0.6) < 1e-6);
 }
 
 int main(int argc, char **argv)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// fog: colours fade with depth; twin of shaders/kernels/fog.comp
+// fog: colours fade with distance; twin of shaders/kernels/fog.comp
 #include "device_cpu/rows.h"
 
 static void fog_row(void *context, uint32_t y)
@@ -16,7 +16,14 @@ static void fog_row(void *context, uint32_t y)
         vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])), vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
         if (!vm_bits(some))
             continue;
-        vf share = vf_min(vf_max((z - start) * inverse, zero), one) * vf_set(args->density);
+        vf away = z;
+        if (args->view.perspective) {
+            vf ray[2];
+            vf_ray(&args->view, x, y, ray);
+            vf square = (ray[0] * ray[0] + ray[1] * ray[1]) + one;
+            away = vf_select(some, z, one) * (square * vf_rsqrt(square));
+        }
+        vf share = vf_min(vf_max((away - start) * inverse, zero), one) * vf_set(args->density);
         vf_load4(colors + 4 * (size_t)x, color);
         vf veil = share * color[3];
         for (int k = 0; k < 3; k++)

@@ -445,9 +445,9 @@ typedef struct patina_effects {
     float hatch_opacity;   // of the ink, 0..1; 0 = 1
     float hatch_ground;    // 0..1: share by which the colours give way to white beneath
     float hatch_color[3];  // linear; all zero = black
-    // Depth fog, over the points and not over the background.
+    // Fog, over the points and not over the background.
     float fog_density;         // share that it hides at its end and beyond, 0..1; 0 = none
-    float fog_start, fog_end;  // distances along the view from the camera
+    float fog_start, fog_end;  // distances from the eye; in orthographic views from the camera's plane
     uint32_t fog_fixed;        // 1 = fog_color; 0 = the background's
     float fog_color[3];        // linear
     // Depth of field of a thin lens, on the composed picture by the depth of the nearest layer.
