@@ -28,6 +28,7 @@ PATIENCE = 6.0  # seconds of frames, after which a slow case stops at five
 QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill": 1, "fill_iterations": 1},
              "unfilled": {"quality": 1, "fill": 2}, "splats": {"surface": 1}}
 LAYERS = 8  # rays through the nested tori meet up to eight surfaces
+COLOR_AND_DEPTH, ALL_PASSES = 3, 0  # patina_settings.passes
 STEADY_FRAMES, STEADY_STEP = 8, 0.05  # pictures and degrees between them: a third of a pixel at 1024
 FIELDS = ("scene", "mode", "device", "width", "height", "points", "quality", "threads", "ms_median", "ms_min", "ms_max",
           "peak_mb", "passes", "error")  # of a row, as the README and other programs know it
@@ -149,8 +150,8 @@ def errors(shown: stages.Stage, case: dict[str, Any], mode: Mode, planes: metric
 
 
 def measure(case: dict[str, Any]) -> dict[str, Any]:
-    """The row's fields and more. All passes are asked for where there is a truth to hold them against, else colour
-    alone; the effects, which VTK draws too, are timed with colour and depth, as VTK has them."""
+    """The row's fields and more. Frames are timed with colour and depth, as other programs have them; all passes are
+    asked for afterwards, where there is a truth to hold them against."""
     base = machine.memory_now()
     mode = MODES[case["mode"]]
     if mode.missing():
@@ -167,9 +168,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
                             "opacity": None})  # the cloud has its own
     machine.reset_peak()
 
-    every = int(not scene_known)  # passes: 0 is all, 1 colour, 3 with depth
-
-    def make(turn: float, passes: int = 3 if case["group"] == "effects" else every) -> native.Scene:
+    def make(turn: float, passes: int = COLOR_AND_DEPTH) -> native.Scene:
         scene = native.Scene()
         fill_scene(scene, cloud, shown, mode, turn)
         scene.set_settings(width=case["width"], height=case["height"], film_transparent=1, world_color=[0.05] * 3,
@@ -182,7 +181,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
     timing = frames(frame, make, case["frames"])
     peak = machine.memory_peak() - base
     stats = frame.stats()
-    frame.render(make(0.0, every))
+    frame.render(make(0.0, ALL_PASSES))
     error, read_ms = {}, 0.0
     if scene_known and not mode.lines:  # the truth has none
         start = time.perf_counter()
@@ -190,7 +189,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
         read_ms = 1e3 * (time.perf_counter() - start)
         error = errors(shown, case, mode, planes, spacing)
         if case.get("steady"):
-            error |= steadiness(frame, make, shown, case["width"], case["height"])
+            error |= steadiness(frame, lambda turn: make(turn, ALL_PASSES), shown, case["width"], case["height"])
     return {**case, "points": count, **timing, "peak_mb": peak, "error": error, "device_name": device.name,
             "device_description": device.description, "read_ms": read_ms, "upload_ms": median(upload_ms),
             "plane_bytes": stats["plane_bytes"], "cloud_bytes": cloud.bytes,
