@@ -49,7 +49,7 @@
 #define PT_DISC_MOST 1e30f
 #define PT_DISC_FINE 1e12f    // so is a radius this many times smaller than the depth
 #define PT_DISC_TILT 1e-6f    // |n . ray| below: seen edge-on, the point stays its pixel
-#define PT_DISC_GENTLE 0.015625f // |slope| <= 2^-6: 1 / (1 + slope) = (1 - slope) (1 + slope^2) within 2^-24 of it
+#define PT_DISC_GENTLE 0.015625f // slopes up to 2^-6: 1 / (1 + s) = (1 - s) (1 + s^2), within 2^-24 of it
 #define PT_DISC_FAR 4194304.0f // pixels: centres beyond are not drawn, boxes end there
 #define PT_SUM_SCALE 262144.0f // 2^18: weights, and what they weigh, are summed as integers
 #define PT_SUM_BRIGHTEST 4096.0f // colours above blend as this, so that a term fits 31 bits

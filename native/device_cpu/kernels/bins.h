@@ -77,7 +77,8 @@ static inline struct pt_bin_block *pt_bin_open(struct pt_bins *bins, struct pt_b
     return bins->blocks + next;
 }
 
-static inline void pt_bin_put(struct pt_bins *bins, struct pt_bin_thread *thread, uint32_t *head, const float place[4], uint32_t word)
+static inline void pt_bin_put(struct pt_bins *bins, struct pt_bin_thread *thread, uint32_t *head, const float place[4],
+                              uint32_t word)
 {
     struct pt_bin_block *block = bins->blocks + (*head >> PT_BIN_SHIFT);
     if (*head % (1u << PT_BIN_SHIFT) == PT_BIN_DISCS && !(block = pt_bin_open(bins, thread, head))) // full, or none yet
@@ -87,13 +88,14 @@ static inline void pt_bin_put(struct pt_bins *bins, struct pt_bin_thread *thread
     block->word[at] = word;
 }
 
-enum { PT_BIN_BATCH = 256 }; // points that are looked at before the first of their discs is put into its bin
+// Points that are looked at before the first of their discs is put into its bin: no branch waits for their arithmetic.
+enum { PT_BIN_BATCH = 256 };
 
-// Some discs of an instance, and the tiles that their boxes touch.
+// Some discs, and the tiles that their boxes touch.
 struct pt_bin_batch {
     float places[PT_BIN_BATCH][4];
-    uint32_t words[PT_BIN_BATCH], bins[PT_BIN_BATCH]; // bins: the first
-    uint32_t columns[PT_BIN_BATCH], rows[PT_BIN_BATCH]; // of tiles, less one
+    uint32_t words[PT_BIN_BATCH], bins[PT_BIN_BATCH];                       // bins: the first
+    uint32_t columns[PT_BIN_BATCH], rows[PT_BIN_BATCH];                     // of tiles, less one
     uint32_t drawn[PT_BIN_BATCH / PT_LANES], wide[PT_BIN_BATCH / PT_LANES]; // wide: over several tiles
 };
 
@@ -172,7 +174,7 @@ static void pt_bin_chunks(void *context, uint32_t begin, uint32_t end, uint32_t 
     }
 }
 
-// Lays them out in scratch memory: struct pt_bins first, for the next call, then heads, what threads need, blocks.
+// Lays them out in scratch memory: itself first, for the next call.
 static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
 {
     const uint32_t threads = pt_pool_threads(bins->call->pool);
@@ -182,7 +184,8 @@ static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
     char *memory = pt_cpu_scratch(bins->call, PT_CPU_BINS, fixed + (size_t)blocks * sizeof *bins->blocks);
     if (!memory)
         return PATINA_ERROR_MEMORY;
-    const size_t room = (bins->call->scratch[PT_CPU_BINS].size - PT_SLACK - fixed) / sizeof *bins->blocks; // an earlier picture's is there still
+    const size_t had = bins->call->scratch[PT_CPU_BINS].size - PT_SLACK; // what an earlier picture needed is there still
+    const size_t room = (had - fixed) / sizeof *bins->blocks;
     bins->room = (uint32_t)(room < PT_BIN_NONE >> PT_BIN_SHIFT ? room : PT_BIN_NONE >> PT_BIN_SHIFT);
     bins->threads = (struct pt_bin_thread *)(void *)(memory + own_bytes);
     bins->heads = (uint32_t *)(void *)(memory + own_bytes + list_bytes);
@@ -267,6 +270,7 @@ static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct p
 {
     *instance = pt_bin_instance(bins, pt_bin_id(block, i), *instance);
     const struct disc_args *args = &bins->discs[*instance];
+    const float *radii = pt_cpu_data(bins->call, bins->first + *instance * bins->stride + 3);
     const uint32_t count = pt_lanes_left(i, end);
     const vi word = vi_load(block->word + i);
     struct pt_discs discs;
@@ -279,7 +283,7 @@ static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct p
     const uint32_t others = vm_bits(vm_and(vm_first(count), vm_not(vi_lt_unsigned(discs.id, vi_set(args->instance.id_count)))));
     const uint32_t taken = others ? (uint32_t)__builtin_ctz(others) : count;
     discs.drawn = vm_first(taken);
-    discs.radius = pt_disc_radius(args, pt_cpu_data(bins->call, bins->first + *instance * bins->stride + 3), discs.id, word, discs.drawn);
+    discs.radius = pt_disc_radius(args, radii, discs.id, word, discs.drawn);
     pt_disc_reach(bins->view, &discs);
     pt_disc_shape(bins->view, args, word, &discs);
     pt_disc_tight_box(bins->view, &discs);

@@ -173,12 +173,17 @@ static float wide_sum(int64_t sum)
 static void sums_of(const struct tile *tile, uint32_t pixel, vm some, vf sums[SUMS])
 {
     float lanes[PT_LANES];
-    for (uint32_t k = 0; k < SUMS; k++) {
-        if (!tile->emptied) {
-            vi at = vi_add(vi_mul(vi_add(vi_set(pixel), vi_lanes()), vi_set(SUMS)), vi_set(k));
-            sums[k] = vi_convert(vi_gather(tile->sums, at, some));
-            continue;
+    if (!tile->emptied) { // halves of pixels, colour and normal in turn
+        vf low[4], high[4];
+        vf_load4((const float *)(const void *)tile->sums[pixel], low);
+        vf_load4((const float *)(const void *)tile->sums[pixel] + 4 * PT_LANES, high);
+        for (uint32_t k = 0; k < 4; k++) {
+            sums[k] = vi_convert(vi_evens(vf_bits(low[k]), vf_bits(high[k])));
+            sums[4 + k] = vi_convert(vi_odds(vf_bits(low[k]), vf_bits(high[k])));
         }
+        return;
+    }
+    for (uint32_t k = 0; k < SUMS; k++) {
         for (uint32_t i = 0; i < PT_LANES; i++)
             lanes[i] = vm_bits(some) >> i & 1u ? wide_sum(tile->wide[pixel + i][k] + tile->sums[pixel + i][k]) : 0.0f;
         sums[k] = vf_load(lanes);
@@ -238,7 +243,8 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
             color[3] = vf_select(vf_lt(sums[3], weight), vf_min(sums[3] * vf_rcp(weight), one), one); // opaque: 1 exactly
             vf_load4(normals + 4 * at, n);
             mean_normal(bins->view, sums, px, py, with_normals(bins, vi_load_id(keys + at), some), n);
-            const vi pair = vi_load(tile->own + pixel), other = vi_load((const uint32_t *)(const void *)(tile->own + pixel) + PT_LANES);
+            const uint32_t *own = (const uint32_t *)(const void *)(tile->own + pixel);
+            const vi pair = vi_load(own), other = vi_load(own + PT_LANES);
             vf dx = vi_convert(vi_sub(vi_add(vi_set(px), vi_lanes()), vi_evens(pair, other)));
             vf dy = vi_convert(vi_sub(vi_set(py), vi_odds(pair, other))), away = dx * dx + dy * dy;
             n[3] = away * vf_rsqrt(vf_max(away, one));

@@ -8,7 +8,7 @@ enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE };
 
 struct tile {
     const struct pt_bins *bins;
-    uint64_t keys[TILE_PIXELS + PT_PATCH_BEYOND];
+    _Alignas(64) uint64_t keys[TILE_PIXELS + PT_PATCH_BEYOND];
     float limit[TILE_PIXELS + PT_PATCH_BEYOND]; // only what lies beyond counts
     int limited;
     struct pt_patches patches;
@@ -40,7 +40,8 @@ static void take_least(void *context, struct pt_patches *list)
         const uint32_t id = tile->ids[patch->disc];
         for (uint32_t bits = takes[i].nearer; bits; bits &= bits - 1) {
             const uint32_t lane = (uint32_t)__builtin_ctz(bits);
-            uint64_t key = (uint64_t)z[i][lane] << 32 | id, *at = &tile->keys[pt_patch_pixel(patch->at, lane)];
+            const uint64_t key = (uint64_t)z[i][lane] << 32 | id;
+            uint64_t *at = &tile->keys[pt_patch_pixel(patch->at, lane)];
             *at = key < *at ? key : *at; // of equal depths the least id
         }
     }
@@ -66,9 +67,10 @@ static void load(struct tile *tile, const uint64_t *keys, const float *limit)
 
 static void save(const struct tile *tile, uint64_t *keys)
 {
-    for (int32_t y = 0; y < tile->patches.tile.height; y++)
-        memcpy(keys + (size_t)(tile->patches.tile.y + y) * tile->bins->view->width + (size_t)tile->patches.tile.x, tile->keys + y * PT_DISC_TILE,
-               (size_t)tile->patches.tile.width * 8);
+    const struct pt_disc_tile *at = &tile->patches.tile;
+    for (int32_t y = 0; y < at->height; y++)
+        memcpy(keys + (size_t)(at->y + y) * tile->bins->view->width + (size_t)at->x, tile->keys + y * PT_DISC_TILE,
+               (size_t)at->width * 8);
 }
 
 static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thread)
