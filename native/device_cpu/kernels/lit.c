@@ -179,14 +179,14 @@ static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, co
                        struct queue *queue)
 {
     const struct lit_args *args = &lit->args;
-    const uint8_t *marks = (const uint8_t *)pt_cpu_data(lit->call, 6) + chunk->first;
+    const uint8_t *marks = pt_cpu_data(lit->call, 6); // none where none are asked for
     const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
     uint32_t count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(i, last));
         vi slot = vi_add(vi_set(i), vi_lanes());
         if (args->marked) {
-            vi mark = vi_and(vi_gather_bytes(marks, slot, lanes), vi_set(255));
+            vi mark = vi_and(vi_gather_bytes(marks, vi_add(slot, vi_set(chunk->first)), lanes), vi_set(255));
             lanes = vm_and(lanes, vm_not(vi_eq(mark, vi_set(0))));
         }
         if (vm_bits(lanes) && !args->close && !args->compare) { // else lit points have to be looked at too
