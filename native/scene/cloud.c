@@ -350,49 +350,6 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     }
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-// The median goes into the info, and stands in for chunks too small to have a spacing of their own.
-static int settle_spacing(struct patina_cloud *cloud)
-{
-    double *known = malloc(cloud->chunk_count * sizeof *known);
-    if (!known)
-        return PATINA_ERROR_MEMORY;
-    uint32_t count = 0;
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
-        if (cloud->chunks[c].count > 1)
-            known[count++] = (double)cloud->chunks[c].spacing;
-    qsort(known, count, sizeof *known, compare_doubles);
-    cloud->info.spacing = count ? known[count / 2] : 0.0;
-    cloud->info.spacing_min = count ? known[0] : 0.0;
-    cloud->info.spacing_max = count ? known[count - 1] : 0.0;
-    cloud->info.layer_distance = (double)PT_SPACING_FACTOR * cloud->info.spacing;
-    for (uint32_t i = 0; i < count && !(cloud->spacing_base > 0.0); i++)
-        cloud->spacing_base = known[i];
-    // sixteen octaves of classes: where density varies more than that, the finest spacings are rounded up
-    if (count && cloud->spacing_base < known[count - 1] / 32768.0)
-        cloud->spacing_base = known[count - 1] / 32768.0;
-    free(known);
-    for (uint32_t c = 0; c < cloud->chunk_count; c++)
-        if (cloud->chunks[c].count == 1)
-            cloud->chunks[c].spacing = (float)cloud->info.spacing;
-    return PATINA_OK;
-}
-
-double pt_spacing_of_class(uint32_t index) { return index ? exp2(((double)index - 1.0) / 4.0) : 0.0; }
-
-static uint32_t class_of_spacing(double spacing, double base) // rounded up: a layer distance may be too wide, not too narrow
-{
-    if (!(spacing > 0.0) || !(base > 0.0) || !isfinite(spacing / base))
-        return 0;
-    double steps = ceil(4.0 * log2(spacing / base) - 1e-6);
-    return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
-}
-
 // ---- normals -------------------------------------------------------------------------------------------------------
 
 // Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
@@ -402,7 +359,7 @@ static void surface_chunk(struct build *build, uint32_t index)
     struct pt_chunk *chunk = &cloud->chunks[index];
     const uint32_t *order = cloud->order + chunk->first;
     uint32_t *surface = cloud->surface + chunk->first;
-    uint32_t class = class_of_spacing((double)chunk->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
+    uint32_t class = pt_class_of_spacing((double)chunk->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
     double axis[3] = { 0.0, 0.0, 0.0 }, n[3];
     for (uint32_t i = 0; i < chunk->count; i++) {
         uint32_t bits = PT_NORMAL_NONE;
@@ -621,7 +578,7 @@ static int build_cloud(struct build *build)
     if (error || (error = cut_chunks(build)) || (error = allocate(build)))
         return error;
     pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
-    if ((error = settle_spacing(cloud)))
+    if ((error = pt_cloud_settle_spacing(cloud)))
         return error;
     pt_parallel(build->pool, cloud->chunk_count, 1, surface_chunks, build);
     pt_progress_set(build->progress, 0.9);

@@ -62,6 +62,9 @@ uint32_t pt_chunk_prefix(const struct pt_chunk *chunk, uint32_t strata);
 
 // The spacing of a class, as a fraction of spacing_base.
 double pt_spacing_of_class(uint32_t index);
+uint32_t pt_class_of_spacing(double spacing, double base);
+// Sums the chunks' spacings up: the cloud's, and the base of its classes. 0 or PATINA_ERROR_MEMORY.
+int pt_cloud_settle_spacing(struct patina_cloud *cloud);
 
 // Octahedral encoding of any non-zero finite vector: 26 bits, nearest of the four roundings.
 uint32_t pt_encode_normal(const double n[3]);
@@ -76,7 +79,8 @@ int pt_cloud_take_values(struct patina_cloud *cloud, const patina_cloud_desc *de
 size_t pt_scalar_bytes(const struct patina_cloud *cloud);
 size_t pt_class_bytes(const struct patina_cloud *cloud);
 
-// Of positions, normals, spacings and opacities, whatever order they came in; never 0. Made at the first call, which reads them all: only shadows ask. Any thread.
+// Of positions, normals, spacings and opacities, whatever order they came in; never 0. Made at the first call, which reads
+// them all: only shadows ask. Any thread.
 uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud);
 
 void pt_alive_release(struct pt_alive *alive);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Local spacing of a chunk: the median over samples of r_k sqrt(pi / k), r_k the distance to the k-th nearest neighbour
 // within the chunk. For k = 6 this is 1 / sqrt(points per area) within 5% on random points and on square grids alike,
-// and a few duplicate points do not fool it.
+// and a few duplicate points do not fool it. What a cloud makes of its chunks' spacings, and their classes.
 #include "cloud.h"
+#include "kernel_args.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -45,4 +46,49 @@ float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32
         distance[s] = kth_nearest(x, y, z, count, (uint32_t)((uint64_t)count * s / samples), k);
     qsort(distance, samples, sizeof *distance, compare_floats);
     return (float)sqrt((double)distance[samples / 2] * 3.14159265358979323846 / k);
+}
+
+// ---- of a whole cloud ----------------------------------------------------------------------------------------------------
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// The median goes into the info, and stands in for chunks too small to have a spacing of their own.
+int pt_cloud_settle_spacing(struct patina_cloud *cloud)
+{
+    double *known = malloc(cloud->chunk_count * sizeof *known);
+    if (!known)
+        return PATINA_ERROR_MEMORY;
+    uint32_t count = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (cloud->chunks[c].count > 1)
+            known[count++] = (double)cloud->chunks[c].spacing;
+    qsort(known, count, sizeof *known, compare_doubles);
+    cloud->info.spacing = count ? known[count / 2] : 0.0;
+    cloud->info.spacing_min = count ? known[0] : 0.0;
+    cloud->info.spacing_max = count ? known[count - 1] : 0.0;
+    cloud->info.layer_distance = (double)PT_SPACING_FACTOR * cloud->info.spacing;
+    for (uint32_t i = 0; i < count && !(cloud->spacing_base > 0.0); i++)
+        cloud->spacing_base = known[i];
+    // sixteen octaves of classes: where density varies more than that, the finest spacings are rounded up
+    if (count && cloud->spacing_base < known[count - 1] / 32768.0)
+        cloud->spacing_base = known[count - 1] / 32768.0;
+    free(known);
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (cloud->chunks[c].count == 1)
+            cloud->chunks[c].spacing = (float)cloud->info.spacing;
+    return PATINA_OK;
+}
+
+double pt_spacing_of_class(uint32_t index) { return index ? exp2(((double)index - 1.0) / 4.0) : 0.0; }
+
+uint32_t pt_class_of_spacing(double spacing, double base) // rounded up: a layer distance may be too wide, not too narrow
+{
+    if (!(spacing > 0.0) || !(base > 0.0) || !isfinite(spacing / base))
+        return 0;
+    double steps = ceil(4.0 * log2(spacing / base) - 1e-6);
+    return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
 }

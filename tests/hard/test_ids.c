@@ -11,16 +11,11 @@
 // `count` rows that are not numbers, the last one at the origin: many ids, hardly any points.
 static patina_cloud *hollow_cloud(uint64_t count)
 {
-    float *position = malloc(count * 3 * sizeof *position);
-    if (!position)
-        support_die("out of memory");
-    for (uint64_t i = 0; i < 3 * count; i++)
-        position[i] = i < 3 * (count - 1) ? NAN : 0.0f;
-    patina_cloud_desc desc = {.struct_size = sizeof desc, .count = count};
-    desc.position = (patina_array){.data = position, .type = PATINA_FLOAT32, .components = 3};
-    patina_cloud *cloud = NULL;
-    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
-    free(position);
+    struct points points = points_create(count, POINTS_PLAIN);
+    for (uint64_t i = 0; i < 3 * (count - 1); i++)
+        points.position[i] = NAN;
+    patina_cloud *cloud = points_upload(&points);
+    points_free(&points);
     return cloud;
 }
 

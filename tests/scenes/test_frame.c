@@ -209,26 +209,21 @@ static void test_plan(void **state)
 enum { NUMBERED = 5000, GRID = 64 };
 
 // A cloud whose point i lies in the pixel i of a grid, row by row, given in a shuffled order; every seventh is no point.
-static patina_cloud *numbered_cloud(uint32_t *given, uint32_t seed)
+static patina_cloud *numbered_cloud(uint32_t *given, uint64_t seed)
 {
-    float *position = malloc(3 * NUMBERED * sizeof *position);
-    uint32_t random = seed;
-    assert_non_null(position);
+    struct points points = points_create(NUMBERED, POINTS_PLAIN);
+    struct pcg random = pcg_seed(seed);
     for (uint32_t i = 0; i < NUMBERED; i++) {
-        uint32_t j = (random = random * 1664525u + 1013904223u) >> 8;
-        given[i] = given[j % (i + 1)];
-        given[j % (i + 1)] = i;
+        const uint32_t j = pcg_u32(&random) % (i + 1);
+        given[i] = given[j];
+        given[j] = i;
     }
     for (uint32_t i = 0; i < NUMBERED; i++) { // points beyond the grid's 4096 pixels are out of view
-        position[3 * i] = given[i] % 7 == 3 ? NAN : (float)(given[i] % GRID) + 0.5f;
-        position[3 * i + 1] = (float)(given[i] / GRID) + 0.5f;
-        position[3 * i + 2] = 0.0f;
+        points.position[3 * i] = given[i] % 7 == 3 ? NAN : (float)(given[i] % GRID) + 0.5f;
+        points.position[3 * i + 1] = (float)(given[i] / GRID) + 0.5f;
     }
-    patina_cloud_desc desc = {.struct_size = sizeof desc, .count = NUMBERED};
-    desc.position = (patina_array){.data = position, .type = PATINA_FLOAT32, .components = 3};
-    patina_cloud *cloud = NULL;
-    CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
-    free(position);
+    patina_cloud *cloud = points_upload(&points);
+    points_free(&points);
     return cloud;
 }
 
