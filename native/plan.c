@@ -81,19 +81,32 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
               "layer distance and normal of instance %u's pixels", i);
 }
 
+// What no pixel's layer distance is below, whatever the rounding; world units.
+static float least_distance(const struct pt_plan *plan)
+{
+    float least = plan->triangles ? 0.0f : INFINITY; // a mesh has but its footprint
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        const struct instance_args *args = &plan->instances[i].args;
+        const patina_cloud_info *info = &plan->instances[i].instance->cloud->info;
+        int known = info->spacing_min > 0.0 && isfinite(info->spacing_max); // no chunk is of class 0
+        least = fminf(least, fmaxf(args->d_min, PT_SPACING_FACTOR * args->spacing[known]));
+    }
+    return 0.999f * least;
+}
+
 static void plan_fill_level(struct pt_builder *builder, uint32_t level)
 {
     struct pt_plan *plan = builder->plan;
     struct fill_args args = {.view = pt_view_at(plan, level),
+                             .phases = PT_FILL_BACKGROUND | PT_FILL_OCCLUDED,
                              .iterations = plan->iterations,
                              .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
-                             .refined = plan->quality == PATINA_QUALITY_REFINED};
-    for (args.occluded = 0; args.occluded < 2; args.occluded++)
-        PT_REASON(PT_ADD(builder, fill, args,
-                         {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
-                          pt_plane_at(PT_PLANE_DEFF, 0)}),
-                  "%s pixels at level %u, %u fills, at most %u un-fills (spacing %.2f pixels)",
-                  args.occluded ? "occluded" : "background", level, args.iterations, args.unfills, plan->spacing_px);
+                             .refined = plan->quality == PATINA_QUALITY_REFINED,
+                             .least = least_distance(plan)};
+    PT_REASON(PT_ADD(builder, fill, args,
+                     {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
+                      pt_plane_at(PT_PLANE_DEFF, 0)}),
+              "level %u: %u fills, at most %u un-fills of background, then of occluded pixels", level, args.iterations, args.unfills);
 }
 
 static void plan_pyramid(struct pt_builder *builder)
@@ -117,7 +130,8 @@ static void plan_pyramid(struct pt_builder *builder)
         struct push_args args = {.view = pt_view_at(plan, level - 1),
                                  .coarse_width = coarse.width,
                                  .coarse_height = coarse.height,
-                                 .refined = plan->quality == PATINA_QUALITY_REFINED};
+                                 .refined = plan->quality == PATINA_QUALITY_REFINED,
+                                 .least = least_distance(plan)};
         PT_REASON(
             PT_ADD(builder, push, args,
                    {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),

@@ -72,6 +72,12 @@ static inline vm pt_filled(vi source, size_t at, vm some)
     return vm_and(some, vm_not(vi_eq(source, vi_add(vi_set((uint32_t)at), vi_lanes()))));
 }
 
+// What d_eff is not below at z: most pixels need not know their own. A cosine may be an ulp above 1.
+static inline vf pt_least_distance(const struct view_args *view, float least, vf z)
+{
+    return vf_max(vf_set(least), vf_footprint(view, z) * vf_set(0.999f));
+}
+
 // d_eff at this view's level of those of PT_LANES pixels from `at` on that `lanes` names; at level 0 most are measured.
 static inline vf pt_own_distance(const struct view_args *view, const float *deff, const float *normals, const uint32_t *from,
                                  size_t at, vf z, vm lanes)

@@ -129,7 +129,8 @@ int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *co
               const atomic_int *cancel);
 int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
                const atomic_int *cancel);
-int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel);
+int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers, uint32_t count,
+               const atomic_int *cancel);
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
 int pt_gl_antialias(struct pt_gl_device *d);
 int pt_gl_push(struct pt_gl_device *d);

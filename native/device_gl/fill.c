@@ -20,6 +20,7 @@ struct fill {
     struct pt_gl_device *d;
     const struct fill_args *args;
     const atomic_int *cancel;
+    uint32_t phase; // PT_FILL_*
     enum program find;
     int first; // the first of its steps looks everywhere
     struct counters counters;
@@ -55,7 +56,7 @@ static int prepare(struct fill *f)
 {
     const struct view_args *view = &f->args->view;
     const GladGLContext *gl = &f->d->gl;
-    int refills = f->args->unfills && f->args->occluded; // an empty pixel is filled once
+    int refills = f->args->unfills && f->phase == PT_FILL_OCCLUDED; // an empty pixel is filled once
     size_t bits = ((size_t)view->width * view->height + 31) / 32 * 4;
     size_t tiles = (size_t)f->d->tiles.columns * f->d->tiles.rows * 4;
     int result = programs(f);
@@ -101,6 +102,8 @@ static int dispatch_entries(struct fill *f, enum program p, uint32_t entries)
         f->d->gl.ProgramUniform1ui(program, 1, f->d->stamp);
     if (p == APPLY || p == RESTORE || p == SELECT)
         f->d->gl.ProgramUniform1ui(program, 2, f->d->tiles.columns);
+    if (p == DECIDE || p == APPLY)
+        f->d->gl.ProgramUniform1ui(program, 5, f->phase);
     return pt_gl_dispatch(f->d, PT_KERNEL_fill, p, x, y);
 }
 
@@ -136,7 +139,7 @@ static int find(struct fill *f)
 
 static int fill_step(struct fill *f)
 {
-    int result = find(f), all_new = f->first || !f->args->occluded;
+    int result = find(f), all_new = f->first || f->phase == PT_FILL_BACKGROUND;
     uint32_t changed = f->counters.changed, kept = f->counters.saved, tiles = f->d->tiles.columns * f->d->tiles.rows;
     f->first = 0;
     f->d->stamp++;
@@ -196,10 +199,10 @@ static int repeat(struct fill *f, int (*step)(struct fill *), uint32_t most)
     return PATINA_OK;
 }
 
-int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomic_int *cancel)
+static int run_phase(struct pt_gl_device *d, const struct fill_args *args, uint32_t phase, const atomic_int *cancel)
 {
-    struct fill f = {.d = d, .args = args, .cancel = cancel, .find = FIND_EMPTY};
-    if (args->occluded)
+    struct fill f = {.d = d, .args = args, .phase = phase, .cancel = cancel, .find = FIND_EMPTY};
+    if (phase == PT_FILL_OCCLUDED)
         f.find = args->view.level ? FIND_COARSE : FIND_OCCLUDED;
     if (!d->tiles.count[PT_GL_TILES_POINTS] && !d->tiles.count[PT_GL_TILES_RIM])
         return PATINA_OK;
@@ -208,5 +211,21 @@ int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, const atomi
         result = repeat(&f, fill_step, args->iterations);
     if (result == PATINA_OK && f.counters.saved)
         result = repeat(&f, unfill_step, args->unfills);
+    return result;
+}
+
+int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers, uint32_t count,
+               const atomic_int *cancel)
+{
+    int result = PATINA_OK;
+    for (uint32_t phase = PT_FILL_BACKGROUND; phase <= PT_FILL_OCCLUDED && result == PATINA_OK; phase++) {
+        if (!(args->phases & phase))
+            continue;
+        result = pt_gl_tiles(d, buffers[0], &args->view); // anew where the phase before wrote keys
+        if (result == PATINA_OK)
+            result = pt_gl_bind_buffers(d, PT_KERNEL_fill, sizeof *args, buffers, count);
+        if (result == PATINA_OK)
+            result = run_phase(d, args, phase, cancel);
+    }
     return result;
 }

@@ -93,8 +93,7 @@ int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_bu
 // Filters that visit listed tiles only. The others write every pixel, or are rare.
 static int tiled(enum pt_kernel kernel)
 {
-    return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_fill ||
-           kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
+    return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
            kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark || kernel == PT_KERNEL_edl ||
            kernel == PT_KERNEL_obscure || kernel == PT_KERNEL_toon || kernel == PT_KERNEL_hatch || kernel == PT_KERNEL_fog ||
            kernel == PT_KERNEL_tint;
@@ -172,12 +171,10 @@ int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t arg
     return PATINA_OK;
 }
 
-static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, const atomic_int *cancel)
+static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments)
 {
     const struct view_args *view = arguments; // every argument struct begins with its view
     switch (kernel) {
-    case PT_KERNEL_fill:
-        return pt_gl_fill(d, arguments, cancel);
     case PT_KERNEL_shade:
         return pt_gl_shade(d, arguments);
     case PT_KERNEL_push:
@@ -252,9 +249,11 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
                 kernel == PT_KERNEL_extract || kernel == PT_KERNEL_ink;
     if (!crops && (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1]))
         return PATINA_OK;
+    if (kernel == PT_KERNEL_fill)
+        return pt_gl_fill(d, arguments, buffers, count, cancel);
     struct view_args tiles = kernel == PT_KERNEL_push ? pt_gl_coarse_view(arguments) : *view;
     int result = tiled(kernel) ? pt_gl_tiles(d, buffers[0], &tiles) : PATINA_OK;
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, kernel, argument_size, buffers, count);
-    return result == PATINA_OK ? run_filter(d, kernel, arguments, cancel) : result;
+    return result == PATINA_OK ? run_filter(d, kernel, arguments) : result;
 }

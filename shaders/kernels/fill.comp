@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// fill: one phase of hole filling. [D 3.2, 3.3] with the rule of SPEC 2.2; twin of native/device_cpu/kernels/fill.c
+// fill: hole filling, one phase a run of these steps. [D 3.2, 3.3] with the rule of SPEC 2.2; twin of
+// native/device_cpu/kernels/fill.c
 //
 // A step first decides from the state before it, then applies: what changes is listed, so the planes are never copied,
 // and only tiles within reach of a change are looked at again. Entries stay listed with the pixel's state before the
@@ -41,6 +42,7 @@ layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
 layout(location = 3) uniform uint all_new; // STEP 1: no entry was filled before in this phase; STEP 4: look at all
 layout(location = 4) uniform uint kept;    // STEP 1: entries saved before this step
+layout(location = 5) uniform uint phase;   // STEP 1, 2: PT_FILL_*
 
 // The ring, anticlockwise from east.
 const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(1, 1), ivec2(0, 1), ivec2(-1, 1), ivec2(-1, 0), ivec2(-1, -1),
@@ -137,7 +139,7 @@ void wake_tiles(uvec4 rect, uvec2 place)
 void main()
 {
     view_args view = args.view;
-    bool refined = args.refined != 0u, occluded = args.occluded != 0u, unfills = args.unfills != 0u;
+    bool refined = args.refined != 0u, occluded = phase == PT_FILL_OCCLUDED, unfills = args.unfills != 0u;
     ivec2 size = ivec2(view.width, view.height);
     uint index = entry_index();
     if (index >= entries)
@@ -186,7 +188,7 @@ void main()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, index = entry_index();
-    bool refills = args.occluded != 0u && args.unfills != 0u; // a pixel can be filled twice in the phase
+    bool refills = phase == PT_FILL_OCCLUDED && args.unfills != 0u; // a pixel can be filled twice in the phase
     if (index >= entries)
         return;
     change c = changed[index];

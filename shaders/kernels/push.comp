@@ -33,15 +33,18 @@ bool is_covered(view_args view, ivec2 coarse_size, uint x, uint y)
     uint at = y * view.width + x;
     // 1. threshold: what is nearer than it covers this pixel
     float own_z = pt_float(keys[at].y);
-    bool some = own_z < pt_float(PT_KEY_EMPTY_Z);
-    uint own = some ? from[at] : 0u;
-    precise float t = own_z - pt_level_distance(view, read_deff(own), read_float4(own).w, own_z);
-    t = some ? t : own_z;
-    // 2. the parent and the three coarse cells on this pixel's side
     int px = int(x >> 1), py = int(y >> 1), sx = (x & 1u) != 0u ? 1 : -1, sy = (y & 1u) != 0u ? 1 : -1;
+    bool some = own_z < pt_float(PT_KEY_EMPTY_Z);
+    precise float least = own_z - pt_least_distance(view, args.least, own_z), parent = coarse_z(coarse_size, px, py);
+    precise float t = some ? least : own_z;
+    for (bool asked = some && parent < t; asked; asked = false) { // not `if`: software skips loops that nobody enters
+        uint own = from[at];
+        t = own_z - pt_level_distance(view, read_deff(own), read_float4(own).w, own_z);
+    }
+    // 2. the parent and the three coarse cells on this pixel's side
     int sides = int(coarse_z(coarse_size, px + sx, py) < t) + int(coarse_z(coarse_size, px, py + sy) < t) +
                 int(coarse_z(coarse_size, px + sx, py + sy) < t);
-    return coarse_z(coarse_size, px, py) < t && sides >= 2;
+    return parent < t && sides >= 2;
 }
 
 void main()

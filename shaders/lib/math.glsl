@@ -141,6 +141,9 @@ float pt_layer_distance(view_args view, float d_min, float spacing, float z, flo
     return scaled;
 }
 
+// What d_eff is not below at z. A cosine may be an ulp above 1.
+float pt_least_distance(view_args view, float least, float z) { return pt_max(least, pt_footprint(view, z) * 0.999); }
+
 // d_eff at this view's level of the pixel whose surface comes from the measured pixel with these values.
 float pt_level_distance(view_args view, float deff, float inverse, float z)
 {

@@ -26,6 +26,8 @@
 // A filled neighbour repeats a surface that was measured elsewhere: 0.33 degrees mean error at weight 1 on a sphere of 1
 // point a pixel, 0.25 at 1/8.
 #define PT_BLEND_FILLED 0.125f
+#define PT_FILL_BACKGROUND 1u // phases of filling
+#define PT_FILL_OCCLUDED 2u
 #define PT_FROM_MIXED 0x80000000u // top bit of the from plane: anti-aliasing mixed this pixel's colour
 
 // Peeling: a pixel is finished when less light than this comes through it (half a step of 8 bits).
@@ -247,15 +249,17 @@ struct push_args {
     struct view_args view; // of the fine level
     uint32_t coarse_width, coarse_height;
     uint32_t refined;
+    float least; // no layer distance in view is below this
 };
 
-// fill: one phase of hole filling. [D 3.2, 3.3], SPEC 2.2
+// fill: hole filling. [D 3.2, 3.3], SPEC 2.2
 struct fill_args {
     struct view_args view;
-    uint32_t occluded;   // 0: background pixels, 1: occluded pixels
+    uint32_t phases;     // PT_FILL_*, in their order
     uint32_t iterations; // fills
     uint32_t unfills;    // at most so many un-fills; 0 = as in the paper
     uint32_t refined;    // 1: depth of the source's tangent plane
+    float least;         // no layer distance in view is below this
 };
 
 // Lights in view space.

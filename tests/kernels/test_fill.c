@@ -46,7 +46,7 @@ static struct planes check(struct harness *h, const struct picture *picture, con
         double z = ref_key_z(got.keys[i]);
         int same = pixels[i].id == ref_key_id(got.keys[i]) && z >= pixels[i].z.lo && z <= pixels[i].z.hi;
         if (!same)
-            harness_fail(h, args->occluded ? "occluded" : "background", x, y,
+            harness_fail(h, args->phases & PT_FILL_OCCLUDED ? "occluded" : "background", x, y,
                          "got z %.9g id %u, expected z %.9g to %.9g id %u (before: z %.9g id %u)", z,
                          ref_key_id(got.keys[i]), pixels[i].z.lo, pixels[i].z.hi, pixels[i].id, ref_key_z(keys[i]),
                          ref_key_id(keys[i]));
@@ -64,6 +64,7 @@ static void both_phases(struct harness *h, struct picture *picture, uint32_t lev
     int hard = refined && picture->kind != PICTURE_SURFACES && picture->kind != PICTURE_NOISE;
     double most_open = hard ? TOL_UNSURE_HARD : TOL_UNSURE_SHARE;
     struct fill_args args = {.view = picture->view,
+                             .phases = PT_FILL_BACKGROUND,
                              .iterations = iterations,
                              .unfills = unfills,
                              .refined = refined};
@@ -72,8 +73,16 @@ static void both_phases(struct harness *h, struct picture *picture, uint32_t lev
     for (uint32_t l = 0; l < level; l++)
         picture_pull(h, &args.view, &keys, &from);
     struct planes filled = check(h, picture, &args, keys, from, most_open);
-    args.occluded = 1;
-    check(h, picture, &args, filled.keys, filled.from, most_open);
+    args.phases = PT_FILL_OCCLUDED;
+    filled = check(h, picture, &args, filled.keys, filled.from, most_open);
+    // at once: the same
+    args.phases = PT_FILL_BACKGROUND | PT_FILL_OCCLUDED;
+    struct planes whole = run(h, picture, &args, keys, from);
+    for (size_t i = 0; i < (size_t)args.view.width * args.view.height; i++)
+        if (whole.keys[i] != filled.keys[i] || whole.from[i] != filled.from[i])
+            harness_fail(h, "both phases", (int)(i % args.view.width), (int)(i / args.view.width),
+                         "got %016llx from %u, expected %016llx from %u", (unsigned long long)whole.keys[i], whole.from[i],
+                         (unsigned long long)filled.keys[i], filled.from[i]);
 }
 
 static void kinds(struct harness *h)
@@ -164,7 +173,7 @@ static void every_ring(struct harness *h)
             if (occluded)
                 picture.keys[centre] = ref_key(9.0f, picture.id_base + (uint32_t)centre);
         }
-        struct fill_args args = {.view = picture.view, .occluded = occluded, .iterations = 1};
+        struct fill_args args = {.view = picture.view, .phases = occluded ? PT_FILL_OCCLUDED : PT_FILL_BACKGROUND, .iterations = 1};
         struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
         for (int ring = 0; ring < 256; ring++) {
             size_t centre = (size_t)(ring / SIDE * STEP + 2) * width + (size_t)(ring % SIDE * STEP + 2);
@@ -186,7 +195,7 @@ static void disc(struct harness *h)
         if (x * x + y * y > 60 * 60)
             picture.keys[i] = REF_EMPTY_KEY;
     }
-    struct fill_args args = {.view = picture.view, .iterations = 6, .unfills = 6};
+    struct fill_args args = {.view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 6, .unfills = 6};
     struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
     size_t grown = 0;
     for (size_t i = 0; i < picture.count; i++)
@@ -208,7 +217,7 @@ static void sanity(struct harness *h)
     static const int order[8] = {5, 8, 7, 6, 3, 0, 1, 2}; // ring, anticlockwise from the right, in a 3 x 3 plane
     int filled = 0;
     for (int ring = 0; ring < 256; ring++) {
-        struct fill_args args = {.view = {.width = 3, .height = 3}, .iterations = 1};
+        struct fill_args args = {.view = {.width = 3, .height = 3}, .phases = PT_FILL_BACKGROUND, .iterations = 1};
         struct ref_pixel pixels[9];
         for (int i = 0; i < 9; i++)
             pixels[i] = ref_pixel(REF_EMPTY_KEY, 0);

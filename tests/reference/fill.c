@@ -13,6 +13,7 @@ static const int ring_y[8] = {0, 1, 1, 1, 0, -1, -1, -1};
 struct phase {
     const struct fill_args *args;
     const float *normal, *deff;
+    int occluded;
     struct ref_range *threshold; // by pixel: as it was before its first fill
     unsigned char *filled;       // 0 no, 1 yes, 2 perhaps
 };
@@ -134,7 +135,7 @@ static struct ref_pixel fill_pixel(const struct phase *phase, const struct ref_p
         *changed = REF_UNSURE;
         return pixel;
     }
-    if (is_empty(&pixel) == (phase->args->occluded != 0))
+    if (is_empty(&pixel) == phase->occluded)
         return pixel;
     enum ref_truth border = has_white_run(phase->args, pixels, x, y, threshold_of(phase, &pixel), 5);
     if (border == REF_YES)
@@ -190,23 +191,32 @@ static int unfill_all(const struct phase *phase, const struct ref_pixel *origina
     return changes;
 }
 
+// Fills, then un-fills, of one phase. phase: with `threshold` and `filled` for every pixel.
+static void run_phase(struct phase *phase, struct ref_pixel *original, struct ref_pixel *after, struct ref_pixel *pixels)
+{
+    const struct fill_args *args = phase->args;
+    size_t count = (size_t)args->view.width * args->view.height;
+    memcpy(original, pixels, count * sizeof *pixels);
+    memset(phase->filled, 0, count);
+    for (uint32_t i = 0, more = 1; i < args->iterations && more; i++) {
+        more = (uint32_t)fill_all(phase, pixels, after);
+        memcpy(pixels, after, count * sizeof *pixels);
+    }
+    for (uint32_t i = 0, more = 1; i < args->unfills && more; i++) {
+        more = (uint32_t)unfill_all(phase, original, pixels, after);
+        memcpy(pixels, after, count * sizeof *pixels);
+    }
+}
+
 int ref_fill(const struct fill_args *args, const float *normal, const float *deff, struct ref_pixel *pixels)
 {
     size_t count = (size_t)args->view.width * args->view.height;
     struct ref_pixel *original = malloc(count * sizeof *original), *after = malloc(count * sizeof *after);
-    struct phase phase = {args, normal, deff, malloc(count * sizeof(struct ref_range)), calloc(count, 1)};
+    struct phase phase = {args, normal, deff, 0, malloc(count * sizeof(struct ref_range)), malloc(count)};
     int ok = original && after && phase.threshold && phase.filled;
-    if (ok) {
-        memcpy(original, pixels, count * sizeof *pixels);
-        for (uint32_t i = 0, more = 1; i < args->iterations && more; i++) {
-            more = (uint32_t)fill_all(&phase, pixels, after);
-            memcpy(pixels, after, count * sizeof *pixels);
-        }
-        for (uint32_t i = 0, more = 1; i < args->unfills && more; i++) {
-            more = (uint32_t)unfill_all(&phase, original, pixels, after);
-            memcpy(pixels, after, count * sizeof *pixels);
-        }
-    }
+    for (phase.occluded = 0; phase.occluded < 2 && ok; phase.occluded++)
+        if (args->phases & (phase.occluded ? PT_FILL_OCCLUDED : PT_FILL_BACKGROUND))
+            run_phase(&phase, original, after, pixels);
     free(original);
     free(after);
     free(phase.threshold);

@@ -143,7 +143,7 @@ static void test_spacing_chooses_levels(void **state)
         assert_true(fabs(plan.spacing_px / spacing - 1.0) < 0.1);
         assert_in_range(plan.levels, cases[i].least_levels, cases[i].most_levels);
         assert_int_equal(passes_of(&plan, PT_KERNEL_push), plan.levels);
-        assert_int_equal(passes_of(&plan, PT_KERNEL_fill), 2 * (plan.levels + 1));
+        assert_int_equal(passes_of(&plan, PT_KERNEL_fill), plan.levels + 1);
         pt_plan_destroy(&plan);
         patina_scene_destroy(scene);
     }

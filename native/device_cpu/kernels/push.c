@@ -71,11 +71,12 @@ static uint32_t covered(const struct push *push, uint32_t x, uint32_t y, uint32_
     vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(push->call, 2) + at));
     const int inside = is_inside(push, x, y);
     vf parent = load_parent(push, x, y, inside, vm_first(lanes));
-    vm asked = vm_and(vm_first(lanes), vf_lt(parent, z)); // d_eff is never below 0
+    vm some = vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
+    vf t = vf_select(some, z - pt_least_distance(&push->args->view, push->args->least, z), z); // what is nearer covers the pixel
+    vm asked = vm_and(vm_first(lanes), vf_lt(parent, t));
     if (!vm_bits(asked))
         return 0;
-    vm some = vm_and(asked, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
-    vf t = z; // the threshold: what is nearer covers the pixel
+    some = vm_and(some, asked);
     if (vm_bits(some))
         t = vf_select(some, z - pt_own_distance(&push->args->view, pt_cpu_data(push->call, 5), pt_cpu_data(push->call, 4),
                                             pt_cpu_data(push->call, 3), at, z, some), z);
