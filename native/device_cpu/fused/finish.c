@@ -159,11 +159,12 @@ static void shade_lit(const struct finish *finish, struct walk *walk, const stru
         if (!vm_bits(ours))
             continue;
         vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, shadows, x, (uint32_t)y, id, ours, color, normal);
-        for (uint32_t k = 0; k < 3; k++) {
+        for (uint32_t k = 0; k < 3; k++)
             vf_store(out->color[k] + x, color[k], ours);
+        for (uint32_t k = 0; k < 3 && finish->extract && finish->extract->normal; k++)
             vf_store(walk->shown[slot(y)][k] + x, normal[k], ours);
-        }
-        vf_store(walk->shown[slot(y)][4] + x, share, ours);
+        if (finish->extract && finish->extract->shadow)
+            vf_store(walk->shown[slot(y)][4] + x, share, ours);
     }
 }
 

@@ -123,6 +123,8 @@ static void load_z(const struct fill *fill, int32_t y, float *row)
 static inline vm hidden(const struct fill *fill, size_t at, vf z, vf nearest, vm asked, vf *threshold)
 {
     asked = vm_and(asked, vf_lt(nearest, z - pt_least_distance(fill->view, fill->args->least, z)));
+    if (vm_bits(asked) && fill->view->level) // d_eff at level 0 spares most a look at the normals
+        asked = vm_and(asked, vf_lt(nearest, z - vf_gather(fill->deff, vi_and(vi_load(fill->from + at), vi_set(~PT_FROM_MIXED)), asked)));
     if (!vm_bits(asked))
         return asked;
     *threshold = z - pt_own_distance(fill->view, fill->deff, fill->normals, fill->from, at, z, asked);
