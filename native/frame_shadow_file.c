@@ -231,8 +231,8 @@ static int take_words(struct reader *reader, struct patina_frame *frame, uint32_
     int error = words ? PATINA_OK : pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "loading shadows: out of memory");
     for (size_t k = 0; k < buffer->size / 4 && !error; k++)
         error = take(reader, &words[k], reader->width);
-    if (!error && frame->device->ops->buffer_write(frame->device, buffer, 0, words, buffer->size))
-        error = pt_fail_again(&frame->handle, PATINA_ERROR_MEMORY);
+    if (!error && (error = frame->device->ops->buffer_write(frame->device, buffer, 0, words, buffer->size)))
+        pt_fail_again(&frame->handle, error);
     free(words);
     return error;
 }
