@@ -158,6 +158,21 @@ static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
     _mm512_mask_storeu_epi64(keys, (__mmask8)lanes, words[0]);
     _mm512_mask_storeu_epi64(keys + 8, (__mmask8)(lanes >> 8), words[1]);
 }
+// keys[i] = min(keys[i], z << 32 | id), of the first half of the lanes; of the others at keys + apart. No key's first bit is set.
+enum { PT_KEYS_AT_ONCE = 4 }; // that many lie in one vector: where they begin at its multiples, what is written is read again soon
+static inline void avx_least_keys(uint64_t *keys, __m256i key)
+{
+    _mm256_storeu_si256((__m256i *)keys, _mm256_min_epu64(key, _mm256_loadu_si256((const __m256i *)keys)));
+}
+static inline void vi_least_keys(uint64_t *keys, size_t apart, vi z, vi id)
+{
+    vi words[2];
+    vi_zip(id, z, words);
+    avx_least_keys(keys, _mm512_castsi512_si256(words[0]));
+    avx_least_keys(keys + 4, _mm512_extracti64x4_epi64(words[0], 1));
+    avx_least_keys(keys + apart, _mm512_castsi512_si256(words[1]));
+    avx_least_keys(keys + apart + 4, _mm512_extracti64x4_epi64(words[1], 1));
+}
 static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) // those lanes, one behind another; room for all
 {
     _mm512_storeu_si512(p, _mm512_maskz_compress_epi32((vm)lanes, a));
@@ -230,6 +245,16 @@ static inline void vi_zip(vi a, vi b, vi out[2])
     vi low = _mm256_unpacklo_epi32(a, b), high = _mm256_unpackhi_epi32(a, b);
     out[0] = _mm256_permute2x128_si256(low, high, 0x20);
     out[1] = _mm256_permute2x128_si256(low, high, 0x31);
+}
+enum { PT_KEYS_AT_ONCE = 4 };
+static inline void vi_least_keys(uint64_t *keys, size_t apart, vi z, vi id)
+{
+    vi words[2];
+    vi_zip(id, z, words);
+    for (size_t k = 0; k < 2; k++) {
+        vi *at = (vi *)(void *)(keys + k * apart), old = _mm256_loadu_si256(at);
+        _mm256_storeu_si256(at, _mm256_blendv_epi8(old, words[k], _mm256_cmpgt_epi64(old, words[k])));
+    }
 }
 static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
 {
@@ -353,6 +378,16 @@ static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
     for (int k = 0; k < 4; k++)
         if (lanes >> k & 1u)
             keys[k] = words[k];
+}
+enum { PT_KEYS_AT_ONCE = 2 };
+static inline void vi_least_keys(uint64_t *keys, size_t apart, vi z, vi id)
+{
+    vi words[2];
+    vi_zip(id, z, words);
+    for (size_t k = 0; k < 2; k++) {
+        vi *at = (vi *)(void *)(keys + k * apart), old = _mm_loadu_si128(at);
+        _mm_storeu_si128(at, _mm_blendv_epi8(old, words[k], _mm_cmpgt_epi64(old, words[k])));
+    }
 }
 static inline vm vm_first(uint32_t n) { return _mm_cmpgt_epi32(_mm_set1_epi32((int)n), vi_lanes()); }
 static inline vm vm_of_bits(uint32_t bits)
@@ -483,6 +518,12 @@ static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
 {
     if (lanes)
         *keys = (uint64_t)z << 32 | id;
+}
+enum { PT_KEYS_AT_ONCE = 1 };
+static inline void vi_least_keys(uint64_t *keys, size_t apart, vi z, vi id)
+{
+    const uint64_t key = (uint64_t)z << 32 | id;
+    *keys = ((void)apart, key < *keys ? key : *keys);
 }
 static inline vf vf_mul_where(vm m, vf a, vf b) { return m ? a * b : 0.0f; }
 static inline vf vf_add_where(vm m, vf a, vf b) { return m ? a + b : a; }

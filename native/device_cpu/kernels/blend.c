@@ -6,8 +6,6 @@
 // 64 before they could overflow.
 #include "bins.h"
 
-typedef float vf_four __attribute__((vector_size(16))); // half of a vf_eight
-
 enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = 8 }; // colour 3, opacity, normal 3, weight
 
 // That sums take before they are emptied: 2^31, less what float32 may count wrong.
@@ -15,7 +13,7 @@ enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = 8 }; // colour 3, opaci
 
 // What a disc adds at weight 1.
 struct terms {
-    float color[PT_LANES][4], normal[PT_LANES][4];
+    float each[PT_LANES][SUMS];
     float most[PT_LANES]; // of their sizes
 };
 
@@ -46,19 +44,24 @@ static inline void set_terms(const struct pt_bins *bins, uint32_t instance, cons
 {
     const struct instance_args *args = &bins->discs[instance].instance;
     const uint32_t at = bins->first + instance * bins->stride;
-    const void *colors = pt_cpu_data(bins->call, at + 4);
+    const void *own = pt_cpu_data(bins->call, at + 4);
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     vf color[4], normal[4], largest = scale;
-    pt_albedo(args, colors, discs->id, 0, discs->drawn, color);
-    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 5), discs->id, 0, discs->drawn) * scale;
+    pt_albedo(args, own, discs->id, 0, discs->drawn, color);
+    color[3] = pt_opacity(args, own, pt_cpu_data(bins->call, at + 5), discs->id, 0, discs->drawn) * scale;
     for (int k = 0; k < 3; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
         largest = vf_max(largest, vf_abs(color[k]));
         normal[k] = discs->n[k] * scale;
     }
     normal[3] = scale;
-    vf_store4(out->color[0], color, vm_bits(vm_first(PT_LANES)));
-    vf_store4(out->normal[0], normal, vm_bits(vm_first(PT_LANES)));
+    float colors[PT_LANES][4], normals[PT_LANES][4];
+    vf_store4(colors[0], color, vm_bits(vm_first(PT_LANES)));
+    vf_store4(normals[0], normal, vm_bits(vm_first(PT_LANES)));
+    for (uint32_t i = 0; i < PT_LANES; i++) {
+        memcpy(out->each[i], colors[i], sizeof colors[i]);
+        memcpy(out->each[i] + 4, normals[i], sizeof normals[i]);
+    }
     vf_store(out->most, largest, vm_first(PT_LANES));
 }
 
@@ -73,43 +76,32 @@ static void empty_sums(struct tile *tile)
     tile->left = SUM_ROOM;
 }
 
-// Patches that show nothing are sorted out first.
+// Pixels that a disc counts in are listed first, and those where nothing lies before it.
 static void add_up(void *context, struct pt_patches *list)
 {
     struct tile *tile = context;
-    _Alignas(64) float weights[PT_PATCHES][PT_LANES];
-    struct {
-        uint32_t patch, nearest; // nearest: pixels where nothing lies before the disc
-    } adds[PT_PATCHES];
-    uint32_t count = 0;
+    struct pt_touched taken, nearest;
+    _Alignas(64) float weights[PT_PATCHES * PT_LANES];
+    taken.count = nearest.count = 0;
     for (uint32_t i = 0; i < list->count; i++) {
-        const struct pt_patch *patch = &list->patches[i];
-        const struct pt_shown shown = pt_patch_show(list, patch);
-        const vi behind = vi_sub(vf_bits(shown.z), vf_bits(pt_patch_load(tile->nearest + patch->at)));
-        const vi most = vf_bits(pt_patch_load(tile->behind + patch->at));
-        const vm taken = vm_and(shown.covered, vm_not(vi_lt_unsigned(most, behind)));
-        vf_store(weights[count], vf_select(taken, pt_shown_weight(&shown), vf_zero()), vm_first(PT_LANES));
-        adds[count].patch = i;
-        adds[count].nearest = vm_bits(vm_and(taken, vi_eq(behind, vi_set(0))));
-        count += vm_bits(taken) != 0;
+        const struct pt_shown shown = pt_patch_show(list, i);
+        const uint32_t at = pt_patch_pixel(list, i);
+        const vi behind = vi_sub(vf_bits(shown.z), vf_bits(pt_patch_load(tile->nearest + at)));
+        const vi most = vf_bits(pt_patch_load(tile->behind + at));
+        const vm counts = vm_and(shown.covered, vm_not(vi_lt_unsigned(most, behind)));
+        vf_store(weights + i * PT_LANES, pt_shown_weight(&shown), vm_first(PT_LANES));
+        pt_touch(&taken, list, i, vm_bits(counts));
+        pt_touch(&nearest, list, i, vm_bits(vm_and(counts, vi_eq(behind, vi_set(0)))));
     }
-    for (uint32_t k = 0; k < count; k++) {
-        const struct pt_patch patch = list->patches[adds[k].patch];
-        vf_four color, normal;
-        memcpy(&color, tile->terms.color[patch.disc], 16);
-        memcpy(&normal, tile->terms.normal[patch.disc], 16);
-        const vf_eight terms = __builtin_shufflevector(color, normal, 0, 1, 2, 3, 4, 5, 6, 7);
-        for (uint32_t j = 0; j < patch.rows; j++) {
-            vi_eight *sums = (vi_eight *)(void *)tile->sums[patch.at + j * PT_DISC_TILE];
-            const float *weight = weights[k] + j * PT_PATCH_COLUMNS;
-            for (uint32_t i = 0; i < PT_PATCH_COLUMNS; i++) // what is not taken adds nothing: not worth a branch
-                sums[i] += __builtin_convertvector(terms * weight[i], vi_eight);
-        }
-        for (uint32_t bits = adds[k].nearest; bits; bits &= bits - 1) {
-            const uint32_t pixel = pt_patch_pixel(patch.at, (uint32_t)__builtin_ctz(bits));
-            if (tile->id[pixel] == tile->ids[patch.disc])
-                tile->own[pixel] = tile->places[patch.disc];
-        }
+    for (uint32_t i = 0; i < taken.count; i++) {
+        vi_eight *sums = (vi_eight *)(void *)tile->sums[taken.at[i] & 0xFFFFu];
+        const vf_eight terms = *(const vf_eight *)(const void *)tile->terms.each[taken.at[i] >> 16 & 15u];
+        *sums += __builtin_convertvector(terms * weights[taken.at[i] >> 20], vi_eight);
+    }
+    for (uint32_t i = 0; i < nearest.count; i++) {
+        const uint32_t pixel = nearest.at[i] & 0xFFFFu, disc = nearest.at[i] >> 16 & 15u;
+        if (tile->id[pixel] == tile->ids[disc])
+            tile->own[pixel] = tile->places[disc];
     }
 }
 
@@ -138,7 +130,7 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
     for (uint32_t i = 0; i < PT_LANES; i += each) {
         some.drawn = vm_and(discs->drawn, vm_of_bits(((1u << each) - 1) << i));
         take_room(tile, each > 1 ? size : tile->terms.most[i] + 1.0f);
-        pt_patches_draw(&tile->patches, &some, add_up, tile);
+        pt_patches_draw(&tile->patches, &some, 1, add_up, tile);
     }
 }
 

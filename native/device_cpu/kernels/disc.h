@@ -204,27 +204,30 @@ enum {
     PT_PATCH_COLUMNS = PT_LANES < 8 ? PT_LANES : 8,
     PT_PATCH_ROWS = PT_LANES / PT_PATCH_COLUMNS,
     PT_PATCH_BEYOND = (PT_PATCH_ROWS - 1) * PT_DISC_TILE + PT_PATCH_COLUMNS, // pixels after a tile's that may be read
-    PT_PATCHES = 64,
+    PT_PATCHES = PT_LANES < 16 ? 32 : 4 * PT_LANES, // four a disc
 };
 
-struct pt_patch {
-    uint16_t at;        // first pixel in the tile, rows of PT_DISC_TILE
-    uint16_t box;       // those of the disc's box, a bit a lane
-    uint8_t disc, rows; // the lane that it has among its like; rows of the box here
-};
+#if defined(PT_ISA_AVX512)
+typedef uint16_t pt_patch_box;
+#else
+typedef uint8_t pt_patch_box;
+#endif
 
 // Discs, their numbers one by one, and their patches.
 struct pt_patches {
     const struct view_args *view;
     struct pt_disc_tile tile;
-    float columns[PT_DISC_TILE + PT_PATCH_COLUMNS]; // middles of pixels: halves are exact
-    _Alignas(64) float rows[PT_DISC_TILE + PT_PATCH_ROWS][PT_PATCH_COLUMNS];
+    float middle_x[PT_DISC_TILE + PT_PATCH_COLUMNS]; // of pixels: halves are exact
+    _Alignas(64) float middle_y[PT_DISC_TILE + PT_PATCH_ROWS][PT_PATCH_COLUMNS];
     float x[PT_LANES], y[PT_LANES], z[PT_LANES], gx[PT_LANES], gy[PT_LANES], e[PT_LANES], f[PT_LANES], g[PT_LANES];
     uint32_t x0[PT_LANES], y0[PT_LANES], x1[PT_LANES], y1[PT_LANES]; // boxes in the tile
+    uint32_t first[PT_LANES], columns[PT_LANES], rows[PT_LANES];     // of those not wide: first pixel, columns as bits, how many rows
     uint32_t column[PT_LANES], row[PT_LANES];                        // own pixels in the tile, if they lie there
     uint32_t small, ends, gentle; // those that may miss or hardly fill their own pixel; that may pass the ends of the view
+    uint32_t wide;                // that need more than four patches
     uint32_t count;
-    struct pt_patch patches[PT_PATCHES];
+    uint32_t at[PT_PATCHES];      // first pixel in the tile, rows of PT_DISC_TILE | lane of the disc << 16
+    pt_patch_box box[PT_PATCHES]; // pixels of the disc's box, a bit a lane
 };
 
 // What a disc shows of a patch.
@@ -235,6 +238,7 @@ struct pt_shown {
     vm own, beside;    // of a small disc: the pixel that its point falls into, and that if the disc lies beside it
 };
 
+static inline vi pt_power_of_two(vi n) { return vf_int(vi_float(vi_mul(vi_add(n, vi_set(127)), vi_set(1u << 23)))); }
 static inline vi pt_lesser(vi a, vi b) { return vi_select(vi_lt_unsigned(a, b), a, b); }
 
 // Turns to another tile.
@@ -243,14 +247,14 @@ static inline void pt_patches_turn(struct pt_patches *out, const struct view_arg
     out->view = view;
     out->tile = tile;
     for (int32_t i = 0; i < PT_DISC_TILE + PT_PATCH_COLUMNS; i++)
-        out->columns[i] = (float)(view->origin_x + tile.x + i) + 0.5f;
+        out->middle_x[i] = (float)(view->origin_x + tile.x + i) + 0.5f;
     for (int32_t i = 0; i < PT_DISC_TILE + PT_PATCH_ROWS; i++)
         for (int k = 0; k < PT_PATCH_COLUMNS; k++)
-            out->rows[i][k] = (float)(view->origin_y + tile.y + i) + 0.5f;
+            out->middle_y[i][k] = (float)(view->origin_y + tile.y + i) + 0.5f;
 }
 
-// Takes down PT_LANES discs; returns those with pixels in the tile.
-static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_discs *d)
+// Takes down PT_LANES discs, whose patches begin at multiples of `step` columns; returns those with pixels in the tile.
+static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_discs *d, uint32_t step)
 {
     const struct view_args *view = out->view;
     const vm all = vm_first(PT_LANES);
@@ -262,10 +266,15 @@ static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_
     const vi y0 = vi_select(vi_lt_unsigned(d->box[1], tile_y), tile_y, d->box[1]);
     const vi x1 = pt_lesser(vi_add(d->box[2], next), vi_set((uint32_t)(out->tile.x + out->tile.width)));
     const vi y1 = pt_lesser(vi_add(d->box[3], next), vi_set((uint32_t)(out->tile.y + out->tile.height)));
+    const vi first = vi_and(x0, vi_set(~(step - 1))); // tiles begin at multiples of it
+    const vi columns = vi_sub(pt_power_of_two(vi_sub(x1, first)), pt_power_of_two(vi_sub(x0, first))), rows = vi_sub(y1, y0);
+    const vm wide = vm_or(vi_lt_unsigned(vi_set(PT_PATCH_COLUMNS), vi_sub(x1, first)),
+                          vi_lt_unsigned(vi_set(4 * PT_PATCH_ROWS), rows));
     const vf reach = d->radius * vf_set(1.01f);
     const vm within = vm_and(vf_le(vf_set(view->z_near), d->z - reach), vf_le(d->z + reach, vf_set(view->z_far)));
     out->ends = ~vm_bits(within);
     out->gentle = vm_bits(d->gentle);
+    out->wide = vm_bits(wide);
     out->small = ~vm_bits(vm_and(vf_le(steep, vf_set(1.9f)), vf_le(slope, vf_set(0.02f))));
     vf_store(out->x, d->x, all);
     vf_store(out->y, d->y, all);
@@ -279,6 +288,9 @@ static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_
     vi_store(out->y0, vi_sub(y0, tile_y), all);
     vi_store(out->x1, vi_sub(x1, tile_x), all);
     vi_store(out->y1, vi_sub(y1, tile_y), all);
+    vi_store(out->first, vi_add(vi_mul(vi_sub(y0, tile_y), vi_set(PT_DISC_TILE)), vi_sub(first, tile_x)), all);
+    vi_store(out->columns, columns, all);
+    vi_store(out->rows, rows, all);
     vi_store(out->column, vi_sub(d->column, tile_x), all);
     vi_store(out->row, vi_sub(d->row, tile_y), all);
     return vm_bits(vm_and(d->drawn, vm_and(vi_lt_unsigned(x0, x1), vi_lt_unsigned(y0, y1))));
@@ -286,39 +298,41 @@ static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_
 
 typedef void pt_patches_work(void *context, struct pt_patches *list);
 
-// Lists a patch that begins at (x, y).
-static inline struct pt_patch pt_patch_at(uint32_t disc, uint32_t x, uint32_t y, uint32_t x1, uint32_t y1)
+// Lists up to four patches of a disc, one below another from the pixel `first` on; columns: those of the box, as bits.
+static inline void pt_patches_list(struct pt_patches *list, uint32_t disc, uint32_t first, uint32_t columns, uint32_t rows)
 {
-    const uint32_t columns = x1 - x < PT_PATCH_COLUMNS ? x1 - x : PT_PATCH_COLUMNS;
-    const uint32_t rows = y1 - y < PT_PATCH_ROWS ? y1 - y : PT_PATCH_ROWS;
-    const uint32_t box = (((1u << columns) - 1) * 0x101u) & ((1u << rows * PT_PATCH_COLUMNS) - 1);
-    return (struct pt_patch){ (uint16_t)(y * PT_DISC_TILE + x), (uint16_t)box, (uint8_t)disc, (uint8_t)rows };
+    typedef uint32_t four __attribute__((vector_size(16)));
+    const four each = { 0, PT_PATCH_ROWS * PT_DISC_TILE, 2 * PT_PATCH_ROWS * PT_DISC_TILE, 3 * PT_PATCH_ROWS * PT_DISC_TILE };
+    const four at = each + (first | disc << 16);
+    const uint64_t box = (columns * 0x0101010101010101u) & ~0ull >> (64 - 8 * rows); // eight bits a row
+    memcpy(list->at + list->count, &at, sizeof at);
+    memcpy(list->box + list->count, &box, 4 * sizeof *list->box);
+    list->count += (rows + PT_PATCH_ROWS - 1) / PT_PATCH_ROWS; // the others do not count
 }
 
+static inline uint32_t pt_at_most(uint32_t a, uint32_t most) { return a < most ? a : most; }
+
 // Calls work for the patches of a tile that the discs may cover, up to PT_PATCHES at a time.
-static inline void pt_patches_draw(struct pt_patches *list, const struct pt_discs *discs, pt_patches_work *work, void *context)
+static inline __attribute__((always_inline)) void pt_patches_draw(struct pt_patches *list, const struct pt_discs *discs,
+                                                                  uint32_t step, pt_patches_work *work, void *context)
 {
+    const uint32_t drawn = pt_patches_begin(list, discs, step);
     list->count = 0;
-    for (uint32_t lanes = pt_patches_begin(list, discs); lanes; lanes &= lanes - 1) {
+    for (uint32_t lanes = drawn & ~list->wide; lanes; lanes &= lanes - 1) {
         const uint32_t k = (uint32_t)__builtin_ctz(lanes);
-        const uint32_t x0 = list->x0[k], x1 = list->x1[k], y0 = list->y0[k], y1 = list->y1[k];
-        if (list->count > PT_PATCHES - 4) {
-            work(context, list);
-            list->count = 0;
-        }
-        if (x1 - x0 <= PT_PATCH_COLUMNS && y1 - y0 <= 4 * PT_PATCH_ROWS) { // most: those of four beyond the box do not count
-            for (uint32_t i = 0; i < 4; i++)
-                list->patches[list->count + i] = pt_patch_at(k, x0, y0 + i * PT_PATCH_ROWS, x1, y1);
-            list->count += (y1 - y0 + PT_PATCH_ROWS - 1) / PT_PATCH_ROWS;
-            continue;
-        }
-        for (uint32_t x = x0; x < x1; x += PT_PATCH_COLUMNS)
-            for (uint32_t y = y0; y < y1; y += PT_PATCH_ROWS) {
-                if (list->count == PT_PATCHES) {
+        pt_patches_list(list, k, list->first[k], list->columns[k], list->rows[k]);
+    }
+    for (uint32_t lanes = drawn & list->wide; lanes; lanes &= lanes - 1) {
+        const uint32_t k = (uint32_t)__builtin_ctz(lanes);
+        for (uint32_t x = list->x0[k]; x < list->x1[k]; x = (x & ~(step - 1)) + PT_PATCH_COLUMNS)
+            for (uint32_t y = list->y0[k]; y < list->y1[k]; y += 4 * PT_PATCH_ROWS) {
+                const uint32_t first = x & ~(step - 1), end = pt_at_most(list->x1[k] - first, PT_PATCH_COLUMNS);
+                if (list->count > PT_PATCHES - 4) {
                     work(context, list);
                     list->count = 0;
                 }
-                list->patches[list->count++] = pt_patch_at(k, x, y, x1, y1);
+                pt_patches_list(list, k, y * PT_DISC_TILE + first, (1u << end) - (1u << (x - first)),
+                                pt_at_most(list->y1[k] - y, 4 * PT_PATCH_ROWS));
             }
     }
     work(context, list);
@@ -334,27 +348,30 @@ static inline vf pt_patch_columns(const float *p)
 #endif
 }
 
+static inline uint32_t pt_patch_pixel(const struct pt_patches *list, uint32_t i) { return list->at[i] & 0xFFFFu; }
+static inline uint32_t pt_patch_disc(const struct pt_patches *list, uint32_t i) { return list->at[i] >> 16; }
+
 // The lane of a small disc's own pixel.
-static inline vm pt_patch_own(const struct pt_patches *list, const struct pt_patch *patch)
+static inline vm pt_patch_own(const struct pt_patches *list, uint32_t i)
 {
-    const uint32_t column = list->column[patch->disc] - patch->at % PT_DISC_TILE;
-    const uint32_t row = list->row[patch->disc] - patch->at / PT_DISC_TILE;
+    const uint32_t k = pt_patch_disc(list, i), at = pt_patch_pixel(list, i);
+    const uint32_t column = list->column[k] - at % PT_DISC_TILE, row = list->row[k] - at / PT_DISC_TILE;
     const int here = column < PT_PATCH_COLUMNS && row < PT_PATCH_ROWS;
-    return vm_of_bits(here ? patch->box & 1u << (row * PT_PATCH_COLUMNS + column) : 0);
+    return vm_of_bits(here ? list->box[i] & 1u << (row * PT_PATCH_COLUMNS + column) : 0);
 }
 
 // Every pixel of a patch against its disc.
-static inline struct pt_shown pt_patch_show(const struct pt_patches *list, const struct pt_patch *patch)
+static inline struct pt_shown pt_patch_show(const struct pt_patches *list, uint32_t i)
 {
     const struct view_args *view = list->view;
-    const uint32_t k = patch->disc;
+    const uint32_t k = pt_patch_disc(list, i), at = pt_patch_pixel(list, i);
     const vf one = vf_set(1.0f), z = vf_set(list->z[k]);
-    struct pt_shown out = { .dx = pt_patch_columns(list->columns + patch->at % PT_DISC_TILE) - vf_set(list->x[k]),
-                            .dy = vf_load(list->rows[patch->at / PT_DISC_TILE]) - vf_set(list->y[k]) };
+    struct pt_shown out = { .dx = pt_patch_columns(list->middle_x + at % PT_DISC_TILE) - vf_set(list->x[k]),
+                            .dy = vf_load(list->middle_y[at / PT_DISC_TILE]) - vf_set(list->y[k]) };
     const vf slope = vf_set(list->gx[k]) * out.dx + vf_set(list->gy[k]) * out.dy;
     out.square = (vf_set(list->e[k]) * out.dx + vf_set(list->f[k]) * out.dy) * out.dx +
                  (vf_set(list->g[k]) * out.dy) * out.dy;
-    out.covered = vm_of_bits(patch->box);
+    out.covered = vm_of_bits(list->box[i]);
     if (view->perspective) {
         vf inverse = (one - slope) * (one + slope * slope);
         if (!(list->gentle >> k & 1u)) {
@@ -369,7 +386,7 @@ static inline struct pt_shown pt_patch_show(const struct pt_patches *list, const
     out.covered = vm_and(out.covered, vf_le(out.square, one));
     out.own = out.beside = vm_of_bits(0);
     if (list->small >> k & 1u) {
-        out.own = pt_patch_own(list, patch);
+        out.own = pt_patch_own(list, i);
         out.beside = vm_and(out.own, vm_not(out.covered)); // covered by the point alone
         out.z = vf_select(out.beside, z, out.z);
         out.covered = vm_or(out.covered, out.beside);
@@ -412,10 +429,19 @@ static inline vf pt_patch_z(const uint64_t *keys)
 #endif
 }
 
-// Where a patch's lane lies in the tile.
-static inline uint32_t pt_patch_pixel(uint32_t at, uint32_t lane)
+// Pixels that patches change, one behind another: no branch waits for how many each does. Pixel in the tile | lane of the disc
+// << 16 | number among all the patches' pixels << 20.
+struct pt_touched {
+    uint32_t count, at[PT_PATCHES * PT_LANES + PT_LANES];
+};
+
+static inline void pt_touch(struct pt_touched *out, const struct pt_patches *list, uint32_t i, uint32_t lanes)
 {
-    return at + lane / PT_PATCH_COLUMNS * PT_DISC_TILE + lane % PT_PATCH_COLUMNS;
+    vi pixels = vi_mul(vi_lanes(), vi_set(1u << 20 | 1));
+    if (PT_PATCH_ROWS > 1)
+        pixels = vi_add(pixels, vi_mul(vi_shr(vi_lanes(), 3), vi_set(PT_DISC_TILE - PT_PATCH_COLUMNS)));
+    vi_pack(out->at + out->count, vi_add(pixels, vi_set(list->at[i] + (PT_LANES * i << 20))), lanes);
+    out->count += (uint32_t)__builtin_popcount(lanes);
 }
 
 #endif

@@ -15,35 +15,18 @@ struct tile {
     uint32_t ids[PT_LANES]; // of the discs at hand
 };
 
-// Takes the least keys. Patches that change nothing are sorted out first, all of them before any pixel is written.
+// Takes the least keys.
 static void take_least(void *context, struct pt_patches *list)
 {
     struct tile *tile = context;
-    _Alignas(64) uint32_t z[PT_PATCHES][PT_LANES];
-    struct {
-        uint32_t patch, nearer;
-    } takes[PT_PATCHES];
-    uint32_t count = 0;
     for (uint32_t i = 0; i < list->count; i++) {
-        const struct pt_patch *patch = &list->patches[i];
-        const struct pt_shown shown = pt_patch_show(list, patch);
-        vm nearer = vm_and(shown.covered, vf_le(shown.z, pt_patch_z(tile->keys + patch->at)));
+        const struct pt_shown shown = pt_patch_show(list, i);
+        const uint32_t at = pt_patch_pixel(list, i);
+        vm covered = shown.covered;
         if (tile->limited)
-            nearer = vm_and(nearer, vf_lt(pt_patch_load(tile->limit + patch->at), shown.z));
-        vi_store(z[count], vf_bits(shown.z), vm_first(PT_LANES));
-        takes[count].patch = i;
-        takes[count].nearer = vm_bits(nearer);
-        count += vm_bits(nearer) != 0;
-    }
-    for (uint32_t i = 0; i < count; i++) {
-        const struct pt_patch *patch = &list->patches[takes[i].patch];
-        const uint32_t id = tile->ids[patch->disc];
-        for (uint32_t bits = takes[i].nearer; bits; bits &= bits - 1) {
-            const uint32_t lane = (uint32_t)__builtin_ctz(bits);
-            const uint64_t key = (uint64_t)z[i][lane] << 32 | id;
-            uint64_t *at = &tile->keys[pt_patch_pixel(patch->at, lane)];
-            *at = key < *at ? key : *at; // of equal depths the least id
-        }
+            covered = vm_and(covered, vf_lt(pt_patch_load(tile->limit + at), shown.z));
+        vi_least_keys(tile->keys + at, PT_PATCH_ROWS > 1 ? PT_DISC_TILE : PT_LANES / 2,
+                      vi_select(covered, vf_bits(shown.z), vi_set(0x7FFFFFFFu)), vi_set(tile->ids[pt_patch_disc(list, i)]));
     }
 }
 
@@ -51,7 +34,7 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
 {
     struct tile *tile = context;
     vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)), vm_first(PT_LANES));
-    pt_patches_draw(&tile->patches, discs, take_least, tile);
+    pt_patches_draw(&tile->patches, discs, PT_KEYS_AT_ONCE, take_least, tile);
 }
 
 static void load(struct tile *tile, const uint64_t *keys, const float *limit)
