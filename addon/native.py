@@ -15,7 +15,7 @@ import os
 import sys
 import threading
 import weakref
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_double, c_float, c_int
 from ctypes import c_size_t, c_uint32, c_uint64, c_void_p, sizeof
 from pathlib import Path
@@ -668,9 +668,14 @@ class Frame(_Handle):
         _check(library().patina_frame_render(self._handle, scene._handle), self._handle, scene._handle,
                self._device._handle)
 
-    def start(self, scene: Scene, planes: Iterable[str], height: int, width: int) -> Task:
-        """A task that renders, and gives these planes of the picture as read() would. Its size: of the scene's region."""
-        pixels = [np.empty((height, width, PLANES[plane][1]), np.float32) for plane in planes]
+    def start(self, scene: Scene, planes: Sequence[str], height: int, width: int,
+              spare: Sequence[np.ndarray] = ()) -> Task:
+        """A task that renders, and gives these planes of the picture as read() would. Its size: of the scene's region.
+        spare: what start() gave for another picture of these planes and is no longer needed; where it fits it is written
+        again, for fresh memory costs more than what is written to it."""
+        shapes = [(height, width, PLANES[plane][1]) for plane in planes]
+        fits = [values.shape for values in spare] == shapes
+        pixels = list(spare) if fits else [np.empty(shape, np.float32) for shape in shapes]
         reads = (_Read * len(pixels))(*(_Read(PLANES[plane][0], values.ctypes.data, values.nbytes)
                                         for plane, values in zip(planes, pixels, strict=True)))
         return Task("render", self._handle, scene._handle, reads, len(reads), keep=(self, self._device, scene, reads, pixels),

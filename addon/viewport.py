@@ -58,14 +58,14 @@ class Shown:
 
     wish: Wish
     clouds: list[sync.CloudItem]  # built
-    color: np.ndarray  # (height, width, 4), premultiplied, scene-linear
+    color: np.ndarray  # (height, width, 4), premultiplied, scene-linear; the next picture but one overwrites it
     depth: np.ndarray  # (height, width, 1), linear z
     pixel: float  # its width, at distance 1 in perspective
     place: tuple[float, float, float, float]  # of the viewport that it covers, 0..1
     stats: dict[str, Any]
     passes: dict[str, Any]
     device: str
-    seconds: float
+    begun: float  # when its making was
 
 
 class Viewport:
@@ -93,6 +93,7 @@ class Viewport:
         self._task: native.Task | Pause | None = None  # the step under way
         self._progress: native.Progress | None = None  # while clouds are made
         self._rendering = False  # while the frame is drawn
+        self._spare: list[np.ndarray] = []  # planes of the picture before the one that is shown
         self._closed = False
         self._news = False
         self._frame: tuple[native.Device, native.Frame] | None = None
@@ -194,35 +195,28 @@ class Viewport:
     def _draw_picture(self, context: bpy.types.Context) -> None:
         overlays = context.space_data.overlay.show_overlays
         if self._drawn is None or self._drawn[0] is not self.shown:
+            if self.shown.wish.view != self._view:  # it moves on
+                self.pace.seen(time.monotonic() - self.shown.begun - self.shown.stats["ms"] / 1000.0)
             self._drawn = (self.shown, _upload(self.shown), None)
         if overlays and self._drawn[2] is None:
             self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.depth), 'R32F'))
         shown, color, depth = self._drawn
-        projection = context.region_data.window_matrix
-        camera = shown.wish.view.camera
-        near = camera.near_clip if camera.orthographic else 0.0
-        shader = _shader()
-        x0, y0, x1, y1 = (2.0 * share - 1.0 for share in shown.place)
-        batch = batch_for_shader(shader, 'TRI_STRIP', {"pos": ((x0, y0), (x1, y0), (x0, y1), (x1, y1)),
-                                                       "uv": ((0, 0), (1, 0), (0, 1), (1, 1))})
-        state = gpu.state
-        shader.bind()
-        shader.uniform_sampler("picture", color)
-        shader.uniform_sampler("depths", depth or color)  # any will do where it is not looked at
-        shader.uniform_float("projection", (projection[2][2], projection[2][3], near, camera.orthographic))
-        shader.uniform_float("cover", 4.0 * shown.pixel)
-        # the colour over everything, the depth where nothing of Blender's is nearer, so that overlays are hidden rightly
-        for colors, test in ((True, 'NONE'), (False, 'LESS_EQUAL'))[:1 + overlays]:
-            state.blend_set('ALPHA_PREMULT' if colors else 'NONE')
-            state.color_mask_set(colors, colors, colors, colors)
-            state.depth_test_set(test)
-            state.depth_mask_set(not colors)
-            shader.uniform_float("share", float(colors))
-            batch.draw(shader)
-        state.color_mask_set(True, True, True, True)
-        state.depth_test_set('NONE')
-        state.depth_mask_set(False)
-        state.blend_set('NONE')
+        corners = [2.0 * share - 1.0 for share in shown.place]
+        gpu.state.depth_test_set('NONE')
+        gpu.state.depth_mask_set(False)
+        gpu.state.blend_set('NONE')  # Blender has cleared what is beneath
+        _fill_rectangle(corners, 'EXACT' if shown.wish.level.shrink == 1 else 'SMOOTH', color)
+        if overlays:  # where nothing of Blender's is nearer, so that they are hidden rightly
+            projection, camera = context.region_data.window_matrix, shown.wish.view.camera
+            near = camera.near_clip if camera.orthographic else 0.0
+            gpu.state.color_mask_set(False, False, False, False)
+            gpu.state.depth_test_set('LESS_EQUAL')
+            gpu.state.depth_mask_set(True)
+            _fill_rectangle(corners, 'DEPTH', depth, cover=4.0 * shown.pixel, projection=(
+                projection[2][2], projection[2][3], near, camera.orthographic))
+            gpu.state.color_mask_set(True, True, True, True)
+            gpu.state.depth_test_set('NONE')
+            gpu.state.depth_mask_set(False)
 
     # ---- the work
 
@@ -253,6 +247,7 @@ class Viewport:
         if cancelled and not self._wanted:
             self._wanted = wish  # the cancel was meant for the picture before
         if shown:
+            self._spare = [self.shown.color, self.shown.depth] if self.shown else []
             self.shown = shown
             self.pictures += 1
             if shown.stats["shadow_pending"] and not self._wanted:
@@ -302,7 +297,7 @@ class Viewport:
             render.describe(scene, description, ["DEPTH"])
             settings = description.settings
             x0, y0, x1, y1 = settings.region
-            task = frame.start(scene, ("COMBINED", "DEPTH"), y1 - y0, x1 - x0)
+            task = frame.start(scene, ("COMBINED", "DEPTH"), y1 - y0, x1 - x0, self._spare)
             self._rendering = True
             try:
                 yield task
@@ -315,14 +310,14 @@ class Viewport:
         return Shown(wish, description.clouds, *planes,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
-                     stats, passes, device.name, time.monotonic() - start)
+                     stats, passes, device.name, start)
 
 
 _VIEWPORTS: set[Viewport] = set()
 # Those with something to do; the first one works. One at a time: frames of a device take turns anyway, and clouds may
 # only get new colours while no picture of them is drawn.
 _TURNS: deque[Viewport] = deque()
-_compiled: list[gpu.types.GPUShader] = []  # none or one
+_compiled: dict[str, gpu.types.GPUShader] = {}  # by what they draw
 
 
 def of_area(area: bpy.types.Area) -> Viewport | None:
@@ -376,7 +371,8 @@ def _redraw_panels(area_pointer: int) -> None:
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
-    np.minimum(shown.color, LARGEST, out=shown.color)
+    if shown.color.max() > LARGEST:  # seldom, and looking costs a tenth
+        np.minimum(shown.color, LARGEST, out=shown.color)
     return _texture(shown.color, 'RGBA16F')
 
 
@@ -408,44 +404,66 @@ void main()
 }
 """
 
-# z of the picture is linear; Blender's depth buffer is the projection's, projection.xy its third row. Overlays hide
-# behind a depth two pixels wider than the surface and four pixels' width (cover) nearer: Blender draws the vertices of
-# our points as dots over every engine's picture, and these lie just behind it.
+# One program for each thing to draw: a GPU in software executes both sides of every branch, and looks at depths for each
+# program that may write one.
 _FRAGMENT = """
+vec4 exact()
+{
+    ivec2 size = textureSize(picture, 0);
+    return texelFetch(picture, min(ivec2(place * vec2(size)), size - 1), 0);
+}
+
 void main()
 {
-    gl_FragDepth = 1.0;
-    if (share < 0.5) {
-        ivec2 size = textureSize(depths, 0);
-        float far = texelFetch(depths, min(ivec2(place * vec2(size)), size - 1), 0).r;
-        float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
-        float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z)
-                                       : projection.y / z - projection.x;
-        if (far < 1e29)
-            gl_FragDepth = clamp(0.5 * ndc + 0.5, 0.0, 1.0);
-    }
-    color = share * texture(picture, place);
+#if defined(DEPTH)
+    float far = exact().r;
+    float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
+    float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z) : projection.y / z - projection.x;
+    gl_FragDepth = far < 1e29 ? clamp(0.5 * ndc + 0.5, 0.0, 1.0) : 1.0;
+    color = vec4(0.0);
+#elif defined(EXACT)
+    color = exact();
+#else
+    color = texture(picture, place);
+#endif
 }
 """
 
 
-def _shader() -> gpu.types.GPUShader:
-    if not _compiled:
-        interface = gpu.types.GPUStageInterfaceInfo("patina_picture")
+def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTexture,
+                    **uniforms: float | tuple[float, ...]) -> None:
+    """Draws a texture over x0, y0, x1, y1 of -1..1. kind: EXACT, texel by texel; SMOOTH, between them; DEPTH, linear z as
+    depths of Blender's projection, uniforms of which are its third row, the near plane and whether it is orthographic.
+    Overlays hide behind a depth two pixels wider than the surface and four pixels' width (cover) nearer: Blender draws the
+    vertices of our points as dots over every engine's picture, and these lie just behind it."""
+    shader = _shader(kind)
+    x0, y0, x1, y1 = corners
+    batch = batch_for_shader(shader, 'TRI_STRIP', {"pos": ((x0, y0), (x1, y0), (x0, y1), (x1, y1)),
+                                                   "uv": ((0, 0), (1, 0), (0, 1), (1, 1))})
+    shader.bind()
+    shader.uniform_sampler("picture", texture)
+    for name, value in uniforms.items():
+        shader.uniform_float(name, value)
+    batch.draw(shader)
+
+
+def _shader(kind: str) -> gpu.types.GPUShader:
+    if kind not in _compiled:
+        interface = gpu.types.GPUStageInterfaceInfo(f"patina_{kind.lower()}")
         interface.smooth('VEC2', "place")
         info = gpu.types.GPUShaderCreateInfo()
-        info.push_constant('VEC4', "projection")
-        info.push_constant('FLOAT', "share")
-        info.push_constant('FLOAT', "cover")
+        info.define(kind)
+        if kind == 'DEPTH':
+            info.push_constant('VEC4', "projection")
+            info.push_constant('FLOAT', "cover")
+            if hasattr(info, "depth_write"):
+                info.depth_write('ANY')
         info.sampler(0, 'FLOAT_2D', "picture")
-        info.sampler(1, 'FLOAT_2D', "depths")
         info.vertex_in(0, 'VEC2', "pos")
         info.vertex_in(1, 'VEC2', "uv")
         info.vertex_out(interface)
         info.fragment_out(0, 'VEC4', "color")
-        if hasattr(info, "depth_write"):
-            info.depth_write('ANY')
         info.vertex_source(_VERTEX)
         info.fragment_source(_FRAGMENT)
-        _compiled.append(gpu.shader.create_from_info(info))
-    return _compiled[0]
+        _compiled[kind] = gpu.shader.create_from_info(info)
+    return _compiled[kind]

@@ -140,9 +140,9 @@ class PatinaSceneProperties(PropertyGroup):
         description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: tiles of 4096 "
                     "pixels for pictures of more than 16 million")
     navigation_ms: IntProperty(
-        name="Navigation", override=_OVERRIDE, default=50, min=5, soft_max=200, max=1000,
-        description="Milliseconds that a picture of the viewport may take while the view moves; fewer points and pixels "
-                    "are drawn until it fits. At rest the whole picture follows")
+        name="Navigation", override=_OVERRIDE, default=60, min=5, soft_max=200, max=1000,
+        description="Milliseconds until a picture of the viewport is seen while the view moves, with what Blender takes for "
+                    "its window; fewer points and pixels are drawn until it fits. At rest the whole picture follows")
 
 
 class PatinaObjectProperties(PropertyGroup):

@@ -288,6 +288,41 @@ def test_navigation_and_rest():
     check(found.shown.wish.level == pace.FULL and found.shown.stats["points_scattered"] > 1_000_000, f"{found.shown.stats}")
 
 
+def test_coarse_pictures_fill_the_view():
+    """A picture of fewer pixels shows the same disc in the same colour, and memory of pictures that are no longer shown is
+    written again."""
+    setup()
+    bpy.context.scene.patina.fill = 'CLOSED'
+    bpy.context.scene.render.film_transparent = False
+    positions, colors, normals = sphere(100000, 1.5, (0, 0, 0))
+    add_points(positions, np.full_like(colors, (200, 100, 50, 255)), normals)
+    yield lambda: settled(100000)
+    found, rest, areas = shown(), viewport.REST, {}
+    found.pace.note = lambda *arguments: None  # the level is chosen here
+    viewport.REST = 1e9  # and stays
+    try:
+        for level in (pace.FULL, pace.Level(pace.STRATA, 2), pace.Level(4, 1)):
+            found.pace.level, view().view_rotation = level, Quaternion((0, 1, 0), 0.1 * (len(areas) + 1))
+            yield lambda: found.shown.wish.level == level
+            picture = screenshot(f"coarse_{level.strata}_{level.shrink}")
+            areas[level] = int((np.abs(picture[..., :3] * 255 - (200, 100, 50)).max(axis=2) < 3).sum())
+        for shrink in (2, 1):
+            found.pace.level, memory = pace.Level(4, shrink), []
+            for step in range(4):
+                before = found.pictures
+                view().view_rotation = Quaternion((0, 1, 0), 0.5 + 0.1 * step + shrink)
+                yield lambda: found.pictures > before
+                memory.append(found.shown.color)
+            check(memory[1] is memory[3] and memory[1] is not memory[2], "fresh memory for every picture")
+    finally:
+        viewport.REST = rest
+        del found.pace.note
+    whole = areas.pop(pace.FULL)
+    check(whole > 10000, f"{whole} pixels of the disc")
+    for level, pixels in areas.items():
+        check(abs(pixels / whole - 1.0) < 0.02, f"{level}: {pixels} pixels of the disc, {whole} of the whole picture")
+
+
 def test_overlays_are_hidden_by_points():
     """An empty's axes behind the points do not show, those before them do."""
     setup(overlays=True)

@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figures of a viewport that orbits many points; for tests/bench/window.py, which runs
 
-    xvfb-run -a -s "-screen 0 1280x800x24" blender --factory-startup --python tests/blender/test_window.py -- figures
+    xvfb-run -a -s "-screen 0 1280x800x24" blender --enable-event-simulate --factory-startup \\
+        --python tests/blender/test_window.py -- figures
 
 PATINA_FIGURES_POINTS says how many. The last line but one of what it prints is JSON. What Blender takes for its window and
 what Patina takes are told apart, for under Xvfb both run on the same cores.
+
+The view is orbited as a user does it, with the middle mouse button: Blender then redraws the view alone. A script that turns
+it through its properties has all of Blender's editors redrawn.
 """
 
 import json
 import os
 import time
-from statistics import median
+from statistics import median, mode
 
 import gpu
 import numpy as np
-from check_viewport import settled, setup, shown, view, window_region
+from check_viewport import area, settled, setup, shown, view, window_region
 from harness import add_points
 from mathutils import Quaternion
 
@@ -23,17 +27,33 @@ from patina import viewport
 SECONDS = 6.0  # of each kind of motion
 
 
+SPEED = 143.0  # pixels that the mouse moves in a second: about a radian
+
+
 def turn(since):
     """A radian a second."""
     view().view_rotation = Quaternion((0, 1, 0), time.perf_counter() - since)
 
 
-def moving(seconds):
-    """Turns the view at each of Blender's steps."""
+def orbit(seconds):
+    """Drags with the middle mouse button, to and fro across a third of the view, at each of Blender's steps."""
+    window, region = viewport.bpy.context.window_manager.windows[0], window_region()
+    reach, x, y = region.width / 3, region.x + region.width // 3, region.y + region.height // 2
+
+    def mouse(kind, value, across=0.0):
+        window.event_simulate(type=kind, value=value, x=x + round(across), y=y)
+
+    mouse('MOUSEMOVE', 'NOTHING')
+    yield lambda: True
+    mouse('MIDDLEMOUSE', 'PRESS')
+    yield lambda: True
     start = time.perf_counter()
-    while time.perf_counter() - start < seconds:
-        turn(start)
+    while (passed := time.perf_counter() - start) < seconds:
+        across = reach - abs(SPEED * passed % (2 * reach) - reach)
+        mouse('MOUSEMOVE', 'NOTHING', across)
         yield lambda: True
+    mouse('MIDDLEMOUSE', 'RELEASE', across)
+    yield lambda: True
 
 
 class Timed:
@@ -54,6 +74,12 @@ class Timed:
 
     def restore(self):
         setattr(self._owner, self._name, self._call)
+
+
+def processor():
+    """Seconds that Blender's process has kept the processor's cores busy, all of them together."""
+    times = os.times()
+    return times.user + times.system
 
 
 def finish_drawing():
@@ -93,21 +119,46 @@ def orbit_figures():
     add_points(directions * 1.5, None, directions)
     yield lambda: settled(count)
     found, region = shown(), window_region()
-    figures = {"points": count, "width": region.width, "height": region.height}
+    figures = {"points": count, "width": region.width, "height": region.height,
+               "transform": scene.view_settings.view_transform}
 
     # as it is
-    draws, begun = Timed(viewport.Viewport, "draw"), found.pictures
-    works = {}
-    for condition in moving(SECONDS):
+    draws, uploads = Timed(viewport.Viewport, "draw"), Timed(viewport, "_upload")
+    works, levels, used = {}, {}, processor()
+    for condition in orbit(SECONDS):
         yield condition
-        works[found.pictures] = found.shown.stats["ms"]
-    stopped = time.perf_counter()
+        works[found.pictures], levels[found.pictures] = found.shown.stats["ms"], found.shown.wish.level
+    stopped, used = time.perf_counter(), processor() - used
     draws.restore()
-    figures |= {"shown_a_second": (found.pictures - begun) / SECONDS, "redraws_a_second": len(draws.calls) / SECONDS,
-                "work_ms": median(works.values()), "longest_ms": 1e3 * max(draws.calls)}
-    level = found.pace.level
+    uploads.restore()
+    figures |= {"shown_a_second": len(uploads.calls) / SECONDS, "redraws_a_second": len(draws.calls) / SECONDS,
+                "processor_ms": 1e3 * used / len(uploads.calls), "work_ms": median(works.values()),
+                "longest_ms": 1e3 * max(draws.calls)}
     yield lambda: settled(count)
-    figures |= {"rest_s": time.perf_counter() - stopped, "strata": level.strata, "shrink": level.shrink}
+    level = mode(levels.values())
+    figures |= {"rest_s": time.perf_counter() - stopped, "strata": level.strata, "shrink": level.shrink,
+                "whole_ms": found.shown.stats["ms"]}
+
+    # Blender alone
+    draw, redraws = viewport.Viewport.draw, []
+    viewport.Viewport.draw = lambda self, context, depsgraph: redraws.append(0) or ""
+    used = processor()
+    yield from orbit(SECONDS)
+    used = processor() - used
+    viewport.Viewport.draw = draw
+    figures |= {"bare_redraws_a_second": len(redraws) / SECONDS, "bare_processor_ms": 1e3 * used / len(redraws)}
+    area().tag_redraw()
+    yield lambda: settled(count)
+
+    # without what Blender does in each redraw for the lines of overlays, hidden or not
+    system = viewport.bpy.context.preferences.system
+    system.use_overlay_smooth_wire = False
+    uploads = Timed(viewport, "_upload")
+    yield from orbit(SECONDS)
+    uploads.restore()
+    system.use_overlay_smooth_wire = True
+    figures["rough_shown_a_second"] = len(uploads.calls) / SECONDS
+    yield lambda: settled(count)
 
     # Patina alone
     figures["delivered_a_second"], busy = delivered(found, SECONDS)
@@ -118,20 +169,14 @@ def orbit_figures():
     pictures = Timed(viewport.Viewport, "_draw_picture", finish_drawing)
     uploads = Timed(viewport, "_upload", finish_drawing)
     ask, viewport.Viewport._ask = viewport.Viewport._ask, lambda self, level: None
-    for condition in moving(SECONDS):
+    for condition in orbit(SECONDS):
         yield condition
         found._drawn = None  # uploaded anew each time
     viewport.Viewport._ask = ask
     pictures.restore()
     uploads.restore()
-    turn(0.0)
     figures |= {"upload_ms": 1e3 * median(uploads.calls), "draw_ms": 1e3 * (median(pictures.calls) - median(uploads.calls))}
+    turn(0.0)
     yield lambda: settled(count)
 
-    # Blender alone
-    draw, redraws = viewport.Viewport.draw, []
-    viewport.Viewport.draw = lambda self, context, depsgraph: redraws.append(0) or ""
-    yield from moving(SECONDS)
-    viewport.Viewport.draw = draw
-    figures["bare_redraws_a_second"] = len(redraws) / SECONDS
     print(json.dumps(figures), flush=True)
