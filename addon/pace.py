@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 STRATA = 6  # of a chunk's points: each holds as many points as all before it
 WHOLE = 0  # strata: all
-# Half the points do not take half the time, for they lie farther apart in memory and on screen; nor do fewer pixels, for some
-# work is the same for any number. Measured with 10 million points from all to a 32nd, and 700,000 pixels to a 16th.
-OF_HALF = 0.67  # of the time of all points
-OF_PIXELS = 1.25  # the power of the pixel's width that their time goes by
+# Half the points do not take half the time, for they lie farther apart in memory and on screen; and some work is the same for
+# any number of pixels. Measured with 10 million points from all to a 32nd, and 700,000 pixels to a 16th.
+OF_HALF = 0.7  # of the time of all points
+FLAT = 0.0025  # seconds of the pixels' time
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Level:
         return STRATA - self.strata + 2.0 * math.log2(self.shrink)
 
     def seconds(self, points: float, pixels: float) -> float:
-        """Predicted, from the time of all points and that of all pixels."""
-        return points * OF_HALF ** (STRATA - self.strata) + pixels / self.shrink ** OF_PIXELS
+        """Predicted, from the time of all points and that of all pixels without what is flat."""
+        return points * OF_HALF ** (STRATA - self.strata) + FLAT + pixels / self.shrink ** 2
 
 
 FULL = Level(STRATA, 1)
@@ -37,9 +37,9 @@ LEAST = _LEVELS[-1]
 
 # A better level must fit into this share of the budget, so that two levels do not take turns.
 CAUTION = 0.7
-# What Blender takes beside a picture comes off the budget, to this share of it: where Blender alone takes longer, coarser
-# pictures would hardly come sooner.
-OURS = 0.25
+# Where Blender alone takes longer than the budget, a picture may come so much later than the least of them would: a coarser
+# one would not be worth it.
+LATER = 1.15
 
 
 class Pace:
@@ -47,27 +47,27 @@ class Pace:
     they were seen."""
 
     def __init__(self, budget: float) -> None:
-        self.budget = budget  # seconds from the begin of a picture until it is seen
+        self.budget = budget  # seconds from a motion until its picture is seen
         self.level = Level(4, 2)  # until something is known
-        self._points = self._pixels = math.nan  # seconds that all points, all pixels take
-        self._beside = 0.0  # seconds of the budget that Blender takes
+        self._points = self._pixels = math.nan  # seconds that all points, all pixels take, without what is flat
+        self._beside = 0.0  # seconds that Blender takes until a picture is seen, without those of the picture
 
     def note(self, level: Level, points: float, pixels: float) -> None:
         """A picture of that level took so many seconds for its points, and for its pixels."""
         points /= OF_HALF ** (STRATA - level.strata)
-        pixels *= level.shrink ** OF_PIXELS
+        pixels = max(pixels - FLAT, 0.0) * level.shrink ** 2
         known = not math.isnan(self._points)  # half of what was known: other programs make single pictures slow
         self._points = 0.5 * (self._points + points) if known else points
         self._pixels = 0.5 * (self._pixels + pixels) if known else pixels
-        if self._fits(self.level, 1.0) and not any(
-                self._fits(better, CAUTION) for better in _LEVELS if better.loss() < self.level.loss()):
-            return
-        self.level = next((level for level in _LEVELS if self._fits(level, CAUTION)), LEAST)
+        now = _LEVELS.index(self.level)
+        self.level = next((level for rank, level in enumerate(_LEVELS) if self._fits(level, CAUTION if rank < now else 1.0)),
+                          LEAST)
 
     def seen(self, beside: float) -> None:
-        """A picture of a view that moves on was seen so many seconds later than its points and pixels explain."""
-        self._beside = 0.5 * (self._beside + min(max(beside, 0.0), self.budget))  # one long pause is soon forgotten
+        """A picture of a view that moves on was seen so many seconds later, from its motion on, than its points and pixels explain."""
+        self._beside = 0.5 * (self._beside + min(max(beside, 0.0), 4.0 * self.budget))  # one long pause is soon forgotten
 
     def _fits(self, level: Level, share: float) -> bool:
-        ours = max(self.budget - self._beside, OURS * self.budget)
+        soonest = self._beside + LEAST.seconds(self._points, self._pixels)
+        ours = max(self.budget, LATER * soonest) - self._beside
         return level.seconds(self._points, self._pixels) <= share * ours

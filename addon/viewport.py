@@ -36,6 +36,7 @@ class Wish:
     scene: sync.SceneDescription
     view: sync.View
     level: pace.Level
+    asked: float  # when
 
     def description(self, clouds: list[sync.CloudItem]) -> sync.SceneDescription:
         shrink = self.level.shrink
@@ -65,7 +66,6 @@ class Shown:
     stats: dict[str, Any]
     passes: dict[str, Any]
     device: str
-    begun: float  # when its making was
 
 
 class Viewport:
@@ -172,7 +172,7 @@ class Viewport:
         if self._closed:
             return
         scene = replace(self._scene, clips=[*self._scene.clips, *self._clips])
-        self._wanted = self._last = Wish(scene, self._view, level)
+        self._wanted = self._last = Wish(scene, self._view, level, time.monotonic())
         # a quick picture of the moment before is worth its end, a whole one is not
         if self._rendering and self._working.level == pace.FULL:
             self._frame[1].cancel()
@@ -196,7 +196,7 @@ class Viewport:
         overlays = context.space_data.overlay.show_overlays
         if self._drawn is None or self._drawn[0] is not self.shown:
             if self.shown.wish.view != self._view:  # it moves on
-                self.pace.seen(time.monotonic() - self.shown.begun - self.shown.stats["ms"] / 1000.0)
+                self.pace.seen(time.monotonic() - self.shown.wish.asked - self.shown.stats["ms"] / 1000.0)
             self._drawn = (self.shown, _upload(self.shown), None)
         if overlays and self._drawn[2] is None:
             self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.depth), 'R32F'))
@@ -258,7 +258,6 @@ class Viewport:
         return self._wanted is not None
 
     def _render(self, wish: Wish) -> Steps[Shown]:
-        start = time.monotonic()
         with native.Progress() as self._progress:
             try:
                 clouds = []
@@ -271,7 +270,7 @@ class Viewport:
         description = wish.description(clouds)
         if not self._lost or self._lost[0] != description.device:
             try:
-                return (yield from self._render_on(render.device_for(description.device), wish, description, start))
+                return (yield from self._render_on(render.device_for(description.device), wish, description))
             except native.PatinaCancelled:
                 raise
             except native.PatinaError as error:
@@ -279,7 +278,7 @@ class Viewport:
                     raise
                 self._lose_device(description.device, str(error))
         device = render.device_for(replace(description.device, name="cpu"))
-        return (yield from self._render_on(device, wish, description, start))
+        return (yield from self._render_on(device, wish, description))
 
     def _lose_device(self, choice: sync.DeviceChoice, reason: str) -> None:
         """From now on the processor draws, until another device is asked for."""
@@ -288,8 +287,7 @@ class Viewport:
         self._frame = None
         render.forget_device()
 
-    def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription,
-                   start: float) -> Steps[Shown]:
+    def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription) -> Steps[Shown]:
         if self._frame is None or self._frame[0] is not device:
             self._frame = (device, native.Frame(device))
         frame = self._frame[1]
@@ -310,7 +308,7 @@ class Viewport:
         return Shown(wish, description.clouds, *planes,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
-                     stats, passes, device.name, start)
+                     stats, passes, device.name)
 
 
 _VIEWPORTS: set[Viewport] = set()
@@ -343,9 +341,7 @@ def _work(until: float) -> None:
     while _TURNS and _TURNS[0].advance(until):
         viewport = _TURNS.popleft()
         if viewport.wants():
-            _TURNS.append(viewport)
-        if time.monotonic() >= until:
-            break
+            _TURNS.append(viewport)  # and begin at once: Blender may be long in coming back
 
 
 def _tick() -> float | None:

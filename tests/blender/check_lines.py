@@ -126,7 +126,7 @@ def test_viewport_scales_lines():
     view = sync.final_view(scene.camera.evaluated_get(depsgraph), depsgraph)
     described = sync.describe(depsgraph, view, lambda what, progress: False)
     level = pace.Level(strata=pace.STRATA, shrink=2)
-    check_close(viewport.Wish(described, view, level).description([]).lines.width, 3.0, 0, "half the pixels, half the width")
+    check_close(viewport.Wish(described, view, level, 0.0).description([]).lines.width, 3.0, 0, "half the pixels, half the width")
     scene.patina.lines.use = False
     scene.update_tag()
     bpy.context.view_layer.update()

@@ -39,10 +39,21 @@ def test_blenders_time_counts():
 
 
 def test_a_slow_window_keeps_its_picture():
-    """Where Blender alone takes longer than asked for, a quarter of the budget is still the picture's."""
-    last = orbit(pace.Pace(0.06), 0.012, 0.004, 0.5)[-1]
-    check(sum(took(last, 0.012, 0.004)) <= 0.015 and last.shrink == 1, f"{last}")
-    check(orbit(pace.Pace(0.06), 10.0, 10.0, 0.5)[-1] == pace.LEAST, "nothing fits, and not the least is drawn")
+    """Where Blender alone takes longer than asked for, a picture is only as coarse as is worth it."""
+    levels = orbit(pace.Pace(0.06), 0.012, 0.004, 0.1)
+    check(sum(took(levels[-1], 0.012, 0.004)) <= 0.02 and levels[-1].shrink == 1, f"{levels[-1]}")
+    check(len(set(levels[8:])) == 1, f"levels take turns: {levels[8:]}")
+    check(orbit(pace.Pace(0.06), 10.0, 10.0, 0.1)[-1] == pace.LEAST, "a picture of seconds, and not the least is drawn")
+
+
+def test_a_coarse_picture_does_not_stay():
+    """When other programs let go of the processor, the picture is soon as fine as before."""
+    chooser = pace.Pace(0.06)
+    fine = orbit(chooser, 0.012, 0.004, 0.05)[-1]
+    coarse = orbit(chooser, 0.2, 0.2, 0.15, 8)[-1]
+    check(coarse.loss() >= fine.loss() + 4, f"{coarse} after {fine}")
+    again = orbit(chooser, 0.012, 0.004, 0.05, 20)[-1]
+    check(again.loss() <= fine.loss() + 2 and again.shrink == 1, f"{again}, was {fine}")
 
 
 def test_one_pause_is_forgotten():
