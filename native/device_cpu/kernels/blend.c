@@ -44,24 +44,23 @@ static inline void set_terms(const struct pt_bins *bins, uint32_t instance, cons
 {
     const struct instance_args *args = &bins->discs[instance].instance;
     const uint32_t at = bins->first + instance * bins->stride;
-    const void *own = pt_cpu_data(bins->call, at + 4);
+    const void *colors = pt_cpu_data(bins->call, at + 4);
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     vf color[4], normal[4], largest = scale;
-    pt_albedo(args, own, discs->id, 0, discs->drawn, color);
-    color[3] = pt_opacity(args, own, pt_cpu_data(bins->call, at + 5), discs->id, 0, discs->drawn) * scale;
+    pt_albedo(args, colors, discs->id, 0, discs->drawn, color);
+    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 5), discs->id, 0, discs->drawn) * scale;
     for (int k = 0; k < 3; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
         largest = vf_max(largest, vf_abs(color[k]));
         normal[k] = discs->n[k] * scale;
     }
     normal[3] = scale;
-    float colors[PT_LANES][4], normals[PT_LANES][4];
-    vf_store4(colors[0], color, vm_bits(vm_first(PT_LANES)));
-    vf_store4(normals[0], normal, vm_bits(vm_first(PT_LANES)));
-    for (uint32_t i = 0; i < PT_LANES; i++) {
-        memcpy(out->each[i], colors[i], sizeof colors[i]);
-        memcpy(out->each[i] + 4, normals[i], sizeof normals[i]);
-    }
+    float halves[2][PT_LANES][4];
+    vf_store4(halves[0][0], color, vm_bits(vm_first(PT_LANES)));
+    vf_store4(halves[1][0], normal, vm_bits(vm_first(PT_LANES)));
+    for (uint32_t i = 0; i < PT_LANES; i++)
+        for (uint32_t k = 0; k < 2; k++)
+            memcpy(out->each[i] + 4 * k, halves[k][i], sizeof halves[k][i]);
     vf_store(out->most, largest, vm_first(PT_LANES));
 }
 
@@ -76,11 +75,29 @@ static void empty_sums(struct tile *tile)
     tile->left = SUM_ROOM;
 }
 
-// Pixels that a disc counts in are listed first, and those where nothing lies before it.
+// Pixels of patches, packed, so that no branch waits for how many of each count: pixel in the tile | lane of the disc << 16 |
+// number among the pixels of all the patches << 20.
+struct counted {
+    uint32_t count, each[PT_PATCHES * PT_LANES + PT_LANES];
+};
+
+static inline void count_pixels(struct counted *out, const struct pt_patches *list, uint32_t i, vm some)
+{
+    vi pixels = vi_mul(vi_lanes(), vi_set(1u << 20 | 1u));
+    if (PT_PATCH_ROWS > 1)
+        pixels = vi_add(pixels, vi_mul(vi_shr(vi_lanes(), 3), vi_set(PT_DISC_TILE - PT_PATCH_COLUMNS)));
+    vi_pack(out->each + out->count, vi_add(pixels, vi_set(list->at[i] + (PT_LANES * i << 20))), vm_bits(some));
+    out->count += (uint32_t)__builtin_popcount(vm_bits(some));
+}
+
+static inline uint32_t counted_pixel(uint32_t one) { return one & 0xFFFFu; }
+static inline uint32_t counted_disc(uint32_t one) { return one >> 16 & 15u; }
+
+// Adds a disc to the sums of its pixels; where nothing lies before it, it may be the one that the key names.
 static void add_up(void *context, struct pt_patches *list)
 {
     struct tile *tile = context;
-    struct pt_touched taken, nearest;
+    struct counted taken, nearest;
     _Alignas(64) float weights[PT_PATCHES * PT_LANES];
     taken.count = nearest.count = 0;
     for (uint32_t i = 0; i < list->count; i++) {
@@ -88,18 +105,19 @@ static void add_up(void *context, struct pt_patches *list)
         const uint32_t at = pt_patch_pixel(list, i);
         const vi behind = vi_sub(vf_bits(shown.z), vf_bits(pt_patch_load(tile->nearest + at)));
         const vi most = vf_bits(pt_patch_load(tile->behind + at));
-        const vm counts = vm_and(shown.covered, vm_not(vi_lt_unsigned(most, behind)));
+        const vm some = vm_and(shown.covered, vm_not(vi_lt_unsigned(most, behind)));
         vf_store(weights + i * PT_LANES, pt_shown_weight(&shown), vm_first(PT_LANES));
-        pt_touch(&taken, list, i, vm_bits(counts));
-        pt_touch(&nearest, list, i, vm_bits(vm_and(counts, vi_eq(behind, vi_set(0)))));
+        count_pixels(&taken, list, i, some);
+        count_pixels(&nearest, list, i, vm_and(some, vi_eq(behind, vi_set(0))));
     }
     for (uint32_t i = 0; i < taken.count; i++) {
-        vi_eight *sums = (vi_eight *)(void *)tile->sums[taken.at[i] & 0xFFFFu];
-        const vf_eight terms = *(const vf_eight *)(const void *)tile->terms.each[taken.at[i] >> 16 & 15u];
-        *sums += __builtin_convertvector(terms * weights[taken.at[i] >> 20], vi_eight);
+        const uint32_t one = taken.each[i];
+        vi_eight *sums = (vi_eight *)(void *)tile->sums[counted_pixel(one)];
+        const vf_eight *terms = (const vf_eight *)(const void *)tile->terms.each[counted_disc(one)];
+        *sums += __builtin_convertvector(*terms * weights[one >> 20], vi_eight);
     }
     for (uint32_t i = 0; i < nearest.count; i++) {
-        const uint32_t pixel = nearest.at[i] & 0xFFFFu, disc = nearest.at[i] >> 16 & 15u;
+        const uint32_t pixel = counted_pixel(nearest.each[i]), disc = counted_disc(nearest.each[i]);
         if (tile->id[pixel] == tile->ids[disc])
             tile->own[pixel] = tile->places[disc];
     }
@@ -116,7 +134,6 @@ static inline void take_room(struct tile *tile, float size)
 static inline void draw(void *context, uint32_t instance, const struct pt_discs *discs)
 {
     struct tile *tile = context;
-    struct pt_discs some = *discs;
     vi places[2];
     float size = 0.0f;
     set_terms(tile->bins, instance, discs, &tile->terms);
@@ -128,9 +145,8 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
     vi_store((uint32_t *)(void *)tile->places + PT_LANES, places[1], vm_first(PT_LANES));
     const uint32_t each = size <= SUM_ROOM ? PT_LANES : 1; // so bright that they have room one by one only
     for (uint32_t i = 0; i < PT_LANES; i += each) {
-        some.drawn = vm_and(discs->drawn, vm_of_bits(((1u << each) - 1) << i));
         take_room(tile, each > 1 ? size : tile->terms.most[i] + 1.0f);
-        pt_patches_draw(&tile->patches, &some, 1, add_up, tile);
+        pt_patches_draw(&tile->patches, discs, ((1u << each) - 1) << i, 1, add_up, tile);
     }
 }
 

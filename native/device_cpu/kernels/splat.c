@@ -34,7 +34,7 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
 {
     struct tile *tile = context;
     vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)), vm_first(PT_LANES));
-    pt_patches_draw(&tile->patches, discs, PT_KEYS_AT_ONCE, take_least, tile);
+    pt_patches_draw(&tile->patches, discs, ~0u, PT_KEYS_AT_ONCE, take_least, tile);
 }
 
 static void load(struct tile *tile, const uint64_t *keys, const float *limit)
