@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from statistics import median
 
 STRATA = 6  # of a chunk's points: each holds as many points as all before it
 WHOLE = 0  # strata: all
 # Half the points do not take half the time, for they lie farther apart in memory and on screen; and some work is the same for
 # any number of pixels. Measured with 10 million points from all to a 32nd, and 700,000 pixels to a 16th.
-OF_HALF = 0.7  # of the time of all points
+OF_HALF = 0.73  # of the time of all points
 FLAT = 0.0025  # seconds of the pixels' time
 
 
@@ -36,10 +38,10 @@ _LEVELS = sorted((Level(strata, shrink) for strata in range(1, STRATA + 1) for s
 LEAST = _LEVELS[-1]
 
 # A better level must fit into this share of the budget, so that two levels do not take turns.
-CAUTION = 0.7
+CAUTION = 0.85
 # Where Blender alone takes longer than the budget, a picture may come so much later than the least of them would: a coarser
 # one would not be worth it.
-LATER = 1.15
+LATER = 1.1
 
 
 class Pace:
@@ -49,25 +51,26 @@ class Pace:
     def __init__(self, budget: float) -> None:
         self.budget = budget  # seconds from a motion until its picture is seen
         self.level = Level(4, 2)  # until something is known
-        self._points = self._pixels = math.nan  # seconds that all points, all pixels take, without what is flat
-        self._beside = 0.0  # seconds that Blender takes until a picture is seen, without those of the picture
+        # Of the last pictures, in seconds: what all points took; all pixels, without what is flat; and Blender, until the
+        # picture was seen. Medians count, for other programs make single pictures slow.
+        self._points, self._pixels, self._beside = (deque(maxlen=3) for _ in range(3))
 
     def note(self, level: Level, points: float, pixels: float) -> None:
         """A picture of that level took so many seconds for its points, and for its pixels."""
-        points /= OF_HALF ** (STRATA - level.strata)
-        pixels = max(pixels - FLAT, 0.0) * level.shrink ** 2
-        known = not math.isnan(self._points)  # half of what was known: other programs make single pictures slow
-        self._points = 0.5 * (self._points + points) if known else points
-        self._pixels = 0.5 * (self._pixels + pixels) if known else pixels
-        now = _LEVELS.index(self.level)
-        self.level = next((level for rank, level in enumerate(_LEVELS) if self._fits(level, CAUTION if rank < now else 1.0)),
-                          LEAST)
+        self._points.append(points / OF_HALF ** (STRATA - level.strata))
+        self._pixels.append(max(pixels - FLAT, 0.0) * level.shrink ** 2)
+        now, most = _LEVELS.index(self.level), self._seconds_for_pictures()
+        self.level = next((level for rank, level in enumerate(_LEVELS)
+                           if self._seconds(level) <= most * (CAUTION if rank < now else 1.0)), LEAST)
 
     def seen(self, beside: float) -> None:
-        """A picture of a view that moves on was seen so many seconds later, from its motion on, than its points and pixels explain."""
-        self._beside = 0.5 * (self._beside + min(max(beside, 0.0), 4.0 * self.budget))  # one long pause is soon forgotten
+        """A picture of a view that moves on was seen so many seconds later, from its motion on, than its points and pixels
+        explain."""
+        self._beside.append(max(beside, 0.0))
 
-    def _fits(self, level: Level, share: float) -> bool:
-        soonest = self._beside + LEAST.seconds(self._points, self._pixels)
-        ours = max(self.budget, LATER * soonest) - self._beside
-        return level.seconds(self._points, self._pixels) <= share * ours
+    def _seconds(self, level: Level) -> float:
+        return level.seconds(median(self._points), median(self._pixels))
+
+    def _seconds_for_pictures(self) -> float:
+        beside = median(self._beside or [0.0])
+        return max(self.budget, LATER * (beside + self._seconds(LEAST))) - beside
