@@ -26,7 +26,6 @@ from .jobs import Pause, Steps
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
 REST = 0.12  # seconds without motion after which the whole picture is drawn
-LARGEST = np.float32(65000.0)  # half floats end at 65504; what overflows turns the viewport black
 
 
 @dataclass(frozen=True)
@@ -367,9 +366,7 @@ def _redraw_panels(area_pointer: int) -> None:
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
-    if shown.color.max() > LARGEST:  # seldom, and looking costs a tenth
-        np.minimum(shown.color, LARGEST, out=shown.color)
-    return _texture(shown.color, 'RGBA16F')
+    return _texture(shown.color, 'RGBA32F')  # as it is: nothing to convert
 
 
 def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
@@ -403,6 +400,8 @@ void main()
 # One program for each thing to draw: a GPU in software executes both sides of every branch, and looks at depths for each
 # program that may write one.
 _FRAGMENT = """
+const vec4 largest = vec4(65000.0); // Blender's half floats end at 65504; what overflows turns the viewport black
+
 vec4 exact()
 {
     ivec2 size = textureSize(picture, 0);
@@ -418,9 +417,9 @@ void main()
     gl_FragDepth = far < 1e29 ? clamp(0.5 * ndc + 0.5, 0.0, 1.0) : 1.0;
     color = vec4(0.0);
 #elif defined(EXACT)
-    color = exact();
+    color = min(exact(), largest);
 #else
-    color = texture(picture, place);
+    color = min(texture(picture, place), largest);
 #endif
 }
 """

@@ -12,7 +12,7 @@ import numpy as np
 from check_combine import hide_each_other
 from check_import import import_ply as import_points
 from check_linked import dense
-from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, sphere
+from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, patina, render, sphere
 from mathutils import Matrix, Quaternion
 
 from patina import pace, viewport
@@ -182,6 +182,19 @@ def test_draws_points():
     region, rv3d = window_region(), view()
     wanted = 1.5 / np.sqrt(36 - 1.5 ** 2) * rv3d.window_matrix[0][0] * region.width / 2
     check(abs(radius - wanted) < 1.5, f"radius {radius:.1f}, not {wanted:.1f} pixels")
+
+
+def test_too_bright_is_white():
+    """Light that half floats, which Blender's viewport is made of, cannot hold."""
+    scene = setup()
+    scene.render.film_transparent = False
+    positions, colors, normals = sphere(100000, 1.5, (0, 0, 0))
+    add_points(positions, np.full_like(colors, 255), normals).patina.lighting = 'LIT'
+    add_light('SUN', 1e7)
+    scene.view_settings.view_transform = 'Filmic'
+    yield lambda: settled(100000) and shown().shown.color.max() > 1e6
+    picture = screenshot("bright")
+    check((picture[..., :3] > 0.99).all(axis=2).sum() > 10000, "the disc is white")
 
 
 def test_same_as_final():
