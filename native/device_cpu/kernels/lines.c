@@ -6,7 +6,7 @@
 #include "antialias.h"
 #include "device_cpu/rows.h"
 
-enum { BAND_ROWS = 32, PAD = 32 }; // rows that a thread takes at once; floats on each side of a row
+enum { BAND_ROWS = 64, PAD = 32 }; // rows that a thread takes at once; floats on each side of a row
 
 // A row of the rectangle, by columns from its left side on.
 struct line_row {
@@ -16,9 +16,10 @@ struct line_row {
     float *least;  // disc within reach along the row
     float *own;    // of pixels with discs: the share that is the line's
     float *radius; // of discs, in world units only
+    uint64_t *bits; // a bit a disc, from 64 columns before the row on
     int steps, any; // there are steps, discs
 };
-enum { ROW_FLOATS = 6 };
+enum { ROW_FLOATS = 7 };
 
 struct lines {
     const struct lines_args *args;
@@ -32,6 +33,7 @@ struct lines {
     size_t stride;
     float *memory;  // per thread: a band's rows and one of scratch
     size_t thread_floats;
+    float distances[PT_LINE_TAPS + PT_LANES]; // of the taps, pixels
 };
 
 // The tangent plane of a pixel's surface: how much it faces the ray, and how it falls away from pixel to pixel.
@@ -217,14 +219,17 @@ static void disc_row(const struct lines *lines, struct line_row *rows, float *wi
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
     rows->any = 0;
+    memset(rows->bits, 0, (lines->width / 64 + 4) * sizeof *rows->bits);
     for (uint32_t x = 0; x < lines->width && rows->steps; x += PT_LANES) {
         vf step = vf_load(rows->step + x), count = vf_zero();
         for (int dy = -1; dy <= 1 && vm_bits(vf_lt(step, empty)); dy++)
             for (int dx = -1; dx <= 1 && rows[dy].steps; dx++)
                 count = vf_add_where(vf_lt(vf_load(rows[dy].step + (int32_t)x + dx), empty), count, one); // itself, too
         vf disc = vf_select(vf_lt(vf_set(PT_LINE_SUPPORT), count), step, empty);
+        uint32_t found = vm_bits(vf_lt(disc, empty));
         vf_store(rows->disc + x, disc, vm_first(PT_LANES));
-        rows->any |= vm_bits(vf_lt(disc, empty)) != 0;
+        rows->bits[1 + x / 64] |= (uint64_t)found << x % 64;
+        rows->any |= found != 0;
     }
     if (!rows->any)
         return;
@@ -241,6 +246,14 @@ struct found {
     vi nearest;
 };
 
+// The discs of 64 columns from x - 32 on.
+static uint64_t discs_around(const struct line_row *row, uint32_t x)
+{
+    const uint64_t *at = row->bits + (x + 32) / 64;
+    uint32_t shift = (x + 32) % 64;
+    return shift ? at[0] >> shift | at[1] << (64 - shift) : at[0];
+}
+
 static struct found search(const struct lines *lines, const struct line_row *rows, uint32_t x, uint32_t y, vf z, vm some)
 {
     const struct lines_args *args = lines->args;
@@ -249,20 +262,21 @@ static struct found search(const struct lines *lines, const struct line_row *row
     const vi column = vi_add(vi_set(rect[0] + x), vi_lanes());
     const struct tangent tangent = tangent_at(lines, column, vi_set(y), z, some);
     struct found found = { vf_zero(), vf_set(args->most), column };
-    uint8_t nearer[2 * PT_LINE_MOST + 1]; // rows with discs that may show
-    for (int k = -(int)args->reach; k <= (int)args->reach; k++)
-        nearer[PT_LINE_MOST + k] = rows[k].any && vm_bits(vm_and(some, vf_lt(vf_load(rows[k].least + x), z)));
+    const uint64_t asked = vm_bits(some);
+    uint64_t discs[2 * PT_LINE_MOST + 1]; // that may show, by rows
+    for (int k = -(int)args->reach; k <= (int)args->reach; k++) {
+        int nearer = rows[k].any && vm_bits(vm_and(some, vf_lt(vf_load(rows[k].least + x), z)));
+        discs[PT_LINE_MOST + k] = nearer ? discs_around(rows + k, x) : 0;
+    }
     for (uint32_t i = 0; i < args->tap_count; i++) {
         const uint32_t tap = args->taps[i];
         const int dx = (int)(tap & 255u) - 128, dy = (int)(tap >> 8 & 255u) - 128;
         const struct line_row *row = rows + dy;
-        if (!nearer[PT_LINE_MOST + dy])
+        if (!(discs[PT_LINE_MOST + dy] >> (32 + dx) & asked)) // as of most pixels: few have discs
             continue;
         vf disc = vf_load(row->disc + (int32_t)x + dx);
         vm hit = vm_and(some, vf_lt(disc, z));
-        if (!vm_bits(hit)) // as of most pixels: few have discs
-            continue;
-        vf square = vf_set((float)(tap >> 16)), distance = square * vf_rsqrt(square);
+        const vf distance = vf_set(lines->distances[i]);
         vm open = vm_and(some, vf_lt(found.beyond, (vf_set(args->most) + half) - distance));
         if (!vm_bits(open))
             break;
@@ -333,7 +347,8 @@ static void line_bands(void *context, uint32_t begin, uint32_t end, uint32_t thr
     float *at = lines->memory + thread * lines->thread_floats + PAD, *windows = at;
     const size_t s = lines->stride;
     for (uint32_t i = 0; i < BAND_ROWS + 2 * margin; i++, at += ROW_FLOATS * s)
-        rows[i] = (struct line_row){ at + s, at + 2 * s, at + 3 * s, at + 4 * s, at + 5 * s, at + 6 * s, 0, 0 };
+        rows[i] = (struct line_row){ at + s, at + 2 * s, at + 3 * s, at + 4 * s, at + 5 * s, at + 6 * s,
+                                     (uint64_t *)(void *)(at + 7 * s), 0, 0 };
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(lines->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
         uint32_t count = last - first + 2 * margin;
@@ -370,6 +385,10 @@ int PT_KERNEL_ENTRY(lines)(const struct pt_cpu_call *call)
     lines.memory = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * lines.thread_floats * sizeof(float));
     if (!lines.memory)
         return PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < args->tap_count; i += PT_LANES) {
+        vf square = vi_convert(vi_shr(vi_load(args->taps + i), 16));
+        vf_store(lines.distances + i, square * vf_rsqrt(square), vm_first(PT_LANES));
+    }
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, line_bands, &lines);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
