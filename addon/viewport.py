@@ -366,7 +366,7 @@ def _redraw_panels(area_pointer: int) -> None:
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
-    return _texture(shown.color, 'RGBA32F')  # as it is: nothing to convert
+    return _texture(shown.color, 'RGBA16F')  # as it is: what is too bright is cut in the shader
 
 
 def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
