@@ -27,7 +27,7 @@ struct pt_planes {
 
 static inline vi pt_source(const struct pt_planes *planes, size_t at)
 {
-    return vi_and(vi_load(planes->from + at), vi_set(~PT_FROM_MIXED));
+    return pt_source_of(planes->from, at);
 }
 
 static inline void pt_empty_row(float *z, uint32_t width)

@@ -4,7 +4,7 @@
 #define PT_ROWS_H
 
 #include "cpu.h"
-#include "simd.h"
+#include "vector_math.h"
 
 #include <stdlib.h>
 
@@ -78,11 +78,17 @@ static inline vf pt_least_distance(const struct view_args *view, float least, vf
     return vf_max(vf_set(least), vf_footprint(view, z) * vf_set(0.999f));
 }
 
+// The measured pixels whose surfaces PT_LANES pixels from `at` on show.
+static inline vi pt_source_of(const uint32_t *from, size_t at)
+{
+    return vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED));
+}
+
 // d_eff at this view's level of those of PT_LANES pixels from `at` on that `lanes` names; at level 0 most are measured.
 static inline vf pt_own_distance(const struct view_args *view, const float *deff, const float *normals, const uint32_t *from,
                                  size_t at, vf z, vm lanes)
 {
-    vi source = vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED));
+    vi source = pt_source_of(from, at);
     if (view->level)
         return vf_level_distance(view, deff, normals, source, z, lanes);
     vm other = pt_filled(source, at, lanes);

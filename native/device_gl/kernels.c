@@ -93,7 +93,8 @@ int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_bu
 // Filters that visit listed tiles only. The others write every pixel, or are rare.
 static int tiled(enum pt_kernel kernel)
 {
-    return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
+    return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_shade ||
+           kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
            kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark || kernel == PT_KERNEL_edl ||
            kernel == PT_KERNEL_obscure || kernel == PT_KERNEL_toon || kernel == PT_KERNEL_hatch || kernel == PT_KERNEL_fog ||
            kernel == PT_KERNEL_tint;

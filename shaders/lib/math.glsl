@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Functions that decide pixels, twins of native/device_cpu/simd.h: correctly rounded +, -, x only, in one written
+// Functions that decide pixels, twins of native/device_cpu/vector_math.h: correctly rounded +, -, x only, in one written
 // order. `precise` forbids contraction and reassociation, so that CPU widths and GL devices agree to the bit (SPEC 1).
 #ifndef PT_MATH_GLSL
 #define PT_MATH_GLSL

@@ -8,7 +8,7 @@
 #ifndef PT_ANTIALIAS_H
 #define PT_ANTIALIAS_H
 
-#include "device_cpu/simd.h"
+#include "device_cpu/vector_math.h"
 
 static const int8_t pt_cross[4][2] = { { 1, 0 }, { 0, 1 }, { -1, 0 }, { 0, -1 } };
 

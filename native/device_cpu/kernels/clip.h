@@ -3,7 +3,7 @@
 #ifndef PT_CLIP_ROW_H
 #define PT_CLIP_ROW_H
 
-#include "device_cpu/simd.h"
+#include "device_cpu/vector_math.h"
 
 // Row k of (lo + R p) + hi.
 static inline vf pt_clip_row(const struct clip_view *clip, int k, const vf p[3])

@@ -3,7 +3,7 @@
 #ifndef PT_COMPOSE_H
 #define PT_COMPOSE_H
 
-#include "device_cpu/simd.h"
+#include "device_cpu/vector_math.h"
 
 static inline void pt_compose(const vf color[4], const vf background[4], vm some, vf out[4])
 {

@@ -9,7 +9,7 @@
 
 #include "device_cpu/cpu.h"
 #include "device_cpu/rows.h"
-#include "device_cpu/simd.h"
+#include "device_cpu/vector_math.h"
 
 // PT_LANES of them.
 struct pt_discs {

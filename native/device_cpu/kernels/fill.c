@@ -118,20 +118,26 @@ static void load_z(const struct fill *fill, int32_t y, float *row)
         row[x] = row[PAD + width + x] = empty;
 }
 
-// 2. Which of PT_LANES pixels have a neighbour that is nearer by more than d_eff: `nearest` is the nearest of the 3 x 3 around
-// them. There *threshold = z - d_eff.
+// 2. Which of PT_LANES pixels may have a neighbour that is nearer by more than d_eff: `nearest` is the nearest of the 3 x 3
+// around them.
+static inline vm maybe_hidden(const struct fill *fill, vf z, vf nearest, vm asked)
+{
+    return vm_and(asked, vf_lt(nearest, z - pt_least_distance(fill->view, fill->args->least, z)));
+}
+
+// Which of them have. There *threshold = z - d_eff.
 static inline vm hidden(const struct fill *fill, size_t at, vf z, vf nearest, vm asked, vf *threshold)
 {
-    asked = vm_and(asked, vf_lt(nearest, z - pt_least_distance(fill->view, fill->args->least, z)));
+    asked = maybe_hidden(fill, z, nearest, asked);
     if (vm_bits(asked) && fill->view->level) // d_eff at level 0 spares most a look at the normals
-        asked = vm_and(asked, vf_lt(nearest, z - vf_gather(fill->deff, vi_and(vi_load(fill->from + at), vi_set(~PT_FROM_MIXED)), asked)));
+        asked = vm_and(asked, vf_lt(nearest, z - vf_gather(fill->deff, pt_source_of(fill->from, at), asked)));
     if (!vm_bits(asked))
         return asked;
     *threshold = z - pt_own_distance(fill->view, fill->deff, fill->normals, fill->from, at, z, asked);
     return vm_and(asked, vf_lt(nearest, *threshold));
 }
 
-// Pixels that are covered, and those that a nearer one hides.
+// Pixels that are covered, and those that a nearer one may hide.
 static void scan_row(const struct fill *fill, const float *const rows[3], float *least, uint32_t y)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
@@ -151,7 +157,7 @@ static void scan_row(const struct fill *fill, const float *const rows[3], float 
                 continue;
             vf nearest = vf_min(vf_min(vf_load(at - 1), vf_load(at + 1)), vf_load(at));
             covered[word] |= (uint64_t)vm_bits(some) << i;
-            suspect[word] |= (uint64_t)vm_bits(vm_and(some, vf_lt(nearest, z - pt_least_distance(fill->view, fill->args->least, z)))) << i;
+            suspect[word] |= (uint64_t)vm_bits(maybe_hidden(fill, z, nearest, some)) << i;
         }
     }
 }
@@ -165,7 +171,8 @@ static void scan_band(const struct fill *fill, uint32_t band, uint32_t thread)
     memset(fill->filled + first * fill->words, 0, (last - first) * fill->words * 8);
     memset(fill->before + first * fill->words, 0, (last - first) * fill->words * 8);
     // a row beyond the rectangle is looked at, never changed
-    uint32_t begin = first && !band ? first - 1 : first, end = last == fill->view->rect[3] && last < fill->view->height ? last + 1 : last;
+    uint32_t begin = first && !band ? first - 1 : first;
+    uint32_t end = last == fill->view->rect[3] && last < fill->view->height ? last + 1 : last;
     for (uint32_t y = begin; y < end; y++) {
         const float *around[3];
         for (int32_t k = 0; k < 3; k++) {
@@ -312,7 +319,8 @@ static void decide_band(struct fill *fill, uint32_t band)
             if (left < 64)
                 fills &= (1ull << left) - 1;
             if (fills)
-                fills = fill->occluded ? occluded_to_fill(fill, word, y, fills, thresholds) : empty_to_fill(fill, word, y, fills);
+                fills = fill->occluded ? occluded_to_fill(fill, word, y, fills, thresholds)
+                                       : empty_to_fill(fill, word, y, fills);
             for (; fills; fills &= fills - 1, count++) {
                 uint32_t i = (uint32_t)__builtin_ctzll(fills);
                 e->x[base + count] = (uint32_t)word * 64 + i;

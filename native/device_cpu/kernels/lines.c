@@ -137,7 +137,7 @@ static vf offset_of(const struct lines *lines, size_t at, vf z, vm some)
     const struct lines_args *args = lines->args;
     if (!(args->offset > 0.0f))
         return pt_own_distance(&args->view, lines->deff, lines->normals, lines->from, at, z, some);
-    vi source = vi_and(vi_load(lines->from + at), vi_set(~PT_FROM_MIXED));
+    vi source = pt_source_of(lines->from, at);
     return vf_set(args->offset) * vf_gather(lines->normals + 3, vi_mul(source, vi_set(4)), some);
 }
 

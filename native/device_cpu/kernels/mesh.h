@@ -5,7 +5,7 @@
 #define PT_MESH_KERNELS_H
 
 #include "device_cpu/cpu.h"
-#include "device_cpu/simd.h"
+#include "device_cpu/vector_math.h"
 
 #include <math.h>
 

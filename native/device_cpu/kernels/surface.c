@@ -2,7 +2,7 @@
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of shaders/kernels/surface.comp
 #include "device_cpu/cpu.h"
 #include "device_cpu/rows.h"
-#include "device_cpu/simd.h"
+#include "device_cpu/vector_math.h"
 
 // word: the surface words of those of PT_LANES pixels from (x, y) on that are the instance's.
 static void surface_pixels(const struct surface_args *args, const struct pt_cpu_call *call, uint32_t x, uint32_t y, vm ours,
