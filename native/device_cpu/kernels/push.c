@@ -174,6 +174,15 @@ static void push_cells(const struct push *push, uint32_t x, uint32_t y)
             any |= bits[row][half] = covered_in_rect(push, 2 * x + half * PT_LANES, 2 * y + row);
     if (!any)
         return;
+    // The next row of cells finds its surfaces in the cache: memory answers too late for gathers. 3.0 ms of one thread in
+    // place of 3.6 at 1024 x 1024. (In a function of its own gcc 12 takes this for nothing and drops it.)
+    for (uint32_t row = 2; row < 4; row++)
+        for (uint32_t i = 0; i < 2 * PT_LANES; i += 4) {
+            size_t at = (size_t)(2 * y + row) * push->args->view.width + 2 * x + i;
+            __builtin_prefetch((const float *)pt_cpu_data(push->call, 4) + 4 * at);
+            if (i % 16 == 0)
+                __builtin_prefetch((const float *)pt_cpu_data(push->call, 5) + at);
+        }
     struct parents parents;
     load_parents(push, x, y, &parents);
     uint32_t give = twice(parents.give);
