@@ -98,18 +98,15 @@ static void ask_for_colors(const struct finish *finish, int32_t y)
             size_t at = (size_t)y * view->width + x;
             vi id;
             vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, view->width), &id);
-            uint32_t ids[PT_LANES], bits = vm_bits(ours);
-            if (!bits)
+            if (!vm_bits(ours))
                 continue;
-            vi_store(ids, id, vm_first(PT_LANES));
-            bits &= ~vm_bits(pt_filled(pt_source(&finish->planes, at), at, ours));
-            for (; bits; bits &= bits - 1) {
-                uint32_t point = ids[__builtin_ctz(bits)];
-                if (size)
-                    __builtin_prefetch(colors + size * point, 0, 1); // into the second level
-                for (uint32_t l = 0; l < casting; l++)
-                    __builtin_prefetch(words[l] + point, 0, 1);
-            }
+            uint32_t points[PT_LANES]; // all of them, the first point where there is none: no branch depends on the pixels
+            vi_store(points, vi_select(ours, id, vi_set(0)), vm_first(PT_LANES));
+            for (uint32_t k = 0; k < PT_LANES && size; k++)
+                __builtin_prefetch(colors + size * points[k], 0, 1); // into the second level
+            for (uint32_t l = 0; l < casting; l++)
+                for (uint32_t k = 0; k < PT_LANES; k++)
+                    __builtin_prefetch(words[l] + points[k], 0, 1);
         }
     }
 }
