@@ -206,11 +206,12 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
     precise vec3 point = vec3(p.ray, pt_negate(p.z + eye_z));
     precise vec3 to_eye = vec3(0.0, 0.0, 1.0);
     if (view.perspective != 0u) {
-        float r = pt_ray_rsqrt(p.ray);
         point = vec3(p.z * p.ray, pt_negate(p.z));
-        to_eye = vec3(0.0 - p.ray * r, r);
+        to_eye = vec3(0.0 - p.ray, 1.0);
     }
     bool away = pt_dot(p.n, to_eye) < 0.0; // both sides are lit
+    if (view.perspective != 0u && factors.z > 0.0) // only shine needs it as a unit
+        to_eye = to_eye * pt_ray_rsqrt(p.ray);
     vec3 n = away ? 0.0 - p.n : p.n;
     vec3 diffuse = vec3(0.0), specular = vec3(0.0);
     precise float sum = 0.0;

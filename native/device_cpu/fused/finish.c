@@ -10,7 +10,7 @@
 #include "device_cpu/kernels/shade.h"
 #include "device_cpu/kernels/smooth.h"
 
-enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 5, CHANNELS_COLOR = 13 }; // shaded 4, smoothed 4, shown 5
+enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 6, CHANNELS_COLOR = 13 }; // shaded 4, smoothed 4, shown 5
 // Row s is shaded when s + reach has been seen, s - 1 is smoothed then, s - 2 finished: anti-aliasing reads s - 3 too.
 enum { SEEN_MOST = 2 * PT_BLEND_MOST + 1 };
 
@@ -46,6 +46,7 @@ struct walk {
     int any[SEEN_MOST];             // whether the row holds anything
     struct pt_color_row shaded[RING], smoothed[RING];
     float *shown[RING][5];          // normals, opacities, what arrives of the lights
+    float *hi, *lo;                 // room for pt_find_flat
     struct pt_tile_sum *tiles;      // of the row of tiles at hand
 };
 
@@ -68,13 +69,15 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
     float *at = finish->memory + thread * finish->thread_floats + PT_ROW_PAD;
     const size_t s = finish->stride;
     for (uint32_t i = 0; i < finish->ring; i++, at += CHANNELS_SEEN * s)
-        walk->seen[i] = (struct pt_seen_row){ at, at + s, { at + 2 * s, at + 3 * s, at + 4 * s } };
+        walk->seen[i] = (struct pt_seen_row){ at, at + s, { at + 2 * s, at + 3 * s, at + 4 * s }, (uint8_t *)(at + 5 * s) };
     for (uint32_t i = 0; i < RING; i++, at += CHANNELS_COLOR * s) {
         walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s, at + 3 * s } };
         walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s } };
         for (uint32_t k = 0; k < 5; k++)
             walk->shown[i][k] = at + (8 + k) * s;
     }
+    walk->hi = at;
+    walk->lo = at + s;
 }
 
 // ---- 1. colours and normals -------------------------------------------------------------------------------------------------
@@ -117,6 +120,14 @@ static void see(const struct finish *finish, struct walk *walk, int32_t y)
                                                  finish->with_normals, seen_row(finish, walk, y));
     if (anything(finish, walk, y))
         ask_for_colors(finish, y);
+}
+
+static void find_flat(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *const rows[3] = { seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
+                                                seen_row(finish, walk, y + 1) };
+    if (anything(finish, walk, y))
+        pt_find_flat(rows, finish->planes.view->width, walk->hi, walk->lo);
 }
 
 // Opacity into the row's colours.
@@ -165,31 +176,70 @@ static void shade_lit(const struct finish *finish, struct walk *walk, const stru
     }
 }
 
+// Colours of three bytes a point, fetched at random: a tight loop gathers those of a block, so that many are under way at a time.
+static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_color_row *out, int32_t y)
+{
+    enum { BLOCK = 16 };
+    const struct shade_args *args = call->arguments;
+    const uint32_t width = finish->planes.view->width;
+    for (uint32_t first = 0; first < width; first += BLOCK * PT_LANES) {
+        vi words[BLOCK];
+        vm ours[BLOCK];
+        uint32_t count = (width - first + PT_LANES - 1) / PT_LANES;
+        count = count < BLOCK ? count : BLOCK;
+        for (uint32_t i = 0; i < count; i++) {
+            uint32_t x = first + i * PT_LANES;
+            vi id;
+            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
+            if (vm_bits(ours[i]))
+                words[i] = pt_gather_rgb(pt_cpu_data(call, 4), id, ours[i]);
+        }
+        for (uint32_t i = 0; i < count; i++) {
+            vf albedo[3];
+            if (!vm_bits(ours[i]))
+                continue;
+            pt_decode_srgb(words[i], albedo);
+            for (uint32_t k = 0; k < 3; k++)
+                vf_store(out->color[k] + first + i * PT_LANES, albedo[k], ours[i]);
+        }
+    }
+}
+
+// Any others, and those that a ramp or grading changes.
+static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_color_row *out, int32_t y)
+{
+    const struct shade_args *args = call->arguments;
+    const uint32_t width = finish->planes.view->width;
+    for (uint32_t x = 0; x < width; x += PT_LANES) {
+        const size_t at = (size_t)y * width + x;
+        vf albedo[3];
+        vi id;
+        vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, width), &id);
+        if (!vm_bits(ours))
+            continue;
+        pt_albedo(&args->instance, pt_cpu_data(call, 4), id, at, ours, albedo);
+        if (pt_recolors(args))
+            pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
+        for (uint32_t k = 0; k < 3; k++)
+            vf_store(out->color[k] + x, albedo[k], ours);
+    }
+}
+
 static void shade(const struct finish *finish, struct walk *walk, int32_t y)
 {
-    const struct view_args *view = finish->planes.view;
     struct pt_color_row *out = &walk->shaded[slot(y)];
     out->z = seen_row(finish, walk, y)->z;
     for (uint32_t i = 0; i < finish->shade_count && anything(finish, walk, y); i++) {
-        const struct shade_args *args = finish->shades[i].call.arguments;
-        // a tight loop of its own: colours are fetched at random, and many are under way at a time
-        for (uint32_t x = 0; x < view->width; x += PT_LANES) {
-            vf albedo[3];
-            vi id;
-            vm ours = pt_of_instance(finish->planes.keys + (size_t)y * view->width + x, &args->instance,
-                                     pt_lanes_left(x, view->width), &id);
-            if (!vm_bits(ours))
-                continue;
-            pt_albedo(&args->instance, pt_cpu_data(&finish->shades[i].call, 4), id, (size_t)y * view->width + x, ours, albedo);
-            if (pt_recolors(args))
-                pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
-            for (uint32_t k = 0; k < 3; k++)
-                vf_store(out->color[k] + x, albedo[k], ours);
-        }
+        const struct pt_cpu_call *call = &finish->shades[i].call;
+        const struct shade_args *args = call->arguments;
+        if (pt_gathers_bytes(&args->instance) && !pt_recolors(args))
+            fetch_bytes(finish, call, out, y);
+        else
+            fetch_colors(finish, call, out, y);
         if (finish->with_normals)
-            shade_lit(finish, walk, &finish->shades[i].call, y);
+            shade_lit(finish, walk, call, y);
         if (finish->channels == 4)
-            make_translucent(finish, &finish->shades[i].call, out, walk->shown[slot(y)][3], y);
+            make_translucent(finish, call, out, walk->shown[slot(y)][3], y);
     }
 }
 
@@ -201,7 +251,7 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
     const struct pt_color_row *const rows[3] = { &walk->shaded[slot(y - 1)], &walk->shaded[slot(y)],
                                                  &walk->shaded[slot(y + 1)] };
     struct pt_color_row *out = &walk->smoothed[slot(y)];
-    const float *limits = seen_row(finish, walk, y)->limit;
+    const struct pt_seen_row *seen = seen_row(finish, walk, y);
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     if (!finish->smooth) {
         *out = *rows[1];
@@ -216,9 +266,11 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         if (!vm_bits(some))
             continue;
         if (finish->channels == 4)
-            pt_smooth_pixels(finish->smooth, rows, 4, x, vf_load(limits + x), some, color);
+            pt_smooth_pixels(finish->smooth, rows, 4, 0, x, vf_load(seen->limit + x), some, color);
+        else if (pt_flat(seen, x))
+            pt_smooth_pixels(finish->smooth, rows, 3, 1, x, vf_load(seen->limit + x), some, color);
         else
-            pt_smooth_pixels(finish->smooth, rows, 3, x, vf_load(limits + x), some, color);
+            pt_smooth_pixels(finish->smooth, rows, 3, 0, x, vf_load(seen->limit + x), some, color);
         for (int k = 0; k < finish->channels; k++)
             vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
     }
@@ -323,7 +375,7 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
         if (vm_bits(some)) {
             vf shown[4] = { vf_load(around.row[1]->color[0] + px), vf_load(around.row[1]->color[1] + px),
                             vf_load(around.row[1]->color[2] + px), vf_set(1.0f) };
-            if (finish->antialias)
+            if (finish->antialias && !pt_flat(seen, px))
                 mixed = mix_edges(finish, &around, seen->limit, px, (uint32_t)y, some, shown);
             pt_compose(shown, background, some, color);
         }
@@ -351,7 +403,7 @@ static void peel_row(const struct finish *finish, struct walk *walk, int32_t y)
         if (vm_bits(some)) {
             for (uint32_t k = 0; k < 4; k++)
                 color[k] = vf_load(around.row[1]->color[k] + x);
-            if (finish->antialias)
+            if (finish->antialias && !pt_flat(seen, x))
                 mix_edges(finish, &around, seen->limit, x, (uint32_t)y, some, color);
         }
         // keys of what was filled across a layer already taken stay: nothing reads them any more
@@ -380,6 +432,7 @@ static void finish_rows(void *context, uint32_t begin, uint32_t end, uint32_t th
     }
     for (; y < last; y++) { // y is finished when y + 2 + reach has been seen
         see(finish, walk, y + 2 + reach);
+        find_flat(finish, walk, y + 1 + reach);
         if (y + 2 >= walk->first - 2)
             shade(finish, walk, y + 2);
         if (y + 1 >= walk->first - 1)
@@ -445,7 +498,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
     finish.channels = finish.peel ? 4 : 3;
     finish.stride = pt_row_stride(finish.planes.view->width);
     finish.ring = (uint32_t)(2 * finish.reach > finish.reach + 3 ? 2 * finish.reach : finish.reach + 3) + 1;
-    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR) * finish.stride;
+    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR + 2) * finish.stride;
     pt_blend_weights(finish.weights);
     uint32_t threads = pt_pool_threads(shared->pool);
     finish.memory = pt_cpu_scratch(shared, 0, threads * finish.thread_floats * sizeof(float));

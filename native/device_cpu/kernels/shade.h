@@ -19,9 +19,9 @@ static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_M
 }
 
 // Normals of those of PT_LANES pixels from x on that `filled` names, blended over (2 reach + 1)^2 pixels; the others keep n.
-// around[reach]: the pixels' own row.
-static inline void pt_blend_normals(const struct pt_seen_row *const *around, int reach, const float *weights, uint32_t x,
-                                    vm filled, vf n[3])
+// around[reach]: the pixels' own row. flat: all those pixels are one layer.
+static inline void pt_blend_normals(const struct pt_seen_row *const *around, int reach, int flat, const float *weights,
+                                    uint32_t x, vm filled, vf n[3])
 {
     const struct pt_seen_row *own = around[reach];
     const vf z = vf_load(own->z + x), limit = vf_load(own->limit + x);
@@ -29,9 +29,11 @@ static inline void pt_blend_normals(const struct pt_seen_row *const *around, int
     for (int dy = -reach; dy <= reach; dy++)
         for (int dx = -reach; dx <= reach; dx++) {
             const struct pt_seen_row *row = around[reach + dy];
-            vm take = vm_and(filled, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit));
             vf weight = vf_set(weights[dx * dx + dy * dy]);
-            for (int k = 0; k < 3; k++)
+            vm take = flat ? filled : vm_and(filled, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit));
+            for (int k = 0; k < 3 && flat; k++)
+                sum[k] = sum[k] + vf_load(row->normal[k] + x + dx) * weight;
+            for (int k = 0; k < 3 && !flat; k++)
                 sum[k] = sum[k] + vf_mul_where(take, vf_load(row->normal[k] + x + dx), weight);
         }
     vf square = (sum[0] * sum[0] + sum[1] * sum[1]) + sum[2] * sum[2];
@@ -41,6 +43,20 @@ static inline void pt_blend_normals(const struct pt_seen_row *const *around, int
         vf whole = n[k] * vf_set(1.0f / PT_BLEND_FILLED); // where the blend is nothing, the source's own
         n[k] = vf_select(filled, vf_select(blended, sum[k] * scale, whole), n[k]);
     }
+}
+
+// Colours of three bytes, gathered as words: byte offsets fit a signed index.
+static inline int pt_gathers_bytes(const struct instance_args *instance)
+{
+    return instance->color_format == 1 && instance->id_count < 1u << 29;
+}
+
+static inline vi pt_gather_rgb(const void *colors, vi id, vm ours) { return vi_gather_bytes(colors, vi_add(id, vi_add(id, id)), ours); }
+
+static inline void pt_decode_srgb(vi rgb, vf linear[3])
+{
+    for (int k = 0; k < 3; k++)
+        linear[k] = vf_look_up(pt_srgb_table, 256, vi_and(vi_shr(rgb, 8 * k), vi_set(255)));
 }
 
 // The points' own colours, before light; at: the first pixel in the plane, where they were blended.
@@ -55,10 +71,8 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
     }
     for (int k = 0; k < 3; k++)
         albedo[k] = vf_set(instance->color[k]);
-    if (instance->color_format == 1 && instance->id_count < 1u << 29) { // byte offsets fit a signed index
-        vi rgb = vi_gather_bytes(colors, vi_add(id, vi_add(id, id)), ours);
-        for (int k = 0; k < 3; k++)
-            albedo[k] = vf_look_up(pt_srgb_table, 256, vi_and(vi_shr(rgb, 8 * k), vi_set(255)));
+    if (pt_gathers_bytes(instance)) {
+        pt_decode_srgb(pt_gather_rgb(colors, id, ours), albedo);
         return;
     }
     if (instance->color_format == PT_COLOR_OF_SCALAR)
@@ -176,22 +190,25 @@ static inline void pt_add_light(const struct instance_args *instance, const stru
 static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z, const vf n[3],
                             struct pt_surface_point *s)
 {
-    const vf zero = vf_zero();
+    const vf zero = vf_zero(), one = vf_set(1.0f);
     s->to_eye[0] = s->to_eye[1] = zero;
-    s->to_eye[2] = vf_set(1.0f);
+    s->to_eye[2] = one;
     s->position[0] = ray[0];
     s->position[1] = ray[1];
     s->position[2] = zero - (z + vf_set(args->eye_z));
     if (args->view.perspective) {
-        vf r = vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f));
         s->position[0] = z * ray[0];
         s->position[1] = z * ray[1];
         s->position[2] = zero - z;
-        s->to_eye[0] = zero - ray[0] * r;
-        s->to_eye[1] = zero - ray[1] * r;
-        s->to_eye[2] = r;
+        s->to_eye[0] = zero - ray[0];
+        s->to_eye[1] = zero - ray[1];
     }
     vm away = vf_lt(pt_dot3(n, s->to_eye), zero); // both sides are lit
+    if (args->view.perspective && args->instance.specular > 0.0f) { // only shine needs it as a unit
+        vf r = vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + one);
+        for (int k = 0; k < 3; k++)
+            s->to_eye[k] = s->to_eye[k] * r;
+    }
     for (int k = 0; k < 3; k++)
         s->n[k] = vf_select(away, zero - n[k], n[k]);
 }
@@ -243,8 +260,10 @@ static inline vf pt_shade_pixels(const struct shade_args *args, const struct pt_
         normal[k] = vf_load(own->normal[k] + x);
     if (args->blend) {
         vm filled = pt_filled(pt_source(planes, at), at, ours);
-        if (vm_bits(filled))
-            pt_blend_normals(around, (int)args->blend, weights, x, filled, normal);
+        if (vm_bits(filled) && args->blend == 1 && pt_flat(own, x))
+            pt_blend_normals(around, 1, 1, weights, x, filled, normal);
+        else if (vm_bits(filled))
+            pt_blend_normals(around, (int)args->blend, 0, weights, x, filled, normal);
     }
     if (args->instance.lit)
         return pt_phong(args, shadows, x, y, id, ours, vf_load(own->z + x), normal, color);
