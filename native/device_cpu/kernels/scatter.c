@@ -33,12 +33,20 @@ static inline void store_least(struct target target, uint32_t pixel, uint64_t ke
         ;
 }
 
-// The points of a block that may be nearer, as columns. A block takes its steps one after another, none with a branch on
-// what memory answers: the depths, later the surface words, are asked for at random, and a processor that need not wait
-// for one answer has many under way.
-enum { BLOCK = 256 };
+// A block takes its steps one after another, none with a branch on what memory answers: the depths, later the surface words,
+// are asked for at random, and a processor that need not wait for one answer has many under way.
+enum { BLOCK = 256, ASKED = 512 }; // points; those of a chunk whose pixels are asked for
 
-struct waiting {
+struct block { // points [first, last) of a chunk
+    const struct chunk_view *chunk;
+    const float *positions;
+    const uint32_t *surface;
+    uint32_t first, last;
+    uint32_t pixel[BLOCK], z[BLOCK];
+    vm inside[BLOCK / PT_LANES]; // the view
+};
+
+struct waiting { // those of them that may be nearer, as columns
     uint32_t count, pixel[BLOCK + PT_LANES], z[BLOCK + PT_LANES], id[BLOCK + PT_LANES];
     float position[3][BLOCK + PT_LANES];
 };
@@ -63,12 +71,12 @@ static struct window window_of(const struct view_args *view)
                             .width = vi_set(view->width) };
 }
 
-// 1. Points [first, last) of the chunk: those in view that are nearer than what their pixel holds wait.
-static inline void project(const struct view_args *view, const struct window *w, const struct chunk_view *chunk,
-                           const float *positions, uint32_t first, uint32_t last, struct target target, struct waiting *waiting)
+// 1. Pixels and depths, and which are in view. What their pixels hold is asked for: a chunk's first points find it in memory.
+static inline void project(const struct view_args *view, const struct window *w, struct target target, struct block *block)
 {
-    uint32_t count = 0;
-    for (uint32_t i = first; i < last; i += PT_LANES) {
+    const struct chunk_view *chunk = block->chunk;
+    const float *positions = block->positions;
+    for (uint32_t i = block->first, at = 0; i < block->last; i += PT_LANES, at += PT_LANES) {
         vf px = vf_load(positions + i), py = vf_load(positions + chunk->padded + i);
         vf pz = vf_load(positions + 2 * (size_t)chunk->padded + i);
         vf z = vf_transform(chunk, 2, px, py, pz);
@@ -83,30 +91,41 @@ static inline void project(const struct view_args *view, const struct window *w,
                            vm_and(vm_and(vf_le(w->left, x), vf_lt(x, w->right)), vm_and(vf_le(w->bottom, y), vf_lt(y, w->top))));
         if (chunk->sifted)
             inside = vm_and(inside, vm_of_bits(target.drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
+        vi column = vi_sub(vf_int(vf_floor(x)), w->origin_x), row = vi_sub(vf_int(vf_floor(y)), w->origin_y);
+        vi pixel = vi_select(inside, vi_add(vi_mul(row, w->width), column), vi_set(0));
+        vi_store(block->pixel + at, pixel, vm_first(PT_LANES));
+        vi_store(block->z + at, vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), vm_first(PT_LANES)); // no sign of -0
+        block->inside[at / PT_LANES] = inside;
+    }
+    for (uint32_t i = 0; i < block->last - block->first && block->first < ASKED; i++)
+        __builtin_prefetch(target.keys + block->pixel[i], 1);
+}
+
+// 2. Those that are nearer than what their pixel holds wait.
+static inline void test_depths(struct target target, const struct block *block, struct waiting *waiting)
+{
+    const struct chunk_view *chunk = block->chunk;
+    uint32_t count = 0;
+    for (uint32_t i = block->first, at = 0; i < block->last; i += PT_LANES, at += PT_LANES) {
+        vm inside = block->inside[at / PT_LANES];
         if (!vm_bits(inside))
             continue;
-        // limit and early depth test; the sign bit of -0 is dropped
-        vi column = vi_sub(vf_int(vf_floor(x)), w->origin_x), row = vi_sub(vf_int(vf_floor(y)), w->origin_y);
-        vi pixel = vi_add(vi_mul(row, w->width), column);
-        vi z_bits = vi_and(vf_bits(z), vi_set(0x7FFFFFFFu));
+        vi pixel = vi_load(block->pixel + at), z = vi_load(block->z + at);
         if (target.limit)
-            inside = vm_and(inside, vf_lt(vf_gather(target.limit, pixel, inside), z));
+            inside = vm_and(inside, vf_lt(vf_gather(target.limit, pixel, inside), vi_float(z)));
         vi stored = vi_gather_z(target.keys, pixel, inside);
-        uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z_bits))));
+        uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z))));
         vi_pack(waiting->pixel + count, pixel, nearer);
-        vi_pack(waiting->z + count, z_bits, nearer);
+        vi_pack(waiting->z + count, z, nearer);
         vi_pack(waiting->id + count, vi_add(vi_set(chunk->first + i), vi_lanes()), nearer);
-        if (chunk->cull) {
-            pack_float(waiting->position[0] + count, px, nearer);
-            pack_float(waiting->position[1] + count, py, nearer);
-            pack_float(waiting->position[2] + count, pz, nearer);
-        }
+        for (uint32_t k = 0; k < 3 && chunk->cull; k++)
+            pack_float(waiting->position[k] + count, vf_load(block->positions + k * (size_t)chunk->padded + i), nearer);
         count += (uint32_t)__builtin_popcount(nearer);
     }
     waiting->count = count;
 }
 
-// 2. Those that face away wait no longer.
+// 3. Those that face away wait no longer.
 static inline void cull(const struct chunk_view *chunk, const uint32_t *surface, struct waiting *waiting)
 {
     uint32_t count = 0;
@@ -129,20 +148,14 @@ static inline void cull(const struct chunk_view *chunk, const uint32_t *surface,
     waiting->count = count;
 }
 
-static void scatter_chunk(const struct view_args *view, const struct chunk_view *chunk, const float *all_positions,
-                          const uint32_t *surface, struct target target)
+static void put(struct target target, const struct block *block)
 {
-    const float *positions = all_positions + 3 * (size_t)chunk->first;
-    const struct window window = window_of(view);
     struct waiting waiting;
-    for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
-        uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-        project(view, &window, chunk, positions, first, last, target, &waiting);
-        if (chunk->cull)
-            cull(chunk, surface, &waiting);
-        for (uint32_t i = 0; i < waiting.count; i++)
-            store_least(target, waiting.pixel[i], (uint64_t)waiting.z[i] << 32 | (uint32_t)(chunk->id_base + waiting.id[i]));
-    }
+    test_depths(target, block, &waiting);
+    if (block->chunk->cull)
+        cull(block->chunk, block->surface, &waiting);
+    for (uint32_t i = 0; i < waiting.count; i++)
+        store_least(target, waiting.pixel[i], (uint64_t)waiting.z[i] << 32 | (uint32_t)(block->chunk->id_base + waiting.id[i]));
 }
 
 static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -154,15 +167,28 @@ static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
                                    .limit = args->behind ? pt_cpu_data(call, 1 + 3 * args->instances) : NULL,
                                    .drawn = args->sifted ? pt_cpu_data(call, 1 + 3 * args->instances + args->behind) : NULL,
                                    .shared = pt_pool_threads(call->pool) > 1 };
-    uint32_t instance = 0;
+    const struct window window = window_of(scatter->view);
+    struct block blocks[2]; // one is projected, then the one before it is put
+    uint32_t instance = 0, count = 0;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(call); c++) {
         while (c >= scatter->begins[instance + 1])
             instance++;
-        const struct chunk_view *chunks = pt_cpu_data(call, 1 + 3 * instance);
-        scatter_chunk(scatter->view, &chunks[c - scatter->begins[instance]], pt_cpu_data(call, 2 + 3 * instance),
-                      pt_cpu_data(call, 3 + 3 * instance), target);
+        const struct chunk_view *chunk = (const struct chunk_view *)pt_cpu_data(call, 1 + 3 * instance) + c - scatter->begins[instance];
+        for (uint32_t first = 0; first < chunk->count; first += BLOCK, count++) {
+            struct block *block = &blocks[count % 2];
+            block->chunk = chunk;
+            block->positions = (const float *)pt_cpu_data(call, 2 + 3 * instance) + 3 * (size_t)chunk->first;
+            block->surface = pt_cpu_data(call, 3 + 3 * instance);
+            block->first = first;
+            block->last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
+            project(scatter->view, &window, target, block);
+            if (count)
+                put(target, &blocks[(count - 1) % 2]);
+        }
     }
+    if (count)
+        put(target, &blocks[(count - 1) % 2]);
 }
 
 int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
