@@ -9,7 +9,7 @@
 #include "glad/gl.h"
 
 enum {
-    PT_GL_VARIANTS = 64,      // programs of one kernel: its passes and special cases
+    PT_GL_VARIANTS = 128,     // programs of one kernel: its passes and special cases
     PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
     PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
     PT_GL_TEXTURES = 5,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl
@@ -132,7 +132,7 @@ int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *c
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers, uint32_t count,
                const atomic_int *cancel);
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
-int pt_gl_antialias(struct pt_gl_device *d);
+int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args);
 int pt_gl_push(struct pt_gl_device *d);
 int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args);
 // The coarse cells over the rectangle of a push.

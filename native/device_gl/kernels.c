@@ -112,6 +112,13 @@ static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t vari
                           (height + (uint32_t)group[1] - 1) / (uint32_t)group[1]);
 }
 
+// Of kernels whose invocations take several rows each: llvmpipe spends as much on an invocation as on a pixel.
+static int run_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t width, uint32_t height)
+{
+    enum { ROWS = 8 }; // as in lib/planes.glsl
+    return run_over(d, kernel, 0, "", width, (height + ROWS - 1) / ROWS);
+}
+
 static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
 {
     static const char *const definitions[] = {"#define PLANE 0\n", "#define PLANE 1\n", "#define PLANE 2\n", "#define PLANE 3\n"};
@@ -181,7 +188,7 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     case PT_KERNEL_push:
         return pt_gl_push(d);
     case PT_KERNEL_antialias:
-        return pt_gl_antialias(d);
+        return pt_gl_antialias(d, arguments);
     case PT_KERNEL_obscure:
         return run_obscure(d);
     case PT_KERNEL_normals:
@@ -196,7 +203,7 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
         return run_tiles(d, kernel);
     case PT_KERNEL_compose: {
         const struct compose_args *args = arguments;
-        return run_over(d, kernel, 0, "", args->crop_width, args->crop_height);
+        return run_rows(d, kernel, args->crop_width, args->crop_height);
     }
     case PT_KERNEL_focus: {
         const struct focus_args *args = arguments;
@@ -216,8 +223,11 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
         pt_gl_tiles_forget(d);
         return run_over(d, kernel, 0, "", view->rect[2] - (view->rect[0] >> PT_TILE_LEVEL << PT_TILE_LEVEL),
                         view->rect[3] - (view->rect[1] >> PT_TILE_LEVEL << PT_TILE_LEVEL));
+    case PT_KERNEL_pull:
+        pt_gl_tiles_forget(d);
+        return run_rows(d, kernel, view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);
     default:
-        pt_gl_tiles_forget(d); // pull and cover write keys
+        pt_gl_tiles_forget(d); // cover writes keys
         return run_over(d, kernel, 0, "", view->rect[2] - view->rect[0], view->rect[3] - view->rect[1]);
     }
 }

@@ -5,7 +5,7 @@
 
 #include <stdio.h>
 
-enum { TILE_PIXELS = 64, GROUP = 64 };
+enum { TILE_PIXELS = 64, GROUP = 64, TAKEN_EACH = 4 }; // TAKEN_EACH: as in push.comp
 
 // Room for as many pixels as the tiles hold; counts from nothing. Both bound.
 static int prepare_list(struct pt_gl_device *d, uint32_t counter_binding, uint32_t list_binding, uint32_t tile_pixels)
@@ -34,17 +34,17 @@ static uint32_t list_length(struct pt_gl_device *d)
     return count;
 }
 
-static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count)
+static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count, uint32_t group)
 {
     uint32_t x, y;
-    pt_gl_grid((count + GROUP - 1) / GROUP, &x, &y);
+    pt_gl_grid((count + group - 1) / group, &x, &y);
     d->gl.ProgramUniform1ui(d->programs[kernel][variant], 0, count);
     return pt_gl_dispatch(d, kernel, variant, x, y);
 }
 
 // ---- shade -----------------------------------------------------------------------------------------------------
 
-enum { NORMALS = 0, BLEND = 1, BLEND_WIDE = 2, COLORS = 3 };
+enum { NORMALS = 0, BLEND = 1, BLEND_WIDE = 2, COLORS = 9 }; // the first three by where opacity comes from
 
 // What a light kernel must know: llvmpipe runs every branch that any lane may take.
 static int plain_lights(const struct shade_args *args)
@@ -56,19 +56,20 @@ static int plain_lights(const struct shade_args *args)
 }
 
 struct shade_choice {
-    uint32_t normals, format, lit, plain, recolors;
+    uint32_t normals, opacity, format, lit, plain, recolors;
 };
 
+static uint32_t normals_of(const struct shade_choice *c) { return 3 * c->opacity + c->normals; }
 static uint32_t colors_of(const struct shade_choice *c) { return COLORS + 12 * c->format + 6 * c->recolors + 2 * c->lit + c->plain; }
 
 static int shade_programs(struct pt_gl_device *d, const struct shade_choice *c)
 {
-    static const char *const steps[] = {"#define STEP 0\n", "#define STEP 0\n#define BLEND 1\n",
-                                        "#define STEP 0\n#define WIDE 1\n"};
+    static const char *const steps[] = {"", "#define BLEND 1\n", "#define WIDE 1\n"};
     char definitions[128];
+    snprintf(definitions, sizeof definitions, "#define STEP 0\n#define OPACITY %u\n%s", c->opacity, steps[c->normals]);
+    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, normals_of(c), definitions);
     snprintf(definitions, sizeof definitions, "#define STEP 1\n#define COLOR_FORMAT %u\n#define LIT %u\n#define PLAIN %u\n#define RECOLOR %u\n",
              c->format, c->lit, c->plain, c->recolors);
-    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, c->normals, steps[c->normals]);
     return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors_of(c), definitions) : result;
 }
 
@@ -94,6 +95,7 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 {
     const struct shade_choice choice = { .normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE,
+                                         .opacity = !args->instance.has_opacities ? 0 : args->instance.color_format == PT_COLOR_OF_PLANE ? 2 : 1,
                                          .format = args->instance.color_format % 5,
                                          .lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1,
                                          .plain = (uint32_t)plain_lights(args),
@@ -103,7 +105,7 @@ int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
         return PATINA_OK;
     int result = shade_programs(d, &choice);
     if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, choice.normals, PT_GL_TILES_POINTS);
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, normals_of(&choice), PT_GL_TILES_POINTS);
     if (result == PATINA_OK && args->instance.lit)
         set_lights(d, args, colors);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, colors, PT_GL_TILES_POINTS) : result;
@@ -113,18 +115,22 @@ int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 
 enum { FIND = 0, MIX = 1, APPLY = 2 };
 
-int pt_gl_antialias(struct pt_gl_device *d)
+int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args)
 {
-    static const char *const definitions[] = {"#define STEP 0\n", "#define STEP 1\n", "#define STEP 2\n"};
+    const uint32_t variant = 3 * args->behind + 6 * args->inked;
     int result = PATINA_OK;
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
-    for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++)
-        result = pt_gl_kernel_program(d, PT_KERNEL_antialias, step, definitions[step]);
+    for (uint32_t step = FIND; step <= APPLY && result == PATINA_OK; step++) {
+        char definitions[64];
+        snprintf(definitions, sizeof definitions, "#define STEP %u\n#define BEHIND %u\n#define INKED %u\n", step, args->behind,
+                 args->inked);
+        result = pt_gl_kernel_program(d, PT_KERNEL_antialias, variant + step, definitions);
+    }
     if (result == PATINA_OK)
         result = prepare_list(d, 7, 8, TILE_PIXELS);
     if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, FIND, PT_GL_TILES_POINTS);
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, variant + FIND, PT_GL_TILES_POINTS);
     if (result != PATINA_OK)
         return result;
     uint32_t count = list_length(d);
@@ -132,9 +138,9 @@ int pt_gl_antialias(struct pt_gl_device *d)
     if (result == PATINA_OK && count)
         result = pt_gl_bind(d, 9, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
     if (result == PATINA_OK)
-        result = dispatch_list(d, PT_KERNEL_antialias, MIX, count);
+        result = dispatch_list(d, PT_KERNEL_antialias, variant + MIX, count, GROUP);
     if (result == PATINA_OK)
-        result = dispatch_list(d, PT_KERNEL_antialias, APPLY, count);
+        result = dispatch_list(d, PT_KERNEL_antialias, variant + APPLY, count, GROUP);
     return result;
 }
 
@@ -165,7 +171,7 @@ int pt_gl_push(struct pt_gl_device *d)
         result = prepare_list(d, 7, 8, 4 * TILE_PIXELS);
     if (result == PATINA_OK) // a tile has twice the columns of a tile of its own level
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_push, COVERED, PT_GL_TILES_POINTS);
-    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_push, TAKE, list_length(d)) : result;
+    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_push, TAKE, list_length(d), TAKEN_EACH * GROUP) : result;
 }
 
 // ---- lines -----------------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@
 // instance.
 #include "device_gl.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 enum {
@@ -113,10 +114,13 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 6, drawn->name, 0, drawn->size, "scatter");
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
-        result = pt_gl_kernel_program(d, PT_KERNEL_scatter, pass, passes[pass]);
+        const uint32_t variant = pass + 3 * args->behind + 6 * args->sifted;
+        char definitions[64];
+        snprintf(definitions, sizeof definitions, "%s#define BEHIND %u\n#define SIFTED %u\n", passes[pass], args->behind, args->sifted);
+        result = pt_gl_kernel_program(d, PT_KERNEL_scatter, variant, definitions);
         for (uint32_t i = 0; i < args->instances && 3 * i + 3 < count && result == PATINA_OK; i++) {
             struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[3 * i + 1], buffers[3 * i + 2], buffers[3 * i + 3]};
-            result = run_instance(d, &b, pass, cancel);
+            result = run_instance(d, &b, variant, cancel);
         }
     }
     return result;

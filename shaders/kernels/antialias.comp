@@ -8,6 +8,7 @@
 //
 // Edges are few: they are listed, their new colours made, and applied when every pixel has been looked at.
 //   STEP 0: find;   STEP 1: mix, an edge an invocation;   STEP 2: apply
+//   BEHIND, INKED: as in the arguments, known beforehand: software would read the through and line planes for nothing.
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -43,38 +44,51 @@ float step_limit(bool layers, uint at, uint z_bits)
     return layers ? limit : pt_float(PT_KEY_EMPTY_Z);
 }
 
-bool is_far(bool behind, uint q, float z, float limit)
+bool is_far(uint q, float z, float limit)
 {
+#if BEHIND
     if (z == pt_float(PT_KEY_EMPTY_Z))
-        return !(behind && through[q] < PT_SPENT);
-    return z > limit;
+        return !(through[q] < PT_SPENT);
+#endif
+    return z > limit || z == pt_float(PT_KEY_EMPTY_Z);
 }
 
 #if STEP == 0
 
-bool is_edge(ivec2 size, bool layers, bool behind, int x, int y)
+bool is_edge_towards(ivec2 size, int x, int y, int i, float limit)
 {
-    uint at = uint(y * size.x + x), z_bits = read_z_bits(at);
-    if (z_bits == PT_KEY_EMPTY_Z || (args.inked != 0u && line[at] > 0.0))
-        return false;
-    float limit = step_limit(layers, at, z_bits);
-    bool edge = false;
-    for (int i = 0; i < 4; i++) {
-        uint q = neighbour(size, x, y, i);
-        edge = is_far(behind, q, read_z(q), limit) || edge;
-    }
-    return edge;
+    uint q = neighbour(size, x, y, i);
+    return is_far(q, read_z(q), limit);
+}
+
+// z_below, z, z_above: of the pixel and those beside it in its column.
+bool is_edge(ivec2 size, bool layers, int x, int y, float z_below, float z, float z_above)
+{
+    uint at = uint(y * size.x + x);
+    float limit = step_limit(layers, at, pt_bits(z));
+    bool edge = is_edge_towards(size, x, y, 0, limit) || is_edge_towards(size, x, y, 2, limit) ||
+                is_far(neighbour(size, x, y, 1), z_above, limit) || is_far(neighbour(size, x, y, 3), z_below, limit);
+#if INKED
+    edge = edge && !(line[at] > 0.0);
+#endif
+    return edge && z < pt_float(PT_KEY_EMPTY_Z);
 }
 
 void main()
 {
     view_args view = args.view;
-    bool layers = args.layers != 0u, behind = args.behind != 0u;
+    bool layers = args.layers != 0u;
     ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
     uint found = 0u, y = column.y, end = pt_tile_end(view, column);
-    for (uint i = 0u; y + i < end; i++)
-        found |= uint(is_edge(size, layers, behind, int(column.x), int(y + i))) << i;
+    int x = int(column.x);
+    float below = read_z(neighbour(size, x, int(y), 3)), z = read_z(y * view.width + column.x);
+    for (uint i = 0u; y + i < end; i++) {
+        float above = read_z(neighbour(size, x, int(y + i), 1));
+        found |= uint(is_edge(size, layers, x, int(y + i), below, z, above)) << i;
+        below = z;
+        z = above;
+    }
     if (found == 0u)
         return;
     uint at = atomicAdd(edge_count, uint(bitCount(found)));
@@ -95,7 +109,7 @@ uint entry_index()
 
 void main()
 {
-    bool layers = args.layers != 0u, behind = args.behind != 0u;
+    bool layers = args.layers != 0u;
     ivec2 size = ivec2(args.view.width, args.view.height);
     uint index = entry_index();
     if (index >= entries)
@@ -108,7 +122,7 @@ void main()
     for (int i = 0; i < 4; i++) {
         uint q = neighbour(size, int(pixel.x), int(pixel.y), i);
         float z = read_z(q);
-        if (!is_far(behind, q, z, limit))
+        if (!is_far(q, z, limit))
             continue;
         count += 1.0;
         if (z < pt_float(PT_KEY_EMPTY_Z))

@@ -5,7 +5,7 @@
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 
-layout(local_size_x = 32, local_size_y = 8) in;
+layout(local_size_x = 32) in; // and each takes PT_ROWS rows
 
 layout(std430, binding = 0) readonly buffer arguments_block { pull_args args; };
 layout(std430, binding = 3) writeonly buffer keys_block { uvec2 keys[]; };
@@ -15,20 +15,21 @@ void main()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, fine_width = args.fine_width, fine_height = args.fine_height;
-    uint x = rect.x + gl_GlobalInvocationID.x, y = rect.y + gl_GlobalInvocationID.y;
-    if (x >= rect.z || y >= rect.w)
-        return;
-    uint best = 2u * y * fine_width + 2u * x;
-    uvec2 key = read_key(best);
-    for (uint child = 1u; child < 4u; child++) {
-        uint fx = 2u * x + (child & 1u), fy = 2u * y + (child >> 1);
-        bool inside = fx < fine_width && fy < fine_height;
-        uint at = inside ? fy * fine_width + fx : best;
-        uvec2 other = read_key(at);
-        bool less = pt_key_less(other, key);
-        best = less ? at : best;
-        key = less ? other : key;
+    uint x = rect.x + gl_GlobalInvocationID.x, first = rect.y + gl_GlobalInvocationID.y * PT_ROWS;
+    uint end = x < rect.z ? min(first + PT_ROWS, rect.w) : first;
+    for (uint y = first; y < end; y++) {
+        uint best = 2u * y * fine_width + 2u * x;
+        uvec2 key = read_key(best);
+        for (uint child = 1u; child < 4u; child++) {
+            uint fx = 2u * x + (child & 1u), fy = 2u * y + (child >> 1);
+            bool inside = fx < fine_width && fy < fine_height;
+            uint at = inside ? fy * fine_width + fx : best;
+            uvec2 other = read_key(at);
+            bool less = pt_key_less(other, key);
+            best = less ? at : best;
+            key = less ? other : key;
+        }
+        keys[y * width + x] = key;
+        from[y * width + x] = texelFetch(from_plane, int(best)).x;
     }
-    keys[y * width + x] = key;
-    from[y * width + x] = texelFetch(from_plane, int(best)).x;
 }

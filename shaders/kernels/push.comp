@@ -28,39 +28,65 @@ float coarse_z(ivec2 size, int x, int y)
     return inside ? z : pt_float(PT_KEY_EMPTY_Z);
 }
 
-bool is_covered(view_args view, ivec2 coarse_size, uint x, uint y)
+// Coarse z of a pixel's parent and of the cell beside it, on the pixel's side.
+vec2 coarse_pair(ivec2 size, ivec2 cell, int side)
 {
-    uint at = y * view.width + x;
-    // 1. threshold: what is nearer than it covers this pixel
-    float own_z = pt_float(keys[at].y);
-    int px = int(x >> 1), py = int(y >> 1), sx = (x & 1u) != 0u ? 1 : -1, sy = (y & 1u) != 0u ? 1 : -1;
-    bool some = own_z < pt_float(PT_KEY_EMPTY_Z);
-    precise float least = own_z - pt_least_distance(view, args.least, own_z), parent = coarse_z(coarse_size, px, py);
-    precise float t = some ? least : own_z;
-    for (bool asked = some && parent < t; asked; asked = false) { // not `if`: software skips loops that nobody enters
-        uint own = from[at];
-        t = own_z - pt_level_distance(view, read_deff(own), read_float4(own).w, own_z);
-    }
-    // 2. the parent and the three coarse cells on this pixel's side
-    int sides = int(coarse_z(coarse_size, px + sx, py) < t) + int(coarse_z(coarse_size, px, py + sy) < t) +
-                int(coarse_z(coarse_size, px + sx, py + sy) < t);
-    return parent < t && sides >= 2;
+    return vec2(coarse_z(size, cell.x, cell.y), coarse_z(size, cell.x + side, cell.y));
+}
+
+// 2. The parent and two of the three coarse cells on this pixel's side are nearer than t. level: parent and the cell beside it;
+// next: those below or above.
+bool is_covered(vec2 level, vec2 next, float t)
+{
+    return level.x < t && int(level.y < t) + int(next.x < t) + int(next.y < t) >= 2;
+}
+
+// 1. threshold: what is nearer than it covers this pixel, which is not empty
+float threshold(view_args view, uint at, float z)
+{
+    uint own = from[at];
+    precise float t = z - pt_level_distance(view, read_deff(own), read_float4(own).w, z);
+    return t;
 }
 
 void main()
 {
     view_args view = args.view;
     ivec2 coarse_size = ivec2(args.coarse_width, args.coarse_height);
+    float empty = pt_float(PT_KEY_EMPTY_Z), least_distance = args.least;
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint lane = gl_LocalInvocationID.x, size = 2u * PT_TILE;
     uint index = group * PT_TILES_IN_GROUP + lane / size;
     uvec2 tile = pt_pixel(tile_list[min(index, tile_count - 1u)], tile_columns);
     uvec2 corner = 2u * (uvec2(view.rect[0] >> 1, view.rect[1] >> 1) + tile * PT_TILE);
-    uint x = corner.x + lane % size, end = min(corner.y + size, view.rect[3]), found = 0u;
+    uint x = corner.x + lane % size, end = min(corner.y + size, view.rect[3]), found = 0u, asked = 0u;
     if (index >= tile_count || x < view.rect[0] || x >= view.rect[2])
         end = 0u;
-    for (uint y = max(corner.y, view.rect[1]); y < end; y++)
-        found |= uint(is_covered(view, coarse_size, x, y)) << (y - corner.y);
+    // Empty pixels, and those that something may cover: few, so they are looked at by themselves.
+    ivec2 cell = ivec2(x, corner.y) >> 1;
+    int side = (x & 1u) != 0u ? 1 : -1;
+    vec2 below = coarse_pair(coarse_size, cell - ivec2(0, 1), side), level = coarse_pair(coarse_size, cell, side);
+    for (uint y = corner.y; y < end; y += 2u, cell.y++) {
+        vec2 above = coarse_pair(coarse_size, cell + ivec2(0, 1), side);
+        for (uint upper = 0u; upper < 2u; upper++) {
+            bool inside = y + upper >= view.rect[1] && y + upper < end;
+            float z = inside ? pt_float(keys[(y + upper) * view.width + x].y) : 0.0;
+            precise float least = z - pt_least_distance(view, least_distance, z);
+            bool some = z < empty;
+            found |= uint(!some && is_covered(level, upper == 0u ? below : above, empty)) << (y + upper - corner.y);
+            asked |= uint(some && inside && level.x < least) << (y + upper - corner.y);
+        }
+        below = level;
+        level = above;
+    }
+    for (; asked != 0u; asked &= asked - 1u) {
+        uint row = uint(findLSB(asked)), y = corner.y + row, at = y * view.width + x;
+        ivec2 cell = ivec2(x, y) >> 1;
+        float t = threshold(view, at, pt_float(keys[at].y));
+        bool covered = is_covered(coarse_pair(coarse_size, cell, side),
+                                  coarse_pair(coarse_size, cell + ivec2(0, (y & 1u) != 0u ? 1 : -1), side), t);
+        found |= uint(covered) << row;
+    }
     if (found == 0u)
         return;
     uint at = atomicAdd(taken_count, uint(bitCount(found)));
@@ -70,19 +96,13 @@ void main()
 
 #else
 
+#define TAKEN_EACH 4u // pixels an invocation takes, as in native/device_gl/pixels.c
+
 layout(location = 0) uniform uint entries;
 
 // 3. The parent's key, where its surface is not dense at this level; refined: its surface's tangent plane here.
-void main()
+void take(view_args view, uint coarse_width, bool refined, uint at)
 {
-    view_args view = args.view;
-    uint coarse_width = args.coarse_width;
-    bool refined = args.refined != 0u;
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
-                 gl_LocalInvocationID.x;
-    if (index >= entries)
-        return;
-    uint at = taken[index];
     ivec2 place = ivec2(pt_pixel(at, view.width)), cell = place >> 1;
     uint parent = uint(cell.y) * coarse_width + uint(cell.x), source = texelFetch(from_plane, int(parent)).x;
     uvec2 key = read_key(parent);
@@ -100,6 +120,19 @@ void main()
     }
     keys[at] = key;
     from[at] = source;
+}
+
+void main()
+{
+    view_args view = args.view;
+    uint coarse_width = args.coarse_width;
+    bool refined = args.refined != 0u;
+    uint group = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * TAKEN_EACH;
+    for (uint i = 0u; i < TAKEN_EACH; i++) {
+        uint index = (group + i) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+        if (index < entries)
+            take(view, coarse_width, refined, taken[index]);
+    }
 }
 
 #endif

@@ -4,6 +4,7 @@
 // A workgroup takes a chunk (or every gl_NumWorkGroups.y-th part of it). The minimum commutes, so the order of points
 // never shows. Without 64-bit atomics a key is made in two passes over all points of all instances:
 //   PASS 0: least z;   PASS 1: least id among the points that have exactly this z.   PASS 2: both at once, 64 bits.
+//   BEHIND, SIFTED: as in the arguments, known beforehand: software would read the limit and drawn words for nothing.
 #version 430 core
 #if PASS == 2
 #extension GL_ARB_gpu_shader_int64 : require
@@ -46,7 +47,7 @@ void main()
     vec4 eye = vec4(chunk.eye[0], chunk.eye[1], chunk.eye[2], chunk.eye[3]);
     float left = float(view.origin_x), right = float(view.origin_x + int(view.width));
     float bottom = float(view.origin_y), top = float(view.origin_y + int(view.height));
-    bool cull = chunk.cull != 0u, behind = args.behind != 0u;
+    bool cull = chunk.cull != 0u;
     uint base = chunk.first - first_slot;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
 
@@ -65,14 +66,18 @@ void main()
         // 2. clip: NaN fails every comparison; what was sifted out is not drawn
         if (!(view.z_near <= z && z <= view.z_far && left <= x && x < right && bottom <= y && y < top))
             continue;
+#if SIFTED
         if (chunk.sifted != 0u &&
             (drawn[chunk.sifted - 1u + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u) == 0u)
             continue;
+#endif
         // 3. limit and early depth test; the sign bit of -0 is dropped
         uint pixel = uint(int(floor(y)) - view.origin_y) * view.width + uint(int(floor(x)) - view.origin_x);
         uint z_bits = pt_bits(z) & 0x7FFFFFFFu;
-        if (behind && !(limit[pixel] < z))
+#if BEHIND
+        if (!(limit[pixel] < z))
             continue;
+#endif
 #if PASS == 0
         if (keys[2u * pixel + 1u] <= z_bits)
             continue;

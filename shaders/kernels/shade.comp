@@ -3,7 +3,7 @@
 // native/device_cpu/kernels/shade.c
 //
 // STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any
-// window); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts;
+// window; OPACITY 0: the instance's, 1: points have their own, 2: the colours' plane has it); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts;
 // RECOLOR: by a ramp, exposure, contrast
 #version 430 core
 #include "lib/math.glsl"
@@ -21,13 +21,17 @@ layout(std430, binding = 10) writeonly buffer arrived_block { float arrived[]; }
 
 #if STEP == 0
 
-float opacity_of(float instance_opacity, bool own, uint id)
+float opacity_of(float instance_opacity, uint id, uint at)
 {
-    if (!own)
-        return instance_opacity;
+#if OPACITY == 2
+    return uintBitsToFloat(point_colors[4u * at + 3u]);
+#elif OPACITY == 1
     uint byte_value = (opacities[id >> 2] >> (8u * (id & 3u))) & 255u;
     precise float opacity = instance_opacity * (float(byte_value) * 0.00392156885936856); // 1 / 255
     return opacity;
+#else
+    return instance_opacity;
+#endif
 }
 
 // The blend, or where it is nothing the source's own normal.
@@ -38,24 +42,40 @@ vec3 finish_blend(vec3 sum, vec3 own)
     return 1e-12 < square ? unit : own;
 }
 
-// What a pixel gives to a blend: the normal of the surface that it shows, and its z; beyond the plane +inf.
-vec4 read_tap(ivec2 size, int x, int y)
+struct surface_pixel {
+    uvec2 key;   // empty beyond the plane
+    uint source; // of the surface that it shows, and its normal; 0 of an empty one
+    vec3 normal;
+};
+
+surface_pixel read_pixel(ivec2 size, int x, int y)
 {
     bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
     uint at = inside ? uint(y * size.x + x) : 0u;
-    float z = inside ? read_z(at) : pt_float(PT_KEY_EMPTY_Z);
-    uint source = z < pt_float(PT_KEY_EMPTY_Z) ? read_from(at) : 0u;
-    precise vec3 normal = read_float4(source).xyz * (source == at ? 1.0 : PT_BLEND_FILLED);
-    return vec4(normal, z);
+    uvec2 key = read_key(at);
+    key.y = inside ? key.y : PT_KEY_EMPTY_Z;
+    uint source = key.y != PT_KEY_EMPTY_Z ? read_from(at) : 0u;
+    return surface_pixel(key, source, read_float4(source).xyz);
 }
+
+// What a pixel gives to a blend: its normal, and its z.
+vec4 tap_of(surface_pixel p, ivec2 size, int x, int y)
+{
+    precise vec3 normal = p.normal * (p.source == uint(y * size.x + x) ? 1.0 : PT_BLEND_FILLED);
+    return vec4(normal, pt_float(p.key.y));
+}
+
+vec4 read_tap(ivec2 size, int x, int y) { return tap_of(read_pixel(size, x, y), size, x, y); }
 
 struct tap_row {
     vec4 west, middle, east;
+    surface_pixel pixel; // the middle one
 };
 
 tap_row read_row(ivec2 size, int x, int y)
 {
-    return tap_row(read_tap(size, x - 1, y), read_tap(size, x, y), read_tap(size, x + 1, y));
+    surface_pixel pixel = read_pixel(size, x, y);
+    return tap_row(read_tap(size, x - 1, y), tap_of(pixel, size, x, y), read_tap(size, x + 1, y), pixel);
 }
 
 void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum)
@@ -89,7 +109,6 @@ void main()
     view_args view = args.view;
     uint id_base = args.instance.id_base, id_count = args.instance.id_count;
     float instance_opacity = args.instance.opacity;
-    bool own_opacity = args.instance.has_opacities != 0u, blended = args.instance.color_format == PT_COLOR_OF_PLANE;
     ivec2 size = ivec2(view.width, view.height);
     uvec2 column = pt_tile_column(view);
     uint end = pt_tile_end(view, column);
@@ -100,28 +119,29 @@ void main()
 #endif
     for (uint y = column.y; y < end; y++) {
         uint at = y * view.width + column.x;
-        uvec2 key = read_key(at);
-        uint source = read_from(at);
-        bool ours = key.x - id_base < id_count && key.y != PT_KEY_EMPTY_Z;
-        source = ours ? source : at;
-        vec3 normal = read_float4(source).xyz;
 #if BLEND
         tap_row above = read_row(size, x, int(y) + 1);
-        float z = pt_float(key.y), limit = read_deff(source);
+        surface_pixel p = row.pixel;
+#else
+        surface_pixel p = read_pixel(size, x, int(y));
+#endif
+        uint id = p.key.x - id_base;
+        vec3 normal = p.normal;
+#if BLEND
+        float z = pt_float(p.key.y), limit = read_deff(p.source);
         vec3 sum = vec3(0.0);
         add_row(below, z, limit, corner, edge, sum);
         add_row(row, z, limit, edge, pt_rcp(1.0), sum);
         add_row(above, z, limit, corner, edge, sum);
-        normal = source == at ? normal : finish_blend(sum, normal);
+        normal = p.source == at ? normal : finish_blend(sum, normal);
         below = row;
         row = above;
 #elif WIDE
-        if (source != at)
-            normal = finish_blend(blend_wide(view, size, x, int(y), pt_float(key.y), read_deff(source)), normal);
+        if (p.source != at)
+            normal = finish_blend(blend_wide(view, size, x, int(y), pt_float(p.key.y), read_deff(p.source)), normal);
 #endif
-        if (ours)
-            shading[at] = vec4(normal, blended && own_opacity ? uintBitsToFloat(point_colors[4u * at + 3u])
-                                                              : opacity_of(instance_opacity, own_opacity, key.x - id_base));
+        if (id < id_count && p.key.y != PT_KEY_EMPTY_Z)
+            shading[at] = vec4(normal, opacity_of(instance_opacity, id, at));
     }
 }
 

@@ -4,6 +4,8 @@
 #ifndef PT_PLANES_GLSL
 #define PT_PLANES_GLSL
 
+#define PT_ROWS 8u // of an invocation of kernels that visit every pixel: as in native/device_gl/kernels.c
+
 layout(binding = 0) uniform usamplerBuffer key_plane;
 layout(binding = 1) uniform usamplerBuffer from_plane;
 layout(binding = 2) uniform samplerBuffer deff_plane;
