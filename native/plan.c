@@ -230,10 +230,9 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
 {
     struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
-    uint32_t margin = (plan->iterations + 2) << plan->levels;
     struct shade_args args;
     pt_shade_lights(builder, pt_receives(instance->instance), &args);
-    args.view = pt_view_of(plan, instance, margin);
+    args.view = pt_view_filled(plan, instance);
     args.instance = instance->args;
     const int shown = pt_line_surface(builder, &args.instance);
     args.light_count = args.instance.lit ? args.light_count : 0;
@@ -444,8 +443,7 @@ static void plan_marks(struct pt_builder *builder)
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count || !pt_receives(instance->instance))
             continue;
-        uint32_t margin = (plan->iterations + 2) << plan->levels;
-        struct mark_args args = {.view = pt_view_of(plan, instance, margin),
+        struct mark_args args = {.view = pt_view_filled(plan, instance),
                                  .id_base = instance->args.id_base,
                                  .id_count = instance->args.id_count};
         PT_REASON(PT_ADD(builder, mark, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_MARKS, i)}),

@@ -107,10 +107,9 @@ void pt_plan_tint(struct pt_builder *builder, enum pt_plane color)
     }
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
-        uint32_t margin = (plan->iterations + 2) << plan->levels;
         if (!instance->chunk_count)
             continue;
-        struct tint_args args = { .view = pt_view_of(plan, instance, margin),
+        struct tint_args args = { .view = pt_view_filled(plan, instance),
                                   .id_base = instance->args.id_base,
                                   .id_count = instance->args.id_count,
                                   .clip_first = plan->clip_count,

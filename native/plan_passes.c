@@ -83,3 +83,14 @@ struct view_args pt_view_of(const struct pt_plan *plan, const struct pt_plan_ins
     view.rect[3] = view.rect[3] < view.height ? view.rect[3] : view.height;
     return view;
 }
+
+struct view_args pt_view_filled(const struct pt_plan *plan, const struct pt_plan_instance *instance)
+{
+    struct view_args view = pt_view_of(plan, instance, (plan->iterations + 2) << plan->levels);
+    const uint32_t *whole = plan->view.rect;
+    for (int k = 0; k < 2; k++) {
+        view.rect[k] = view.rect[k] > whole[k] ? view.rect[k] : whole[k];
+        view.rect[2 + k] = view.rect[2 + k] < whole[2 + k] ? view.rect[2 + k] : whole[2 + k];
+    }
+    return view;
+}

@@ -107,5 +107,7 @@ double pt_pixel_width(const struct patina_scene *scene);
 struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level);
 // The instance's rectangle, wider by what filling may carry its points.
 struct view_args pt_view_of(const struct pt_plan *plan, const struct pt_plan_instance *instance, uint32_t margin);
+// Where the instance may show once holes are filled: nothing is filled beyond the plan's rectangle.
+struct view_args pt_view_filled(const struct pt_plan *plan, const struct pt_plan_instance *instance);
 
 #endif

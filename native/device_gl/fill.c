@@ -145,7 +145,8 @@ static int fill_step(struct fill *f)
     f->d->stamp++;
     if (result != PATINA_OK || !changed)
         return result;
-    pt_gl_tiles_forget(f->d);
+    if (f->phase == PT_FILL_BACKGROUND) // the other phase touches no empty pixel
+        pt_gl_tiles_forget(f->d);
     if (f->args->unfills)
         result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, ((size_t)kept + changed) * SAVED_SIZE,
                               (size_t)kept * SAVED_SIZE);

@@ -95,7 +95,9 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
 {
     const struct shade_choice choice = { .normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE,
-                                         .opacity = !args->instance.has_opacities ? 0 : args->instance.color_format == PT_COLOR_OF_PLANE ? 2 : 1,
+                                         .opacity = !args->instance.has_opacities ? 0
+                                                    : args->instance.color_format == PT_COLOR_OF_PLANE ? 2
+                                                                                                       : 1,
                                          .format = args->instance.color_format % 5,
                                          .lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1,
                                          .plain = (uint32_t)plain_lights(args),

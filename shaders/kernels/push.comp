@@ -81,7 +81,7 @@ void main()
     }
     for (; asked != 0u; asked &= asked - 1u) {
         uint row = uint(findLSB(asked)), y = corner.y + row, at = y * view.width + x;
-        ivec2 cell = ivec2(x, y) >> 1;
+        cell = ivec2(x, y) >> 1;
         float t = threshold(view, at, pt_float(keys[at].y));
         bool covered = is_covered(coarse_pair(coarse_size, cell, side),
                                   coarse_pair(coarse_size, cell + ivec2(0, (y & 1u) != 0u ? 1 : -1), side), t);
