@@ -3,8 +3,9 @@
 // native/device_cpu/kernels/shade.c
 //
 // STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any
-// window; OPACITY 0: the instance's, 1: points have their own, 2: the colours' plane has it); STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts;
-// RECOLOR: by a ramp, exposure, contrast
+// window; OPACITY 0: the instance's, 1: points have their own, 2: the colours' plane has it)
+// STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts; RECOLOR: by a
+// ramp, exposure, contrast
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
