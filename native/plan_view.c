@@ -30,7 +30,8 @@ struct camera {
 struct seen {
     uint32_t chunk;
     uint32_t cull, away; // test each point's normal; every point faces away
-    double rect[4];        // bounds on screen, padded picture
+    double rect[4];        // bounds on screen, pixels of the picture without its padding
+    double z_beyond;       // nothing lies beyond it
     double spacing_px, area_px;
 };
 
@@ -38,9 +39,14 @@ struct object {
     double linear[9], translation[3]; // world from object
     double view[9];                   // camera axes x linear
     double inverse[9];                // object from world, linear part; valid when !singular
+    double eye[4];                    // in its coordinates: xyz and 1, or the direction towards the viewer and 0
     double scale;                     // largest stretch
     int singular;
 };
+
+// As fmin and fmax, which are calls; the second where one is not a number.
+static inline double least(double a, double b) { return a < b ? a : b; }
+static inline double most(double a, double b) { return a > b ? a : b; }
 
 // ---- camera and objects ------------------------------------------------------------------------------------------------
 
@@ -87,6 +93,11 @@ static void set_object(const struct camera *camera, const double world_from_obje
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)
             object->inverse[3 * r + c] = object->singular ? 0.0 : cofactors[3 * c + r] / determinant;
+    double offset[3];
+    for (int k = 0; k < 3; k++)
+        offset[k] = camera->position[k] - object->translation[k];
+    pt_apply(object->inverse, camera->orthographic ? camera->axes + 6 : offset, object->eye);
+    object->eye[3] = camera->orthographic ? 0.0 : 1.0;
 }
 
 // Normals are covectors: the inverse transposed, which also keeps "outward" under mirroring. Scaled to about 1.
@@ -102,15 +113,9 @@ static void normal_matrix(const struct camera *camera, const struct object *obje
         out[i] = object->singular || !(largest > 0.0) ? 0.0f : (float)(sign * product[i] / largest);
 }
 
-// The chunk's product: screen X, Y (perspective: times z) and z rows, and their translation.
-static void chunk_product(const struct camera *camera, const struct object *object, const struct pt_chunk *chunk,
-                          double rows[9], double translation[3])
+// The product's rows, the same for every chunk of an object: screen X, Y (perspective: times z) and z.
+static void product_rows(const struct camera *camera, const struct object *object, double rows[9])
 {
-    double world[3], view[3];
-    pt_apply(object->linear, chunk->origin, world);
-    for (int k = 0; k < 3; k++) // subtract first: the difference is exact where 5e6 m cancel
-        world[k] = (world[k] + object->translation[k]) - camera->position[k];
-    pt_apply(camera->axes, world, view);
     const double sx = 1.0 / camera->xs, sy = 1.0 / camera->ys;
     const double ox = -camera->left * sx, oy = -camera->bottom * sy; // pixel of the axis
     const double *v = object->view;
@@ -123,6 +128,19 @@ static void chunk_product(const struct camera *camera, const struct object *obje
             rows[3 + c] += oy * rows[6 + c];
         }
     }
+}
+
+// The product's translation: of the chunk's origin.
+static void chunk_translation(const struct camera *camera, const struct object *object, const struct pt_chunk *chunk,
+                              double translation[3])
+{
+    double world[3], view[3];
+    pt_apply(object->linear, chunk->origin, world);
+    for (int k = 0; k < 3; k++) // subtract first: the difference is exact where 5e6 m cancel
+        world[k] = (world[k] + object->translation[k]) - camera->position[k];
+    pt_apply(camera->axes, world, view);
+    const double sx = 1.0 / camera->xs, sy = 1.0 / camera->ys;
+    const double ox = -camera->left * sx, oy = -camera->bottom * sy;
     translation[2] = camera->orthographic ? -view[2] - camera->near_clip : -view[2];
     translation[0] = sx * view[0] + ox * (camera->orthographic ? 1.0 : translation[2]);
     translation[1] = sy * view[1] + oy * (camera->orthographic ? 1.0 : translation[2]);
@@ -143,89 +161,76 @@ static double disc_reach(const struct patina_scene *scene, const struct pt_insta
     return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
 }
 
-// Bounds on screen of the chunk's box and what lies within `reach` of it, a pixel wider than exact, its middle depth and one
-// that nothing lies beyond; 0 when it is outside the view.
+// Bounds on screen of the chunk's box and what lies within `reach` of it, a pixel wider than exact and not cut off at the
+// picture's, its middle depth and one that nothing lies beyond; 0 when it is outside the view.
 static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chunk, const double rows[9],
                         const double translation[3], double reach, double rect[4], double *z_middle, double *z_beyond)
 {
     const double z_far = camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip;
     const double z_near = camera->orthographic ? 0.0 : camera->near_clip;
-    double z_min = INFINITY, z_max = -INFINITY, p[3], q[3];
+    double z_min = INFINITY, z_max = -INFINITY, q[3][8]; // of the corners
+    double error[3], slop; // what float32 may move a point by: where |R p| is large beside the sum, more than a pixel
     rect[0] = rect[1] = INFINITY;
     rect[2] = rect[3] = -INFINITY;
-    for (int corner = 0; corner < 8; corner++) {
-        for (int k = 0; k < 3; k++)
-            p[k] = (double)(corner >> k & 1 ? chunk->box_max[k] : chunk->box_min[k]);
-        pt_apply(rows, p, q);
-        for (int k = 0; k < 3; k++)
-            q[k] += translation[k];
-        z_min = q[2] < z_min ? q[2] : z_min; // as fmin and fmax would, which are calls
-        z_max = q[2] > z_max ? q[2] : z_max;
-        double w = camera->orthographic ? 1.0 : q[2];
+    for (int k = 0; k < 3; k++) {
+        double part[3][2];
+        error[k] = fabs(translation[k]);
+        for (int c = 0; c < 3; c++) {
+            part[c][0] = rows[3 * k + c] * (double)chunk->box_min[c];
+            part[c][1] = rows[3 * k + c] * (double)chunk->box_max[c];
+            error[k] += most(fabs(part[c][0]), fabs(part[c][1]));
+        }
+        error[k] *= 0x1p-21;
+        for (int i = 0; i < 8; i++)
+            q[k][i] = ((part[0][i & 1] + part[1][i >> 1 & 1]) + part[2][i >> 2]) + translation[k];
+    }
+    for (int i = 0; i < 8; i++) {
+        z_min = least(q[2][i], z_min);
+        z_max = most(q[2][i], z_max);
+        double w = camera->orthographic ? 1.0 : q[2][i];
         for (int k = 0; k < 2 && w > 0.0; k++) {
-            double at = q[k] / w;
-            rect[k] = at - 1.0 < rect[k] ? at - 1.0 : rect[k];
-            rect[2 + k] = at + 1.0 > rect[2 + k] ? at + 1.0 : rect[2 + k];
+            double at = q[k][i] / w;
+            rect[k] = least(at - 1.0, rect[k]);
+            rect[2 + k] = most(at + 1.0, rect[2 + k]);
         }
     }
-    double error[3], slop; // what float32 may move a point by: where |R p| is large beside the sum, more than a pixel
-    for (int k = 0; k < 3; k++) {
-        error[k] = fabs(translation[k]);
-        for (int c = 0; c < 3; c++)
-            error[k] += fabs(rows[3 * k + c]) * fmax(fabs((double)chunk->box_min[c]), fabs((double)chunk->box_max[c]));
-        error[k] *= 0x1p-21;
-    }
     slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
-    *z_middle = 0.5 * (fmax(z_min, z_near) + fmax(z_max, z_near)); // of the part before the eye
+    *z_middle = 0.5 * (most(z_min, z_near) + most(z_max, z_near)); // of the part before the eye
     *z_beyond = z_max + slop + reach;
     const double nearest_z = z_min - reach;
     if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
         return 0;
-    double nearest = camera->orthographic ? 1.0 : fmax(nearest_z, z_near) - error[2];
+    double nearest = camera->orthographic ? 1.0 : most(nearest_z, z_near) - error[2];
     for (int k = 0; k < 2; k++) {
-        double far = fmax(fabs(rect[k]), fabs(rect[2 + k])), wider = INFINITY;
+        double far = most(fabs(rect[k]), fabs(rect[2 + k])), wider = INFINITY;
         if (camera->orthographic)
             wider = error[k];
         else if (nearest > 0.0)
             wider = (error[k] + far * error[2]) / nearest + far * 0x1p-20;
         // sideways, and along the view at the rim's slope
         double step = k ? camera->ys : camera->xs, start = k ? camera->bottom : camera->left;
-        double slope = fmax(fabs(start + step * rect[k]), fabs(start + step * rect[2 + k]));
+        double slope = most(fabs(start + step * rect[k]), fabs(start + step * rect[2 + k]));
         if (reach > 0.0)
-            wider += camera->orthographic ? reach / step : reach * (1.0 + slope) / (step * fmax(nearest, 0.0));
+            wider += camera->orthographic ? reach / step : reach * (1.0 + slope) / (step * most(nearest, 0.0));
         rect[k] -= wider;
         rect[2 + k] += wider;
     }
     if (!camera->orthographic && nearest_z < z_near) { // corners behind the camera bound nothing
-        rect[0] = rect[1] = 0.0;
-        rect[2] = camera->width;
-        rect[3] = camera->height;
+        rect[0] = rect[1] = -INFINITY;
+        rect[2] = rect[3] = INFINITY;
     }
-    rect[0] = fmax(rect[0], 0.0);
-    rect[1] = fmax(rect[1], 0.0);
-    rect[2] = fmin(rect[2], camera->width);
-    rect[3] = fmin(rect[3], camera->height);
-    return rect[0] < rect[2] && rect[1] < rect[3];
+    // what is not a number bounds nothing
+    return !(rect[0] >= camera->width || rect[1] >= camera->height || rect[2] <= 0.0 || rect[3] <= 0.0);
 }
 
 enum facing { FACES_AWAY, FACES_BOTH, FACES_US };
 
-// The eye in the chunk's coordinates: xyz and 1, or the direction towards the viewer and 0.
-static void chunk_eye(const struct camera *camera, const struct object *object, const struct pt_chunk *chunk,
-                      double eye[4])
+// The object's, in the chunk's coordinates.
+static void chunk_eye(const struct object *object, const struct pt_chunk *chunk, double eye[4])
 {
-    if (camera->orthographic) {
-        pt_apply(object->inverse, camera->axes + 6, eye);
-        eye[3] = 0.0;
-        return;
-    }
-    double offset[3];
+    eye[3] = object->eye[3];
     for (int k = 0; k < 3; k++)
-        offset[k] = camera->position[k] - object->translation[k];
-    pt_apply(object->inverse, offset, eye);
-    for (int k = 0; k < 3; k++)
-        eye[k] -= chunk->origin[k];
-    eye[3] = 1.0;
+        eye[k] = eye[3] > 0.0 ? object->eye[k] - chunk->origin[k] : object->eye[k];
 }
 
 // How the chunk's normals lie towards the eye, by their cone: the angle between its axis and the direction to the eye, and
@@ -246,8 +251,8 @@ static int chunk_angles(const struct pt_chunk *chunk, const double eye[4], doubl
     radius = eye[3] > 0.0 ? sqrt(radius) : 0.0;
     if (!(distance > radius))
         return 0;
-    *angle = acos(fmax(-1.0, fmin(1.0, pt_dot(axis, towards) / distance)));
-    *spread = acos(fmax(-1.0, (double)chunk->cone_cosine)) + asin(radius / distance) + 1e-3;
+    *angle = acos(most(least(pt_dot(axis, towards) / distance, 1.0), -1.0));
+    *spread = acos(most((double)chunk->cone_cosine, -1.0)) + asin(radius / distance) + 1e-3;
     return 1;
 }
 
@@ -267,7 +272,7 @@ static double chunk_cosine(int known, double angle, double spread)
     if (!known)
         return 1.0;
     angle = angle > right_angle ? 2.0 * right_angle - angle : angle;
-    return fmax(cos(fmax(angle - spread, 0.0)), (double)PT_COSINE_FLOOR);
+    return most(cos(most(angle - spread, 0.0)), (double)PT_COSINE_FLOOR);
 }
 
 // ---- the chunks in view ------------------------------------------------------------------------------------------------
@@ -302,6 +307,9 @@ static int is_transparent(const struct pt_instance *instance)
     return instance->style.transparency > 0.0f || instance->cloud->info.has_opacities;
 }
 
+// Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
+enum { AROUND = 160 };
+
 static int look_at_instance(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey, uint32_t i)
 {
     const struct pt_instance *instance = &scene->instances[i];
@@ -317,26 +325,31 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, clips);
+    const double apart = thinning(scene);
+    double rows[9];
+    product_rows(camera, object, rows);
     for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         struct seen seen = { .chunk = c };
-        double rows[9], translation[3], eye[4], z, beyond, angle = 0.0, spread = 0.0;
+        double translation[3], eye[4], z, angle = 0.0, spread = 0.0;
         if (pt_sieve_chunk(&survey->sieves[i], chunk, NULL, NULL) == PT_CUT_AWAY) {
             plan->chunks_clipped++;
             continue;
         }
-        chunk_product(camera, object, chunk, rows, translation);
-        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, thinning(scene)), seen.rect,
-                          &z, &beyond))
+        chunk_translation(camera, object, chunk, translation);
+        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart), seen.rect, &z,
+                          &seen.z_beyond))
             continue;
-        chunk_eye(camera, object, chunk, eye);
+        for (int k = 0; k < 4; k++)
+            seen.rect[k] -= AROUND;
+        chunk_eye(object, chunk, eye);
         int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
         enum facing facing = chunk_facing(known, angle, spread);
         if (cull && facing == FACES_AWAY)
             continue;
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered;
-        double footprint = fmax(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
+        double footprint = most(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
         uint32_t count = drawn_points(scene, chunk);
         double thinned = sqrt((double)chunk->count / count);
         seen.spacing_px = thinned * (double)chunk->spacing * object->scale / footprint *
@@ -496,14 +509,15 @@ static void set_product(const double rows[9], const double translation[3], float
     }
 }
 
-static void set_chunk(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
-                      const struct pt_chunk *chunk, uint32_t count, uint32_t cull, struct chunk_view *out)
+static void set_chunk(const struct camera *camera, const struct object *object, const double rows[9],
+                      const struct pt_instance *instance, const struct pt_chunk *chunk, uint32_t count, uint32_t cull,
+                      struct chunk_view *out)
 {
-    double rows[9], translation[3], eye[4] = { 0 };
-    chunk_product(camera, object, chunk, rows, translation);
+    double translation[3], eye[4] = { 0 };
+    chunk_translation(camera, object, chunk, translation);
     set_product(rows, translation, out->row, out->hi, out->lo);
     if (cull)
-        chunk_eye(camera, object, chunk, eye);
+        chunk_eye(object, chunk, eye);
     for (int k = 0; k < 4; k++)
         out->eye[k] = (float)eye[k];
     out->first = chunk->first;
@@ -552,16 +566,18 @@ static void join_rect(uint32_t rect[4], const uint32_t other[4])
     }
 }
 
-// The part of a chunk's bounds that the planes hold; 0 when none.
-static int rect_in_window(const struct view_args *view, const double bounds[4], uint32_t rect[4])
+// The part of bounds, in a picture padded by `pad` less than the planes' one, that the planes hold; 0 when none.
+static int rect_in_window(const struct view_args *view, const double bounds[4], uint32_t pad, uint32_t rect[4])
 {
-    const double origin[2] = { view->origin_x, view->origin_y }, size[2] = { view->width, view->height };
-    for (int k = 0; k < 2; k++) {
-        double first = floor(bounds[k] - origin[k]), last = ceil(bounds[2 + k] - origin[k]);
+    const double origin[2] = { (double)view->origin_x - pad, (double)view->origin_y - pad };
+    const double size[2] = { view->width, view->height };
+    for (int k = 0; k < 2; k++) { // cut first: what is left is whole numbers that fit
+        double first = most(bounds[k] - origin[k], 0.0), last = least(bounds[2 + k] - origin[k], size[k]);
         if (!(last > 0.0) || !(first < size[k]))
             return 0;
-        rect[k] = (uint32_t)fmax(first, 0.0);
-        rect[2 + k] = (uint32_t)fmin(last, size[k]);
+        rect[k] = (uint32_t)first;
+        rect[2 + k] = (uint32_t)last;
+        rect[2 + k] += (double)rect[2 + k] < last;
     }
     return rect[0] < rect[2] && rect[1] < rect[3];
 }
@@ -579,19 +595,17 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
     if (!out->chunks || !out->bounds)
         return PATINA_ERROR_MEMORY;
+    double rows[9];
+    product_rows(&survey->camera, &survey->objects[i], rows);
     for (uint32_t k = 0; k < survey->seen_count[i]; k++) {
         const struct seen *seen = &survey->seen[i][k];
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
-        double rows[9], translation[3], bounds[4], z, beyond;
         uint32_t *rect = out->bounds[out->chunk_count].rect;
-        chunk_product(&survey->camera, &survey->objects[i], chunk, rows, translation);
-        double reach = disc_reach(scene, instance, &survey->objects[i], chunk, thinning(scene));
-        if (!chunk_bounds(&survey->camera, chunk, rows, translation, reach, bounds, &z, &beyond) ||
-            !rect_in_window(&plan->view, bounds, rect))
+        if (!rect_in_window(&plan->view, seen->rect, plan->guard, rect))
             continue;
         uint32_t count = drawn_points(scene, chunk);
-        out->bounds[out->chunk_count].z_far = nextafterf((float)beyond, INFINITY);
-        set_chunk(&survey->camera, &survey->objects[i], instance, chunk, count, seen->cull,
+        out->bounds[out->chunk_count].z_far = nextafterf((float)seen->z_beyond, INFINITY);
+        set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
                   &out->chunks[out->chunk_count]);
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
@@ -613,9 +627,10 @@ static void place_mesh(struct pt_plan *plan, const struct camera *camera, const 
     double rows[9], translation[3], bounds[4], z, beyond;
     *out = (struct pt_plan_mesh){ .instance = instance };
     set_object(camera, instance->style.world_from_object, &object);
-    chunk_product(camera, &object, &mesh->box, rows, translation);
+    product_rows(camera, &object, rows);
+    chunk_translation(camera, &object, &mesh->box, translation);
     if (!pt_mesh_drawn(mesh) || !chunk_bounds(camera, &mesh->box, rows, translation, 0.0, bounds, &z, &beyond) ||
-        !rect_in_window(&plan->view, bounds, out->rect))
+        !rect_in_window(&plan->view, bounds, 0, out->rect))
         return;
     struct mesh_args *args = &out->args;
     set_product(rows, translation, args->row, args->hi, args->lo);
@@ -642,7 +657,7 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
         return PATINA_ERROR_MEMORY;
     int error = set_camera(scene, &survey->camera);
     const struct camera bare = survey->camera;
-    pad_camera(&survey->camera, 160);
+    pad_camera(&survey->camera, AROUND);
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = look_at_instance(scene, plan, survey, i);
     survey->camera = bare;
@@ -704,7 +719,9 @@ int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const
     pad_camera(&camera, plan->guard);
     set_object(&camera, instance->style.world_from_object, &object);
     set_instance(&camera, &object, instance, 1.0, args);
+    double rows[9];
+    product_rows(&camera, &object, rows);
     for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-        set_chunk(&camera, &object, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0, &(*chunks)[c]);
+        set_chunk(&camera, &object, rows, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0, &(*chunks)[c]);
     return PATINA_OK;
 }

@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-double pt_dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 void pt_cofactors(const double m[9], double out[9])
 {
     for (int r = 0; r < 3; r++)
@@ -26,12 +24,6 @@ void pt_multiply(const double a[9], const double b[9], double out[9])
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)
             out[3 * r + c] = a[3 * r] * b[c] + a[3 * r + 1] * b[3 + c] + a[3 * r + 2] * b[6 + c];
-}
-
-void pt_apply(const double m[9], const double v[3], double out[3])
-{
-    for (int r = 0; r < 3; r++)
-        out[r] = pt_dot(m + 3 * r, v);
 }
 
 void pt_split_matrix(const double matrix[16], double linear[9], double translation[3])

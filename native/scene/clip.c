@@ -134,6 +134,8 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
 {
     struct pt_division found = { 0 };
     double linear[9], object[3], origin[3];
+    if (!sieve->count && !sieve->keeping && !sieve->hiding)
+        return PT_WHOLE; // of most scenes all are
     int by_class = hidden(sieve, chunk), kept = !sieve->keeping;
     if (by_class == 1)
         return PT_CUT_AWAY;

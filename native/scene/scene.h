@@ -42,8 +42,12 @@ struct patina_scene {
 double pt_determinant(const double m[9]);
 void pt_cofactors(const double m[9], double out[9]); // inverse transposed = cofactors / determinant
 void pt_multiply(const double a[9], const double b[9], double out[9]);
-void pt_apply(const double m[9], const double v[3], double out[3]);
-double pt_dot(const double a[3], const double b[3]);
+static inline double pt_dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static inline void pt_apply(const double m[9], const double v[3], double out[3])
+{
+    for (int r = 0; r < 3; r++)
+        out[r] = pt_dot(m + 3 * r, v);
+}
 
 // The camera's axes (unit, rows x, y, z) and position from world_from_camera. PATINA_ERROR_ARGUMENT when singular.
 int pt_camera_axes(const patina_camera *camera, double axes[9], double position[3]);
