@@ -89,8 +89,10 @@ static inline vf pt_own_distance(const struct view_args *view, const float *deff
                                  size_t at, vf z, vm lanes)
 {
     vi source = pt_source_of(from, at);
-    if (view->level)
-        return vf_level_distance(view, deff, normals, source, z, lanes);
+    if (view->level) {
+        vf inverse = vf_gather_inverse(normals, source, lanes);
+        return vf_level_distance(view, vf_gather(deff, source, lanes), inverse, z);
+    }
     vm other = pt_filled(source, at, lanes);
     vf own = vf_load(deff + at);
     if (!vm_bits(other))

@@ -135,16 +135,16 @@ static inline vf vf_layer_distance(const struct view_args *view, float d_min, vf
     return d * inverse;
 }
 
-// d_eff at this view's level of pixels whose surface comes from the measured pixels `source`.
-static inline vf vf_level_distance(const struct view_args *view, const float *deff, const float *normals, vi source, vf z,
-                                   vm lanes)
+// 1 / max(|n.v|, C) of pixels.
+static inline vf vf_gather_inverse(const float *normals, vi i, vm lanes)
 {
-    vf d = vf_gather(deff, source, lanes);
-    if (view->level) {
-        vf inverse = vf_gather(normals, vi_add(vi_mul(source, vi_set(4)), vi_set(3)), lanes);
-        d = vf_max(d, vf_footprint(view, z) * inverse);
-    }
-    return d;
+    return vf_gather(normals, vi_add(vi_mul(i, vi_set(4)), vi_set(3)), lanes);
+}
+
+// d_eff at this view's level, given that of level 0 and 1 / max(|n.v|, C).
+static inline vf vf_level_distance(const struct view_args *view, vf d, vf inverse, vf z)
+{
+    return view->level ? vf_max(d, vf_footprint(view, z) * inverse) : d;
 }
 
 // z at ray p of the plane with normal n through the point at (ray q, z_q), not nearer than z_q, not farther than
