@@ -372,10 +372,14 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
         uint32_t px = args->crop_x + x, count = pt_lanes_left(x, args->crop_width);
         vf z = vf_load(seen->z + px), color[4] = { background[0], background[1], background[2], background[3] };
         vm some = vm_and(vm_first(count), vf_lt(z, empty)), mixed = vm_of_bits(0);
-        if (vm_bits(some)) {
+        if (vm_bits(some) && count == PT_LANES && pt_flat(seen, px)) { // opaque, and no edge
+            for (uint32_t k = 0; k < 3; k++)
+                color[k] = vf_load(around.row[1]->color[k] + px);
+            color[3] = vf_set(1.0f);
+        } else if (vm_bits(some)) {
             vf shown[4] = { vf_load(around.row[1]->color[0] + px), vf_load(around.row[1]->color[1] + px),
                             vf_load(around.row[1]->color[2] + px), vf_set(1.0f) };
-            if (finish->antialias && !pt_flat(seen, px))
+            if (finish->antialias)
                 mixed = mix_edges(finish, &around, seen->limit, px, (uint32_t)y, some, shown);
             pt_compose(shown, background, some, color);
         }
