@@ -11,11 +11,16 @@
 enum { MAX_THREADS = 256, SPINS = 2000 };
 
 // Every thread has a range of its own, the same in every step of a frame with as many items: what it wrote it reads again,
-// from its own caches. A thread that is done takes from the others' ranges.
+// from its own caches. A thread that is done takes the latter half of what another has left, so that both go on in one piece:
+// rows that follow each other cost less than rows here and there.
 struct range {
-    _Alignas(64) atomic_uint next;
-    uint32_t end;
+    _Alignas(64) _Atomic uint64_t span; // next | end << 32; an item that has left it never comes back
 };
+
+static uint64_t span_of(uint32_t next, uint32_t end) { return (uint64_t)end << 32 | next; }
+static uint32_t span_next(uint64_t span) { return (uint32_t)span; }
+static uint32_t span_end(uint64_t span) { return (uint32_t)(span >> 32); }
+static uint32_t span_left(uint64_t span) { return span_next(span) < span_end(span) ? span_end(span) - span_next(span) : 0; }
 
 struct job {
     pt_work *work;
@@ -44,17 +49,51 @@ struct helper_start {
     uint32_t thread;
 };
 
+// Up to a grain from the front of the thread's own range; 0 when it is empty.
+static int take(struct job *job, uint32_t thread, uint32_t *begin, uint32_t *end)
+{
+    _Atomic uint64_t *own = &job->range[thread].span;
+    uint64_t span = atomic_load_explicit(own, memory_order_relaxed);
+    do {
+        if (!span_left(span))
+            return 0;
+        *begin = span_next(span);
+        *end = *begin + (span_left(span) < job->grain ? span_left(span) : job->grain);
+    } while (!atomic_compare_exchange_weak_explicit(own, &span, span_of(*end, span_end(span)), memory_order_relaxed,
+                                                    memory_order_relaxed));
+    return 1;
+}
+
+// Fills the thread's own range, which is empty, from the longest; 0 when all are empty.
+static int steal(struct job *job, uint32_t thread)
+{
+    for (;;) {
+        uint64_t most = 0;
+        uint32_t victim = thread;
+        for (uint32_t t = 0; t < job->ranges; t++) {
+            uint64_t span = atomic_load_explicit(&job->range[t].span, memory_order_relaxed);
+            victim = span_left(span) > span_left(most) ? t : victim;
+            most = span_left(span) > span_left(most) ? span : most;
+        }
+        if (!span_left(most))
+            return 0;
+        uint32_t left = span_left(most), middle = span_end(most) - (left <= job->grain ? left : left / 2);
+        uint64_t expected = most;
+        if (!atomic_compare_exchange_strong_explicit(&job->range[victim].span, &expected, span_of(span_next(most), middle),
+                                                     memory_order_relaxed, memory_order_relaxed))
+            continue;
+        atomic_store_explicit(&job->range[thread].span, span_of(middle, span_end(most)), memory_order_relaxed);
+        return 1;
+    }
+}
+
 static void take_part(struct job *job, uint32_t thread)
 {
-    for (uint32_t k = 0; k < job->ranges; k++) {
-        struct range *range = &job->range[(thread + k) % job->ranges];
-        for (;;) {
-            uint32_t begin = atomic_fetch_add_explicit(&range->next, job->grain, memory_order_relaxed);
-            if (begin >= range->end)
-                break;
-            job->work(job->context, begin, range->end - begin < job->grain ? range->end : begin + job->grain, thread);
-        }
-    }
+    uint32_t begin, end;
+    do {
+        while (take(job, thread, &begin, &end))
+            job->work(job->context, begin, end, thread);
+    } while (steal(job, thread));
 }
 
 static void pause_a_moment(void)
@@ -166,15 +205,14 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
         grain = pool->batch;
     if (!grain)
         grain = items / (4 * pool->threads);
-    // next runs past its end by up to threads * grain; keep that from wrapping
-    uint32_t most = UINT32_MAX / (2 * pool->threads);
-    grain = grain < 1 ? 1 : grain > most ? most : grain;
+    grain = grain < 1 ? 1 : grain;
     struct job job = { work, context, grain, pool->threads, pool->ranges };
     pthread_mutex_lock(&pool->caller);
-    for (uint32_t t = 0; t < pool->threads; t++) {
-        atomic_init(&pool->ranges[t].next, (uint32_t)((uint64_t)items * t / pool->threads));
-        pool->ranges[t].end = (uint32_t)((uint64_t)items * (t + 1) / pool->threads);
-    }
+    for (uint32_t t = 0; t < pool->threads; t++)
+        atomic_store_explicit(&pool->ranges[t].span,
+                              span_of((uint32_t)((uint64_t)items * t / pool->threads),
+                                      (uint32_t)((uint64_t)items * (t + 1) / pool->threads)),
+                              memory_order_relaxed);
     if (items > grain) {
         pthread_mutex_lock(&pool->lock);
         pool->job = &job;
