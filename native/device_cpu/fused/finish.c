@@ -265,12 +265,16 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         vf color[4];
         if (!vm_bits(some))
             continue;
-        if (finish->channels == 4)
-            pt_smooth_pixels(finish->smooth, rows, 4, 0, x, vf_load(seen->limit + x), some, color);
-        else if (pt_flat(seen, x))
-            pt_smooth_pixels(finish->smooth, rows, 3, 1, x, vf_load(seen->limit + x), some, color);
+        const vf limit = vf_load(seen->limit + x);
+        const int flat = pt_flat(seen, x);
+        if (finish->channels == 3 && flat)
+            pt_smooth_pixels(finish->smooth, rows, 3, 1, x, limit, some, color);
+        else if (finish->channels == 3)
+            pt_smooth_pixels(finish->smooth, rows, 3, 0, x, limit, some, color);
+        else if (flat)
+            pt_smooth_pixels(finish->smooth, rows, 4, 1, x, limit, some, color);
         else
-            pt_smooth_pixels(finish->smooth, rows, 3, 0, x, vf_load(seen->limit + x), some, color);
+            pt_smooth_pixels(finish->smooth, rows, 4, 0, x, limit, some, color);
         for (int k = 0; k < finish->channels; k++)
             vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
     }
