@@ -260,6 +260,7 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
     out->z = rows[1]->z;
     if (!anything(finish, walk, y))
         return;
+    const vf whole = vf_set(pt_smooth_scale(finish->smooth));
     for (uint32_t x = 0; x < width; x += PT_LANES) {
         vm some = vf_lt(vf_load(out->z + x), empty); // +inf behind the row's end
         vf color[4];
@@ -268,13 +269,13 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         const vf limit = vf_load(seen->limit + x);
         const int flat = pt_flat(seen, x);
         if (finish->channels == 3 && flat)
-            pt_smooth_pixels(finish->smooth, rows, 3, 1, x, limit, some, color);
+            pt_smooth_pixels(finish->smooth, rows, 3, &whole, x, limit, some, color);
         else if (finish->channels == 3)
-            pt_smooth_pixels(finish->smooth, rows, 3, 0, x, limit, some, color);
+            pt_smooth_pixels(finish->smooth, rows, 3, NULL, x, limit, some, color);
         else if (flat)
-            pt_smooth_pixels(finish->smooth, rows, 4, 1, x, limit, some, color);
+            pt_smooth_pixels(finish->smooth, rows, 4, &whole, x, limit, some, color);
         else
-            pt_smooth_pixels(finish->smooth, rows, 4, 0, x, limit, some, color);
+            pt_smooth_pixels(finish->smooth, rows, 4, NULL, x, limit, some, color);
         for (int k = 0; k < finish->channels; k++)
             vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
     }
@@ -376,16 +377,16 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
         uint32_t px = args->crop_x + x, count = pt_lanes_left(x, args->crop_width);
         vf z = vf_load(seen->z + px), color[4] = { background[0], background[1], background[2], background[3] };
         vm some = vm_and(vm_first(count), vf_lt(z, empty)), mixed = vm_of_bits(0);
-        if (vm_bits(some) && count == PT_LANES && pt_flat(seen, px)) { // opaque, and no edge
-            for (uint32_t k = 0; k < 3; k++)
-                color[k] = vf_load(around.row[1]->color[k] + px);
-            color[3] = vf_set(1.0f);
-        } else if (vm_bits(some)) {
+        if (vm_bits(some)) {
             vf shown[4] = { vf_load(around.row[1]->color[0] + px), vf_load(around.row[1]->color[1] + px),
                             vf_load(around.row[1]->color[2] + px), vf_set(1.0f) };
-            if (finish->antialias)
-                mixed = mix_edges(finish, &around, seen->limit, px, (uint32_t)y, some, shown);
-            pt_compose(shown, background, some, color);
+            if (pt_flat(seen, px)) { // opaque, and no edge
+                memcpy(color, shown, sizeof color);
+            } else {
+                if (finish->antialias)
+                    mixed = mix_edges(finish, &around, seen->limit, px, (uint32_t)y, some, shown);
+                pt_compose(shown, background, some, color);
+            }
         }
         vf_put4(combined + 4 * (size_t)x, color, count);
         if (finish->extract)

@@ -16,10 +16,10 @@ static inline float pt_smooth_scale(const struct smooth_args *args)
     return pt_rcp((args->center + 4.0f * args->edge) + 4.0f * args->corner);
 }
 
-// rows: y - 1, y, y + 1. limit: d_eff of the pixels from x on. `some` are not empty. channels: 3, or 4 with alpha. flat: all of
-// them and those around are one layer.
+// rows: y - 1, y, y + 1. limit: d_eff of the pixels from x on. `some` are not empty. channels: 3, or 4 with alpha. whole:
+// where all of them and those around are one layer pt_smooth_scale, else NULL.
 static inline void pt_smooth_pixels(const struct smooth_args *args, const struct pt_color_row *const rows[3], int channels,
-                                    int flat, uint32_t x, vf limit, vm some, vf out[4])
+                                    const vf *whole, uint32_t x, vf limit, vm some, vf out[4])
 {
     const vf zero = vf_zero(), one = vf_set(1.0f), z = vf_load(rows[1]->z + x);
     vf edges[5] = { zero, zero, zero, zero, zero }, corners[5] = { zero, zero, zero, zero, zero }; // the last counts
@@ -29,9 +29,9 @@ static inline void pt_smooth_pixels(const struct smooth_args *args, const struct
                 continue;
             const struct pt_color_row *row = rows[1 + dy];
             vf *sum = dx && dy ? corners : edges;
-            for (int k = 0; k < channels && flat; k++)
+            for (int k = 0; k < channels && whole; k++)
                 sum[k] = sum[k] + vf_load(row->color[k] + x + dx);
-            if (flat)
+            if (whole)
                 continue;
             vm same = vm_and(some, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit)); // else another layer, or nothing
             for (int k = 0; k < channels; k++)
@@ -39,7 +39,7 @@ static inline void pt_smooth_pixels(const struct smooth_args *args, const struct
             sum[4] = vf_add_where(same, sum[4], one);
         }
     const vf center = vf_set(args->center), edge = vf_set(args->edge), corner = vf_set(args->corner);
-    vf scale = flat ? vf_set(pt_smooth_scale(args)) : vf_rcp((center + edges[4] * edge) + corners[4] * corner);
+    vf scale = whole ? *whole : vf_rcp((center + edges[4] * edge) + corners[4] * corner);
     for (int k = 0; k < channels; k++) {
         vf own = vf_load(rows[1]->color[k] + x) * center;
         out[k] = ((own + edges[k] * edge) + corners[k] * corner) * scale;
