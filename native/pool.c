@@ -7,8 +7,8 @@
 #include <stdlib.h>
 
 // A frame is a few dozen short parallel steps: waking a sleeping thread costs 50 us each time, so both sides look for
-// work a while (some 30 us) before they sleep. Not where threads outnumber cores.
-enum { MAX_THREADS = 256, SPINS = 2000 };
+// work a while (some 100 us: longer than a plan takes) before they sleep. Not where threads outnumber cores.
+enum { MAX_THREADS = 256, SPINS = 6000 };
 
 // Every thread has a range of its own, the same in every step of a frame with as many items: what it wrote it reads again,
 // from its own caches. A thread that is done takes the latter half of what another has left, so that both go on in one piece:
@@ -33,10 +33,10 @@ struct pt_pool {
     pthread_mutex_t lock;
     pthread_mutex_t caller; // one pt_parallel at a time
     pthread_cond_t wake, done;
-    struct job *job;
+    struct job *job;      // that helpers may join; NULL between two
     struct range *ranges; // one a thread
     _Atomic uint64_t generation;
-    atomic_uint running; // helpers still in the current job
+    atomic_uint running; // helpers that joined it and are not done
     uint32_t spins;
     uint32_t threads, batch;
     int quit;
@@ -121,7 +121,10 @@ static void *helper_main(void *argument)
             break;
         seen = pool->generation;
         struct job *job = pool->job;
+        pool->running += job != NULL;
         pthread_mutex_unlock(&pool->lock);
+        if (!job)
+            continue;
         take_part(job, start.thread);
         pthread_mutex_lock(&pool->lock);
         if (atomic_fetch_sub(&pool->running, 1) == 1)
@@ -216,7 +219,6 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
     if (items > grain) {
         pthread_mutex_lock(&pool->lock);
         pool->job = &job;
-        pool->running = pool->started;
         pool->generation++;
         pthread_cond_broadcast(&pool->wake);
         pthread_mutex_unlock(&pool->lock);
@@ -224,6 +226,7 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
         for (uint32_t i = 0; i < pool->spins && atomic_load_explicit(&pool->running, memory_order_acquire); i++)
             pause_a_moment();
         pthread_mutex_lock(&pool->lock);
+        pool->job = NULL; // who still sleeps is not waited for: nothing is left to do
         while (pool->running)
             pthread_cond_wait(&pool->done, &pool->lock);
         pthread_mutex_unlock(&pool->lock);
