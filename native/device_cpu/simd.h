@@ -134,6 +134,11 @@ static inline vi vi_sides(vi a) // lane 2k: k, lane 2k + 1: k + 2
 {
     return _mm512_permutexvar_epi32(_mm512_setr_epi32(0, 2, 1, 3, 2, 4, 3, 5, 4, 6, 5, 7, 6, 8, 7, 9), a);
 }
+static inline vi vi_west(vi before, vi own) // of each lane of own the one before it
+{
+    return _mm512_alignr_epi32(own, before, 15);
+}
+static inline vi vi_east(vi own, vi behind) { return _mm512_alignr_epi32(behind, own, 1); }
 static inline vi vi_evens(vi a, vi b) // lanes 0, 2, 4 ... of both
 {
     const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
@@ -299,6 +304,8 @@ static inline vi vi_sides(vi a)
 {
     return _mm256_permutevar8x32_epi32(a, _mm256_setr_epi32(0, 2, 1, 3, 2, 4, 3, 5));
 }
+static inline vi vi_west(vi before, vi own) { return _mm256_alignr_epi8(own, _mm256_permute2x128_si256(before, own, 0x21), 12); }
+static inline vi vi_east(vi own, vi behind) { return _mm256_alignr_epi8(_mm256_permute2x128_si256(own, behind, 0x21), own, 4); }
 #define PT_VECTOR(name) _mm256_##name
 
 #elif defined(PT_ISA_SSE42)
@@ -411,6 +418,8 @@ static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm_and_ps(b, _mm_c
 static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { sse_pack(p, a, lanes); }
 static inline vi vi_pairs(vi a) { return _mm_shuffle_epi32(a, 0x50); }
 static inline vi vi_sides(vi a) { return _mm_shuffle_epi32(a, 0xD8); }
+static inline vi vi_west(vi before, vi own) { return _mm_alignr_epi8(own, before, 12); }
+static inline vi vi_east(vi own, vi behind) { return _mm_alignr_epi8(behind, own, 4); }
 #define PT_VECTOR(name) _mm_##name
 
 #else // scalar: the same kernels, a lane at a time
@@ -486,6 +495,8 @@ static inline vi vi_load_id(const uint64_t *keys) { return vi_evens(vi_load(keys
 static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { *p = ((void)lanes, a); }
 static inline vi vi_pairs(vi a) { return a; }
 static inline vi vi_sides(vi a) { return a; } // of an even pixel
+static inline vi vi_west(vi before, vi own) { return ((void)own, before); }
+static inline vi vi_east(vi own, vi behind) { return ((void)own, behind); }
 static inline vi vi_evens(vi a, vi b) { return ((void)b, a); }
 static inline vi vi_odds(vi a, vi b) { return ((void)a, b); }
 static inline void vi_zip(vi a, vi b, vi out[2])
@@ -624,6 +635,8 @@ static inline vi vi_gather_id(const uint64_t *keys, vi i, vm m) // lower words o
     return vi_gather_z((const uint64_t *)(const void *)((const char *)keys - 4), i, m);
 }
 static inline vf vf_gather(const float *base, vi i, vm m) { return vi_float(vi_gather(base, i, m)); }
+static inline vf vf_west(vf before, vf own) { return vi_float(vi_west(vf_bits(before), vf_bits(own))); }
+static inline vf vf_east(vf own, vf behind) { return vi_float(vi_east(vf_bits(own), vf_bits(behind))); }
 // vi_least_keys: keys[i] = min(keys[i], z << 32 | id), of the first half of the lanes; of the others at keys + apart. No key's
 // first bit is set. PT_KEYS_AT_ONCE lie in one vector: where they begin at its multiples, what is written is read again soon.
 #if defined(PT_ISA_AVX2) || defined(PT_ISA_SSE42)
