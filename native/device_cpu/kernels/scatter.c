@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // scatter: points -> least key a pixel. [D 3.1]; twin of shaders/kernels/scatter.comp
 //
-// A gathered depth test comes before any store: only nearer points go on to the scalar part. Threads share the plane and
-// store by compare-and-swap; the minimum commutes, so neither threads nor batches show. Chunks are compact on screen, so
-// threads seldom meet: 3.1 ms for 1M points on two cores where private planes, merged afterwards, take 6.1.
+// What faces away leaves first: the words of a chunk's points lie side by side. Several threads share the plane and store by
+// compare-and-swap (9 cycles), after a gathered depth test; one takes the minimum without asking. The minimum commutes, so
+// neither threads nor batches show. Chunks are compact on screen, so threads seldom meet: 3.1 ms for 1M points on two cores
+// where private planes, merged afterwards, take 6.1.
 #include "device_cpu/cpu.h"
 #include "device_cpu/vector_math.h"
 
@@ -24,8 +25,7 @@ static inline void store_least(struct target target, uint32_t pixel, uint64_t ke
 {
     uint64_t *at = target.keys + pixel;
     if (!target.shared) {
-        if (key < *at)
-            *at = key;
+        *at = key < *at ? key : *at;
         return;
     }
     uint64_t seen = __atomic_load_n(at, __ATOMIC_RELAXED);
@@ -33,25 +33,15 @@ static inline void store_least(struct target target, uint32_t pixel, uint64_t ke
         ;
 }
 
-// A block takes its steps one after another, none with a branch on what memory answers: the depths, later the surface words,
-// are asked for at random, and a processor that need not wait for one answer has many under way.
+// A block takes its steps one after another, none with a branch on what memory answers: the depths are asked for at random,
+// and a processor that need not wait for one answer has many under way.
 enum { BLOCK = 256, ASKED = 512 }; // points; those of a chunk whose pixels are asked for
 
-struct block { // points [first, last) of a chunk
-    const struct chunk_view *chunk;
-    const float *positions;
-    const uint32_t *surface;
-    uint32_t first, last;
-    uint32_t pixel[BLOCK], z[BLOCK];
-    vm inside[BLOCK / PT_LANES]; // the view
+struct block { // of a chunk: its points in view that do not face away, packed
+    uint32_t count;
+    _Alignas(64) uint32_t pixel[BLOCK + PT_LANES];
+    uint32_t z[BLOCK + PT_LANES], id[BLOCK + PT_LANES];
 };
-
-struct waiting { // those of them that may be nearer, as columns
-    uint32_t count, pixel[BLOCK + PT_LANES], z[BLOCK + PT_LANES], id[BLOCK + PT_LANES];
-    float position[3][BLOCK + PT_LANES];
-};
-
-static inline void pack_float(float *p, vf a, uint32_t lanes) { vi_pack((uint32_t *)(void *)p, vf_bits(a), lanes); }
 
 struct window { // the view's, as vectors
     vf z_near, z_far, left, right, bottom, top;
@@ -71,16 +61,28 @@ static struct window window_of(const struct view_args *view)
                             .width = vi_set(view->width) };
 }
 
-// 1. Pixels and depths, and which are in view. What their pixels hold is asked for: a chunk's first points find it in memory.
-static inline void project(const struct view_args *view, const struct window *w, struct target target, struct block *block)
+// Which of PT_LANES points face away.
+static inline vm faces_away(const struct chunk_view *chunk, vi word, const vf p[3])
 {
-    const struct chunk_view *chunk = block->chunk;
-    const float *positions = block->positions;
-    for (uint32_t i = block->first, at = 0; i < block->last; i += PT_LANES, at += PT_LANES) {
-        vf px = vf_load(positions + i), py = vf_load(positions + chunk->padded + i);
-        vf pz = vf_load(positions + 2 * (size_t)chunk->padded + i);
-        vf z = vf_transform(chunk, 2, px, py, pz);
-        vf x = vf_transform(chunk, 0, px, py, pz), y = vf_transform(chunk, 1, px, py, pz);
+    vf n[3], v[3];
+    vf_decode_normal(word, n);
+    for (uint32_t k = 0; k < 3; k++)
+        v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * p[k];
+    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
+    return vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))));
+}
+
+// 1. Pixels and depths of points [first, last). What their pixels hold is asked for: a chunk's first points find it in memory.
+static inline void project(const struct view_args *view, const struct window *w, struct target target,
+                           const struct chunk_view *chunk, const float *positions, const uint32_t *surface, uint32_t first,
+                           uint32_t last, struct block *block)
+{
+    uint32_t count = 0;
+    for (uint32_t i = first; i < last; i += PT_LANES) {
+        const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                          vf_load(positions + 2 * (size_t)chunk->padded + i) };
+        vf z = vf_transform(chunk, 2, p[0], p[1], p[2]);
+        vf x = vf_transform(chunk, 0, p[0], p[1], p[2]), y = vf_transform(chunk, 1, p[0], p[1], p[2]);
         if (view->perspective) {
             vf r = vf_rcp(z);
             x = x * r;
@@ -91,71 +93,44 @@ static inline void project(const struct view_args *view, const struct window *w,
                            vm_and(vm_and(vf_le(w->left, x), vf_lt(x, w->right)), vm_and(vf_le(w->bottom, y), vf_lt(y, w->top))));
         if (chunk->sifted)
             inside = vm_and(inside, vm_of_bits(target.drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
+        if (chunk->cull)
+            inside = vm_and(inside, vm_not(faces_away(chunk, vi_load(surface + i), p)));
         vi column = vi_sub(vf_int(vf_floor(x)), w->origin_x), row = vi_sub(vf_int(vf_floor(y)), w->origin_y);
-        vi pixel = vi_select(inside, vi_add(vi_mul(row, w->width), column), vi_set(0));
-        vi_store(block->pixel + at, pixel, vm_first(PT_LANES));
-        vi_store(block->z + at, vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), vm_first(PT_LANES)); // no sign of -0
-        block->inside[at / PT_LANES] = inside;
+        uint32_t lanes = vm_bits(inside);
+        vi_pack(block->pixel + count, vi_add(vi_mul(row, w->width), column), lanes);
+        vi_pack(block->z + count, vi_and(vf_bits(z), vi_set(0x7FFFFFFFu)), lanes); // no sign of -0
+        vi_pack(block->id + count, vi_add(vi_set(chunk->id_base + chunk->first + i), vi_lanes()), lanes);
+        count += (uint32_t)__builtin_popcount(lanes);
     }
-    for (uint32_t i = 0; i < block->last - block->first && block->first < ASKED; i++)
+    block->count = count;
+    for (uint32_t i = 0; i < count && first < ASKED; i++)
         __builtin_prefetch(target.keys + block->pixel[i], 1);
 }
 
-// 2. Those that are nearer than what their pixel holds wait.
-static inline void test_depths(struct target target, const struct block *block, struct waiting *waiting)
+// 2. Those stay that are nearer than what their pixel holds.
+static inline void test_depths(struct target target, struct block *block)
 {
-    const struct chunk_view *chunk = block->chunk;
     uint32_t count = 0;
-    for (uint32_t i = block->first, at = 0; i < block->last; i += PT_LANES, at += PT_LANES) {
-        vm inside = block->inside[at / PT_LANES];
-        if (!vm_bits(inside))
-            continue;
-        vi pixel = vi_load(block->pixel + at), z = vi_load(block->z + at);
+    for (uint32_t at = 0; at < block->count; at += PT_LANES) {
+        vm lanes = vm_first(block->count - at < PT_LANES ? block->count - at : PT_LANES);
+        vi pixel = vi_load(block->pixel + at), z = vi_load(block->z + at), id = vi_load(block->id + at);
         if (target.limit)
-            inside = vm_and(inside, vf_lt(vf_gather(target.limit, pixel, inside), vi_float(z)));
-        vi stored = vi_gather_z(target.keys, pixel, inside);
-        uint32_t nearer = vm_bits(vm_and(inside, vm_not(vi_lt_unsigned(stored, z))));
-        vi_pack(waiting->pixel + count, pixel, nearer);
-        vi_pack(waiting->z + count, z, nearer);
-        vi_pack(waiting->id + count, vi_add(vi_set(chunk->first + i), vi_lanes()), nearer);
-        for (uint32_t k = 0; k < 3 && chunk->cull; k++)
-            pack_float(waiting->position[k] + count, vf_load(block->positions + k * (size_t)chunk->padded + i), nearer);
+            lanes = vm_and(lanes, vf_lt(vf_gather(target.limit, pixel, lanes), vi_float(z)));
+        uint32_t nearer = vm_bits(vm_and(lanes, vm_not(vi_lt_unsigned(vi_gather_z(target.keys, pixel, lanes), z))));
+        vi_pack(block->pixel + count, pixel, nearer);
+        vi_pack(block->z + count, z, nearer);
+        vi_pack(block->id + count, id, nearer);
         count += (uint32_t)__builtin_popcount(nearer);
     }
-    waiting->count = count;
+    block->count = count;
 }
 
-// 3. Those that face away wait no longer.
-static inline void cull(const struct chunk_view *chunk, const uint32_t *surface, struct waiting *waiting)
+static void put(struct target target, struct block *block)
 {
-    uint32_t count = 0;
-    for (uint32_t at = 0; at < waiting->count; at += PT_LANES) {
-        vm lanes = vm_first(waiting->count - at < PT_LANES ? waiting->count - at : PT_LANES);
-        vi pixel = vi_load(waiting->pixel + at), z = vi_load(waiting->z + at), id = vi_load(waiting->id + at);
-        vi word = vi_gather(surface, id, lanes);
-        vf n[3], v[3];
-        vf_decode_normal(word, n);
-        for (uint32_t k = 0; k < 3; k++)
-            v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * vf_load(waiting->position[k] + at);
-        vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
-        away = vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))));
-        uint32_t kept = vm_bits(vm_and(lanes, vm_not(away)));
-        vi_pack(waiting->pixel + count, pixel, kept);
-        vi_pack(waiting->z + count, z, kept);
-        vi_pack(waiting->id + count, id, kept);
-        count += (uint32_t)__builtin_popcount(kept);
-    }
-    waiting->count = count;
-}
-
-static void put(struct target target, const struct block *block)
-{
-    struct waiting waiting;
-    test_depths(target, block, &waiting);
-    if (block->chunk->cull)
-        cull(block->chunk, block->surface, &waiting);
-    for (uint32_t i = 0; i < waiting.count; i++)
-        store_least(target, waiting.pixel[i], (uint64_t)waiting.z[i] << 32 | (uint32_t)(block->chunk->id_base + waiting.id[i]));
+    if (target.shared || target.limit)
+        test_depths(target, block);
+    for (uint32_t i = 0, count = block->count; i < count; i++)
+        store_least(target, block->pixel[i], (uint64_t)block->z[i] << 32 | block->id[i]);
 }
 
 static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -175,14 +150,11 @@ static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t
         while (c >= scatter->begins[instance + 1])
             instance++;
         const struct chunk_view *chunk = (const struct chunk_view *)pt_cpu_data(call, 1 + 3 * instance) + c - scatter->begins[instance];
+        const float *positions = (const float *)pt_cpu_data(call, 2 + 3 * instance) + 3 * (size_t)chunk->first;
+        const uint32_t *surface = (const uint32_t *)pt_cpu_data(call, 3 + 3 * instance) + chunk->first;
         for (uint32_t first = 0; first < chunk->count; first += BLOCK, count++) {
-            struct block *block = &blocks[count % 2];
-            block->chunk = chunk;
-            block->positions = (const float *)pt_cpu_data(call, 2 + 3 * instance) + 3 * (size_t)chunk->first;
-            block->surface = pt_cpu_data(call, 3 + 3 * instance);
-            block->first = first;
-            block->last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-            project(scatter->view, &window, target, block);
+            const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
+            project(scatter->view, &window, target, chunk, positions, surface, first, last, &blocks[count % 2]);
             if (count)
                 put(target, &blocks[(count - 1) % 2]);
         }
