@@ -30,6 +30,6 @@ void main()
             key = less ? other : key;
         }
         keys[y * width + x] = key;
-        from[y * width + x] = texelFetch(from_plane, int(best)).x;
+        from[y * width + x] = args.view.level == 1u ? best : texelFetch(from_plane, int(best)).x; // of level 0: measured, or empty
     }
 }

@@ -24,14 +24,14 @@ static struct cells least(struct cells a, struct cells b)
     return (struct cells){ vi_select(less, b.z, a.z), vi_select(less, b.id, a.id), vi_select(less, b.from, a.from) };
 }
 
-// The lesser of each pair of 2 PT_LANES fine pixels.
-static struct cells least_of_row(const uint64_t *keys, const uint32_t *from)
+// The lesser of each pair of 2 PT_LANES fine pixels from `at` on; those of level 0 are measured ones, or empty.
+static struct cells least_of_row(const uint64_t *keys, const uint32_t *from, size_t at, int measured)
 {
     vi z[2], id[2], f[2];
     for (uint32_t k = 0; k < 2; k++) {
-        z[k] = vi_load_z(keys + k * PT_LANES);
-        id[k] = vi_load_id(keys + k * PT_LANES);
-        f[k] = vi_load(from + k * PT_LANES);
+        z[k] = vi_load_z(keys + at + k * PT_LANES);
+        id[k] = vi_load_id(keys + at + k * PT_LANES);
+        f[k] = measured ? vi_add(vi_set((uint32_t)at + k * PT_LANES), vi_lanes()) : vi_load(from + at + k * PT_LANES);
     }
     return least((struct cells){ vi_evens(z[0], z[1]), vi_evens(id[0], id[1]), vi_evens(f[0], f[1]) },
                  (struct cells){ vi_odds(z[0], z[1]), vi_odds(id[0], id[1]), vi_odds(f[0], f[1]) });
@@ -42,12 +42,13 @@ static uint32_t pull_vectors(const struct pull_args *args, const uint64_t *fine_
                              uint64_t *keys, uint32_t *from, uint32_t y)
 {
     uint32_t x = args->view.rect[0], end = args->view.rect[2] < args->fine_width / 2 ? args->view.rect[2] : args->fine_width / 2;
+    const int measured = args->view.level == 1;
     if (2 * y + 1 >= args->fine_height)
         return x;
     for (; x + PT_LANES <= end; x += PT_LANES) {
         size_t at = (size_t)(2 * y) * args->fine_width + 2 * x, out = (size_t)y * args->view.width + x;
-        struct cells cells = least(least_of_row(fine_keys + at, fine_from + at),
-                                   least_of_row(fine_keys + at + args->fine_width, fine_from + at + args->fine_width));
+        struct cells cells = least(least_of_row(fine_keys, fine_from, at, measured),
+                                   least_of_row(fine_keys, fine_from, at + args->fine_width, measured));
         vi_store_keys(keys + out, cells.z, cells.id, (1u << PT_LANES) - 1u);
         vi_store(from + out, cells.from, vm_first(PT_LANES));
     }
