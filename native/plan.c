@@ -115,10 +115,13 @@ static void plan_pyramid(struct pt_builder *builder)
     for (uint32_t level = 1; level <= plan->levels; level++) {
         struct view_args fine = pt_view_at(plan, level - 1);
         struct pull_args args = {.view = pt_view_at(plan, level), .fine_width = fine.width, .fine_height = fine.height};
-        // the whole plane: filters may look one pixel past the rectangle
-        args.view.rect[0] = args.view.rect[1] = 0;
-        args.view.rect[2] = args.view.width;
-        args.view.rect[3] = args.view.height;
+        // whole rows, and some past the rectangle: filters look one past it, at this level and at coarser ones
+        const uint32_t more = 2u << (plan->levels - level);
+        uint32_t *rect = args.view.rect;
+        rect[0] = 0;
+        rect[1] = rect[1] > more ? rect[1] - more : 0;
+        rect[2] = args.view.width;
+        rect[3] = rect[3] + more < args.view.height ? rect[3] + more : args.view.height;
         PT_REASON(PT_ADD(builder, pull, args,
                          {pt_keys_of(builder, level - 1), pt_from_of(builder, level - 1), pt_keys_of(builder, level),
                           pt_from_of(builder, level)}),
