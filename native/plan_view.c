@@ -336,17 +336,17 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
             plan->chunks_clipped++;
             continue;
         }
+        chunk_eye(object, chunk, eye);
+        int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
+        enum facing facing = chunk_facing(known, angle, spread);
+        if (cull && facing == FACES_AWAY)
+            continue;
         chunk_translation(camera, object, chunk, translation);
         if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart), seen.rect, &z,
                           &seen.z_beyond))
             continue;
         for (int k = 0; k < 4; k++)
             seen.rect[k] -= AROUND;
-        chunk_eye(object, chunk, eye);
-        int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
-        enum facing facing = chunk_facing(known, angle, spread);
-        if (cull && facing == FACES_AWAY)
-            continue;
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered;
         double footprint = most(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
