@@ -63,14 +63,18 @@ static inline void pt_empty_row(float *z, uint32_t width)
         vf_store(z - PT_ROW_PAD + x, empty, vm_first(PT_LANES));
 }
 
-// PT_LANES pixels of the planes that are about to be read.
-static inline void pt_ask_for(const struct pt_planes *planes, size_t at, int with_normals)
+// Asks for PT_LANES pixels of planes: hardware forgets a stream between two rows.
+static inline void pt_ask_for_keys(const struct pt_planes *planes, size_t at)
 {
     __builtin_prefetch(planes->keys + at);
     __builtin_prefetch(planes->keys + at + 8);
     __builtin_prefetch(planes->from + at);
     __builtin_prefetch(planes->deff + at);
-    for (uint32_t i = 0; i < 4 * PT_LANES && with_normals; i += 16)
+}
+
+static inline void pt_ask_for_normals(const struct pt_planes *planes, size_t at)
+{
+    for (uint32_t i = 0; i < 4 * PT_LANES; i += 16)
         __builtin_prefetch(planes->normals + 4 * at + i);
 }
 
@@ -95,23 +99,23 @@ static inline int pt_see_row(const struct pt_planes *planes, int32_t y, float sh
         if (!vm_bits(some))
             continue;
         any = 1;
-        pt_ask_for(planes, at + width, with_normals); // the row above: hardware forgets a stream between two rows
+        pt_ask_for_keys(planes, at + width); // shading asks for normals
         vi source = pt_source(planes, at);
         vm filled = pt_filled(source, at, some);
-        vf limit = vf_load(planes->deff + at), n[4];
-        if (with_normals)
-            vf_load4(planes->normals + 4 * at, n);
-        if (vm_bits(filled)) {
-            limit = vf_select(filled, vf_gather(planes->deff, source, filled), limit);
-            vf of_source[4];
+        const vf factor = vf_select(filled, vf_set(share), vf_set(1.0f));
+        vf n[4]; // and d_eff
+        if (vm_bits(filled) && with_normals) {
+            vf_gather3_1(planes->normals, planes->deff, source, some, n);
+        } else if (vm_bits(filled)) {
+            n[3] = vf_gather(planes->deff, source, some);
+        } else {
             if (with_normals)
-                vf_gather4(planes->normals, source, filled, of_source);
-            for (uint32_t k = 0; k < 3 && with_normals; k++)
-                n[k] = vf_select(filled, of_source[k] * vf_set(share), n[k]);
+                vf_load4(planes->normals + 4 * at, n);
+            n[3] = vf_load(planes->deff + at);
         }
-        vf_store(row->limit + x, limit, vm_first(PT_LANES));
+        vf_store(row->limit + x, n[3], vm_first(PT_LANES));
         for (uint32_t k = 0; k < 3 && with_normals; k++)
-            vf_store(row->normal[k] + x, n[k], vm_first(PT_LANES));
+            vf_store(row->normal[k] + x, n[k] * factor, vm_first(PT_LANES));
     }
     for (uint32_t i = 0; i < PT_ROW_PAD; i++)
         row->z[width + i] = pt_float(PT_KEY_EMPTY_Z);

@@ -31,6 +31,17 @@ static inline void sse_pack(uint32_t *p, __m128i a, uint32_t lanes)
 }
 #endif
 
+#if !defined(PT_ISA_SCALAR)
+// The float4 pixel of half this number; fourth: where its last float comes from, NULL for its own.
+static inline __m128 sse_pixel(const float *p, const float *fourth, uint32_t twice)
+{
+    __m128 pixel = _mm_loadu_ps(p + 2 * (size_t)twice);
+    if (!fourth)
+        return pixel;
+    return _mm_insert_ps(pixel, _mm_load_ss((const float *)(const void *)((const char *)fourth + 2 * (size_t)twice)), 0x30);
+}
+#endif
+
 #if defined(PT_ISA_AVX512)
 
 #define PT_LANES 16
@@ -91,13 +102,12 @@ static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vec
         r[j] = _mm512_loadu_ps(p + 16 * j);
     vf_swap_quarters(r);
 }
-static inline void vf_pick_pixels(const float *p, const uint32_t i[16], vf r[4]) // those of numbers i, arranged as above
+static inline void vf_pick_pixels(const float *p, const float *fourth, const uint32_t i[16], vf r[4]) // arranged as above
 {
     for (int k = 0; k < 4; k++) {
-        vf low = _mm512_castps128_ps512(_mm_loadu_ps(p + 4 * (size_t)i[k]));
-        low = _mm512_insertf32x4(low, _mm_loadu_ps(p + 4 * (size_t)i[4 + k]), 1);
-        low = _mm512_insertf32x4(low, _mm_loadu_ps(p + 4 * (size_t)i[8 + k]), 2);
-        r[k] = _mm512_insertf32x4(low, _mm_loadu_ps(p + 4 * (size_t)i[12 + k]), 3);
+        __m256 low = _mm256_set_m128(sse_pixel(p, fourth, i[4 + k]), sse_pixel(p, fourth, i[k]));
+        __m256 high = _mm256_set_m128(sse_pixel(p, fourth, i[12 + k]), sse_pixel(p, fourth, i[8 + k]));
+        r[k] = _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
     }
 }
 static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
@@ -275,10 +285,10 @@ static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vec
     for (int k = 0; k < 4; k++)
         r[k] = _mm256_set_m128(_mm_loadu_ps(p + 16 + 4 * k), _mm_loadu_ps(p + 4 * k));
 }
-static inline void vf_pick_pixels(const float *p, const uint32_t i[8], vf r[4])
+static inline void vf_pick_pixels(const float *p, const float *fourth, const uint32_t i[8], vf r[4])
 {
     for (int k = 0; k < 4; k++)
-        r[k] = _mm256_set_m128(_mm_loadu_ps(p + 4 * (size_t)i[4 + k]), _mm_loadu_ps(p + 4 * (size_t)i[k]));
+        r[k] = _mm256_set_m128(sse_pixel(p, fourth, i[4 + k]), sse_pixel(p, fourth, i[k]));
 }
 static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
 {
@@ -402,10 +412,10 @@ static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vec
     for (int k = 0; k < 4; k++)
         r[k] = _mm_loadu_ps(p + 4 * k);
 }
-static inline void vf_pick_pixels(const float *p, const uint32_t i[4], vf r[4])
+static inline void vf_pick_pixels(const float *p, const float *fourth, const uint32_t i[4], vf r[4])
 {
     for (int k = 0; k < 4; k++)
-        r[k] = _mm_loadu_ps(p + 4 * (size_t)i[k]);
+        r[k] = sse_pixel(p, fourth, i[k]);
 }
 static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
 {
@@ -553,13 +563,13 @@ static inline void vf_load4(const float *pixels, vf out[4])
     vf_load_pixels(pixels, out);
     vf_transpose(out);
 }
-// Float4 pixels of any numbers, the first pixel's where a lane is not asked for. A pixel is one load: half the time of a
-// gather for each of its numbers.
-static inline void vf_gather4(const float *pixels, vi i, vm lanes, vf out[4])
+// Float4 pixels of any numbers, the first pixel's where a lane is not asked for, their last float from `fourth` unless NULL.
+// A pixel is one load: half the time of a gather for each of its numbers.
+static inline void vf_gather3_1(const float *pixels, const float *fourth, vi i, vm lanes, vf out[4])
 {
-    uint32_t numbers[PT_LANES];
-    vi_store(numbers, vi_select(lanes, i, vi_set(0)), vm_first(PT_LANES));
-    vf_pick_pixels(pixels, numbers, out);
+    uint32_t twice[PT_LANES];
+    vi_store(twice, vi_select(lanes, vi_add(i, i), vi_set(0)), vm_first(PT_LANES));
+    vf_pick_pixels(pixels, fourth, twice, out);
     vf_transpose(out);
 }
 static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
@@ -570,13 +580,20 @@ static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 }
 #else
 static inline void vf_load4(const float *pixels, vf out[4]) { memcpy(out, pixels, 16); }
-static inline void vf_gather4(const float *pixels, vi i, vm lanes, vf out[4]) { vf_load4(pixels + 4 * (size_t)(lanes ? i : 0), out); }
+static inline void vf_gather3_1(const float *pixels, const float *fourth, vi i, vm lanes, vf out[4])
+{
+    size_t at = lanes ? i : 0;
+    vf_load4(pixels + 4 * at, out);
+    out[3] = fourth ? fourth[at] : out[3];
+}
 static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 {
     if (lanes)
         memcpy(pixels, in, 16);
 }
 #endif
+
+static inline void vf_gather4(const float *pixels, vi i, vm lanes, vf out[4]) { vf_gather3_1(pixels, NULL, i, lanes, out); }
 
 // Writes to the picture, which is read later and by others. count <= PT_LANES pixels of one, four or three floats. Past the
 // caches where a vector is a line of theirs: a line of which some is stored and some streamed costs a trip to memory for

@@ -256,6 +256,8 @@ static inline vf pt_shade_pixels(const struct shade_args *args, const struct pt_
 {
     size_t at = (size_t)y * args->view.width + x;
     const struct pt_seen_row *own = around[args->blend];
+    // of two rows above those seen, since filled pixels show the next row's, too: while light is computed, memory has time
+    pt_ask_for_normals(planes, at + (args->blend + 2) * args->view.width);
     for (int k = 0; k < 3; k++)
         normal[k] = vf_load(own->normal[k] + x);
     if (args->blend) {
