@@ -149,7 +149,8 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
     }
 }
 
-static void shade_lit(const struct finish *finish, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
+static inline __attribute__((always_inline)) void light_row(const struct finish *finish, struct walk *walk,
+                                                            const struct pt_cpu_call *call, int32_t y, int plain)
 {
     const struct shade_args *args = call->arguments;
     const uint32_t *shadows = pt_cpu_data(call, 8);
@@ -166,7 +167,8 @@ static void shade_lit(const struct finish *finish, struct walk *walk, const stru
                                  pt_lanes_left(x, view->width), &id);
         if (!vm_bits(ours))
             continue;
-        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, shadows, x, (uint32_t)y, id, ours, color, normal);
+        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, shadows, x, (uint32_t)y, id, ours, plain, color,
+                                   normal);
         for (uint32_t k = 0; k < 3; k++)
             vf_store(out->color[k] + x, color[k], ours);
         for (uint32_t k = 0; k < 3 && finish->extract && finish->extract->normal; k++)
@@ -174,6 +176,14 @@ static void shade_lit(const struct finish *finish, struct walk *walk, const stru
         if (finish->extract && finish->extract->shadow)
             vf_store(walk->shown[slot(y)][4] + x, share, ours);
     }
+}
+
+static void shade_lit(const struct finish *finish, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
+{
+    if (pt_plain(call->arguments))
+        light_row(finish, walk, call, y, 1);
+    else
+        light_row(finish, walk, call, y, 0);
 }
 
 // Colours of three bytes a point, fetched at random: a tight loop gathers those of a block, so that many are under way at a time.
