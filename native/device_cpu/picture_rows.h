@@ -16,6 +16,7 @@ struct pt_seen_row {
     float *limit;     // d_eff of the surface shown
     float *normal[3]; // of the surface shown, those of filled pixels times `share`
     uint8_t *flat;    // of PT_LANES pixels each: whether all nine around each are one layer; NULL: not known
+    uint32_t first, end; // columns between which something is seen, multiples of PT_LANES; equal where nothing is
 };
 
 // The planes that a row is seen from.
@@ -35,12 +36,14 @@ static inline vi pt_source(const struct pt_planes *planes, size_t at)
 // hi, lo: rows of room.
 static inline void pt_find_flat(const struct pt_seen_row *const rows[3], uint32_t width, float *hi, float *lo)
 {
-    for (int32_t x = -PT_LANES; x < (int32_t)width + PT_LANES; x += PT_LANES) {
+    const int32_t first = (int32_t)rows[1]->first, end = (int32_t)rows[1]->end;
+    for (int32_t x = first - PT_LANES; x < end + PT_LANES; x += PT_LANES) {
         vf below = vf_load(rows[0]->z + x), own = vf_load(rows[1]->z + x), above = vf_load(rows[2]->z + x);
         vf_store(hi + x, vf_max(vf_max(below, above), own), vm_first(PT_LANES));
         vf_store(lo + x, vf_min(vf_min(below, above), own), vm_first(PT_LANES));
     }
-    for (uint32_t x = 0; x < width; x += PT_LANES) {
+    memset(rows[1]->flat, 0, width / PT_LANES + 2);
+    for (uint32_t x = rows[1]->first; x < rows[1]->end; x += PT_LANES) {
         vf z = vf_load(rows[1]->z + x), limit = vf_load(rows[1]->limit + x);
         vf far = vf_max(vf_max(vf_load(hi + x - 1), vf_load(hi + x + 1)), vf_load(hi + x));
         vf near = vf_min(vf_min(vf_load(lo + x - 1), vf_load(lo + x + 1)), vf_load(lo + x));
@@ -78,16 +81,15 @@ static inline void pt_ask_for_normals(const struct pt_planes *planes, size_t at)
         __builtin_prefetch(planes->normals + 4 * at + i);
 }
 
-// Returns whether anything is seen in row y. with_normals = 0: they are not wanted.
-static inline int pt_see_row(const struct pt_planes *planes, int32_t y, float share, int with_normals,
-                             const struct pt_seen_row *row)
+// Row y of the planes. with_normals = 0: they are not wanted.
+static inline void pt_see_row(const struct pt_planes *planes, int32_t y, float share, int with_normals, struct pt_seen_row *row)
 {
     const uint32_t width = planes->view->width;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    int any = 0;
+    row->first = row->end = 0;
     if (y < 0 || y >= (int32_t)planes->view->height) {
         pt_empty_row(row->z, width);
-        return 0;
+        return;
     }
     for (int32_t i = 0; i < PT_ROW_PAD; i += PT_LANES)
         vf_store(row->z - PT_ROW_PAD + i, empty, vm_first(PT_LANES));
@@ -98,7 +100,8 @@ static inline int pt_see_row(const struct pt_planes *planes, int32_t y, float sh
         vf_store(row->z + x, z, vm_first(PT_LANES));
         if (!vm_bits(some))
             continue;
-        any = 1;
+        row->first = row->end ? row->first : x;
+        row->end = x + PT_LANES;
         pt_ask_for_keys(planes, at + width); // shading asks for normals
         vi source = pt_source(planes, at);
         vm filled = pt_filled(source, at, some);
@@ -119,7 +122,6 @@ static inline int pt_see_row(const struct pt_planes *planes, int32_t y, float sh
     }
     for (uint32_t i = 0; i < PT_ROW_PAD; i++)
         row->z[width + i] = pt_float(PT_KEY_EMPTY_Z);
-    return any;
 }
 
 #endif

@@ -19,7 +19,7 @@ static struct pt_seen_row ring_row(const struct shade *shade, uint32_t thread, u
 {
     float *row = shade->rows + ((size_t)thread * shade->ring + slot) * CHANNELS * shade->stride + PT_ROW_PAD;
     const size_t s = shade->stride;
-    return (struct pt_seen_row){ row, row + s, { row + 2 * s, row + 3 * s, row + 4 * s }, NULL };
+    return (struct pt_seen_row){ row, row + s, { row + 2 * s, row + 3 * s, row + 4 * s }, NULL, 0, 0 };
 }
 
 static void shade_row(const struct shade *shade, const struct pt_seen_row *const *around, uint32_t y)
