@@ -24,6 +24,7 @@ struct pt_buffer {
     void *data;       // CPU device: the memory. GL device: NULL
     uint32_t name;    // GL device: buffer object
     uint32_t wrapped; // CPU device: data belongs to somebody else
+    size_t clean[2];  // keys: bytes at its beginning and at its end that are empty
 };
 
 // A kernel with what it runs on: see run.
@@ -45,8 +46,10 @@ struct pt_device_ops {
                         size_t size);
     int (*buffer_read)(struct patina_device *device, const struct pt_buffer *buffer, size_t offset, void *target,
                        size_t size);
-    // Repeats a pattern of 4 or 8 bytes (low word first) over the whole buffer.
-    int (*buffer_fill)(struct patina_device *device, struct pt_buffer *buffer, uint64_t pattern, uint32_t bytes);
+    // Repeats a pattern of 4 or 8 bytes (low word first) from offset on, `size` bytes; both are multiples of 8, or size reaches
+    // the buffer's end.
+    int (*buffer_fill)(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size, uint64_t pattern,
+                       uint32_t bytes);
     // Runs a kernel; arguments are copied, buffers as kernels.def lists them. When it returns, later calls see its effect.
     // cancel (may be NULL) is polled by long kernels; a cancelled run leaves undefined planes and returns
     // PATINA_ERROR_CANCELLED.

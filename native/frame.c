@@ -175,10 +175,17 @@ static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *r
 int pt_frame_clear_keys(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
                         enum pt_plane which)
 {
+    struct pt_buffer *plane = &planes[which][0];
     int error = pt_frame_ensure_plane(frame, planes, plan, which, 0);
-    return error ? error
-                 : frame->device->ops->buffer_fill(frame->device, &planes[which][0],
-                                                   (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+    if (!error)
+        error = frame->device->ops->buffer_fill(frame->device, plane, plane->clean[0],
+                                                plane->size - plane->clean[0] - plane->clean[1],
+                                                (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
+    if (error)
+        return error;
+    plane->clean[0] = 8 * (size_t)plan->view.width * plan->view.rect[1]; // no pass writes beyond the rectangle
+    plane->clean[1] = plane->size - 8 * (size_t)plan->view.width * plan->view.rect[3];
+    return PATINA_OK;
 }
 
 // Before a layer: `which` are its keys.
@@ -194,6 +201,12 @@ static int clear_keys(struct patina_frame *frame, const struct pt_plan *plan, en
 
 // ---- layers --------------------------------------------------------------------------------------------------------------
 
+static int fill_plane(struct patina_frame *frame, enum pt_plane which, uint32_t word)
+{
+    struct pt_buffer *plane = &frame->planes[which][0];
+    return frame->device->ops->buffer_fill(frame->device, plane, 0, plane->size, word, 4);
+}
+
 // Before the first layer: all light comes through, outside the points' rectangle too, and lines find nothing before them.
 static int begin_peeling(struct render *render)
 {
@@ -203,11 +216,11 @@ static int begin_peeling(struct render *render)
     if (!error && render->plan->line_radius > 0.0f)
         error = pt_frame_ensure_plane(frame, frame->planes, render->plan, PT_PLANE_OVER, 0);
     if (!error && render->plan->line_radius > 0.0f)
-        error = frame->device->ops->buffer_fill(frame->device, &frame->planes[PT_PLANE_OVER][0], 0, 4);
+        error = fill_plane(frame, PT_PLANE_OVER, 0);
     render->tiles = malloc(tiles);
     if (!error && !render->tiles)
         error = pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
-    return error ? error : frame->device->ops->buffer_fill(frame->device, &frame->planes[PT_PLANE_THROUGH][0], 0x3F800000u, 4);
+    return error ? error : fill_plane(frame, PT_PLANE_THROUGH, 0x3F800000u);
 }
 
 // Reads what a peeled layer left.

@@ -158,7 +158,7 @@ int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene
             error = ops->buffer_create(frame->device, (scene->instances[i].cloud->slots + 3) / 4 * 4, NULL, 0,
                                        &shadows->marks[i]);
         if (!error && shadows->marks[i].size)
-            error = ops->buffer_fill(frame->device, &shadows->marks[i], 0, 4);
+            error = ops->buffer_fill(frame->device, &shadows->marks[i], 0, shadows->marks[i].size, 0, 4);
     }
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
@@ -444,7 +444,8 @@ static int clear_words(struct update *update, uint32_t index)
     const struct pt_device_ops *ops = frame->device->ops;
     if (update->plan->light_count == 1) {
         for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
-            if (frame->shadows.words[i].size && ops->buffer_fill(frame->device, &frame->shadows.words[i], 0, 4))
+            if (frame->shadows.words[i].size &&
+                ops->buffer_fill(frame->device, &frame->shadows.words[i], 0, frame->shadows.words[i].size, 0, 4))
                 return PATINA_ERROR_INTERNAL;
         return PATINA_OK;
     }

@@ -139,15 +139,17 @@ static void fill_words(void *context, uint32_t begin, uint32_t end, uint32_t thr
         job->words[i] = job->pattern;
 }
 
-static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, uint64_t pattern, uint32_t bytes)
+static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size,
+                           uint64_t pattern, uint32_t bytes)
 {
     struct cpu_device *cpu = (struct cpu_device *)device;
     if (bytes == 4)
         pattern = (pattern & 0xFFFFFFFFu) | pattern << 32;
-    struct fill_job job = { buffer->data, pattern, buffer->size / 8 };
+    char *data = (char *)buffer->data + offset;
+    struct fill_job job = { (uint64_t *)(void *)data, pattern, size / 8 };
     pt_parallel(cpu->pool, (uint32_t)((job.count + FILL_BLOCK - 1) / FILL_BLOCK), 4, fill_words, &job);
-    if (buffer->size % 8)
-        memcpy((char *)buffer->data + buffer->size / 8 * 8, &pattern, buffer->size % 8);
+    if (size % 8)
+        memcpy(data + size / 8 * 8, &pattern, size % 8);
     return PATINA_OK;
 }
 

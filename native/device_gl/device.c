@@ -283,8 +283,8 @@ static int fill_buffer(struct pt_gl_device *d, void *context)
     uint32_t words[2] = {(uint32_t)b->pattern, (uint32_t)(b->pattern >> 32)};
     d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, b->bytes == 8 ? GL_RG32UI : GL_R32UI, 0,
-                             (GLsizeiptr)(b->buffer->size & ~(size_t)(b->bytes - 1)),
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, b->bytes == 8 ? GL_RG32UI : GL_R32UI, (GLintptr)b->offset,
+                             (GLsizeiptr)(b->size & ~(size_t)(b->bytes - 1)),
                              b->bytes == 8 ? GL_RG_INTEGER : GL_RED_INTEGER, GL_UNSIGNED_INT, words);
     return pt_gl_check(d, "clearing a buffer");
 }
@@ -341,9 +341,11 @@ static int op_buffer_read(struct patina_device *device, const struct pt_buffer *
                 &(struct buffer_call){.buffer = &copy, .offset = offset, .size = size, .target = target});
 }
 
-static int op_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, uint64_t pattern, uint32_t bytes)
+static int op_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size,
+                          uint64_t pattern, uint32_t bytes)
 {
-    return call(device, fill_buffer, &(struct buffer_call){.buffer = buffer, .pattern = pattern, .bytes = bytes});
+    return call(device, fill_buffer,
+                &(struct buffer_call){.buffer = buffer, .offset = offset, .size = size, .pattern = pattern, .bytes = bytes});
 }
 
 static int op_run(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,

@@ -33,6 +33,36 @@ static patina_frame *frame_of(patina_device *device, struct stage *stage)
     return frame;
 }
 
+// What a frame keeps from view to view never shows: keys, and where it left them empty.
+static void test_view_after_view(void **state)
+{
+    static const double shifts[] = {0.0, 0.4, -0.7, 5.0, 0.3, 0.0}; // of the picture's height; at 5 nothing is in view
+    (void)state;
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        patina_device *device = support_device_open(support_device_name(k), 0, 0);
+        if (!device)
+            continue;
+        struct stage stage = stage_build(staging_named("small, 1 point a pixel"));
+        const double bottom = stage.camera.bottom, height = stage.camera.top - bottom;
+        patina_frame *kept = frame_of(device, &stage);
+        for (uint32_t i = 0; i < sizeof shifts / sizeof shifts[0]; i++) {
+            stage.camera.bottom = bottom + shifts[i] * height;
+            stage.camera.top = stage.camera.bottom + height;
+            patina_frame *fresh = frame_of(device, &stage);
+            CHECK(patina_frame_render(kept, stage.scene), kept);
+            CHECK(patina_frame_render(fresh, stage.scene), fresh);
+            struct picture got = picture_read(kept), expected = picture_read(fresh);
+            picture_assert_identical(&got, &expected, 0, 0, "after another view");
+            picture_free(&got);
+            picture_free(&expected);
+            patina_frame_destroy(fresh);
+        }
+        patina_frame_destroy(kept);
+        stage_free(&stage);
+        patina_device_destroy(device);
+    }
+}
+
 // ---- JSON --------------------------------------------------------------------------------------------------------
 
 static const char *json_value(const char *at);
@@ -512,6 +542,7 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_view_after_view),
         cmocka_unit_test(test_statistics),
         cmocka_unit_test(test_plan),
         cmocka_unit_test(test_callers_numbers),

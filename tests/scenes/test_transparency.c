@@ -503,7 +503,7 @@ static uint64_t *scatter_behind(patina_frame *frame, const struct pt_plan *plan,
     assert_non_null(out);
     CHECK(device->ops->buffer_create(device, pixels * 8, NULL, 0, &keys), device);
     CHECK(device->ops->buffer_create(device, count * sizeof *chunks, chunks, 0, &list), device);
-    CHECK(device->ops->buffer_fill(device, &keys, KEY_EMPTY, 8), device);
+    CHECK(device->ops->buffer_fill(device, &keys, 0, keys.size, KEY_EMPTY, 8), device);
     CHECK(pt_residency_take(&frame->residency, device, cloud, &resident), device);
     struct scatter_args args = {.view = plan->view, .instances = 1, .behind = 1};
     struct pt_buffer *buffers[] = {&keys, &list, &resident->buffers[PT_POSITIONS],
