@@ -90,13 +90,17 @@ static struct ref_met meet(const struct view_args *view, const struct ref_disc *
     const struct ref_ray pixel = ref_ray(view, x, y);
     const struct ref_vec own = ray_of(view, px, py);
     const double du = pixel.u - (view->ray_x0 + (double)view->ray_xs * px), dv = pixel.v - (view->ray_y0 + (double)view->ray_ys * py);
-    struct ref_vec ray = own, offset = {du, dv, 0.0};
+    struct ref_vec ray = view->perspective ? ref_vec(pixel.u, pixel.v, -1.0) : own, offset = {du, dv, 0.0};
     double depth, scale = view->perspective ? z : 1.0;
     struct ref_met out = {.covered = REF_NO, .square = {2.0, 2.0}};
     if (!(disc->radius > 0.0))
         return out;
+    // a ray that passes the disc's ball meets no disc, however its plane lies
+    const struct ref_vec middle_of = ref_add(ref_scale(own, scale), view->perspective ? ref_vec(0, 0, 0) : ref_vec(-du, -dv, 1.0));
+    const double along = view->perspective ? ref_dot(middle_of, ray) / ref_dot(ray, ray) : 0.0;
+    if (ref_length(ref_add(middle_of, ref_scale(ray, -along))) > 1.001 * disc->radius + 1e-5 * z)
+        return out;
     if (view->perspective) {
-        ray = ref_vec(pixel.u, pixel.v, -1.0);
         depth = z * ref_dot(disc->n, own) / ref_dot(disc->n, ray);
         offset = ref_add(ref_scale(ray, depth), ref_scale(own, -z));
     } else {
@@ -110,11 +114,6 @@ static struct ref_met meet(const struct view_args *view, const struct ref_disc *
                    scale * (pixel.error_u + pixel.error_v) + 4.0 * TOL_UNIT * z;
     error = 2.0 * (error + distance * disc->normal_error) / cosine + distance * 32.0 * TOL_UNIT / (cosine * cosine) +
             4.0 * TOL_UNIT * disc->radius;
-    // a ray that passes the disc's ball meets no disc, however its plane lies
-    const struct ref_vec middle_of = ref_add(ref_scale(own, scale), view->perspective ? ref_vec(0, 0, 0) : ref_vec(-du, -dv, 1.0));
-    const double along = view->perspective ? ref_dot(middle_of, ray) / ref_dot(ray, ray) : 0.0;
-    if (ref_length(ref_add(middle_of, ref_scale(ray, -along))) > 1.001 * disc->radius + 1e-5 * z)
-        return out;
     if (disc->edge_on || !isfinite(error) || !isfinite(distance)) {
         out.covered = REF_UNSURE;
         out.z = (struct ref_range){z - disc->radius * 1.001, z + disc->radius * 1.001};
