@@ -84,6 +84,18 @@ static inline vi pt_source_of(const uint32_t *from, size_t at)
     return vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED));
 }
 
+// The same of pixels anywhere.
+static inline vi pt_source_gather(const uint32_t *from, vi at, vm lanes)
+{
+    return vi_and(vi_gather(from, at, lanes), vi_set(~PT_FROM_MIXED));
+}
+
+// Whether keys are less than others.
+static inline vm pt_less(vi z, vi id, vi than_z, vi than_id)
+{
+    return vm_or(vi_lt_unsigned(z, than_z), vm_and(vi_eq(z, than_z), vi_lt_unsigned(id, than_id)));
+}
+
 // d_eff at this view's level of those of PT_LANES pixels from `at` on that `lanes` names; at level 0 most are measured.
 static inline vf pt_own_distance(const struct view_args *view, const float *deff, const float *normals, const uint32_t *from,
                                  size_t at, vf z, vm lanes)

@@ -11,26 +11,36 @@
 
 // ---- deciding ------------------------------------------------------------------------------------------------------------
 
+struct pixels { // PT_LANES pixels
+    vi x, y, at;
+    vm inside; // the plane
+};
+
+// Neighbours on side d of the pixels (x, y) that `lanes` names.
+static inline struct pixels neighbours(const struct fill *fill, vi x, vi y, int d, vm lanes)
+{
+    const vi width = vi_set(fill->view->width), height = vi_set(fill->view->height);
+    const vi qx = vi_add(x, vi_set((uint32_t)(int32_t)ring_x[d])), qy = vi_add(y, vi_set((uint32_t)(int32_t)ring_y[d]));
+    return (struct pixels){ qx, qy, vi_add(vi_mul(qy, width), qx),
+                            vm_and(lanes, vm_and(vi_lt_unsigned(qx, width), vi_lt_unsigned(qy, height))) };
+}
+
 // 1. PT_LANES entries from `at` on, as far as `end`, take the least key among their neighbours.
 static void take_least(const struct fill *fill, size_t at, size_t end)
 {
     const struct entries *e = &fill->entries;
-    const vi width = vi_set(fill->view->width), height = vi_set(fill->view->height);
-    const vi x = vi_load(e->x + at), y = vi_load(e->y + at), pixel = vi_add(vi_mul(y, width), x);
+    const vi x = vi_load(e->x + at), y = vi_load(e->y + at);
     const vm lanes = entry_lanes(at, end);
-    vi z = vi_set(UINT32_MAX), id = z, from = pixel, qx = x, qy = y;
-    for (uint32_t d = 0; d < RING; d++) {
-        const vi nx = vi_add(x, vi_set((uint32_t)(int32_t)ring_x[d])), ny = vi_add(y, vi_set((uint32_t)(int32_t)ring_y[d]));
-        const vi q = vi_add(vi_mul(ny, width), nx);
-        vm inside = vm_and(lanes, vm_and(vi_lt_unsigned(nx, width), vi_lt_unsigned(ny, height)));
-        vi other_z = vi_gather_z(fill->keys, q, inside), other_id = vi_gather_id(fill->keys, q, inside);
-        vm less = vm_or(vi_lt_unsigned(other_z, z), vm_and(vi_eq(other_z, z), vi_lt_unsigned(other_id, id)));
-        less = vm_and(less, inside);
+    vi z = vi_set(UINT32_MAX), id = z, from = vi_add(vi_mul(y, vi_set(fill->view->width)), x), qx = x, qy = y;
+    for (int d = 0; d < RING; d++) {
+        const struct pixels q = neighbours(fill, x, y, d, lanes);
+        vi other_z = vi_gather_z(fill->keys, q.at, q.inside), other_id = vi_gather_id(fill->keys, q.at, q.inside);
+        vm less = vm_and(q.inside, pt_less(other_z, other_id, z, id));
         z = vi_select(less, other_z, z);
         id = vi_select(less, other_id, id);
-        from = vi_select(less, q, from);
-        qx = vi_select(less, nx, qx);
-        qy = vi_select(less, ny, qy);
+        from = vi_select(less, q.at, from);
+        qx = vi_select(less, q.x, qx);
+        qy = vi_select(less, q.y, qy);
     }
     vi_store(e->qx + at, qx, lanes);
     vi_store(e->qy + at, qy, lanes);
@@ -156,17 +166,14 @@ static size_t mark_word(struct fill *fill, size_t word, uint32_t y, uint64_t loo
 static void unmark_entries(const struct fill *fill, uint32_t band)
 {
     const struct entries *e = &fill->entries;
-    const vi width = vi_set(fill->view->width), height = vi_set(fill->view->height);
     size_t base = band * fill->band_entries, end = base + fill->kept[band];
     for (size_t i = base; i < end; i += PT_LANES) {
         vm lanes = entry_lanes(i, end);
         vi x = vi_load(e->x + i), y = vi_load(e->y + i), white = vi_set(0);
         vf threshold = vf_load(e->threshold + i);
         for (int d = 0; d < RING; d++) {
-            vi qx = vi_add(x, vi_set((uint32_t)(int32_t)ring_x[d])), qy = vi_add(y, vi_set((uint32_t)(int32_t)ring_y[d]));
-            vm inside = vm_and(lanes, vm_and(vi_lt_unsigned(qx, width), vi_lt_unsigned(qy, height)));
-            vf z = vi_float(vi_gather_z(fill->keys, vi_add(vi_mul(qy, width), qx), inside));
-            vm dark = vm_and(inside, vf_lt(z, threshold));
+            const struct pixels q = neighbours(fill, x, y, d, lanes);
+            vm dark = vm_and(q.inside, vf_lt(vi_float(vi_gather_z(fill->keys, q.at, q.inside)), threshold));
             white = vi_or(white, vi_select(dark, vi_set(0), vi_set(0x101u << d))); // twice: runs wrap round
         }
         vi run = vi_and(vi_and(white, vi_shr(white, 1)), vi_and(vi_shr(white, 2), vi_shr(white, 3)));
@@ -264,7 +271,8 @@ static int allocate(struct fill *fill)
     struct entries *e = &fill->entries;
     size_t count = bands(fill);
     fill->words = (view->width + 63) / 64;
-    fill->band_entries = 2 * (size_t)view->width * BAND_ROWS + PT_LANES; // every pixel may be kept, and be filled again in this step
+    // every pixel may be kept, and be filled again in this step
+    fill->band_entries = 2 * (size_t)view->width * BAND_ROWS + PT_LANES;
     size_t words = fill->words * view->height, room = count * fill->band_entries + PT_LANES;
     uint8_t *lists = pt_cpu_scratch(fill->call, 1, room * 44);
     fill->covered = pt_cpu_scratch(fill->call, 0, words * 5 * 8 + count * 8);

@@ -76,7 +76,7 @@ static size_t keep_occluded(const struct fill *fill, size_t at, size_t end)
         const vf farthest = vf_load(e->threshold + at);
         vm some = entry_lanes(at, end);
         const vf z = vi_float(vi_gather_z(fill->keys, pixel, some));
-        const vi source = vi_and(vi_gather(fill->from, pixel, some), vi_set(~PT_FROM_MIXED));
+        const vi source = pt_source_gather(fill->from, pixel, some);
         vf distance = vf_gather(fill->deff, source, some); // d_eff at level 0 spares most a look at the normals
         some = vm_and(some, vf_lt(farthest, z - distance));
         if (fill->view->level && vm_bits(some)) {

@@ -104,7 +104,7 @@ static struct tangent tangent_at(const struct lines *lines, vi x, vi y, vf z, vm
         out.floor = vf_gather(lines->limit, at, wanted);
     if (!vm_bits(some))
         return out;
-    vi source = vi_and(vi_gather(lines->from, at, some), vi_set(~PT_FROM_MIXED));
+    vi source = pt_source_gather(lines->from, at, some);
     vf n[3], ray[2];
     for (int k = 0; k < 3; k++)
         n[k] = vf_gather(lines->normals + k, vi_mul(source, vi_set(4)), some);

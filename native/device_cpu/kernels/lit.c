@@ -129,7 +129,7 @@ static uint32_t in_shadow(const struct lit *lit, const struct fall *f, vi id)
     look_around(&lit->args.view, pt_cpu_data(lit->call, 0), f->column, f->row, dark, &around);
     none = vm_and(none, dark);
     if (vm_bits(none)) {
-        vi source = vi_and(vi_gather(pt_cpu_data(lit->call, 1), f->texel, none), vi_set(~PT_FROM_MIXED));
+        vi source = pt_source_gather(pt_cpu_data(lit->call, 1), f->texel, none);
         vf steep = vf_select(beside_nothing(&around, none), d * vf_set(PT_SHADOW_STEEP), d);
         d = vf_select(none, vf_max(steep, vf_gather(pt_cpu_data(lit->call, 2), source, none)), d);
         dark = vm_and(dark, vf_lt(vf_select(none, farthest(&around, f->map), f->map) + d, f->z));

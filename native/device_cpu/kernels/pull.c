@@ -20,7 +20,7 @@ static uint32_t pull_cell(const struct pull_args *args, const uint64_t *fine_key
 #if PT_LANES > 1
 static struct cells least(struct cells a, struct cells b)
 {
-    vm less = vm_or(vi_lt_unsigned(b.z, a.z), vm_and(vi_eq(b.z, a.z), vi_lt_unsigned(b.id, a.id)));
+    vm less = pt_less(b.z, b.id, a.z, a.id);
     return (struct cells){ vi_select(less, b.z, a.z), vi_select(less, b.id, a.id), vi_select(less, b.from, a.from) };
 }
 
@@ -74,7 +74,7 @@ static void pull_row(void *context, uint32_t y)
     for (uint32_t x = pull_vectors(args, fine_keys, fine_from, keys, from, y); x < args->view.rect[2]; x++) {
         uint32_t best = pull_cell(args, fine_keys, x, y);
         keys[(size_t)y * args->view.width + x] = fine_keys[best];
-        from[(size_t)y * args->view.width + x] = fine_from[best];
+        from[(size_t)y * args->view.width + x] = args->view.level == 1 ? best : fine_from[best];
     }
 }
 

@@ -267,9 +267,10 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
 
 // Light on, and shown normals of, PT_LANES pixels of the instance from (x, y) on. color: in albedo. around: rows
 // y - blend ... y + blend. Returns the mean share of the casting lights that arrives.
-static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes,
-                                 const struct pt_seen_row *const *around, const float *weights, const uint32_t *shadows,
-                                 uint32_t x, uint32_t y, vi id, vm ours, int plain, vf color[3], vf normal[3])
+static inline __attribute__((always_inline)) vf
+pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes, const struct pt_seen_row *const *around,
+                const float *weights, const uint32_t *shadows, uint32_t x, uint32_t y, vi id, vm ours, int plain, vf color[3],
+                vf normal[3])
 {
     size_t at = (size_t)y * args->view.width + x;
     const struct pt_seen_row *own = around[args->blend];
