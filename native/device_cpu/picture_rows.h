@@ -22,6 +22,7 @@ struct pt_seen_row {
 // The planes that a row is seen from.
 struct pt_planes {
     const struct view_args *view;
+    uint32_t rect[4]; // nothing is seen beyond it
     const uint64_t *keys;
     const uint32_t *from;
     const float *normals, *deff;
@@ -59,11 +60,18 @@ static inline int pt_flat(const struct pt_seen_row *row, uint32_t x)
     return row->flat && row->flat[x / PT_LANES] && row->flat[(x + PT_LANES - 1) / PT_LANES];
 }
 
-static inline void pt_empty_row(float *z, uint32_t width)
+// Columns from x on that nothing is seen in; at least PT_LANES.
+static inline void pt_empty_columns(float *z, int32_t x, int32_t end)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    for (size_t x = 0; x < pt_row_stride(width); x += PT_LANES)
-        vf_store(z - PT_ROW_PAD + x, empty, vm_first(PT_LANES));
+    for (; x < end - PT_LANES; x += PT_LANES)
+        vf_store(z + x, empty, vm_first(PT_LANES));
+    vf_store(z + end - PT_LANES, empty, vm_first(PT_LANES));
+}
+
+static inline void pt_empty_row(float *z, uint32_t width)
+{
+    pt_empty_columns(z, -PT_ROW_PAD, (int32_t)width + PT_ROW_PAD);
 }
 
 // Asks for PT_LANES pixels of planes: hardware forgets a stream between two rows.
@@ -84,19 +92,18 @@ static inline void pt_ask_for_normals(const struct pt_planes *planes, size_t at)
 // Row y of the planes. with_normals = 0: they are not wanted.
 static inline void pt_see_row(const struct pt_planes *planes, int32_t y, float share, int with_normals, struct pt_seen_row *row)
 {
-    const uint32_t width = planes->view->width;
+    const uint32_t width = planes->view->width, *rect = planes->rect, first = rect[0] / PT_LANES * PT_LANES;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     row->first = row->end = 0;
-    if (y < 0 || y >= (int32_t)planes->view->height) {
+    if (y < (int32_t)rect[1] || y >= (int32_t)rect[3]) {
         pt_empty_row(row->z, width);
         return;
     }
-    for (int32_t i = 0; i < PT_ROW_PAD; i += PT_LANES)
-        vf_store(row->z - PT_ROW_PAD + i, empty, vm_first(PT_LANES));
-    for (uint32_t x = 0; x < width; x += PT_LANES) {
+    pt_empty_columns(row->z, -PT_ROW_PAD, (int32_t)first);
+    for (uint32_t x = first; x < rect[2]; x += PT_LANES) {
         size_t at = (size_t)y * width + x;
         vf z = vi_float(vi_load_z(planes->keys + at));
-        vm some = vm_and(vm_first(pt_lanes_left(x, width)), vf_lt(z, empty));
+        vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])), vf_lt(z, empty));
         vf_store(row->z + x, z, vm_first(PT_LANES));
         if (!vm_bits(some))
             continue;
@@ -120,8 +127,7 @@ static inline void pt_see_row(const struct pt_planes *planes, int32_t y, float s
         for (uint32_t k = 0; k < 3 && with_normals; k++)
             vf_store(row->normal[k] + x, n[k] * factor, vm_first(PT_LANES));
     }
-    for (uint32_t i = 0; i < PT_ROW_PAD; i++)
-        row->z[width + i] = pt_float(PT_KEY_EMPTY_Z);
+    pt_empty_columns(row->z, (int32_t)rect[2], (int32_t)width + PT_ROW_PAD);
 }
 
 #endif

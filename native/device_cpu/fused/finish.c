@@ -505,6 +505,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
     }
     if (finish.shade_count)
         finish.planes.from = pt_cpu_data(shared, 1);
+    memcpy(finish.planes.rect, finish.planes.view->rect, sizeof finish.planes.rect);
     finish.channels = finish.peel ? 4 : 3;
     finish.stride = pt_row_stride(finish.planes.view->width);
     finish.ring = (uint32_t)(2 * finish.reach > finish.reach + 3 ? 2 * finish.reach : finish.reach + 3) + 1;

@@ -86,8 +86,8 @@ int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
     const uint32_t *rect = args->view.rect;
     struct shade shade = { .call = call,
                            .args = args,
-                           .planes = { &args->view, pt_cpu_data(call, 0), pt_cpu_data(call, 1), pt_cpu_data(call, 2),
-                                       pt_cpu_data(call, 3) },
+                           .planes = { &args->view, { 0, 0, args->view.width, args->view.height }, pt_cpu_data(call, 0),
+                                       pt_cpu_data(call, 1), pt_cpu_data(call, 2), pt_cpu_data(call, 3) },
                            .stride = pt_row_stride(args->view.width),
                            .ring = 2 * args->blend + 1 };
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
