@@ -607,6 +607,8 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->z_beyond, INFINITY);
         set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
                   &out->chunks[out->chunk_count]);
+        out->chunks[out->chunk_count].row_first = rect[1];
+        out->chunks[out->chunk_count].row_end = rect[3];
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
         join_rect(out->rect, rect);

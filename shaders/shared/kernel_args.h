@@ -119,6 +119,7 @@ struct chunk_view {
     uint32_t id_base;
     uint32_t sifted; // 1 + its first drawn word; 0: all points are drawn
     uint32_t clip_first, clip_count, clip_keeps; // sift: its clips, and how many of them, the first, are PT_CLIP_KEEP
+    uint32_t row_first, row_end; // of pixels that its points may fall into; both 0: not known
 };
 
 // A clip in a chunk's coordinates, or (tint) in view space: q = (lo + R p) + hi in this order. In a box every |q| <= 1.

@@ -415,6 +415,59 @@ static void limits(struct harness *h)
 }
 
 // No instance at all, and a plane that already holds something nearer.
+// The rows that the chunk's points may fall into.
+static void note_rows(const struct scene *scene, const struct cloud *cloud, struct chunk_view *chunk)
+{
+    chunk->row_first = scene->view.height;
+    for (uint32_t s = 0; s < chunk->count; s++) {
+        struct ref_splat splat = ref_scatter(&scene->view, chunk, cloud->positions, cloud->surface, s);
+        if (!splat.possible)
+            continue;
+        uint32_t first = splat.y0 < 0 ? 0 : (uint32_t)splat.y0, end = (uint32_t)splat.y1 + 1;
+        chunk->row_first = first < chunk->row_first ? first : chunk->row_first;
+        chunk->row_end = end > chunk->row_end ? end : chunk->row_end;
+    }
+    chunk->row_end = chunk->row_end < scene->view.height ? chunk->row_end : scene->view.height;
+    if (chunk->row_first >= chunk->row_end)
+        chunk->row_first = chunk->row_end = 0;
+}
+
+// Chunks that say where they fall: most into a few rows, some across all, some do not say.
+static void rows_known(struct harness *h)
+{
+    enum { CHUNKS = 48 };
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {50 + (uint64_t)p};
+        uint32_t counts[CHUNKS];
+        for (uint32_t c = 0; c < CHUNKS; c++)
+            counts[c] = 1 + rng_below(&rng, 300);
+        struct scene scene = {.view = points_window(67, 45, p, p ? 60.0 : 20.0)};
+        struct camera camera = points_look(&rng, &scene.view, p ? 60.0 : 20.0, 4.0);
+        struct cloud *cloud = points_add_cloud(h, &rng, &scene, &camera, counts, CHUNKS, 0, 0);
+        points_scatter_about(&rng, cloud, 1.0);
+        for (uint32_t c = 0; c < CHUNKS; c++) {
+            float middle[3] = {0.0f, 0.0f, 0.0f};
+            for (int axis = 0; axis < 3 && c % 8; axis++)
+                middle[axis] = (float)rng_range(&rng, -1.0, 1.0);
+            for (uint32_t i = 0; i < counts[c]; i++)
+                for (int axis = 0; axis < 3 && c % 8; axis++)
+                    *points_coordinate(cloud, c, i, axis) = middle[axis] + 0.1f * *points_coordinate(cloud, c, i, axis);
+        }
+        const uint64_t *unknown = run_scatter(h, &scene);
+        uint32_t narrow = 0;
+        for (uint32_t c = 0; c < CHUNKS; c++) {
+            struct chunk_view *chunk = &cloud->chunks[c];
+            if (c % 12)
+                note_rows(&scene, cloud, chunk);
+            narrow += chunk->row_end && chunk->row_end - chunk->row_first < 15;
+        }
+        const uint64_t *known = check_scene(h, &scene);
+        HARNESS_CHECK(h, narrow > CHUNKS / 2);
+        for (uint32_t i = 0; i < scene.view.width * scene.view.height; i++)
+            HARNESS_CHECK(h, known[i] == unknown[i]);
+    }
+}
+
 static void nothing(struct harness *h)
 {
     struct scene scene = {.view = points_window(67, 45, 1, 60.0)};
@@ -456,6 +509,7 @@ int main(int argc, char **argv)
         {"back faces", culling, 0},
         {"behind a layer", limits, 0},
         {"sifted chunks", sifted, 0},
+        {"chunks that know their rows", rows_known, 0},
         {"nothing to draw", nothing, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

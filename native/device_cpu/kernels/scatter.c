@@ -1,17 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // scatter: points -> least key a pixel. [D 3.1]; twin of shaders/kernels/scatter.comp
 //
-// What faces away leaves first: the words of a chunk's points lie side by side. Several threads share the plane and store by
-// compare-and-swap (9 cycles), after a gathered depth test; one takes the minimum without asking. The minimum commutes, so
-// neither threads nor batches show. Chunks are compact on screen, so threads seldom meet: 3.1 ms for 1M points on two cores
-// where private planes, merged afterwards, take 6.1.
+// What faces away leaves first: the words of a chunk's points lie side by side. Threads share the plane, and a chunk's points
+// fall into few of its rows: every thread has a stripe of rows, and first takes the chunks within, whose keys nobody else
+// stores. What is left when one has done that, chunks across stripes too, is stored by compare-and-swap (9 cycles), after a
+// gathered depth test. 1M points on two cores: 1.2 ms in place of 1.5. The minimum commutes, so neither threads nor batches
+// show.
 #include "device_cpu/cpu.h"
 #include "device_cpu/vector_math.h"
+
+enum { BINS = 256 }; // of rows
+
+struct stripe { // its chunks, of scatter.order
+    uint32_t next, end;
+};
 
 struct scatter {
     const struct pt_cpu_call *call;
     const struct view_args *view;
-    const uint32_t *begins; // begins[i]: first chunk of instance i in the list of all chunks
+    const struct scatter_args *args;
+    uint32_t *begins; // begins[i]: first chunk of instance i in the list of all chunks
+    uint32_t *order;  // chunks by stripes; last those across several
+    struct stripe *stripes; // one a thread, and one of those last
+    atomic_int over;  // a stripe is done
 };
 
 struct target {
@@ -133,46 +144,148 @@ static void put(struct target target, struct block *block)
         store_least(target, block->pixel[i], (uint64_t)block->z[i] << 32 | block->id[i]);
 }
 
-static void scatter_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+struct walk { // over chunks
+    struct target target;
+    struct window window;
+    uint32_t instance, count;
+    struct block blocks[2]; // one is projected, then the one before it is put
+};
+
+static void begin_walk(const struct scatter *scatter, int shared, struct walk *walk)
+{
+    const struct pt_cpu_call *call = scatter->call;
+    const uint32_t instances = scatter->args->instances, behind = scatter->args->behind;
+    walk->target = (struct target){ .keys = pt_cpu_data(call, 0),
+                                    .limit = behind ? pt_cpu_data(call, 1 + 3 * instances) : NULL,
+                                    .drawn = scatter->args->sifted ? pt_cpu_data(call, 1 + 3 * instances + behind) : NULL,
+                                    .shared = shared };
+    walk->window = window_of(scatter->view);
+    walk->instance = walk->count = 0;
+}
+
+static const struct chunk_view *chunk_at(const struct scatter *scatter, uint32_t c, uint32_t *instance)
+{
+    while (c < scatter->begins[*instance])
+        --*instance;
+    while (c >= scatter->begins[*instance + 1])
+        ++*instance;
+    return (const struct chunk_view *)pt_cpu_data(scatter->call, 1 + 3 * *instance) + c - scatter->begins[*instance];
+}
+
+static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *walk)
+{
+    const struct chunk_view *chunk = chunk_at(scatter, c, &walk->instance);
+    const float *positions = (const float *)pt_cpu_data(scatter->call, 2 + 3 * walk->instance) + 3 * (size_t)chunk->first;
+    const uint32_t *surface = (const uint32_t *)pt_cpu_data(scatter->call, 3 + 3 * walk->instance) + chunk->first;
+    for (uint32_t first = 0; first < chunk->count; first += BLOCK, walk->count++) {
+        const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
+        project(scatter->view, &walk->window, walk->target, chunk, positions, surface, first, last,
+                &walk->blocks[walk->count % 2]);
+        if (walk->count)
+            put(walk->target, &walk->blocks[(walk->count - 1) % 2]);
+    }
+}
+
+static void end_walk(struct walk *walk)
+{
+    if (walk->count)
+        put(walk->target, &walk->blocks[(walk->count - 1) % 2]);
+}
+
+static void scatter_stripes(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct scatter *scatter = context;
+    struct walk walk;
+    (void)thread;
+    for (uint32_t s = begin; s < end; s++) {
+        uint32_t i = scatter->stripes[s].next;
+        begin_walk(scatter, 0, &walk);
+        for (; i < scatter->stripes[s].end && !atomic_load_explicit(&scatter->over, memory_order_relaxed) &&
+               !pt_cpu_cancelled(scatter->call); i++)
+            walk_chunk(scatter, scatter->order[i], &walk);
+        end_walk(&walk);
+        scatter->stripes[s].next = i;
+        atomic_store_explicit(&scatter->over, 1, memory_order_relaxed);
+    }
+}
+
+static void scatter_rest(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct scatter *scatter = context;
-    const struct pt_cpu_call *call = scatter->call;
-    const struct scatter_args *args = call->arguments;
-    const struct target target = { .keys = pt_cpu_data(call, 0),
-                                   .limit = args->behind ? pt_cpu_data(call, 1 + 3 * args->instances) : NULL,
-                                   .drawn = args->sifted ? pt_cpu_data(call, 1 + 3 * args->instances + args->behind) : NULL,
-                                   .shared = pt_pool_threads(call->pool) > 1 };
-    const struct window window = window_of(scatter->view);
-    struct block blocks[2]; // one is projected, then the one before it is put
-    uint32_t instance = 0, count = 0;
+    struct walk walk;
     (void)thread;
-    for (uint32_t c = begin; c < end && !pt_cpu_cancelled(call); c++) {
-        while (c >= scatter->begins[instance + 1])
-            instance++;
-        const struct chunk_view *chunk = (const struct chunk_view *)pt_cpu_data(call, 1 + 3 * instance) + c - scatter->begins[instance];
-        const float *positions = (const float *)pt_cpu_data(call, 2 + 3 * instance) + 3 * (size_t)chunk->first;
-        const uint32_t *surface = (const uint32_t *)pt_cpu_data(call, 3 + 3 * instance) + chunk->first;
-        for (uint32_t first = 0; first < chunk->count; first += BLOCK, count++) {
-            const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-            project(scatter->view, &window, target, chunk, positions, surface, first, last, &blocks[count % 2]);
-            if (count)
-                put(target, &blocks[(count - 1) % 2]);
-        }
+    begin_walk(scatter, 1, &walk);
+    for (uint32_t i = begin; i < end && !pt_cpu_cancelled(scatter->call); i++)
+        walk_chunk(scatter, scatter->order[i], &walk);
+    end_walk(&walk);
+}
+
+// ---- who takes which chunks --------------------------------------------------------------------------------------------
+
+static uint32_t bin_of(const struct view_args *view, uint32_t row) { return (uint32_t)((uint64_t)row * BINS / view->height); }
+
+// The stripes of bins: as many points in each.
+static void divide_rows(const struct scatter *scatter, uint32_t chunks, uint32_t stripes, uint16_t stripe_of[BINS])
+{
+    uint64_t points[BINS] = { 0 }, all = 1, before = 0;
+    for (uint32_t c = 0, instance = 0; c < chunks; c++) {
+        const struct chunk_view *chunk = chunk_at(scatter, c, &instance);
+        points[bin_of(scatter->view, (chunk->row_first + chunk->row_end) / 2)] += chunk->count;
+        all += chunk->count;
     }
-    if (count)
-        put(target, &blocks[(count - 1) % 2]);
+    for (uint32_t bin = 0; bin < BINS; before += points[bin++])
+        stripe_of[bin] = (uint16_t)((before + points[bin] / 2) * stripes / all);
+}
+
+// Of those of a chunk; `stripes` for one across several.
+static uint32_t stripe_of_chunk(const struct scatter *scatter, const struct chunk_view *chunk, uint32_t stripes,
+                                const uint16_t stripe_of[BINS])
+{
+    uint32_t end = chunk->row_end ? chunk->row_end : scatter->view->height;
+    uint32_t first = stripe_of[bin_of(scatter->view, chunk->row_first)], last = stripe_of[bin_of(scatter->view, end - 1)];
+    return first == last ? first : stripes;
+}
+
+static void sort_chunks(struct scatter *scatter, uint32_t chunks, uint32_t stripes)
+{
+    uint16_t stripe_of[BINS];
+    divide_rows(scatter, chunks, stripes, stripe_of);
+    memset(scatter->stripes, 0, (stripes + 1) * sizeof *scatter->stripes);
+    for (uint32_t c = 0, instance = 0; c < chunks; c++)
+        scatter->stripes[stripe_of_chunk(scatter, chunk_at(scatter, c, &instance), stripes, stripe_of)].end++;
+    for (uint32_t s = 0, first = 0; s <= stripes; s++) {
+        scatter->stripes[s].next = first;
+        first += scatter->stripes[s].end;
+        scatter->stripes[s].end = scatter->stripes[s].next;
+    }
+    for (uint32_t c = 0, instance = 0; c < chunks; c++) {
+        struct stripe *stripe =
+            &scatter->stripes[stripe_of_chunk(scatter, chunk_at(scatter, c, &instance), stripes, stripe_of)];
+        scatter->order[stripe->end++] = c;
+    }
 }
 
 int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
 {
     const struct scatter_args *args = call->arguments;
-    uint32_t *begins = pt_cpu_scratch(call, 0, (args->instances + 1) * sizeof *begins);
-    if (!begins)
-        return PATINA_ERROR_MEMORY;
-    begins[0] = 0;
+    const uint32_t stripes = pt_pool_threads(call->pool);
+    struct scatter scatter = { .call = call, .view = &args->view, .args = args };
+    uint32_t chunks = 0, left = 0;
     for (uint32_t i = 0; i < args->instances; i++)
-        begins[i + 1] = begins[i] + (uint32_t)(call->buffers[1 + 3 * i]->size / sizeof(struct chunk_view));
-    struct scatter scatter = { call, &args->view, begins };
-    pt_parallel(call->pool, begins[args->instances], 4, scatter_chunks, &scatter);
+        chunks += (uint32_t)(call->buffers[1 + 3 * i]->size / sizeof(struct chunk_view));
+    scatter.begins = pt_cpu_scratch(call, 0, (args->instances + 1 + chunks) * sizeof(uint32_t));
+    scatter.stripes = pt_cpu_scratch(call, 1, (stripes + 1) * sizeof *scatter.stripes);
+    if (!scatter.begins || !scatter.stripes)
+        return PATINA_ERROR_MEMORY;
+    scatter.order = scatter.begins + args->instances + 1;
+    scatter.begins[0] = 0;
+    for (uint32_t i = 0; i < args->instances; i++)
+        scatter.begins[i + 1] = scatter.begins[i] + (uint32_t)(call->buffers[1 + 3 * i]->size / sizeof(struct chunk_view));
+    sort_chunks(&scatter, chunks, stripes);
+    pt_parallel(call->pool, stripes, 1, scatter_stripes, &scatter);
+    for (uint32_t s = 0; s <= stripes; s++)
+        for (uint32_t i = scatter.stripes[s].next; i < scatter.stripes[s].end; i++)
+            scatter.order[left++] = scatter.order[i];
+    pt_parallel(call->pool, left, 4, scatter_rest, &scatter);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
