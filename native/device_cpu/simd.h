@@ -646,6 +646,8 @@ static inline void vf_put3(float *p, const vf n[3], uint32_t count)
 // Eight floats or integers side by side at every level: what is summed for a pixel. Not a vector of lanes.
 typedef float vf_eight __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int32_t vi_eight __attribute__((vector_size(32), aligned(4), may_alias));
+// Words of bits side by side, four at every level: what planes of bits are worked on by.
+typedef uint64_t vi_words __attribute__((vector_size(32), aligned(8), may_alias));
 
 static inline vi vi_gather_id(const uint64_t *keys, vi i, vm m) // lower words of keys
 {

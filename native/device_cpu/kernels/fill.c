@@ -3,10 +3,11 @@
 // shaders/kernels/fill.comp
 //
 // The planes are read once: that gives a bit a pixel that is covered, and one that may be occluded. Background pixels are
-// filled and un-filled by bits alone, 64 at once: eight masks of dark neighbours, four bit operations a mask find the runs.
+// filled and un-filled by bits alone, 64 at once: eight masks of dark neighbours, three bit operations a mask find the runs.
 // A step first decides from the state before it, then applies: what changes is listed by bands of rows, so the planes are
-// never copied. Entries stay listed with the pixel's state before the phase, for un-filling.
-// A step looks only where the one before it changed something. What is listed is worked on by whole vectors.
+// never copied. Occluded pixels' entries stay listed with the pixel's state before the phase, for un-filling, and a step looks
+// for such only where the one before it changed something. What is listed is worked on by whole vectors.
+#include "fill_background.h"
 #include "fill_occluded.h"
 
 // ---- deciding ------------------------------------------------------------------------------------------------------------
@@ -67,43 +68,13 @@ static void refine(const struct fill *fill, size_t at, size_t end)
     vi_store_keys(e->key + at, vf_bits(z), vi_load_id(e->key + at), vm_bits(lanes));
 }
 
-// Of 64 pixels those that `look` names, empty or (occluded) covered ones, if they are to be filled, or may be.
-static size_t list_some(struct fill *fill, size_t word, uint32_t y, uint64_t look, size_t count)
-{
-    if (!fill->occluded)
-        look &= ~empty_run(fill, word, y, 5);
-    for (uint32_t i = 0; i < 64 && look >> i; i += PT_LANES) {
-        const uint32_t x = (uint32_t)word * 64 + i;
-        vm some = vm_of_bits((uint32_t)(look >> i));
-        vf threshold = vf_set(pt_float(PT_KEY_EMPTY_Z));
-        if (vm_bits(some) && fill->occluded)
-            some = suspects_at(fill, x, y, some, &threshold);
-        if (vm_bits(some))
-            count = list(&fill->entries, count, vi_add(vi_set(x), vi_lanes()), vi_set(y), threshold, some);
-    }
-    return count;
-}
-
-static inline size_t list_word(struct fill *fill, size_t word, uint32_t y, uint64_t look, size_t count)
-{
-    const uint64_t covered = fill->covered[y * fill->words + word], left = fill->view->width - word * 64;
-    look &= fill->occluded ? covered : left < 64 ? ~covered & ((1ull << left) - 1) : ~covered;
-    return look ? list_some(fill, word, y, look, count) : count;
-}
-
 static void decide_band(struct fill *fill, uint32_t band)
 {
     const size_t base = band * fill->band_entries, kept = base + fill->kept[band];
-    const uint64_t *first = fill->occluded ? fill->suspect : fill->covered;
-    size_t listed = over_asked(fill, band, fill->first ? first : fill->dirty, kept, list_word);
-    if (fill->occluded)
-        listed = keep_occluded(fill, kept, listed);
+    const size_t listed = fill->occluded ? list_hidden(fill, band, kept) : list_empty(fill, band, kept);
     fill->listed[band] = (uint32_t)(listed - base);
-    if (fill->first) {
-        uint32_t begin, end;
-        band_rows(fill, band, &begin, &end);
-        memset(fill->filled + begin * fill->words, 0, (end - begin) * fill->words * 8);
-    }
+    if (fill->first)
+        clear_band(fill, band, fill->filled);
     for (size_t i = kept; i < listed; i += PT_LANES)
         take_least(fill, i, listed);
     // only now: the surfaces are under way
@@ -128,45 +99,40 @@ static void note_change(struct fill *fill, uint32_t changed)
 
 static void apply_band(struct fill *fill, uint32_t band)
 {
+    const struct span span = band_words(fill, band);
     const struct entries *e = &fill->entries;
     size_t base = band * fill->band_entries, keep = base + fill->kept[band], end = base + fill->listed[band];
-    note_change(fill, fill->listed[band] - fill->kept[band]);
+    if (keep == end)
+        return;
+    note_change(fill, (uint32_t)(end - keep));
     for (size_t i = keep; i < end; i++) {
-        size_t pixel = (size_t)e->y[i] * fill->view->width + e->x[i], word = e->y[i] * fill->words + e->x[i] / 64;
-        uint64_t bit = 1ull << e->x[i] % 64, old_key = fill->keys[pixel];
-        uint32_t old_from = fill->from[pixel];
-        fill->touched[word] |= bit;
-        fill->covered[word] |= bit;
-        fill->suspect[word] |= bit;
+        const size_t pixel = (size_t)e->y[i] * fill->view->width + e->x[i];
+        // filled before in this phase: that entry knows the state before it
+        if (fill->occluded && !(fill->filled[word_of(fill, e->x[i], e->y[i])] & bit_of(e->x[i]))) {
+            e->old_key[i] = fill->keys[pixel];
+            e->old_from[i] = fill->from[pixel];
+            move_entry(e, keep++, i);
+        }
         fill->keys[pixel] = e->key[i];
         fill->from[pixel] = e->from[i];
-        if (fill->filled[word] & bit)
-            continue; // filled before in this phase: that entry knows the state before it
-        fill->filled[word] |= bit;
-        e->old_key[i] = old_key;
-        e->old_from[i] = old_from;
-        move_entry(e, keep++, i);
     }
     fill->kept[band] = (uint32_t)(keep - base);
+    for (size_t i = span.begin; i < span.end; i += WORDS) {
+        const vi_words touched = *words_at(fill->touched + i);
+        *words_at(fill->covered + i) |= touched;
+        *words_at(fill->suspect + i) |= touched;
+        *words_at(fill->filled + i) |= touched;
+    }
 }
 
 // ---- un-filling ----------------------------------------------------------------------------------------------------------
 
-// A filled pixel that shows four consecutive white cells is marked ...
-static size_t mark_word(struct fill *fill, size_t word, uint32_t y, uint64_t look, size_t count)
-{
-    look &= fill->filled[y * fill->words + word];
-    if (look && !fill->occluded)
-        look &= empty_run(fill, word, y, 4);
-    fill->touched[y * fill->words + word] = look;
-    return count + (look != 0);
-}
-
-// What was occluded has thresholds of its own: entries without such cells lose their mark.
-static void unmark_entries(const struct fill *fill, uint32_t band)
+// An occluded pixel that shows four consecutive white cells by its own threshold is marked ...
+static void mark_entries(const struct fill *fill, uint32_t band)
 {
     const struct entries *e = &fill->entries;
     size_t base = band * fill->band_entries, end = base + fill->kept[band];
+    clear_band(fill, band, fill->touched);
     for (size_t i = base; i < end; i += PT_LANES) {
         vm lanes = entry_lanes(i, end);
         vi x = vi_load(e->x + i), y = vi_load(e->y + i), white = vi_set(0);
@@ -177,46 +143,46 @@ static void unmark_entries(const struct fill *fill, uint32_t band)
             white = vi_or(white, vi_select(dark, vi_set(0), vi_set(0x101u << d))); // twice: runs wrap round
         }
         vi run = vi_and(vi_and(white, vi_shr(white, 1)), vi_and(vi_shr(white, 2), vi_shr(white, 3)));
-        uint32_t stay = vm_bits(vm_and(lanes, vi_eq(vi_and(run, vi_set(255)), vi_set(0))));
-        for (; stay; stay &= stay - 1) {
-            size_t k = i + (uint32_t)__builtin_ctz(stay);
-            fill->touched[e->y[k] * fill->words + e->x[k] / 64] &= ~(1ull << e->x[k] % 64);
+        uint32_t marked = vm_bits(vm_and(lanes, vi_lt_unsigned(vi_set(0), vi_and(run, vi_set(255)))));
+        for (; marked; marked &= marked - 1) {
+            const size_t k = i + (uint32_t)__builtin_ctz(marked);
+            fill->touched[word_of(fill, e->x[k], e->y[k])] |= bit_of(e->x[k]);
         }
     }
 }
 
-static void mark_band(struct fill *fill, uint32_t band)
-{
-    const uint64_t *plane = fill->first ? fill->filled : fill->dirty;
-    fill->listed[band] = (uint32_t)over_asked(fill, band, plane, 0, mark_word);
-    if (fill->listed[band] && fill->occluded)
-        unmark_entries(fill, band);
-}
-
-// ... and gets back what it was before the phase.
-static void restore_band(struct fill *fill, uint32_t band)
+// ... and gets back what it was before the phase. Returns how many.
+static uint32_t restore_entries(const struct fill *fill, uint32_t band)
 {
     const struct entries *e = &fill->entries;
-    const size_t base = band * fill->band_entries;
-    size_t end = base + fill->kept[band];
-    if (!fill->listed[band])
-        return;
+    const size_t base = band * fill->band_entries, kept = fill->kept[band];
+    size_t end = base + kept;
     for (size_t i = base; i < end;) {
-        size_t pixel = (size_t)e->y[i] * fill->view->width + e->x[i], word = e->y[i] * fill->words + e->x[i] / 64;
-        uint64_t bit = 1ull << e->x[i] % 64;
-        if (!(fill->touched[word] & bit)) {
+        const size_t pixel = (size_t)e->y[i] * fill->view->width + e->x[i], word = word_of(fill, e->x[i], e->y[i]);
+        if (!(fill->touched[word] & bit_of(e->x[i]))) {
             i++;
             continue;
         }
         fill->keys[pixel] = e->old_key[i];
         fill->from[pixel] = e->old_from[i];
-        fill->filled[word] &= ~bit;
-        if (!fill->occluded) // what was empty before the phase
-            fill->covered[word] &= ~bit;
+        fill->filled[word] &= ~bit_of(e->x[i]);
         move_entry(e, i, --end);
     }
-    note_change(fill, fill->kept[band] - (uint32_t)(end - base));
     fill->kept[band] = (uint32_t)(end - base);
+    return (uint32_t)(base + kept - end);
+}
+
+static void mark_band(struct fill *fill, uint32_t band)
+{
+    if (fill->occluded)
+        mark_entries(fill, band);
+    else
+        mark_empty(fill, band);
+}
+
+static void restore_band(struct fill *fill, uint32_t band)
+{
+    note_change(fill, fill->occluded ? restore_entries(fill, band) : restore_empty(fill, band));
 }
 
 // ---- steps -------------------------------------------------------------------------------------------------------------
@@ -270,14 +236,20 @@ static int allocate(struct fill *fill)
     const struct view_args *view = fill->view;
     struct entries *e = &fill->entries;
     size_t count = bands(fill);
-    fill->words = (view->width + 63) / 64;
+    uint64_t **const planes[] = { &fill->covered, &fill->suspect, &fill->filled, &fill->dirty, &fill->touched };
+    enum { PLANES = sizeof planes / sizeof *planes };
+    fill->words = ((view->width + 65) / 64 + WORDS - 1) / WORDS * WORDS;
     // every pixel may be kept, and be filled again in this step
     fill->band_entries = 2 * (size_t)view->width * BAND_ROWS + PT_LANES;
-    size_t words = fill->words * view->height, room = count * fill->band_entries + PT_LANES;
+    size_t words = fill->words * (view->height + 2) + 2, room = count * fill->band_entries + PT_LANES;
     uint8_t *lists = pt_cpu_scratch(fill->call, 1, room * 44);
-    fill->covered = pt_cpu_scratch(fill->call, 0, words * 5 * 8 + count * 8);
-    if (!lists || !fill->covered)
+    uint64_t *bits = pt_cpu_scratch(fill->call, 0, words * PLANES * 8 + count * 8);
+    if (!lists || !bits)
         return PATINA_ERROR_MEMORY;
+    for (size_t i = 0; i < PLANES; i++)
+        *planes[i] = bits + i * words + fill->words + 1;
+    fill->kept = (uint32_t *)(bits + PLANES * words);
+    fill->listed = fill->kept + count;
     e->key = (uint64_t *)lists;
     e->old_key = e->key + room;
     e->x = (uint32_t *)(e->old_key + room);
@@ -287,12 +259,6 @@ static int allocate(struct fill *fill)
     e->from = e->qy + room;
     e->old_from = e->from + room;
     e->threshold = (float *)(e->old_from + room);
-    fill->suspect = fill->covered + words;
-    fill->filled = fill->suspect + words;
-    fill->dirty = fill->filled + words;
-    fill->touched = fill->dirty + words;
-    fill->kept = (uint32_t *)(fill->touched + words);
-    fill->listed = fill->kept + count;
     return PATINA_OK;
 }
 

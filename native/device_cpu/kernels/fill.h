@@ -5,7 +5,7 @@
 
 #include "device_cpu/rows.h"
 
-enum { BAND_ROWS = 16, RING = 8 };
+enum { BAND_ROWS = 16, RING = 8, WORDS = sizeof(vi_words) / 8 };
 
 // The ring, anticlockwise from east.
 static const int8_t ring_x[RING] = { 1, 1, 0, -1, -1, -1, 0, 1 };
@@ -25,16 +25,17 @@ struct fill {
     uint64_t *keys;
     uint32_t *from;
     const float *normals, *deff;
-    // planes of bits, a word 64 pixels of a row
+    // Planes of bits, a word 64 pixels of a row. Two bits or more of a row are to spare and 0, as is a row beyond the rectangle
+    // or the plane: words that follow each other are neighbours, whatever the row.
     uint64_t *covered, *suspect; // not empty; maybe occluded: as the planes were before, or filled since
     uint64_t *filled;            // in this phase
     uint64_t *dirty, *touched;   // changed by the last step; by this one
-    size_t words;                // in a row
+    size_t words;                // in a row; a multiple of WORDS
     struct entries entries;      // of all bands
     size_t band_entries;
-    uint32_t *kept, *listed; // per band: entries of earlier steps; with those of this step
+    uint32_t *kept, *listed; // per band: entries of earlier steps, of occluded pixels; with those of this step
     int occluded;            // the phase
-    int first;               // its first step looks everywhere
+    int first;               // its first step
     atomic_uint changed;
 };
 
@@ -50,67 +51,64 @@ static void band_rows(const struct fill *fill, uint32_t band, uint32_t *first, u
 }
 
 // ---- planes of bits --------------------------------------------------------------------------------------------------------
-
-struct trio { // of 64 pixels: the bits of those to the west of them, their own, those to the east
-    uint64_t west, own, east;
+struct span { // of words
+    size_t begin, end;
 };
 
-static struct trio trio_of(const struct fill *fill, const uint64_t *row, size_t word)
+static struct span band_words(const struct fill *fill, uint32_t band)
 {
-    uint64_t own = row[word], before = word ? row[word - 1] : 0, behind = word + 1 < fill->words ? row[word + 1] : 0;
+    uint32_t first, last;
+    band_rows(fill, band, &first, &last);
+    return (struct span){ first * fill->words, last * fill->words };
+}
+
+static void clear_band(const struct fill *fill, uint32_t band, uint64_t *plane)
+{
+    const struct span span = band_words(fill, band);
+    memset(plane + span.begin, 0, (span.end - span.begin) * 8);
+}
+
+static inline vi_words *words_at(uint64_t *plane) { return (vi_words *)(void *)plane; }
+
+static inline uint64_t bits_between(uint32_t begin, uint32_t end) // of a word
+{
+    return (end < 64 ? (1ull << end) - 1 : UINT64_MAX) & ~((1ull << begin) - 1);
+}
+
+static inline size_t word_of(const struct fill *fill, uint32_t x, uint32_t y) { return y * fill->words + x / 64; }
+static inline uint64_t bit_of(uint32_t x) { return 1ull << x % 64; }
+
+struct trio { // of 64 WORDS pixels: the bits of those to the west of them, their own, those to the east
+    vi_words west, own, east;
+};
+
+static inline struct trio trio_of(const uint64_t *at)
+{
+    vi_words before, own, behind;
+    memcpy(&before, at - 1, sizeof before);
+    memcpy(&own, at, sizeof own);
+    memcpy(&behind, at + 1, sizeof behind);
     return (struct trio){ own << 1 | before >> 63, own, own >> 1 | behind << 63 };
 }
 
-// Calls work for the words of a band that have bits of the plane, or pixels beside them: where to look. Passes on the count.
-// Clears what is touched. Within view.rect: nothing beyond it ever changes, and no pixel does with all that is dark on one side.
-typedef size_t word_work(struct fill *fill, size_t word, uint32_t y, uint64_t look, size_t count);
-
-static inline size_t over_asked(struct fill *fill, uint32_t band, const uint64_t *plane, size_t count, word_work *work)
+// Which of 64 WORDS pixels have bits, or neighbours that do.
+static inline void wider(const uint64_t *at, size_t words, vi_words *out)
 {
-    const uint32_t *rect = fill->view->rect;
-    const size_t begin = rect[0] / 64, end = (rect[2] + 63) / 64;
-    uint32_t first, last;
-    band_rows(fill, band, &first, &last);
-    for (uint32_t y = first; y < last; y++) {
-        const uint64_t *own = plane + y * fill->words, *below = y > rect[1] ? own - fill->words : own;
-        const uint64_t *above = y + 1 < rect[3] ? own + fill->words : own;
-        uint64_t *near = fill->touched + y * fill->words, any = 0;
-        for (size_t word = begin; word < end; word++)
-            any |= near[word] = below[word] | own[word] | above[word];
-        if (!any)
-            continue;
-        uint64_t west = 0, here = near[begin], east;
-        for (size_t word = begin; word < end; word++, west = here, here = east) {
-            east = word + 1 < end ? near[word + 1] : 0;
-            near[word] = 0;
-            uint64_t look = west >> 63 | here << 1 | here | here >> 1 | east << 63;
-            if (look)
-                count = work(fill, word, y, look, count);
-        }
-    }
-    return count;
+    const struct trio below = trio_of(at - words), own = trio_of(at), above = trio_of(at + words);
+    *out = below.west | below.own | below.east | own.west | own.own | own.east | above.west | above.own | above.east;
 }
 
-// Which of 64 pixels have `length` consecutive white ring neighbours.
-static inline uint64_t white_run(const uint64_t dark[RING], int length)
+// Which of 64 WORDS pixels have `length` consecutive ring neighbours without bits.
+static inline void white_run(const uint64_t *at, size_t words, int length, vi_words *out)
 {
-    uint64_t pair[RING], none = UINT64_MAX;
+    const struct trio below = trio_of(at - words), own = trio_of(at), above = trio_of(at + words);
+    const vi_words dark[RING] = { own.east, above.east, above.own, above.west, own.west, below.west, below.own, below.east };
+    vi_words pair[RING], none = ~(vi_words){ 0 };
     for (int d = 0; d < RING; d++)
         pair[d] = dark[d] | dark[(d + 1) % RING];
     for (int d = 0; d < RING; d++)
-        none &= pair[d] | pair[(d + 2) % RING] | (length == 5 ? dark[(d + 4) % RING] : 0);
-    return ~none;
-}
-
-// The same where what is covered is dark.
-static inline uint64_t empty_run(const struct fill *fill, size_t word, uint32_t y, int length)
-{
-    const uint64_t *row = fill->covered + y * fill->words;
-    const struct trio none = { 0, 0, 0 }, own = trio_of(fill, row, word);
-    const struct trio below = y ? trio_of(fill, row - fill->words, word) : none;
-    const struct trio above = y + 1 < fill->view->height ? trio_of(fill, row + fill->words, word) : none;
-    return white_run((const uint64_t[RING]){ own.east, above.east, above.own, above.west, own.west, below.west, below.own,
-                                             below.east }, length);
+        none &= pair[d] | pair[(d + 2) % RING] | dark[(d + length - 1) % RING];
+    *out = ~none;
 }
 
 #endif
