@@ -112,4 +112,25 @@ static inline vf pt_own_distance(const struct view_args *view, const float *deff
     return vf_select(other, vf_gather(deff, source, other), own);
 }
 
+struct pt_row_z { // z of PT_LANES pixels, and of those to the west and to the east of them
+    vf west, own, east;
+};
+
+static inline vf pt_z_of(const uint64_t *key) { return vf_set(pt_float((uint32_t)(*key >> 32))); }
+
+// From (x, y) on, +inf beyond the plane. edge: whether there may be columns beyond it.
+static inline struct pt_row_z pt_load_row_z(const uint64_t *keys, uint32_t width, uint32_t height, uint32_t x, uint32_t y,
+                                            int edge)
+{
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    if (y >= height)
+        return (struct pt_row_z){ empty, empty, empty };
+    keys += (size_t)y * width + x;
+    vf own = vi_float(vi_load_z(keys));
+    if (edge && width - x < PT_LANES)
+        own = vf_select(vm_first(width - x), own, empty);
+    return (struct pt_row_z){ vf_west(edge && !x ? empty : pt_z_of(keys - 1), own), own,
+                              vf_east(own, edge && width - x <= PT_LANES ? empty : pt_z_of(keys + PT_LANES)) };
+}
+
 #endif

@@ -136,14 +136,6 @@ static inline void vf_pack3(const vf n[3], vf out[3]) // x, y, z of 16 points ->
     for (int k = 0; k < 3; k++)
         out[k] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(n[0], vi_load(first[k]), n[1]), vi_load(then[k]), n[2]);
 }
-static inline vi vi_pairs(vi a) // each of the first half of the lanes twice
-{
-    return _mm512_permutexvar_epi32(_mm512_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7), a);
-}
-static inline vi vi_sides(vi a) // lane 2k: k, lane 2k + 1: k + 2
-{
-    return _mm512_permutexvar_epi32(_mm512_setr_epi32(0, 2, 1, 3, 2, 4, 3, 5, 4, 6, 5, 7, 6, 8, 7, 9), a);
-}
 static inline vi vi_west(vi before, vi own) // of each lane of own the one before it
 {
     return _mm512_alignr_epi32(own, before, 15);
@@ -306,14 +298,6 @@ static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
     sse_pack(p, _mm256_castsi256_si128(a), lanes & 15u);
     sse_pack(p + __builtin_popcount(lanes & 15u), _mm256_extracti128_si256(a, 1), lanes >> 4);
 }
-static inline vi vi_pairs(vi a)
-{
-    return _mm256_permutevar8x32_epi32(a, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3));
-}
-static inline vi vi_sides(vi a)
-{
-    return _mm256_permutevar8x32_epi32(a, _mm256_setr_epi32(0, 2, 1, 3, 2, 4, 3, 5));
-}
 static inline vi vi_west(vi before, vi own) { return _mm256_alignr_epi8(own, _mm256_permute2x128_si256(before, own, 0x21), 12); }
 static inline vi vi_east(vi own, vi behind) { return _mm256_alignr_epi8(_mm256_permute2x128_si256(own, behind, 0x21), own, 4); }
 #define PT_VECTOR(name) _mm256_##name
@@ -426,8 +410,6 @@ static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
 static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm_and_ps(a * b, _mm_castsi128_ps(m)); }
 static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm_and_ps(b, _mm_castsi128_ps(m)); }
 static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { sse_pack(p, a, lanes); }
-static inline vi vi_pairs(vi a) { return _mm_shuffle_epi32(a, 0x50); }
-static inline vi vi_sides(vi a) { return _mm_shuffle_epi32(a, 0xD8); }
 static inline vi vi_west(vi before, vi own) { return _mm_alignr_epi8(own, before, 12); }
 static inline vi vi_east(vi own, vi behind) { return _mm_alignr_epi8(behind, own, 4); }
 #define PT_VECTOR(name) _mm_##name
@@ -503,8 +485,6 @@ static inline vi vi_load_id(const uint64_t *keys) { return vi_evens(vi_load(keys
 
 #if PT_LANES == 1
 static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { *p = ((void)lanes, a); }
-static inline vi vi_pairs(vi a) { return a; }
-static inline vi vi_sides(vi a) { return a; } // of an even pixel
 static inline vi vi_west(vi before, vi own) { return ((void)own, before); }
 static inline vi vi_east(vi own, vi behind) { return ((void)own, behind); }
 static inline vi vi_evens(vi a, vi b) { return ((void)b, a); }

@@ -147,6 +147,15 @@ static inline vf vf_level_distance(const struct view_args *view, vf d, vf invers
     return view->level ? vf_max(d, vf_footprint(view, z) * inverse) : d;
 }
 
+// z at a ray of the plane through a point at z_q of another, given n . ray of both.
+static inline vf vf_meet(vf z_q, vf dot_q, vf dot_p)
+{
+    vf sign = vf_select(vf_lt(dot_p, vf_zero()), vf_set(-1.0f), vf_set(1.0f)), size = vf_abs(dot_p);
+    vm good = vf_lt(vf_set(1e-6f), size);
+    vf r = vf_rcp(vf_select(good, size, vf_set(1.0f)));
+    return vf_select(good, ((z_q * dot_q) * sign) * r, z_q);
+}
+
 // z at ray p of the plane with normal n through the point at (ray q, z_q), not nearer than z_q, not farther than
 // z_q + limit. SPEC 2.2, refined filling.
 static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], const vf ray_q[2], vf z_q, const vf ray_p[2],
@@ -156,10 +165,7 @@ static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], con
     vf z = z_q;
     if (view->perspective) {
         vf dot_q = (n[0] * ray_q[0] + n[1] * ray_q[1]) - n[2], dot_p = (n[0] * ray_p[0] + n[1] * ray_p[1]) - n[2];
-        vf sign = vf_select(vf_lt(dot_p, zero), vf_set(-1.0f), one), size = vf_abs(dot_p);
-        vm good = vf_lt(vf_set(1e-6f), size);
-        vf r = vf_rcp(vf_select(good, size, one));
-        z = vf_select(good, (z_q * (dot_q * sign)) * r, z);
+        z = vf_meet(z_q, dot_q, dot_p);
     } else {
         vf sign = vf_select(vf_lt(n[2], zero), vf_set(-1.0f), one), size = vf_abs(n[2]);
         vm good = vf_lt(vf_set(1e-6f), size);

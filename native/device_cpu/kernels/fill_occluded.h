@@ -10,27 +10,15 @@
 
 #include "fill.h"
 
-struct row { // z of PT_LANES pixels, and of those to the west and to the east of them; the least of the two, and of the three
-    vf west, own, east, beside, all;
+struct row {
+    vf west, own, east, beside, all; // z; the least of west and east, and of the three
 };
 
-static inline vf z_of(const uint64_t *key) { return vf_set(pt_float((uint32_t)(*key >> 32))); }
-
-// From (x, y) on, +inf beyond the plane. edge: whether there may be columns beyond it.
 static inline struct row load_row(const struct fill *fill, uint32_t x, uint32_t y, int edge)
 {
-    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    const uint32_t width = fill->view->width;
-    if (y >= fill->view->height)
-        return (struct row){ empty, empty, empty, empty, empty };
-    const uint64_t *keys = fill->keys + (size_t)y * width + x;
-    vf own = vi_float(vi_load_z(keys));
-    if (edge && width - x < PT_LANES)
-        own = vf_select(vm_first(width - x), own, empty);
-    const vf west = vf_west(edge && !x ? empty : z_of(keys - 1), own);
-    const vf east = vf_east(own, edge && width - x <= PT_LANES ? empty : z_of(keys + PT_LANES));
-    const vf beside = vf_min(west, east);
-    return (struct row){ west, own, east, beside, vf_min(beside, own) };
+    const struct pt_row_z z = pt_load_row_z(fill->keys, fill->view->width, fill->view->height, x, y, edge);
+    const vf beside = vf_min(z.west, z.east);
+    return (struct row){ z.west, z.own, z.east, beside, vf_min(beside, z.own) };
 }
 
 // The least, over all two that are apart, of the farther.
