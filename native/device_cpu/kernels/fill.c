@@ -91,10 +91,11 @@ static void move_entry(const struct entries *e, size_t to, size_t from)
     e->old_from[to] = e->old_from[from];
 }
 
+// Written once a step at the most: other threads read what lies beside it.
 static void note_change(struct fill *fill, uint32_t changed)
 {
-    if (changed)
-        atomic_fetch_add_explicit(&fill->changed, changed, memory_order_relaxed);
+    if (changed && !atomic_load_explicit(&fill->changed, memory_order_relaxed))
+        atomic_store_explicit(&fill->changed, 1, memory_order_relaxed);
 }
 
 static void apply_band(struct fill *fill, uint32_t band)
