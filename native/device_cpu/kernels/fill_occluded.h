@@ -14,9 +14,9 @@ struct row {
     vf west, own, east, beside, all; // z; the least of west and east, and of the three
 };
 
-static inline struct row load_row(const struct fill *fill, uint32_t x, uint32_t y, int edge)
+static inline struct row load_row(const uint64_t *keys, const struct view_args *view, uint32_t x, uint32_t y, int edge)
 {
-    const struct pt_row_z z = pt_load_row_z(fill->keys, fill->view->width, fill->view->height, x, y, edge);
+    const struct pt_row_z z = pt_load_row_z(keys, view->width, view->height, x, y, edge);
     const vf beside = vf_min(z.west, z.east);
     return (struct row){ z.west, z.own, z.east, beside, vf_min(beside, z.own) };
 }
@@ -45,18 +45,22 @@ static inline size_t list(const struct entries *e, size_t count, vi x, vi y, vf 
 static inline __attribute__((always_inline)) size_t list_columns(const struct fill *fill, uint32_t x, uint32_t y, uint32_t rows,
                                                                  const uint64_t *asked, uint64_t within, int edge, size_t count)
 {
-    struct row below = load_row(fill, x, y - 1, edge), row = load_row(fill, x, y, edge), above;
+    const struct view_args view = *fill->view; // of our own: what is listed does not change it
+    const uint64_t *keys = fill->keys;
+    const float least = fill->args->least;
+    const size_t words = fill->words;
+    struct row below = load_row(keys, &view, x, y - 1, edge), row = load_row(keys, &view, x, y, edge), above;
     for (uint32_t k = 0; k < rows; k++, below = row, row = above) {
-        above = load_row(fill, x, y + k + 1, edge);
+        above = load_row(keys, &view, x, y + k + 1, edge);
         // one of the two is beside, or one is above and one is below: not so of most pixels
-        const vf most = row.own - pt_least_distance(fill->view, fill->args->least, row.own);
-        uint32_t bits = (uint32_t)((asked[k * fill->words] & within) >> x % 64);
+        const vf most = row.own - pt_least_distance(&view, least, row.own);
+        uint32_t bits = (uint32_t)((asked[k * words] & within) >> x % 64);
         bits &= vm_bits(vf_lt(vf_min(row.beside, vf_max(below.all, above.all)), most));
         if (!bits)
             continue;
         const vf nearest = nearest_two(&below, &row, &above);
         bits &= vm_bits(vf_lt(nearest, most));
-        const size_t at = (size_t)(y + k) * fill->view->width + x;
+        const size_t at = (size_t)(y + k) * view.width + x;
         __builtin_prefetch(fill->from + at);
         __builtin_prefetch(fill->deff + at);
         count = list(&fill->entries, count, vi_add(vi_set(x), vi_lanes()), vi_set(y + k), nearest, bits);
