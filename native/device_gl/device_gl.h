@@ -69,7 +69,7 @@ struct pt_gl_device {
     int lost;
     char message[512];
     size_t block_size; // greatest storage block
-    size_t alignment;  // of a block's offset in its buffer
+    size_t alignment;  // of a block's or a texture's offset in its buffer
     size_t texels;     // in a buffer texture
     GLuint arguments;
     GLuint srgb;    // uniform block: linear values of the 256 sRGB bytes
@@ -102,6 +102,7 @@ int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t arg
                        struct pt_buffer *const *buffers, uint32_t count);
 // Unit 0: keys, 1: from, 2: deff, 3 and 4: float4 planes.
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane);
+int pt_gl_bind_texels(struct pt_gl_device *d, uint32_t unit, GLuint name, size_t offset, size_t size); // a part of a buffer
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);
 // At least `size` bytes; keeps the first `keep` bytes when it has to grow.
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep);

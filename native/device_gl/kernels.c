@@ -77,16 +77,21 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)
 {
+    return pt_gl_bind_texels(d, unit, plane->name, 0, plane->size);
+}
+
+int pt_gl_bind_texels(struct pt_gl_device *d, uint32_t unit, GLuint name, size_t offset, size_t size)
+{
     static const GLenum formats[PT_GL_TEXTURES] = {GL_RG32UI, GL_R32UI, GL_R32F, GL_RGBA32F, GL_RGBA32F};
     static const uint8_t sizes[PT_GL_TEXTURES] = {8, 4, 4, 16, 16};
-    size_t texels = plane->size / sizes[unit];
+    size_t texels = size / sizes[unit];
     if (texels > d->texels)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
                           "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels,
                           d->texels);
     d->gl.ActiveTexture(GL_TEXTURE0 + unit);
     d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
-    d->gl.TexBuffer(GL_TEXTURE_BUFFER, formats[unit], plane->name);
+    d->gl.TexBufferRange(GL_TEXTURE_BUFFER, formats[unit], name, (GLintptr)offset, (GLsizeiptr)size);
     return PATINA_OK;
 }
 

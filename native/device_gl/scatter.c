@@ -27,6 +27,14 @@ static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, 
 {
     const char *what = pt_kernel_names[b->kernel];
     int result = pt_gl_bind(d, b->binding, b->chunks->name, 0, b->chunks->size, what);
+    if (b->kernel == PT_KERNEL_scatter) { // both as textures
+        const size_t first = batch->first_slot * 4, left = b->surface->size - first, size = batch->slots * 4;
+        if (result == PATINA_OK)
+            result = pt_gl_bind_texels(d, 1, b->surface->name, first, size < left ? size : left);
+        if (result == PATINA_OK)
+            result = pt_gl_bind_texels(d, 2, b->positions->name, 3 * first, 3 * size);
+        return result;
+    }
     if (result == PATINA_OK)
         result = pt_gl_bind(d, b->binding + 1, b->positions->name, batch->first_slot * 12, batch->slots * 12, what);
     if (result == PATINA_OK && b->surface)
@@ -50,11 +58,17 @@ static int run_batch(struct pt_gl_device *d, const struct instance_buffers *b, c
     return result;
 }
 
-// The next run of chunks whose slots fit into a block.
+// That fit into a block, and a texture.
+static uint64_t most_slots(const struct pt_gl_device *d)
+{
+    return d->block_size / 12 < d->texels / 3 ? d->block_size / 12 : d->texels / 3;
+}
+
+// The next run of chunks whose slots fit.
 static struct batch next_batch(const struct pt_gl_device *d, const struct chunk_view *chunks, uint32_t count,
                                uint32_t first)
 {
-    uint64_t limit = d->block_size / 12, begin = UINT64_MAX, end = 0;
+    uint64_t limit = most_slots(d), begin = UINT64_MAX, end = 0;
     struct batch batch = {.first_chunk = first};
     for (uint32_t c = first; c < count; c++) {
         // Offsets are multiples of the driver's alignment for every element size when slots are.
@@ -80,7 +94,7 @@ static int run_instance(struct pt_gl_device *d, const struct instance_buffers *b
     uint32_t count = (uint32_t)(b->chunks->size / sizeof(struct chunk_view));
     if (!count)
         return PATINA_OK;
-    if (b->positions->size <= d->block_size) {
+    if (b->positions->size / 12 <= most_slots(d)) {
         struct batch whole = {.chunk_count = count, .slots = b->positions->size / 12};
         return run_batch(d, b, &whole, pass, cancel);
     }
@@ -110,14 +124,16 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
     const struct pt_buffer *drawn = args->sifted ? buffers[1 + 3 * args->instances + args->behind] : buffers[0];
     int result = pt_gl_bind(d, 1, buffers[0]->name, 0, buffers[0]->size, "scatter");
     if (result == PATINA_OK)
+        result = pt_gl_bind_texture(d, 0, buffers[0]);
+    if (result == PATINA_OK)
         result = pt_gl_bind(d, 5, limit->name, 0, limit->size, "scatter");
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 6, drawn->name, 0, drawn->size, "scatter");
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         const uint32_t variant = pass + 3 * args->behind + 6 * args->sifted;
-        char definitions[64];
-        snprintf(definitions, sizeof definitions, "%s#define BEHIND %u\n#define SIFTED %u\n", passes[pass], args->behind,
-                 args->sifted);
+        char definitions[96];
+        snprintf(definitions, sizeof definitions, "%s#define BEHIND %u\n#define SIFTED %u\n#define GROUP %u\n", passes[pass],
+                 args->behind, args->sifted, d->base.info.hardware ? 64u : 8u);
         result = pt_gl_kernel_program(d, PT_KERNEL_scatter, variant, definitions);
         for (uint32_t i = 0; i < args->instances && 3 * i + 3 < count && result == PATINA_OK; i++) {
             struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[3 * i + 1], buffers[3 * i + 2], buffers[3 * i + 3]};

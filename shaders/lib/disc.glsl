@@ -137,7 +137,7 @@ bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
 {
     uint base = chunk.first - first_slot, at = 3u * base + slot;
     if (chunk.sifted != 0u &&
-        (read_drawn(chunk.sifted - 1u + slot / PT_SLOTS_A_WORD) >> slot % PT_SLOTS_A_WORD & 1u) == 0u)
+        (read_word(chunk.sifted - 1u + slot / PT_SLOTS_A_WORD) >> slot % PT_SLOTS_A_WORD & 1u) == 0u)
         return false;
     vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
     precise float z = (((chunk.lo[2] + chunk.row[6] * p.x) + chunk.row[7] * p.y) + chunk.row[8] * p.z) + chunk.hi[2];

@@ -15,7 +15,8 @@ layout(binding = 4) uniform samplerBuffer other_float4_plane;
 uvec2 read_key(uint pixel) { return texelFetch(key_plane, int(pixel)).xy; }
 uint read_z_bits(uint pixel) { return texelFetch(key_plane, int(pixel)).y; }
 float read_z(uint pixel) { return uintBitsToFloat(texelFetch(key_plane, int(pixel)).y); }
-uint read_drawn(uint word) { return texelFetch(from_plane, int(word)).x; } // of kernels that read no from plane
+uint read_word(uint i) { return texelFetch(from_plane, int(i)).x; } // of kernels that read no from plane: other words
+float read_float(uint i) { return texelFetch(deff_plane, int(i)).x; } // of kernels that read no deff plane
 uint read_from(uint pixel) { return texelFetch(from_plane, int(pixel)).x & ~PT_FROM_MIXED; }
 float read_deff(uint pixel) { return texelFetch(deff_plane, int(pixel)).x; }
 vec4 read_float4(uint pixel) { return texelFetch(float4_plane, int(pixel)); }
