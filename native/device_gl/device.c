@@ -278,6 +278,20 @@ static int read_buffer(struct pt_gl_device *d, void *context)
     return pt_gl_check(d, "reading a buffer back");
 }
 
+// In software the memory is at hand, and the driver clears by a call every 8 bytes: 2.0 ms for the keys of 1024² in place of 0.3.
+static int fill_mapped(struct pt_gl_device *d, const struct buffer_call *b)
+{
+    const uint64_t pattern = b->bytes == 8 ? b->pattern : (b->pattern << 32 | (uint32_t)b->pattern);
+    const size_t count = (b->size + 7) / 8; // buffers are padded
+    uint64_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, (GLintptr)b->offset, (GLsizeiptr)(8 * count),
+                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT);
+    for (size_t i = 0; i < count && to; i++)
+        to[i] = pattern;
+    if (to)
+        d->gl.UnmapBuffer(GL_COPY_WRITE_BUFFER);
+    return pt_gl_check(d, "clearing a buffer");
+}
+
 static int fill_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
@@ -285,6 +299,8 @@ static int fill_buffer(struct pt_gl_device *d, void *context)
     uint32_t words[2] = {(uint32_t)b->pattern, (uint32_t)(b->pattern >> 32)};
     d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);
+    if (!d->base.info.hardware && b->size)
+        return fill_mapped(d, b);
     d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, b->bytes == 8 ? GL_RG32UI : GL_R32UI, (GLintptr)b->offset,
                              (GLsizeiptr)(b->size & ~(size_t)(b->bytes - 1)),
                              b->bytes == 8 ? GL_RG_INTEGER : GL_RED_INTEGER, GL_UNSIGNED_INT, words);
