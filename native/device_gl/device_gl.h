@@ -75,6 +75,8 @@ struct pt_gl_device {
     GLuint srgb;    // uniform block: linear values of the 256 sRGB bytes
     uint32_t stamp; // fill: of the current step
     GLuint programs[PT_KERNEL_COUNT][PT_GL_VARIANTS];
+    char shade_definitions[PT_GL_VARIANTS][256]; // of shade's programs, shade_count of them
+    uint32_t shade_count;
     GLuint tile_programs[2];
     GLuint textures[PT_GL_TEXTURES];
     struct pt_gl_tiles tiles;
@@ -132,7 +134,7 @@ int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *c
                const atomic_int *cancel);
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers, uint32_t count,
                const atomic_int *cancel);
-int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args);
+int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt_buffer *const *buffers);
 int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args);
 int pt_gl_push(struct pt_gl_device *d);
 int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args);

@@ -66,7 +66,7 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     // keys, from, deff, float4, float4
     [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
-    [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3, 6},
+    [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3},
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
     [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},   [PT_KERNEL_mark] = {1},
     [PT_KERNEL_lit] = {1, 2, 3},        [PT_KERNEL_edl] = {1},
@@ -91,7 +91,8 @@ int pt_gl_bind_texels(struct pt_gl_device *d, uint32_t unit, GLuint name, size_t
                           d->texels);
     d->gl.ActiveTexture(GL_TEXTURE0 + unit);
     d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
-    d->gl.TexBufferRange(GL_TEXTURE_BUFFER, formats[unit], name, (GLintptr)offset, (GLsizeiptr)size);
+    d->gl.TexBufferRange(GL_TEXTURE_BUFFER, formats[unit], name, (GLintptr)offset,
+                         (GLsizeiptr)(size ? size : 16)); // as buffers are made
     return PATINA_OK;
 }
 
@@ -117,11 +118,14 @@ static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t vari
                           (height + (uint32_t)group[1] - 1) / (uint32_t)group[1]);
 }
 
-// Of kernels whose invocations take several rows each: llvmpipe spends as much on an invocation as on a pixel.
+// Of kernels whose invocations take several pixels each: llvmpipe spends as much on an invocation as on a pixel.
 static int run_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t width, uint32_t height)
 {
-    enum { ROWS = 8 }; // as in lib/planes.glsl
-    return run_over(d, kernel, 0, "", width, (height + ROWS - 1) / ROWS);
+    enum { COLUMNS = 64, ROWS = 4 }; // of a workgroup, as in lib/planes.glsl
+    int result = pt_gl_kernel_program(d, kernel, 0, "");
+    return result == PATINA_OK
+               ? pt_gl_dispatch(d, kernel, 0, (width + COLUMNS - 1) / COLUMNS, (height + ROWS - 1) / ROWS)
+               : result;
 }
 
 static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
@@ -133,6 +137,21 @@ static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
         if (asked[i])
             result = run_over(d, PT_KERNEL_extract, i, definitions[i], args->crop_width, args->crop_height);
     return result;
+}
+
+// llvmpipe reads a texel in half the time of a block's word; elsewhere blocks hold more.
+static int run_surface(struct pt_gl_device *d, const struct surface_args *args, const struct pt_buffer *words)
+{
+    const uint32_t texels = !d->base.info.hardware, normals = args->instance.has_normals != 0, variant = 2 * texels + normals;
+    char definitions[48];
+    snprintf(definitions, sizeof definitions, "#define TEXELS %u\n#define NORMALS %u\n", texels, normals);
+    int result = pt_gl_kernel_program(d, PT_KERNEL_surface, variant, definitions);
+    if (result == PATINA_OK && texels)
+        result = pt_gl_bind_texture(d, 1, words);
+    if (result != PATINA_OK)
+        return result;
+    d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_surface][variant], 16, PT_SPACINGS, args->instance.spacing);
+    return pt_gl_dispatch_tiles(d, PT_KERNEL_surface, variant, PT_GL_TILES_POINTS);
 }
 
 // Every pixel is gathered before any is blurred.
@@ -184,20 +203,21 @@ int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t arg
     return PATINA_OK;
 }
 
-static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments)
+static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, struct pt_buffer *const *buffers)
 {
     const struct view_args *view = arguments; // every argument struct begins with its view
     switch (kernel) {
     case PT_KERNEL_shade:
-        return pt_gl_shade(d, arguments);
+        return pt_gl_shade(d, arguments, buffers);
     case PT_KERNEL_push:
         return pt_gl_push(d);
     case PT_KERNEL_antialias:
         return pt_gl_antialias(d, arguments);
     case PT_KERNEL_obscure:
         return run_obscure(d);
-    case PT_KERNEL_normals:
     case PT_KERNEL_surface:
+        return run_surface(d, arguments, buffers[1]);
+    case PT_KERNEL_normals:
     case PT_KERNEL_smooth:
     case PT_KERNEL_mark:
     case PT_KERNEL_edl:
@@ -271,5 +291,5 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
     int result = tiled(kernel) ? pt_gl_tiles(d, buffers[0], &tiles) : PATINA_OK;
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, kernel, argument_size, buffers, count);
-    return result == PATINA_OK ? run_filter(d, kernel, arguments) : result;
+    return result == PATINA_OK ? run_filter(d, kernel, arguments, buffers) : result;
 }

@@ -4,6 +4,7 @@
 #include "device_gl.h"
 
 #include <stdio.h>
+#include <string.h>
 
 enum { TILE_PIXELS = 64, GROUP = 64, TAKEN_EACH = 4 }; // TAKEN_EACH: as in push.comp
 
@@ -44,7 +45,7 @@ static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 
 // ---- shade -----------------------------------------------------------------------------------------------------
 
-enum { NORMALS = 0, BLEND = 1, BLEND_WIDE = 2, COLORS = 9 }; // the first three by where opacity comes from
+enum { MOST_UNROLLED = 8 }; // lights
 
 // What a light kernel must know: llvmpipe runs every branch that any lane may take.
 static int plain_lights(const struct shade_args *args)
@@ -55,26 +56,41 @@ static int plain_lights(const struct shade_args *args)
     return 1;
 }
 
-struct shade_choice {
-    uint32_t normals, opacity, format, lit, plain, recolors;
-};
-
-static uint32_t normals_of(const struct shade_choice *c) { return 3 * c->opacity + c->normals; }
-static uint32_t colors_of(const struct shade_choice *c) { return COLORS + 12 * c->format + 6 * c->recolors + 2 * c->lit + c->plain; }
-
-static int shade_programs(struct pt_gl_device *d, const struct shade_choice *c)
+// What the program knows beforehand, as llvmpipe runs all that it may have to: branches, and loops once more than they turn.
+static void shade_definitions(const struct shade_args *args, int shading, char *text, size_t size)
 {
-    static const char *const steps[] = {"", "#define BLEND 1\n", "#define WIDE 1\n"};
-    char definitions[128];
-    snprintf(definitions, sizeof definitions, "#define STEP 0\n#define OPACITY %u\n%s", c->opacity, steps[c->normals]);
-    int result = pt_gl_kernel_program(d, PT_KERNEL_shade, normals_of(c), definitions);
-    snprintf(definitions, sizeof definitions, "#define STEP 1\n#define COLOR_FORMAT %u\n#define LIT %u\n#define PLAIN %u\n#define RECOLOR %u\n",
-             c->format, c->lit, c->plain, c->recolors);
-    return result == PATINA_OK ? pt_gl_kernel_program(d, PT_KERNEL_shade, colors_of(c), definitions) : result;
+    static const char *const blend[] = {"", "#define BLEND 1\n", "#define WIDE 1\n"};
+    const struct instance_args *instance = &args->instance;
+    const uint32_t opacity = !instance->has_opacities ? 0 : instance->color_format == PT_COLOR_OF_PLANE ? 2 : 1;
+    char lights[24] = "args.light_count";
+    if (args->light_count <= MOST_UNROLLED)
+        snprintf(lights, sizeof lights, "%uu", args->light_count);
+    snprintf(text, size,
+             "#define SHADING %d\n#define ARRIVED %d\n#define OPACITY %u\n#define COLOR_FORMAT %u\n#define LIT %d\n"
+             "#define LIGHTS %s\n#define PLAIN %d\n#define RECOLOR %d\n%s",
+             shading, args->arrived != 0, opacity, instance->color_format % 5,
+             !instance->lit ? 0 : instance->specular > 0.0f ? 2 : 1, lights, plain_lights(args),
+             args->recolor.source || args->recolor.graded, blend[args->blend < 2 ? args->blend : 2]);
+}
+
+// Variants are numbered as they come; beyond the last, it gives way.
+static int shade_program(struct pt_gl_device *d, const char *definitions, uint32_t *variant)
+{
+    uint32_t v = 0;
+    while (v < d->shade_count && strcmp(d->shade_definitions[v], definitions) != 0)
+        v++;
+    if (v == PT_GL_VARIANTS) {
+        d->gl.DeleteProgram(d->programs[PT_KERNEL_shade][--v]);
+        d->programs[PT_KERNEL_shade][v] = 0;
+    }
+    snprintf(d->shade_definitions[v], sizeof d->shade_definitions[v], "%s", definitions);
+    d->shade_count = v < d->shade_count ? d->shade_count : v + 1;
+    *variant = v;
+    return pt_gl_kernel_program(d, PT_KERNEL_shade, v, definitions);
 }
 
 // In a uniform array: read once for all lanes, where a block would be read once a lane.
-static void set_lights(struct pt_gl_device *d, const struct shade_args *args, uint32_t colors)
+static void set_lights(struct pt_gl_device *d, const struct shade_args *args, uint32_t variant)
 {
     GLfloat lights[PT_MAX_LIGHTS][12] = {{0}};
     for (uint32_t i = 0; i < args->light_count && i < PT_MAX_LIGHTS; i++) {
@@ -89,28 +105,20 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
         lights[i][10] = (GLfloat)light->shadow;
         lights[i][11] = light->shadow_scale;
     }
-    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][colors], 16, 3 * PT_MAX_LIGHTS, &lights[0][0]);
+    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][variant], 16, 3 * PT_MAX_LIGHTS, &lights[0][0]);
 }
 
-int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args)
+int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt_buffer *const *buffers)
 {
-    const struct shade_choice choice = { .normals = args->blend == 0 ? NORMALS : args->blend == 1 ? BLEND : BLEND_WIDE,
-                                         .opacity = !args->instance.has_opacities ? 0
-                                                    : args->instance.color_format == PT_COLOR_OF_PLANE ? 2
-                                                                                                       : 1,
-                                         .format = args->instance.color_format % 5,
-                                         .lit = !args->instance.lit ? 0 : args->instance.specular > 0.0f ? 2 : 1,
-                                         .plain = (uint32_t)plain_lights(args),
-                                         .recolors = args->recolor.source || args->recolor.graded};
-    const uint32_t colors = colors_of(&choice);
+    char definitions[sizeof d->shade_definitions[0]];
+    uint32_t variant;
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
-    int result = shade_programs(d, &choice);
-    if (result == PATINA_OK)
-        result = pt_gl_dispatch_tiles(d, PT_KERNEL_shade, normals_of(&choice), PT_GL_TILES_POINTS);
+    shade_definitions(args, buffers[5] && buffers[5]->name, definitions, sizeof definitions);
+    int result = shade_program(d, definitions, &variant);
     if (result == PATINA_OK && args->instance.lit)
-        set_lights(d, args, colors);
-    return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, colors, PT_GL_TILES_POINTS) : result;
+        set_lights(d, args, variant);
+    return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, variant, PT_GL_TILES_POINTS) : result;
 }
 
 // ---- antialias -------------------------------------------------------------------------------------------------

@@ -184,7 +184,9 @@ static int compile(struct pt_gl_device *d, const struct source *s, GLuint *progr
 int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definitions, GLuint *program)
 {
     struct source s = {0};
-    int result = add_file(d, &s, name, definitions);
+    char all[512];
+    snprintf(all, sizeof all, "%s%s", d->base.info.hardware ? "" : "#define PT_SOFTWARE 1\n", definitions);
+    int result = add_file(d, &s, name, all);
     if (result == PATINA_OK)
         result = compile(d, &s, program);
     free(s.text);

@@ -61,13 +61,17 @@ bool is_edge_towards(ivec2 size, int x, int y, int i, float limit)
     return is_far(q, read_z(q), limit);
 }
 
-// z_below, z, z_above: of the pixel and those beside it in its column.
-bool is_edge(ivec2 size, bool layers, int x, int y, float z_below, float z, float z_above)
+// Among cross_offsets: ahead on the line, and to its sides.
+const int AHEAD = PT_STEP.x != 0u ? 0 : 1, SIDE = 1 - AHEAD;
+
+// z_behind, z, z_ahead: of the pixel and those beside it in its line.
+bool is_edge(ivec2 size, bool layers, int x, int y, float z_behind, float z, float z_ahead)
 {
     uint at = uint(y * size.x + x);
     float limit = step_limit(layers, at, pt_bits(z));
-    bool edge = is_edge_towards(size, x, y, 0, limit) || is_edge_towards(size, x, y, 2, limit) ||
-                is_far(neighbour(size, x, y, 1), z_above, limit) || is_far(neighbour(size, x, y, 3), z_below, limit);
+    bool edge = is_edge_towards(size, x, y, SIDE, limit) || is_edge_towards(size, x, y, SIDE + 2, limit) ||
+                is_far(neighbour(size, x, y, AHEAD), z_ahead, limit) ||
+                is_far(neighbour(size, x, y, AHEAD + 2), z_behind, limit);
 #if INKED
     edge = edge && !(line[at] > 0.0);
 #endif
@@ -79,21 +83,25 @@ void main()
     view_args view = args.view;
     bool layers = args.layers != 0u;
     ivec2 size = ivec2(view.width, view.height);
-    uvec2 column = pt_tile_column(view);
-    uint found = 0u, y = column.y, end = pt_tile_end(view, column);
-    int x = int(column.x);
-    float below = read_z(neighbour(size, x, int(y), 3)), z = read_z(y * view.width + column.x);
-    for (uint i = 0u; y + i < end; i++) {
-        float above = read_z(neighbour(size, x, int(y + i), 1));
-        found |= uint(is_edge(size, layers, x, int(y + i), below, z, above)) << i;
-        below = z;
-        z = above;
-    }
+    uvec2 first = pt_tile_line(view);
+    uint found = 0u, steps = pt_tile_steps(view, first), i = 0u;
+    if (steps == 0u)
+        return;
+    float behind = read_z(neighbour(size, int(first.x), int(first.y), AHEAD + 2)), z = read_z(first.y * view.width + first.x);
+    do {
+        ivec2 here = ivec2(first + i * PT_STEP);
+        float ahead = read_z(neighbour(size, here.x, here.y, AHEAD));
+        found |= uint(is_edge(size, layers, here.x, here.y, behind, z, ahead)) << i;
+        behind = z;
+        z = ahead;
+    } while (++i < steps);
     if (found == 0u)
         return;
     uint at = atomicAdd(edge_count, uint(bitCount(found)));
-    for (; found != 0u; found &= found - 1u, at++)
-        edges[at] = (y + uint(findLSB(found))) * view.width + column.x;
+    for (; found != 0u; found &= found - 1u, at++) {
+        uvec2 here = first + uint(findLSB(found)) * PT_STEP;
+        edges[at] = here.y * view.width + here.x;
+    }
 }
 
 #else

@@ -4,7 +4,7 @@
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 
-layout(local_size_x = 32) in; // and each takes PT_ROWS rows
+layout(local_size_x = 32) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { compose_args args; };
 layout(std430, binding = 3) writeonly buffer combined_block { vec4 combined[]; };
@@ -15,13 +15,16 @@ void main()
     uint crop_width = args.crop_width, crop_height = args.crop_height;
     vec4 background = vec4(args.background[0], args.background[1], args.background[2], args.background[3]);
     bool everywhere = args.everywhere != 0u;
-    uint x = gl_GlobalInvocationID.x, first = gl_GlobalInvocationID.y * PT_ROWS;
-    uint end = x < crop_width ? min(first + PT_ROWS, crop_height) : first;
-    for (uint y = first; y < end; y++) {
+    uvec2 first = pt_first_of_row();
+    uint x = first.x, y = first.y, end = y < crop_height ? min(x + 8u * PT_APART, crop_width) : x;
+    if (x >= end)
+        return;
+    do {
         uint at = (crop_y + y) * width + crop_x + x;
         vec4 c = read_float4(at);
         precise vec4 over = c + (1.0 - c.w) * background;
         bool empty = !everywhere && read_z_bits(at) == PT_KEY_EMPTY_Z;
         combined[y * crop_width + x] = empty ? background : over;
-    }
+        x += PT_APART;
+    } while (x < end);
 }

@@ -20,17 +20,16 @@ void main()
     view_args view = args.view;
     bool perspective = view.perspective != 0u;
     float scale = args.scale, gain = args.gain;
-    uvec2 column = pt_tile_column(view);
-    uint x = column.x;
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + x;
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uint at = here.y * view.width + here.x;
         float z = read_z(at);
         if (z == pt_float(PT_KEY_EMPTY_Z))
             continue;
         float own = depth_of(z, perspective);
         precise float sum = 0.0;
         for (int i = 0; i < PT_EDL_NEIGHBOURS; i++) {
-            uint qx = x + uint(args.offsets[2 * i]), qy = y + uint(args.offsets[2 * i + 1]); // -1 wraps to beyond the plane
+            uint qx = here.x + uint(args.offsets[2 * i]), qy = here.y + uint(args.offsets[2 * i + 1]); // -1 wraps to beyond the plane
             bool inside = qx < view.width && qy < view.height;
             float near = inside ? depth_of(read_z(qy * view.width + qx), perspective) : PT_EDL_BEYOND;
             precise float behind = scale * (own - near);

@@ -67,6 +67,12 @@ float own_distance(view_args view, uint source, float z)
 
 #if STEP == 0
 
+vec3 z_across(ivec2 size, ivec2 p)
+{
+    ivec2 low = p - ivec2(PT_ACROSS), high = p + ivec2(PT_ACROSS);
+    return vec3(z_at(size, low.x, low.y), z_at(size, p.x, p.y), z_at(size, high.x, high.y));
+}
+
 // 2. Threshold of a pixel, and whether it is a candidate at all.
 bool candidate(view_args view, uint pixel, float z, out float threshold)
 {
@@ -86,30 +92,34 @@ void main()
 {
     view_args view = args.view;
     ivec2 size = ivec2(view.width, view.height);
-    uvec2 column = pt_tile_column(view);
-    uint end = pt_tile_end(view, column), fills = 0u;
-    int x = int(column.x), y = int(column.y);
-    // 1. z of three rows, sliding upwards
-    vec3 below = vec3(z_at(size, x - 1, y - 1), z_at(size, x, y - 1), z_at(size, x + 1, y - 1));
-    vec3 row = vec3(z_at(size, x - 1, y), z_at(size, x, y), z_at(size, x + 1, y));
-    for (uint i = 0u; i < PT_TILE; i++, y++) {
-        vec3 above = vec3(z_at(size, x - 1, y + 1), z_at(size, x, y + 1), z_at(size, x + 1, y + 1));
+    uvec2 first = pt_tile_line(view);
+    uint steps = pt_tile_steps(view, first), fills = 0u, i = 0u;
+    if (steps == 0u)
+        return;
+    // 1. z of three rows across the line, sliding along it
+    ivec2 here = ivec2(first);
+    vec3 behind = z_across(size, here - ivec2(PT_STEP)), row = z_across(size, here);
+    do {
+        vec3 ahead = z_across(size, here + ivec2(PT_STEP));
         float t;
-        bool fill = uint(y) < end && candidate(view, uint(y * size.x + x), row.y, t);
+        bool fill = candidate(view, uint(here.y * size.x + here.x), row.y, t);
         // 3. white: not nearer than the threshold; five consecutive ones: a true border
-        uint white = uint(!(row.z < t)) | uint(!(above.z < t)) << 1 | uint(!(above.y < t)) << 2 |
-                     uint(!(above.x < t)) << 3 | uint(!(row.x < t)) << 4 | uint(!(below.x < t)) << 5 |
-                     uint(!(below.y < t)) << 6 | uint(!(below.z < t)) << 7;
+        uint white = uint(!(row.z < t)) | uint(!(ahead.z < t)) << 1 | uint(!(ahead.y < t)) << 2 |
+                     uint(!(ahead.x < t)) << 3 | uint(!(row.x < t)) << 4 | uint(!(behind.x < t)) << 5 |
+                     uint(!(behind.y < t)) << 6 | uint(!(behind.z < t)) << 7;
         fills |= uint(fill && !pt_five_white(white)) << i;
-        below = row;
-        row = above;
-    }
+        behind = row;
+        row = ahead;
+        here += ivec2(PT_STEP);
+    } while (++i < steps);
     if (fills == 0u)
         return;
     uint at = atomicAdd(changed_count, uint(bitCount(fills)));
-    for (; fills != 0u; fills &= fills - 1u, at++)
+    for (; fills != 0u; fills &= fills - 1u, at++) {
+        uvec2 found = first + uint(findLSB(fills)) * PT_STEP;
         if (at < entries) // else the list is made larger and the step repeated: nothing has changed yet
-            changed[at].pixel = (column.y + uint(findLSB(fills))) * view.width + column.x;
+            changed[at].pixel = found.y * view.width + found.x;
+    }
 }
 
 #else

@@ -13,15 +13,15 @@ void main()
     view_args view = args.view;
     float start = args.start, inverse = args.inverse, density = args.density;
     vec3 veil = vec3(args.color[0], args.color[1], args.color[2]);
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + column.x;
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uint at = here.y * view.width + here.x;
         float z = read_z(at);
         if (z == pt_float(PT_KEY_EMPTY_Z))
             continue;
         precise float away = z;
         if (view.perspective != 0u) {
-            vec2 ray = pt_ray(view, int(column.x), int(y));
+            vec2 ray = pt_ray(view, int(here.x), int(here.y));
             precise float square = (ray.x * ray.x + ray.y * ray.y) + 1.0;
             away = z * (square * pt_rsqrt(square));
         }

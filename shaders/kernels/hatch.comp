@@ -64,13 +64,13 @@ void main()
 {
     view_args view = args.view;
     vec3 stroke_color = vec3(args.color[0], args.color[1], args.color[2]);
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + column.x;
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uint at = here.y * view.width + here.x;
         float z = read_z(at);
         if (z == pt_float(PT_KEY_EMPTY_Z))
             continue;
-        pixel p = find(view, column.x, y, z, read_float4(at).xyz);
+        pixel p = find(view, here.x, here.y, z, read_float4(at).xyz);
         vec4 c = color[at];
         precise float light = (0.2126 * c.x + 0.7152 * c.y) + 0.0722 * c.z;
         light = light * pt_rcp(pt_max(c.w, 1e-6));

@@ -13,9 +13,9 @@ void main()
 {
     view_args view = args.view;
     uint id_base = args.id_base, id_count = args.id_count;
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uvec2 key = read_key(y * view.width + column.x);
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uvec2 key = read_key(here.y * view.width + here.x);
         uint id = key.x - id_base;
         if (id < id_count && key.y != PT_KEY_EMPTY_Z)
             atomicOr(marks[id >> 2], 1u << 8u * (id & 3u));

@@ -125,7 +125,7 @@ void main()
     float d_min = args.instance.d_min;
     int radius = int(args.radius);
     bool steep = args.steep != 0u;
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
-        normal_pixel(view, radius, steep, id_base, id_count, d_min, column.x, y);
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP)
+        normal_pixel(view, radius, steep, id_base, id_count, d_min, here.x, here.y);
 }

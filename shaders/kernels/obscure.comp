@@ -68,16 +68,15 @@ void main()
 {
     view_args view = args.view;
     float radius = args.radius;
-    uvec2 column = pt_tile_column(view);
-    uint x = column.x;
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + x;
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uint at = here.y * view.width + here.x;
         if (read_z_bits(at) == PT_KEY_EMPTY_Z)
             continue;
-        point p = place(view, radius, at, x, y);
+        point p = place(view, radius, at, here.x, here.y);
         precise float sum = 0.0;
         for (int i = 0; i < PT_OBSCURE_TAPS; i++)
-            sum = sum + tap(view, p, vec2(args.spiral[2 * i], args.spiral[2 * i + 1]), x, y);
+            sum = sum + tap(view, p, vec2(args.spiral[2 * i], args.spiral[2 * i + 1]), here.x, here.y);
         precise float mean = sum * (PT_OBSCURE_GAIN / PT_OBSCURE_TAPS);
         obscured[at] = pt_min(mean, 1.0);
     }
@@ -89,10 +88,9 @@ void main()
 {
     view_args view = args.view;
     float strength = args.strength;
-    uvec2 column = pt_tile_column(view);
-    uint x = column.x;
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + x;
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uint at = here.y * view.width + here.x;
         float z = read_z(at);
         if (z == pt_float(PT_KEY_EMPTY_Z))
             continue;
@@ -100,7 +98,7 @@ void main()
         precise float sum = 0.0, total = 0.0;
         for (int dy = -PT_OBSCURE_BLUR; dy <= PT_OBSCURE_BLUR; dy++)
             for (int dx = -PT_OBSCURE_BLUR; dx <= PT_OBSCURE_BLUR; dx++) {
-                uint qx = x + uint(dx), qy = y + uint(dy);
+                uint qx = here.x + uint(dx), qy = here.y + uint(dy);
                 if (qx >= view.width || qy >= view.height)
                     continue;
                 uint q = qy * view.width + qx;

@@ -5,7 +5,7 @@
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 
-layout(local_size_x = 32) in; // and each takes PT_ROWS rows
+layout(local_size_x = 32) in;
 
 layout(std430, binding = 0) readonly buffer arguments_block { pull_args args; };
 layout(std430, binding = 3) writeonly buffer keys_block { uvec2 keys[]; };
@@ -15,9 +15,11 @@ void main()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, fine_width = args.fine_width, fine_height = args.fine_height;
-    uint x = rect.x + gl_GlobalInvocationID.x, first = rect.y + gl_GlobalInvocationID.y * PT_ROWS;
-    uint end = x < rect.z ? min(first + PT_ROWS, rect.w) : first;
-    for (uint y = first; y < end; y++) {
+    uvec2 first = rect.xy + pt_first_of_row();
+    uint x = first.x, y = first.y, end = y < rect.w ? min(x + 8u * PT_APART, rect.z) : x;
+    if (x >= end)
+        return;
+    do {
         uint best = 2u * y * fine_width + 2u * x;
         uvec2 key = read_key(best);
         for (uint child = 1u; child < 4u; child++) {
@@ -31,5 +33,6 @@ void main()
         }
         keys[y * width + x] = key;
         from[y * width + x] = args.view.level == 1u ? best : texelFetch(from_plane, int(best)).x; // of level 0: measured, or empty
-    }
+        x += PT_APART;
+    } while (x < end);
 }

@@ -66,7 +66,10 @@ void main()
     ivec2 cell = ivec2(x, corner.y) >> 1;
     int side = (x & 1u) != 0u ? 1 : -1;
     vec2 below = coarse_pair(coarse_size, cell - ivec2(0, 1), side), level = coarse_pair(coarse_size, cell, side);
-    for (uint y = corner.y; y < end; y += 2u, cell.y++) {
+    if (corner.y >= end)
+        return;
+    uint y = corner.y;
+    do {
         vec2 above = coarse_pair(coarse_size, cell + ivec2(0, 1), side);
         for (uint upper = 0u; upper < 2u; upper++) {
             bool inside = y + upper >= view.rect[1] && y + upper < end;
@@ -78,7 +81,9 @@ void main()
         }
         below = level;
         level = above;
-    }
+        y += 2u;
+        cell.y++;
+    } while (y < end);
     for (; asked != 0u; asked &= asked - 1u) {
         uint row = uint(findLSB(asked)), y = corner.y + row, at = y * view.width + x;
         cell = ivec2(x, y) >> 1;

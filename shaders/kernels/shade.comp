@@ -2,10 +2,11 @@
 // shade: id -> colour and normal, Phong. [D 3.1], deferred: only what the picture shows is lit; twin of
 // native/device_cpu/kernels/shade.c
 //
-// STEP 0: normals and opacity (BLEND: of filled pixels over 3 x 3 pixels, kept while walking up a column; WIDE: over any
-// window; OPACITY 0: the instance's, 1: points have their own, 2: the colours' plane has it)
-// STEP 1: colour, by COLOR_FORMAT and LIT (2: with highlights); PLAIN: only suns and points, and none casts; RECOLOR: by a
-// ramp, exposure, contrast
+// Normals and opacity: BLEND: of filled pixels over 3 x 3 pixels, kept while walking along a line; WIDE: over any window;
+// OPACITY 0: the instance's, 1: points have their own, 2: the colours' plane has it.
+// Colour, by COLOR_FORMAT and LIT (2: with highlights); LIGHTS: how many; PLAIN: only suns and points, and none casts;
+// RECOLOR: by a ramp, exposure, contrast.
+// SHADING, ARRIVED: whether these planes are written.
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -20,7 +21,8 @@ layout(std430, binding = 8) readonly buffer opacities_block { uint opacities[]; 
 layout(std430, binding = 9) readonly buffer shadows_block { uint shadows[]; };
 layout(std430, binding = 10) writeonly buffer arrived_block { float arrived[]; };
 
-#if STEP == 0
+#include "lib/albedo.glsl"
+#include "lib/recolor.glsl"
 
 float opacity_of(float instance_opacity, uint id, uint at)
 {
@@ -68,15 +70,16 @@ vec4 tap_of(surface_pixel p, ivec2 size, int x, int y)
 
 vec4 read_tap(ivec2 size, int x, int y) { return tap_of(read_pixel(size, x, y), size, x, y); }
 
-struct tap_row {
-    vec4 west, middle, east;
+struct tap_row { // across the line
+    vec4 low, middle, high;
     surface_pixel pixel; // the middle one
 };
 
-tap_row read_row(ivec2 size, int x, int y)
+tap_row read_row(ivec2 size, ivec2 p)
 {
-    surface_pixel pixel = read_pixel(size, x, y);
-    return tap_row(read_tap(size, x - 1, y), tap_of(pixel, size, x, y), read_tap(size, x + 1, y), pixel);
+    ivec2 low = p - ivec2(PT_ACROSS), high = p + ivec2(PT_ACROSS);
+    surface_pixel pixel = read_pixel(size, p.x, p.y);
+    return tap_row(read_tap(size, low.x, low.y), tap_of(pixel, size, p.x, p.y), read_tap(size, high.x, high.y), pixel);
 }
 
 void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum)
@@ -86,11 +89,21 @@ void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum)
     sum = pt_abs(apart) <= limit ? more : sum;
 }
 
-void add_row(tap_row row, float z, float limit, float side, float middle, inout vec3 sum)
+// In the order of rows.
+vec3 blend_nine(tap_row behind, tap_row row, tap_row ahead, float z, float limit)
 {
-    add_tap(row.west, z, limit, side, sum);
-    add_tap(row.middle, z, limit, middle, sum);
-    add_tap(row.east, z, limit, side, sum);
+    float edge = pt_rcp(2.0), corner = pt_rcp(3.0);
+    vec3 sum = vec3(0.0);
+    add_tap(behind.low, z, limit, corner, sum);
+    add_tap(PT_UPWARDS ? behind.middle : row.low, z, limit, edge, sum);
+    add_tap(PT_UPWARDS ? behind.high : ahead.low, z, limit, corner, sum);
+    add_tap(PT_UPWARDS ? row.low : behind.middle, z, limit, edge, sum);
+    add_tap(row.middle, z, limit, pt_rcp(1.0), sum);
+    add_tap(PT_UPWARDS ? row.high : ahead.middle, z, limit, edge, sum);
+    add_tap(PT_UPWARDS ? ahead.low : behind.high, z, limit, corner, sum);
+    add_tap(PT_UPWARDS ? ahead.middle : row.high, z, limit, edge, sum);
+    add_tap(ahead.high, z, limit, corner, sum);
+    return sum;
 }
 
 #if WIDE
@@ -105,51 +118,6 @@ vec3 blend_wide(view_args view, ivec2 size, int x, int y, float z, float limit)
 }
 #endif
 
-void main()
-{
-    view_args view = args.view;
-    uint id_base = args.instance.id_base, id_count = args.instance.id_count;
-    float instance_opacity = args.instance.opacity;
-    ivec2 size = ivec2(view.width, view.height);
-    uvec2 column = pt_tile_column(view);
-    uint end = pt_tile_end(view, column);
-    int x = int(column.x);
-#if BLEND
-    float edge = pt_rcp(2.0), corner = pt_rcp(3.0);
-    tap_row below = read_row(size, x, int(column.y) - 1), row = read_row(size, x, int(column.y));
-#endif
-    for (uint y = column.y; y < end; y++) {
-        uint at = y * view.width + column.x;
-#if BLEND
-        tap_row above = read_row(size, x, int(y) + 1);
-        surface_pixel p = row.pixel;
-#else
-        surface_pixel p = read_pixel(size, x, int(y));
-#endif
-        uint id = p.key.x - id_base;
-        vec3 normal = p.normal;
-#if BLEND
-        float z = pt_float(p.key.y), limit = read_deff(p.source);
-        vec3 sum = vec3(0.0);
-        add_row(below, z, limit, corner, edge, sum);
-        add_row(row, z, limit, edge, pt_rcp(1.0), sum);
-        add_row(above, z, limit, corner, edge, sum);
-        normal = p.source == at ? normal : finish_blend(sum, normal);
-        below = row;
-        row = above;
-#elif WIDE
-        if (p.source != at)
-            normal = finish_blend(blend_wide(view, size, x, int(y), pt_float(p.key.y), read_deff(p.source)), normal);
-#endif
-        if (id < id_count && p.key.y != PT_KEY_EMPTY_Z)
-            shading[at] = vec4(normal, opacity_of(instance_opacity, id, at));
-    }
-}
-
-#else
-
-#include "lib/recolor.glsl"
-
 struct pixel {
     float z;
     vec2 ray;
@@ -157,8 +125,6 @@ struct pixel {
 };
 
 layout(location = 16) uniform vec4 lights[3 * PT_MAX_LIGHTS]; // colour and type; vector; cone, shadow and its scale
-
-#include "lib/albedo.glsl"
 
 float power(float x, uint exponent)
 {
@@ -221,8 +187,8 @@ void add_light(uint light, uint type, vec3 from, float share, uint shininess, ve
 
 // c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
 // the light. shadow: the mean m of lights that cast.
-vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint light_count, uint id, uint id_count,
-           pixel p, out float shadow)
+vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint id, uint id_count, pixel p,
+           out float shadow)
 {
     precise vec3 point = vec3(p.ray, pt_negate(p.z + eye_z));
     precise vec3 to_eye = vec3(0.0, 0.0, 1.0);
@@ -237,7 +203,7 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
     vec3 diffuse = vec3(0.0), specular = vec3(0.0);
     precise float sum = 0.0;
     uint casting = 0u;
-    for (uint i = 0u; i < light_count; i++) {
+    for (uint i = 0u; i < LIGHTS; i++) {
         uint type = uint(lights[3u * i].w);
         precise float share = 1.0;
 #if PLAIN
@@ -268,41 +234,67 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
 void main()
 {
     view_args view = args.view;
-    uint id_base = args.instance.id_base, id_count = args.instance.id_count, light_count = args.light_count;
+    uint id_base = args.instance.id_base, id_count = args.instance.id_count;
     uint shininess = args.instance.shininess;
+    float instance_opacity = args.instance.opacity, eye_z = args.eye_z;
     vec3 factors = vec3(args.instance.ambient, args.instance.diffuse, args.instance.specular);
     vec3 style = vec3(args.instance.color[0], args.instance.color[1], args.instance.color[2]);
     vec3 world = vec3(args.world[0], args.world[1], args.world[2]);
-    float eye_z = args.eye_z;
-    bool write_arrived = args.arrived != 0u;
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + column.x;
-        uvec2 key = read_key(at);
-        uint id = key.x - id_base;
-        if (id >= id_count || key.y == PT_KEY_EMPTY_Z)
-            continue;
-        pixel p;
-        p.z = pt_float(key.y);
-        p.ray = pt_ray(view, int(column.x), int(y));
-        p.albedo = pt_gather_albedo(style, id, at);
-#if RECOLOR
-        p.albedo = recolor(view, eye_z, p.ray, p.z, style, p.albedo);
+    ivec2 size = ivec2(view.width, view.height);
+    uvec2 here = pt_tile_line(view);
+    uint left = pt_tile_steps(view, here);
+    if (left == 0u)
+        return;
+#if BLEND
+    tap_row behind = read_row(size, ivec2(here - PT_STEP)), row = read_row(size, ivec2(here));
 #endif
-        vec4 shaded = texelFetch(other_float4_plane, int(at));
-        p.n = shaded.xyz;
-        // 3. light
-        float shadow = 1.0;
-#if LIT
-        vec3 c = phong(view, eye_z, factors, shininess, world, light_count, id, id_count, p, shadow);
+    do {
+        uint at = here.y * view.width + here.x;
+        int x = int(here.x), y = int(here.y);
+        // 1. the normal
+#if BLEND
+        tap_row ahead = read_row(size, ivec2(here + PT_STEP));
+        surface_pixel own = row.pixel;
 #else
-        vec3 c = p.albedo;
+        surface_pixel own = read_pixel(size, x, y);
 #endif
-        precise vec3 premultiplied = c * shaded.w;
-        color[at] = vec4(premultiplied, shaded.w);
-        if (write_arrived)
+        uint id = own.key.x - id_base;
+        pixel p;
+        p.z = pt_float(own.key.y);
+        p.n = own.normal;
+#if BLEND
+        vec3 sum = blend_nine(behind, row, ahead, p.z, read_deff(own.source));
+        p.n = own.source == at ? p.n : finish_blend(sum, p.n);
+        behind = row;
+        row = ahead;
+#elif WIDE
+        if (own.source != at)
+            p.n = finish_blend(blend_wide(view, size, x, y, p.z, read_deff(own.source)), p.n);
+#endif
+        if (id < id_count && own.key.y != PT_KEY_EMPTY_Z) {
+            // 2. colour and opacity
+            float opacity = opacity_of(instance_opacity, id, at);
+            p.ray = pt_ray(view, x, y);
+            p.albedo = pt_gather_albedo(style, id, at);
+#if RECOLOR
+            p.albedo = recolor(view, eye_z, p.ray, p.z, style, p.albedo);
+#endif
+            // 3. light
+            float shadow = 1.0;
+#if LIT
+            vec3 c = phong(view, eye_z, factors, shininess, world, id, id_count, p, shadow);
+#else
+            vec3 c = p.albedo;
+#endif
+            precise vec3 premultiplied = c * opacity;
+            color[at] = vec4(premultiplied, opacity);
+#if SHADING
+            shading[at] = vec4(p.n, opacity);
+#endif
+#if ARRIVED
             arrived[at] = shadow;
-    }
-}
-
 #endif
+        }
+        here += PT_STEP;
+    } while (--left != 0u);
+}

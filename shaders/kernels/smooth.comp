@@ -23,13 +23,14 @@ tap read_tap(uvec4 rect, uint width, uint x, uint y)
     return tap(read_float4(at), inside ? z : pt_float(PT_KEY_EMPTY_Z));
 }
 
-struct tap_row {
-    tap west, middle, east;
+struct tap_row { // across the line
+    tap low, middle, high;
 };
 
-tap_row read_row(uvec4 rect, uint width, uint x, uint y)
+tap_row read_row(uvec4 rect, uint width, uvec2 p)
 {
-    return tap_row(read_tap(rect, width, x - 1u, y), read_tap(rect, width, x, y), read_tap(rect, width, x + 1u, y));
+    uvec2 low = p - PT_ACROSS, high = p + PT_ACROSS;
+    return tap_row(read_tap(rect, width, low.x, low.y), read_tap(rect, width, p.x, p.y), read_tap(rect, width, high.x, high.y));
 }
 
 struct tap_sum {
@@ -52,30 +53,33 @@ void main()
     uvec4 rect = uvec4(view.rect[0], view.rect[1], view.rect[2], view.rect[3]);
     bool translucent = args.translucent != 0u;
     float center = args.center, edge = args.edge, corner = args.corner;
-    uvec2 column = pt_tile_column(view);
-    uint end = pt_tile_end(view, column), x = column.x;
-    tap_row below = read_row(rect, view.width, x, column.y - 1u), row = read_row(rect, view.width, x, column.y);
-    for (uint y = column.y; y < end; y++) {
-        tap_row above = read_row(rect, view.width, x, y + 1u);
-        uint at = y * view.width + x;
+    uvec2 here = pt_tile_line(view);
+    uint left = pt_tile_steps(view, here);
+    if (left == 0u)
+        return;
+    tap_row behind = read_row(rect, view.width, here - PT_STEP), row = read_row(rect, view.width, here);
+    do {
+        tap_row ahead = read_row(rect, view.width, here + PT_STEP);
+        uint at = here.y * view.width + here.x;
         float z = row.middle.z;
         bool some = z < pt_float(PT_KEY_EMPTY_Z);
         float limit = read_deff(some ? read_from(at) : at);
         tap_sum edges = tap_sum(vec4(0.0), 0.0), corners = edges;
-        add_tap(below.west, z, limit, corners);
-        add_tap(below.middle, z, limit, edges);
-        add_tap(below.east, z, limit, corners);
-        add_tap(row.west, z, limit, edges);
-        add_tap(row.east, z, limit, edges);
-        add_tap(above.west, z, limit, corners);
-        add_tap(above.middle, z, limit, edges);
-        add_tap(above.east, z, limit, corners);
+        add_tap(behind.low, z, limit, corners); // in the order of rows
+        add_tap(PT_UPWARDS ? behind.middle : row.low, z, limit, edges);
+        add_tap(PT_UPWARDS ? behind.high : ahead.low, z, limit, corners);
+        add_tap(PT_UPWARDS ? row.low : behind.middle, z, limit, edges);
+        add_tap(PT_UPWARDS ? row.high : ahead.middle, z, limit, edges);
+        add_tap(PT_UPWARDS ? ahead.low : behind.high, z, limit, corners);
+        add_tap(PT_UPWARDS ? ahead.middle : row.high, z, limit, edges);
+        add_tap(ahead.high, z, limit, corners);
         precise float weights = (center + edges.count * edge) + corners.count * corner;
         precise vec4 total = (row.middle.color * center + edges.color * edge) + corners.color * corner;
         precise vec4 mean = total * pt_rcp(weights);
         if (some) // nothing reads the colour of an empty pixel
             result[at] = vec4(mean.xyz, translucent ? pt_min(mean.w, 1.0) : 1.0);
-        below = row;
-        row = above;
-    }
+        behind = row;
+        row = ahead;
+        here += PT_STEP;
+    } while (--left != 0u);
 }

@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/surface.c
+//   NORMALS: whether the cloud has normals;   TEXELS: whether its words come as a texture
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
 layout(std430, binding = 0) readonly buffer arguments_block { surface_args args; };
+layout(location = 16) uniform float spacings[PT_SPACINGS]; // args.instance.spacing
+#if TEXELS
+#define WORD(i) read_word(i)
+#else
 layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
+#define WORD(i) surface[i]
+#endif
 layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = 4) writeonly buffer deff_block { float deff[]; };
 layout(std430, binding = 5) writeonly buffer from_block { uint from[]; };
 
 struct instance_part {
     uint id_base, id_count;
-    bool has_normals;
     float d_min;
     vec3 rows[3]; // of the normal matrix
 };
@@ -28,16 +34,16 @@ void surface_pixel(view_args view, instance_part instance, uint x, uint y)
         return;
     float z = pt_float(key.y);
     vec2 ray = pt_ray(view, int(x), int(y));
-    uint word = surface[id];
-    float spacing = args.instance.spacing[word >> PT_SPACING_SHIFT];
+    uint word = WORD(id);
+    float spacing = spacings[word >> PT_SPACING_SHIFT];
     // 2. its normal, in view space: the cloud's, or the estimate that the normal plane holds
     vec3 object = pt_decode_normal(word);
     vec3 n = vec3(pt_dot(instance.rows[0], object), pt_dot(instance.rows[1], object), pt_dot(instance.rows[2], object));
     bool none = (word & PT_NORMAL_BITS) == PT_NORMAL_NONE;
-    if (!instance.has_normals) {
-        n = read_float4(at).xyz;
-        none = false;
-    }
+#if !NORMALS
+    n = read_float4(at).xyz;
+    none = false;
+#endif
     float square = pt_dot(n, n);
     none = none || !(1e-30 <= square);
     precise vec3 unit = n * pt_rsqrt(square);
@@ -61,12 +67,16 @@ void main()
     instance_part instance;
     instance.id_base = args.instance.id_base;
     instance.id_count = args.instance.id_count;
-    instance.has_normals = args.instance.has_normals != 0u;
     instance.d_min = args.instance.d_min;
     for (int i = 0; i < 3; i++)
         instance.rows[i] = vec3(args.instance.normal_matrix[3 * i], args.instance.normal_matrix[3 * i + 1],
                                 args.instance.normal_matrix[3 * i + 2]);
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++)
-        surface_pixel(view, instance, column.x, y);
+    uvec2 here = pt_tile_line(view);
+    uint left = pt_tile_steps(view, here);
+    if (left == 0u)
+        return;
+    do {
+        surface_pixel(view, instance, here.x, here.y);
+        here += PT_STEP;
+    } while (--left != 0u);
 }

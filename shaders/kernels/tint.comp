@@ -35,14 +35,14 @@ void main()
 {
     view_args view = args.view;
     uint id_base = args.id_base, id_count = args.id_count, first = args.clip_first, last = first + args.clip_count;
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + column.x;
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uint at = here.y * view.width + here.x;
         uvec2 key = read_key(at);
         if (key.x - id_base >= id_count || key.y == PT_KEY_EMPTY_Z)
             continue;
         float z = pt_float(key.y), per_pixel = pt_rcp(pt_footprint(view, z)), most = 0.0, deepest = 0.0;
-        vec2 ray = pt_ray(view, int(column.x), int(y));
+        vec2 ray = pt_ray(view, int(here.x), int(here.y));
         precise vec3 p = vec3(ray, pt_negate(z + args.eye_z));
         if (view.perspective != 0u)
             p.xy = z * ray;

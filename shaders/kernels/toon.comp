@@ -31,9 +31,9 @@ void main()
 {
     view_args view = args.view;
     float bands = args.bands, steepness = args.steepness, inverse = args.inverse;
-    uvec2 column = pt_tile_column(view);
-    for (uint y = column.y, end = pt_tile_end(view, column); y < end; y++) {
-        uint at = y * view.width + column.x;
+    uvec2 here = pt_tile_line(view);
+    for (uint left = pt_tile_steps(view, here); left != 0u; left--, here += PT_STEP) {
+        uint at = here.y * view.width + here.x;
         if (read_z_bits(at) == PT_KEY_EMPTY_Z)
             continue;
         vec3 albedo = read_float4(at).xyz;
