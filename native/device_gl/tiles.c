@@ -47,9 +47,6 @@ static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
     size_t tiles = (size_t)t->columns * t->rows;
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILE_COUNTS].name);
     gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
-    gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILES].name);
-    gl->ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)(tiles * 4), GL_RED_INTEGER, GL_UNSIGNED_INT,
-                           NULL);
     int result = pt_gl_bind(d, 2, s[PT_GL_SCRATCH_TILES].name, 0, tiles * 4, "tiles");
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 3, s[PT_GL_SCRATCH_TILE_LISTS].name, 0, LISTS * t->stride * 4, "tiles");
@@ -58,7 +55,7 @@ static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
     if (result != PATINA_OK)
         return result;
     for (int i = 0; i < 2; i++) {
-        GLuint program = d->tile_programs[i], x = (t->columns * TILE + GROUP - 1) / GROUP, y = t->rows;
+        GLuint program = d->tile_programs[i], x = (t->columns + GROUP - 1) / GROUP, y = t->rows;
         gl->ProgramUniform4ui(program, 0, t->rect[0], t->rect[1], t->rect[2], t->rect[3]);
         gl->ProgramUniform1ui(program, 1, t->width);
         gl->ProgramUniform2ui(program, 2, t->columns, t->rows);

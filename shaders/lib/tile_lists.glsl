@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Makes the lists of tiles that filters walk (lib/tiles.glsl, native/device_gl/tiles.c).
-//   STEP 0: what each tile holds, an invocation a column of it;   STEP 1: the lists, an invocation a tile
+//   STEP 0: what each tile holds;   STEP 1: the lists; an invocation a tile
 #version 430 core
 #include "shared/kernel_args.h"
 
@@ -24,12 +24,17 @@ layout(location = 3) uniform uint stride;
 
 void main()
 {
-    uint column = min(gl_GlobalInvocationID.x, rect.z - rect.x - 1u);
-    uint x = rect.x + column, y = rect.y + gl_WorkGroupID.y * TILE;
-    uint holds = 0u, end = min(y + TILE, rect.w);
-    for (; y < end; y++)
-        holds |= texelFetch(key_plane, int(y * width + x)).y != PT_KEY_EMPTY_Z ? HOLDS_POINTS : HOLDS_NOTHING;
-    atomicOr(tiles[gl_WorkGroupID.y * size.x + column / TILE], holds);
+    uvec2 tile = uvec2(gl_GlobalInvocationID.x, gl_WorkGroupID.y);
+    uvec2 first = rect.xy + tile * TILE, last = min(first + TILE, rect.zw) - 1u;
+    uint holds = 0u, y = first.y;
+    if (tile.x >= size.x)
+        return;
+    do {
+        for (uint i = 0u; i < TILE; i++)
+            holds |= texelFetch(key_plane, int(y * width + min(first.x + i, last.x))).y != PT_KEY_EMPTY_Z ? HOLDS_POINTS
+                                                                                                        : HOLDS_NOTHING;
+    } while (++y <= last.y);
+    tiles[tile.y * size.x + tile.x] = holds;
 }
 
 #else
