@@ -315,6 +315,18 @@ static int run_pass(struct render *render, const struct pt_pass *pass)
 // Planes that pass from layer to layer.
 static int peeled(enum pt_plane plane) { return plane >= PT_PLANE_LIMIT && plane <= PT_PLANE_TILES; }
 
+static int runs_together(const struct patina_device *device, const struct pt_pass *passes)
+{
+    enum pt_kernel kernels[64];
+    if (!passes->together || !device->ops->finish_picture || !device->ops->finishes)
+        return passes->together && device->ops->finish_picture;
+    if (passes->together > sizeof kernels / sizeof *kernels)
+        return 0;
+    for (uint32_t i = 0; i < passes->together; i++)
+        kernels[i] = passes[i].kernel;
+    return device->ops->finishes(kernels, passes->together);
+}
+
 // Passes as one: the planes between them are neither made nor written.
 static int run_together(struct render *render, const struct pt_pass *passes)
 {
@@ -370,7 +382,7 @@ static int run_plan(struct render *render)
         if (!writing && atomic_load(&frame->cancel))
             return PATINA_ERROR_CANCELLED;
         const struct pt_pass *pass = &plan->passes[i], *last = pass;
-        if (pass->together && frame->device->ops->finish_picture)
+        if (runs_together(frame->device, pass))
             last += pass->together - 1;
         if (!writing && is_output(last)) {
             if ((error = ensure_picture(frame, plan)))

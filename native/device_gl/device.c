@@ -279,32 +279,45 @@ static int read_buffer(struct pt_gl_device *d, void *context)
 }
 
 // In software the memory is at hand, and the driver clears by a call every 8 bytes: 2.0 ms for the keys of 1024² in place of 0.3.
-static int fill_mapped(struct pt_gl_device *d, const struct buffer_call *b)
+static int clear_mapped(struct pt_gl_device *d, size_t offset, size_t size, uint64_t first, uint64_t second)
 {
-    const uint64_t pattern = b->bytes == 8 ? b->pattern : (b->pattern << 32 | (uint32_t)b->pattern);
-    const size_t count = (b->size + 7) / 8; // buffers are padded
-    uint64_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, (GLintptr)b->offset, (GLsizeiptr)(8 * count),
+    const size_t count = (size + 7) / 8; // buffers are padded
+    uint64_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)(8 * count),
                                         GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT);
-    for (size_t i = 0; i < count && to; i++)
-        to[i] = pattern;
-    if (to)
-        d->gl.UnmapBuffer(GL_COPY_WRITE_BUFFER);
+    if (!to)
+        return pt_gl_check(d, "clearing a buffer");
+    for (size_t i = 0; i < count / 2; i++) {
+        to[2 * i] = first;
+        to[2 * i + 1] = second;
+    }
+    if (count & 1)
+        to[count - 1] = first;
+    d->gl.UnmapBuffer(GL_COPY_WRITE_BUFFER);
+    return pt_gl_check(d, "clearing a buffer");
+}
+
+int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
+                uint32_t bytes)
+{
+    static const GLenum formats[] = {GL_R32UI, GL_RG32UI, GL_NONE, GL_RGBA32UI};
+    static const GLenum parts[] = {GL_RED_INTEGER, GL_RG_INTEGER, GL_NONE, GL_RGBA_INTEGER};
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, buffer->name);
+    if (!size)
+        return PATINA_OK;
+    if (!d->base.info.hardware)
+        return clear_mapped(d, offset, size, (uint64_t)words[1] << 32 | words[0], (uint64_t)words[3] << 32 | words[2]);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, formats[bytes / 4 - 1], (GLintptr)offset,
+                             (GLsizeiptr)(size - size % bytes), parts[bytes / 4 - 1], GL_UNSIGNED_INT, words);
     return pt_gl_check(d, "clearing a buffer");
 }
 
 static int fill_buffer(struct pt_gl_device *d, void *context)
 {
     const struct buffer_call *b = context;
+    const uint32_t low = (uint32_t)b->pattern, high = b->bytes == 8 ? (uint32_t)(b->pattern >> 32) : low;
     pt_gl_tiles_forget(d);
-    uint32_t words[2] = {(uint32_t)b->pattern, (uint32_t)(b->pattern >> 32)};
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, b->buffer->name);
-    if (!d->base.info.hardware && b->size)
-        return fill_mapped(d, b);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, b->bytes == 8 ? GL_RG32UI : GL_R32UI, (GLintptr)b->offset,
-                             (GLsizeiptr)(b->size & ~(size_t)(b->bytes - 1)),
-                             b->bytes == 8 ? GL_RG_INTEGER : GL_RED_INTEGER, GL_UNSIGNED_INT, words);
-    return pt_gl_check(d, "clearing a buffer");
+    return pt_gl_clear(d, b->buffer, b->offset, b->size, (const uint32_t[]){low, high, low, high}, b->bytes);
 }
 
 struct run_call {
@@ -320,6 +333,17 @@ static int run_kernel(struct pt_gl_device *d, void *context)
 {
     const struct run_call *r = context;
     return pt_gl_run(d, r->kernel, r->arguments, r->argument_size, r->buffers, r->count, r->cancel);
+}
+
+struct finish_call {
+    const struct pt_bound_pass *passes;
+    uint32_t count;
+};
+
+static int finish_picture(struct pt_gl_device *d, void *context)
+{
+    const struct finish_call *f = context;
+    return pt_gl_finish_picture(d, f->passes, f->count);
 }
 
 static int finish_work(struct pt_gl_device *d, void *unused)
@@ -378,6 +402,23 @@ static int op_run(struct patina_device *device, enum pt_kernel kernel, const voi
                                    .cancel = cancel});
 }
 
+// What pt_gl_finish_picture is made for.
+static int op_finishes(const enum pt_kernel *kernels, uint32_t count)
+{
+    static const enum pt_kernel tail[] = {PT_KERNEL_smooth, PT_KERNEL_antialias, PT_KERNEL_compose};
+    if (count < 4 || memcmp(kernels + count - 3, tail, sizeof tail) != 0)
+        return 0;
+    for (uint32_t i = 0; i < count - 3; i++)
+        if (kernels[i] != PT_KERNEL_shade)
+            return 0;
+    return 1;
+}
+
+static int op_finish_picture(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
+{
+    return call(device, finish_picture, &(struct finish_call){.passes = passes, .count = count});
+}
+
 static int op_finish(struct patina_device *device)
 {
     return call(device, finish_work, NULL);
@@ -402,6 +443,8 @@ static const struct pt_device_ops ops = {
     .buffer_read = op_buffer_read,
     .buffer_fill = op_buffer_fill,
     .run = op_run,
+    .finishes = op_finishes,
+    .finish_picture = op_finish_picture,
     .finish = op_finish,
 };
 

@@ -25,6 +25,7 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_COUNTERS,
     PT_GL_SCRATCH_PIXELS, // fill: this step's changes; shade: filled pixels; antialias: edges; lines: steps
     PT_GL_SCRATCH_COLORS, // antialias: of edges; lines: discs
+    PT_GL_SCRATCH_SHADED, // finish: colours before they are smoothed
     PT_GL_SCRATCH_SAVED,  // fill: pixels as they were before the phase
     PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
     PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
@@ -89,6 +90,10 @@ int pt_gl_fail(struct pt_gl_device *d, int code, const char *format, ...) __attr
 // Turns whatever GL has to complain about into a code and a sentence: "OpenGL ran out of memory while ...".
 int pt_gl_check(struct pt_gl_device *d, const char *doing);
 
+// words: 16 bytes; a pattern of 4 or 8 `bytes` repeats in them. Offset and size are multiples of 8, or size reaches the end.
+int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
+                uint32_t bytes);
+
 // program.c
 // Compiles shaders/NAME with a line of definitions ("#define PASS 1\n") into a program.
 int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definitions, GLuint *program);
@@ -97,6 +102,7 @@ int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definiti
 int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, size_t argument_size,
               struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel);
 // Steps that a kernel's own runner shares with the default one.
+void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size); // bound at 0
 int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions);
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what);
 // The kernel's buffers from binding 1 on, and those of them that it reads as textures.
@@ -136,6 +142,8 @@ int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_b
                const atomic_int *cancel);
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt_buffer *const *buffers);
 int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args);
+// shade, of any number of instances, smooth, antialias and compose, without the planes between them.
+int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count);
 int pt_gl_push(struct pt_gl_device *d);
 int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args);
 // The coarse cells over the rectangle of a push.

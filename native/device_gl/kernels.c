@@ -257,14 +257,19 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     }
 }
 
+void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size)
+{
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->arguments);
+    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)((size + 15) & ~(size_t)15), NULL, GL_STREAM_DRAW);
+    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)size, arguments);
+    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
+}
+
 int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, size_t argument_size,
               struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
 {
     const struct view_args *view = arguments;
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->arguments);
-    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)((argument_size + 15) & ~(size_t)15), NULL, GL_STREAM_DRAW);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)argument_size, arguments);
-    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
+    pt_gl_arguments(d, arguments, argument_size);
     if (kernel == PT_KERNEL_scatter) {
         pt_gl_tiles_forget(d);
         return pt_gl_scatter(d, arguments, buffers, count, cancel);

@@ -154,6 +154,76 @@ int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args)
     return result;
 }
 
+// ---- finish ----------------------------------------------------------------------------------------------------
+
+enum { FINISH = 1 }; // among compose's programs: two steps, and two where lines are drawn
+
+// Of smooth, antialias and compose, as lib/finish.glsl reads them.
+struct finish_args {
+    struct smooth_args smooth;
+    struct antialias_args antialias;
+    struct compose_args compose;
+};
+
+static int bind_finish(struct pt_gl_device *d, const struct finish_args *args, const struct pt_bound_pass *passes,
+                       const struct pt_buffer *shaded)
+{
+    struct pt_buffer *const *planes = passes[0].buffers; // keys, from, deff
+    const struct pt_buffer *combined = passes[2].buffers[2], *line = args->antialias.inked ? passes[1].buffers[5] : combined;
+    pt_gl_arguments(d, args, sizeof *args);
+    int result = pt_gl_bind(d, 1, combined->name, 0, combined->size, "finish");
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 6, line->name, 0, line->size, "finish");
+    for (uint32_t unit = 0; unit < 3 && result == PATINA_OK; unit++)
+        result = pt_gl_bind_texture(d, unit, planes[unit]);
+    return result == PATINA_OK ? pt_gl_bind_texture(d, 3, shaded) : result;
+}
+
+// What shows no point is background; the rest is smoothed into the picture, and then its edges.
+static int finish(struct pt_gl_device *d, const struct finish_args *args, const struct pt_bound_pass *passes,
+                  const struct pt_buffer *shaded)
+{
+    static const char *const definitions[] = {"#define STEP 0\n#define INKED 0\n", "#define STEP 1\n#define INKED 0\n",
+                                              "#define STEP 0\n#define INKED 1\n", "#define STEP 1\n#define INKED 1\n"};
+    const struct pt_buffer *combined = passes[2].buffers[2];
+    const uint32_t find = 2 * (args->antialias.inked != 0);
+    uint32_t words[4];
+    memcpy(words, args->compose.background, sizeof words);
+    int result = pt_gl_clear(d, combined, 0, combined->size, words, sizeof words);
+    if (result == PATINA_OK)
+        result = pt_gl_tiles(d, passes[0].buffers[0], &args->smooth.view);
+    if (result != PATINA_OK || !d->tiles.count[PT_GL_TILES_POINTS])
+        return result;
+    for (uint32_t i = find; i < find + 2 && result == PATINA_OK; i++)
+        if (!d->programs[PT_KERNEL_compose][FINISH + i])
+            result = pt_gl_program(d, "lib/finish.glsl", definitions[i], &d->programs[PT_KERNEL_compose][FINISH + i]);
+    if (result == PATINA_OK)
+        result = bind_finish(d, args, passes, shaded);
+    if (result == PATINA_OK)
+        result = prepare_list(d, 7, 8, TILE_PIXELS);
+    if (result == PATINA_OK)
+        result = pt_gl_dispatch_tiles(d, PT_KERNEL_compose, FINISH + find, PT_GL_TILES_POINTS);
+    return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, FINISH + find + 1, list_length(d), GROUP) : result;
+}
+
+int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count)
+{
+    const struct pt_bound_pass *tail = passes + count - 3;
+    const struct finish_args args = {*(const struct smooth_args *)tail[0].arguments,
+                                     *(const struct antialias_args *)tail[1].arguments,
+                                     *(const struct compose_args *)tail[2].arguments};
+    const size_t size = (size_t)args.smooth.view.width * args.smooth.view.height * 16;
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_SHADED, size, 0);
+    struct pt_buffer shaded = {.size = size, .name = d->scratch[PT_GL_SCRATCH_SHADED].name};
+    for (const struct pt_bound_pass *shade = passes; shade < tail && result == PATINA_OK; shade++) {
+        shade->buffers[5] = NULL; // shading
+        shade->buffers[6] = &shaded;
+        result = pt_gl_run(d, PT_KERNEL_shade, shade->arguments, sizeof(struct shade_args), shade->buffers, shade->buffer_count,
+                           NULL);
+    }
+    return result == PATINA_OK ? finish(d, &args, tail, &shaded) : result;
+}
+
 // ---- push ------------------------------------------------------------------------------------------------------
 
 enum { COVERED = 0, TAKE = 1 };

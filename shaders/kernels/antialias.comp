@@ -27,31 +27,7 @@ layout(std430, binding = 7) buffer counters_block { uint edge_count; };
 layout(std430, binding = 8) buffer edges_block { uint edges[]; };
 layout(std430, binding = 9) buffer mixed_block { vec4 mixed[]; };
 
-const ivec2 cross_offsets[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1));
-
-// Neighbour i of a pixel; its own index for one outside the plane: unknown, no edge.
-uint neighbour(ivec2 size, int x, int y, int i)
-{
-    int qx = x + cross_offsets[i].x, qy = y + cross_offsets[i].y;
-    bool inside = qx >= 0 && qy >= 0 && qx < size.x && qy < size.y;
-    return inside ? uint(qy * size.x + qx) : uint(y * size.x + x);
-}
-
-// Beyond this a neighbour is on another layer.
-float step_limit(bool layers, uint at, uint z_bits)
-{
-    precise float limit = pt_float(z_bits) + read_deff(read_from(at));
-    return layers ? limit : pt_float(PT_KEY_EMPTY_Z);
-}
-
-bool is_far(uint q, float z, float limit)
-{
-#if BEHIND
-    if (z == pt_float(PT_KEY_EMPTY_Z))
-        return !(through[q] < PT_SPENT);
-#endif
-    return z > limit || z == pt_float(PT_KEY_EMPTY_Z);
-}
+#include "lib/edges.glsl"
 
 #if STEP == 0
 
@@ -136,8 +112,7 @@ void main()
         if (z < pt_float(PT_KEY_EMPTY_Z))
             sum = sum + read_float4(q);
     }
-    precise float coverage = pt_max(0.833333313465 - count * 0.333333343267, 0.166666671634); // 5/6, 1/3, 1/6
-    coverage = read_key(at).x - args.mesh_base < args.mesh_count ? PT_MESH_COVERAGE : coverage;
+    float coverage = edge_coverage(args, read_key(at).x, count);
     precise float share = (1.0 - coverage) * pt_rcp(count);
     precise vec4 mix_color = read_float4(at) * coverage + sum * share;
     mixed[index] = mix_color;
