@@ -139,19 +139,16 @@ static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
     return result;
 }
 
-// llvmpipe reads a texel in half the time of a block's word; elsewhere blocks hold more.
 static int run_surface(struct pt_gl_device *d, const struct surface_args *args, const struct pt_buffer *words)
 {
-    const uint32_t texels = !d->base.info.hardware, normals = args->instance.has_normals != 0, variant = 2 * texels + normals;
-    char definitions[48];
-    snprintf(definitions, sizeof definitions, "#define TEXELS %u\n#define NORMALS %u\n", texels, normals);
-    int result = pt_gl_kernel_program(d, PT_KERNEL_surface, variant, definitions);
-    if (result == PATINA_OK && texels)
+    const uint32_t normals = args->instance.has_normals != 0;
+    int result = pt_gl_kernel_program(d, PT_KERNEL_surface, normals, normals ? "#define NORMALS 1\n" : "#define NORMALS 0\n");
+    if (result == PATINA_OK && !d->base.info.hardware)
         result = pt_gl_bind_texture(d, 1, words);
     if (result != PATINA_OK)
         return result;
-    d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_surface][variant], 16, PT_SPACINGS, args->instance.spacing);
-    return pt_gl_dispatch_tiles(d, PT_KERNEL_surface, variant, PT_GL_TILES_POINTS);
+    d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_surface][normals], 16, PT_SPACINGS, args->instance.spacing);
+    return pt_gl_dispatch_tiles(d, PT_KERNEL_surface, normals, PT_GL_TILES_POINTS);
 }
 
 // Every pixel is gathered before any is blurred.

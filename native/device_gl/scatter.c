@@ -131,9 +131,9 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
         result = pt_gl_bind(d, 6, drawn->name, 0, drawn->size, "scatter");
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         const uint32_t variant = pass + 3 * args->behind + 6 * args->sifted;
-        char definitions[96];
-        snprintf(definitions, sizeof definitions, "%s#define BEHIND %u\n#define SIFTED %u\n#define GROUP %u\n", passes[pass],
-                 args->behind, args->sifted, d->base.info.hardware ? 64u : 8u);
+        char definitions[64];
+        snprintf(definitions, sizeof definitions, "%s#define BEHIND %u\n#define SIFTED %u\n", passes[pass], args->behind,
+                 args->sifted);
         result = pt_gl_kernel_program(d, PT_KERNEL_scatter, variant, definitions);
         for (uint32_t i = 0; i < args->instances && 3 * i + 3 < count && result == PATINA_OK; i++) {
             struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[3 * i + 1], buffers[3 * i + 2], buffers[3 * i + 3]};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/surface.c
-//   NORMALS: whether the cloud has normals;   TEXELS: whether its words come as a texture
+//   NORMALS: whether the cloud has normals
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -8,7 +8,7 @@
 
 layout(std430, binding = 0) readonly buffer arguments_block { surface_args args; };
 layout(location = 16) uniform float spacings[PT_SPACINGS]; // args.instance.spacing
-#if TEXELS
+#ifdef PT_SOFTWARE // a texel takes half the time of a block's word; elsewhere blocks hold more
 #define WORD(i) read_word(i)
 #else
 layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
