@@ -12,7 +12,7 @@ enum {
     PT_GL_VARIANTS = 128,     // programs of one kernel: its passes and special cases
     PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
     PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
-    PT_GL_TEXTURES = 5,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl
+    PT_GL_TEXTURES = 6,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl
 };
 
 // Memory that kernels keep between runs; grows, never shrinks.
@@ -108,7 +108,7 @@ int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t off
 // The kernel's buffers from binding 1 on, and those of them that it reads as textures.
 int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t argument_size,
                        struct pt_buffer *const *buffers, uint32_t count);
-// Unit 0: keys, 1: from, 2: deff, 3 and 4: float4 planes.
+// Unit 0: keys, 1: from, 2: deff, 3 and 4: float4 planes, 5: words of points.
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane);
 int pt_gl_bind_texels(struct pt_gl_device *d, uint32_t unit, GLuint name, size_t offset, size_t size); // a part of a buffer
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);

@@ -64,7 +64,7 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 
 // Planes that shaders read as buffer textures (lib/planes.glsl): numbers of buffers in kernels.def, from 1; 0: none.
 static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
-    // keys, from, deff, float4, float4
+    // keys, from, deff, float4, float4; words: by their runners
     [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
     [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3},
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
@@ -82,8 +82,8 @@ int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_bu
 
 int pt_gl_bind_texels(struct pt_gl_device *d, uint32_t unit, GLuint name, size_t offset, size_t size)
 {
-    static const GLenum formats[PT_GL_TEXTURES] = {GL_RG32UI, GL_R32UI, GL_R32F, GL_RGBA32F, GL_RGBA32F};
-    static const uint8_t sizes[PT_GL_TEXTURES] = {8, 4, 4, 16, 16};
+    static const GLenum formats[PT_GL_TEXTURES] = {GL_RG32UI, GL_R32UI, GL_R32F, GL_RGBA32F, GL_RGBA32F, GL_R32UI};
+    static const uint8_t sizes[PT_GL_TEXTURES] = {8, 4, 4, 16, 16, 4};
     size_t texels = size / sizes[unit];
     if (texels > d->texels)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
@@ -144,7 +144,7 @@ static int run_surface(struct pt_gl_device *d, const struct surface_args *args, 
     const uint32_t normals = args->instance.has_normals != 0;
     int result = pt_gl_kernel_program(d, PT_KERNEL_surface, normals, normals ? "#define NORMALS 1\n" : "#define NORMALS 0\n");
     if (result == PATINA_OK && !d->base.info.hardware)
-        result = pt_gl_bind_texture(d, 1, words);
+        result = pt_gl_bind_texture(d, 5, words);
     if (result != PATINA_OK)
         return result;
     d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_surface][normals], 16, PT_SPACINGS, args->instance.spacing);

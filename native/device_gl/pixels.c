@@ -116,6 +116,8 @@ int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt
         return PATINA_OK;
     shade_definitions(args, buffers[5] && buffers[5]->name, definitions, sizeof definitions);
     int result = shade_program(d, definitions, &variant);
+    if (result == PATINA_OK && !d->base.info.hardware && buffers[4] && buffers[4]->name)
+        result = pt_gl_bind_texture(d, 5, buffers[4]);
     if (result == PATINA_OK && args->instance.lit)
         set_lights(d, args, variant);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, variant, PT_GL_TILES_POINTS) : result;

@@ -30,7 +30,7 @@ static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, 
     if (b->kernel == PT_KERNEL_scatter) { // both as textures
         const size_t first = batch->first_slot * 4, left = b->surface->size - first, size = batch->slots * 4;
         if (result == PATINA_OK)
-            result = pt_gl_bind_texels(d, 1, b->surface->name, first, size < left ? size : left);
+            result = pt_gl_bind_texels(d, 5, b->surface->name, first, size < left ? size : left);
         if (result == PATINA_OK)
             result = pt_gl_bind_texels(d, 2, b->positions->name, 3 * first, 3 * size);
         return result;
@@ -170,7 +170,7 @@ int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 6, limit->name, 0, limit->size, "splat");
     if (result == PATINA_OK && args->sifted)
-        result = pt_gl_bind_texture(d, 1, buffers[1 + 4 * args->instances + args->behind]);
+        result = pt_gl_bind_texture(d, 5, buffers[1 + 4 * args->instances + args->behind]);
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_splat, pass, passes[pass]);
         for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
@@ -223,7 +223,7 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
     if (result == PATINA_OK)
         result = pt_gl_bind_texture(d, 2, buffers[1]);
     if (result == PATINA_OK && args->sifted)
-        result = pt_gl_bind_texture(d, 1, buffers[4 + 6 * args->instances]);
+        result = pt_gl_bind_texture(d, 5, buffers[4 + 6 * args->instances]);
     for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)
         result = blend_band(d, args, buffers, y, y + rows < height ? y + rows : height, cancel);
     return result;

@@ -11,6 +11,7 @@ layout(std430, binding = 0) readonly buffer arguments_block { ink_args args; };
 layout(std430, binding = 2) readonly buffer line_block { float line[]; };
 layout(std430, binding = 3) readonly buffer nearest_block { uint nearest[]; };
 layout(std430, binding = 4) readonly buffer colors_block { uint point_colors[]; };
+#define POINT_COLOR(i) point_colors[i]
 layout(std430, binding = 5) buffer color_block { vec4 color[]; };
 layout(std430, binding = 6) buffer depth_block { float depth[]; };
 layout(std430, binding = 7) writeonly buffer mask_block { float mask[]; };

@@ -14,7 +14,12 @@
 #include "lib/tiles.glsl"
 
 layout(std430, binding = 0) readonly buffer arguments_block { shade_args args; };
+#ifdef PT_SOFTWARE // as in surface
+#define POINT_COLOR(i) read_word(i)
+#else
 layout(std430, binding = 5) readonly buffer colors_block { uint point_colors[]; };
+#define POINT_COLOR(i) point_colors[i]
+#endif
 layout(std430, binding = 6) writeonly buffer shading_block { vec4 shading[]; };
 layout(std430, binding = 7) writeonly buffer color_block { vec4 color[]; };
 layout(std430, binding = 8) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
@@ -27,7 +32,7 @@ layout(std430, binding = 10) writeonly buffer arrived_block { float arrived[]; }
 float opacity_of(float instance_opacity, uint id, uint at)
 {
 #if OPACITY == 2
-    return uintBitsToFloat(point_colors[4u * at + 3u]);
+    return uintBitsToFloat(POINT_COLOR(4u * at + 3u));
 #elif OPACITY == 1
     uint byte_value = (opacities[id >> 2] >> (8u * (id & 3u))) & 255u;
     precise float opacity = instance_opacity * (float(byte_value) * 0.00392156885936856); // 1 / 255

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A point's own colour, before light, by COLOR_FORMAT. Include it behind a block that has uint point_colors[], four bytes a word, and
+// A point's own colour, before light, by COLOR_FORMAT. Include it behind POINT_COLOR(i), a word of them, four bytes, and
 // lib/srgb.glsl. at: of the pixel.
 #ifndef PT_ALBEDO_GLSL
 #define PT_ALBEDO_GLSL
@@ -9,16 +9,16 @@ vec3 pt_gather_albedo(vec3 style, uint id, uint at)
 #if COLOR_FORMAT == 0
     return style;
 #elif COLOR_FORMAT == 4
-    return vec3(uintBitsToFloat(point_colors[id]));
+    return vec3(uintBitsToFloat(POINT_COLOR(id)));
 #elif COLOR_FORMAT == 2
-    return vec3(uintBitsToFloat(point_colors[3u * id]), uintBitsToFloat(point_colors[3u * id + 1u]),
-                uintBitsToFloat(point_colors[3u * id + 2u]));
+    return vec3(uintBitsToFloat(POINT_COLOR(3u * id)), uintBitsToFloat(POINT_COLOR(3u * id + 1u)),
+                uintBitsToFloat(POINT_COLOR(3u * id + 2u)));
 #elif COLOR_FORMAT == 3 // blended discs
-    return vec3(uintBitsToFloat(point_colors[4u * at]), uintBitsToFloat(point_colors[4u * at + 1u]),
-                uintBitsToFloat(point_colors[4u * at + 2u]));
+    return vec3(uintBitsToFloat(POINT_COLOR(4u * at)), uintBitsToFloat(POINT_COLOR(4u * at + 1u)),
+                uintBitsToFloat(POINT_COLOR(4u * at + 2u)));
 #else // three bytes from byte 3 id on: they lie in one word or two
     uint first = 3u * id, shift = 8u * (first & 3u);
-    uint low = point_colors[first >> 2], high = point_colors[(first + 2u) >> 2];
+    uint low = POINT_COLOR(first >> 2), high = POINT_COLOR((first + 2u) >> 2);
     uint bytes = low >> shift | (shift > 8u ? high << (32u - shift) : 0u);
     return vec3(pt_srgb(bytes & 255u), pt_srgb((bytes >> 8) & 255u), pt_srgb((bytes >> 16) & 255u));
 #endif

@@ -19,11 +19,12 @@ layout(binding = 1) uniform usamplerBuffer from_plane;
 layout(binding = 2) uniform samplerBuffer deff_plane;
 layout(binding = 3) uniform samplerBuffer float4_plane; // normals or colours
 layout(binding = 4) uniform samplerBuffer other_float4_plane;
+layout(binding = 5) uniform usamplerBuffer word_plane; // of points
 
 uvec2 read_key(uint pixel) { return texelFetch(key_plane, int(pixel)).xy; }
 uint read_z_bits(uint pixel) { return texelFetch(key_plane, int(pixel)).y; }
 float read_z(uint pixel) { return uintBitsToFloat(texelFetch(key_plane, int(pixel)).y); }
-uint read_word(uint i) { return texelFetch(from_plane, int(i)).x; } // of kernels that read no from plane: other words
+uint read_word(uint i) { return texelFetch(word_plane, int(i)).x; }
 float read_float(uint i) { return texelFetch(deff_plane, int(i)).x; } // of kernels that read no deff plane
 uint read_from(uint pixel) { return texelFetch(from_plane, int(pixel)).x & ~PT_FROM_MIXED; }
 float read_deff(uint pixel) { return texelFetch(deff_plane, int(pixel)).x; }
