@@ -33,21 +33,29 @@ static inline vi pt_source(const struct pt_planes *planes, size_t at)
     return pt_source_of(planes->from, at);
 }
 
+struct pt_span { // of z of PT_LANES columns of rows y - 1, y, y + 1
+    vf near, far;
+};
+
+static inline struct pt_span pt_span_at(const struct pt_seen_row *const rows[3], int32_t x)
+{
+    vf below = vf_load(rows[0]->z + x), own = vf_load(rows[1]->z + x), above = vf_load(rows[2]->z + x);
+    return (struct pt_span){ vf_min(vf_min(below, above), own), vf_max(vf_max(below, above), own) };
+}
+
 // What flat says of the row in the middle: no filter of 3 x 3 need tell layers apart there. 94% of the torus' vectors are.
-// hi, lo: rows of room.
-static inline void pt_find_flat(const struct pt_seen_row *const rows[3], uint32_t width, float *hi, float *lo)
+static inline void pt_find_flat(const struct pt_seen_row *const rows[3], uint32_t width)
 {
     const int32_t first = (int32_t)rows[1]->first, end = (int32_t)rows[1]->end;
-    for (int32_t x = first - PT_LANES; x < end + PT_LANES; x += PT_LANES) {
-        vf below = vf_load(rows[0]->z + x), own = vf_load(rows[1]->z + x), above = vf_load(rows[2]->z + x);
-        vf_store(hi + x, vf_max(vf_max(below, above), own), vm_first(PT_LANES));
-        vf_store(lo + x, vf_min(vf_min(below, above), own), vm_first(PT_LANES));
-    }
+    struct pt_span west, here = pt_span_at(rows, first - PT_LANES), east = pt_span_at(rows, first);
     memset(rows[1]->flat, 0, width / PT_LANES + 2);
-    for (uint32_t x = rows[1]->first; x < rows[1]->end; x += PT_LANES) {
+    for (int32_t x = first; x < end; x += PT_LANES) {
+        west = here;
+        here = east;
+        east = pt_span_at(rows, x + PT_LANES);
         vf z = vf_load(rows[1]->z + x), limit = vf_load(rows[1]->limit + x);
-        vf far = vf_max(vf_max(vf_load(hi + x - 1), vf_load(hi + x + 1)), vf_load(hi + x));
-        vf near = vf_min(vf_min(vf_load(lo + x - 1), vf_load(lo + x + 1)), vf_load(lo + x));
+        vf near = vf_min(vf_min(vf_west(west.near, here.near), vf_east(here.near, east.near)), here.near);
+        vf far = vf_max(vf_max(vf_west(west.far, here.far), vf_east(here.far, east.far)), here.far);
         vm same = vm_and(vf_le(far - z, limit), vf_le(z - near, limit)); // as smoothing compares, then as anti-aliasing does
         same = vm_and(same, vf_le(far, z + limit));
         rows[1]->flat[x / PT_LANES] = vm_bits(same) == vm_bits(vm_first(PT_LANES));
@@ -58,6 +66,61 @@ static inline void pt_find_flat(const struct pt_seen_row *const rows[3], uint32_
 static inline int pt_flat(const struct pt_seen_row *row, uint32_t x)
 {
     return row->flat && row->flat[x / PT_LANES] && row->flat[(x + PT_LANES - 1) / PT_LANES];
+}
+
+// ---- weighted sums of 3 x 3 pixels -------------------------------------------------------------------------------------
+
+struct pt_nine { // weights
+    float center, edge, corner;
+};
+
+static inline vf pt_nine_sum(const struct pt_nine *weights, vf own, vf edges, vf corners)
+{
+    return (own * vf_set(weights->center) + edges * vf_set(weights->edge)) + corners * vf_set(weights->corner);
+}
+
+// Which of the nine around `some` pixels are of their layer. z: of rows y - 1, y, y + 1, at the first of PT_LANES pixels.
+static inline void pt_same_layer(const float *const z[3], vf limit, vm some, vm same[3][3])
+{
+    const vf own = vf_load(z[1]);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            same[r][c] = vm_and(some, vf_le(vf_abs(vf_load(z[r] + c - 1) - own), limit));
+}
+
+// Sums of PT_LANES pixels; 0 for those that are not the same layer. rows as above, of any channel.
+static inline vf pt_nine_pixels(const struct pt_nine *weights, const float *const rows[3], const vm same[3][3])
+{
+    vf tap[3][3];
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            tap[r][c] = vf_select(same[r][c], vf_load(rows[r] + c - 1), vf_zero());
+    return pt_nine_sum(weights, tap[1][1], (tap[1][0] + tap[1][2]) + (tap[0][1] + tap[2][1]),
+                       (tap[0][0] + tap[2][0]) + (tap[0][2] + tap[2][2]));
+}
+
+struct pt_column { // PT_LANES pixels
+    vf own, beside; // of row y; of rows y - 1 and y + 1, the sum
+};
+
+static inline struct pt_column pt_column_at(const float *const rows[3], int32_t x)
+{
+    return (struct pt_column){ vf_load(rows[1] + x), vf_load(rows[0] + x) + vf_load(rows[2] + x) };
+}
+
+// The same sums, times scale and at most `most`, from x to `end` where all nine are one layer: every column is loaded once.
+static inline void pt_nine_flat(const struct pt_nine *weights, const float *const rows[3], int32_t x, int32_t end, vf scale,
+                                vf most, float *out)
+{
+    struct pt_column west, here = pt_column_at(rows, x - PT_LANES), east = pt_column_at(rows, x);
+    for (; x < end; x += PT_LANES) {
+        west = here;
+        here = east;
+        east = pt_column_at(rows, x + PT_LANES);
+        vf edges = (vf_west(west.own, here.own) + vf_east(here.own, east.own)) + here.beside;
+        vf corners = vf_west(west.beside, here.beside) + vf_east(here.beside, east.beside);
+        vf_store(out + x, vf_min(pt_nine_sum(weights, here.own, edges, corners) * scale, most), vm_first(PT_LANES));
+    }
 }
 
 // Columns from x on that nothing is seen in; at least PT_LANES.

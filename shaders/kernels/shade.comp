@@ -87,6 +87,25 @@ tap_row read_row(ivec2 size, ivec2 p)
     return tap_row(read_tap(size, low.x, low.y), tap_of(pixel, size, p.x, p.y), read_tap(size, high.x, high.y), pixel);
 }
 
+// A neighbour of the same layer; of another, nothing.
+vec3 same_layer(vec4 tap, float z, float limit)
+{
+    precise float apart = tap.w - z;
+    return pt_abs(apart) <= limit ? tap.xyz : vec3(0.0);
+}
+
+vec3 blend_nine(tap_row behind, tap_row row, tap_row ahead, float z, float limit)
+{
+    vec3 first = same_layer(behind.low, z, limit), last = same_layer(ahead.high, z, limit);
+    vec3 higher = same_layer(behind.high, z, limit), further = same_layer(ahead.low, z, limit);
+    precise vec3 edges = (same_layer(row.low, z, limit) + same_layer(row.high, z, limit)) +
+                         (same_layer(behind.middle, z, limit) + same_layer(ahead.middle, z, limit));
+    precise vec3 corners = PT_UPWARDS ? (first + further) + (higher + last) : (first + higher) + (further + last); // of columns
+    precise vec3 sum = (same_layer(row.middle, z, limit) * pt_rcp(1.0) + edges * pt_rcp(2.0)) + corners * pt_rcp(3.0);
+    return sum;
+}
+
+#if WIDE
 void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum)
 {
     precise float apart = tap.w - z;
@@ -94,24 +113,6 @@ void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum)
     sum = pt_abs(apart) <= limit ? more : sum;
 }
 
-// In the order of rows.
-vec3 blend_nine(tap_row behind, tap_row row, tap_row ahead, float z, float limit)
-{
-    float edge = pt_rcp(2.0), corner = pt_rcp(3.0);
-    vec3 sum = vec3(0.0);
-    add_tap(behind.low, z, limit, corner, sum);
-    add_tap(PT_UPWARDS ? behind.middle : row.low, z, limit, edge, sum);
-    add_tap(PT_UPWARDS ? behind.high : ahead.low, z, limit, corner, sum);
-    add_tap(PT_UPWARDS ? row.low : behind.middle, z, limit, edge, sum);
-    add_tap(row.middle, z, limit, pt_rcp(1.0), sum);
-    add_tap(PT_UPWARDS ? row.high : ahead.middle, z, limit, edge, sum);
-    add_tap(PT_UPWARDS ? ahead.low : behind.high, z, limit, corner, sum);
-    add_tap(PT_UPWARDS ? ahead.middle : row.high, z, limit, edge, sum);
-    add_tap(ahead.high, z, limit, corner, sum);
-    return sum;
-}
-
-#if WIDE
 vec3 blend_wide(view_args view, ivec2 size, int x, int y, float z, float limit)
 {
     vec3 sum = vec3(0.0);

@@ -34,28 +34,30 @@ struct tap_sum {
     float count;
 };
 
-void add_tap(tap t, float z, float limit, inout tap_sum sum)
+// A neighbour of the same layer; of another, nothing: what an empty pixel's colour holds is anything, NaN too.
+tap_sum same_layer(tap t, float z, float limit)
 {
     precise float apart = t.z - z;
-    precise vec4 more = sum.color + t.color;
-    bool same = pt_abs(apart) <= limit; // else another layer, or nothing
-    sum.count += same ? 1.0 : 0.0;
-    sum.color = same ? more : sum.color; // what an empty pixel's colour holds is anything, NaN too
+    bool same = pt_abs(apart) <= limit;
+    return tap_sum(same ? t.color : vec4(0.0), same ? 1.0 : 0.0);
+}
+
+tap_sum both(tap_sum a, tap_sum b)
+{
+    precise vec4 color = a.color + b.color;
+    return tap_sum(color, a.count + b.count);
 }
 
 // limit: how far apart in depth neighbours of the same layer are at most.
 vec4 pt_smooth(smooth_args args, tap_row behind, tap_row row, tap_row ahead, float limit)
 {
     float z = row.middle.z;
-    tap_sum edges = tap_sum(vec4(0.0), 0.0), corners = edges;
-    add_tap(behind.low, z, limit, corners); // in the order of rows
-    add_tap(PT_UPWARDS ? behind.middle : row.low, z, limit, edges);
-    add_tap(PT_UPWARDS ? behind.high : ahead.low, z, limit, corners);
-    add_tap(PT_UPWARDS ? row.low : behind.middle, z, limit, edges);
-    add_tap(PT_UPWARDS ? row.high : ahead.middle, z, limit, edges);
-    add_tap(PT_UPWARDS ? ahead.low : behind.high, z, limit, corners);
-    add_tap(PT_UPWARDS ? ahead.middle : row.high, z, limit, edges);
-    add_tap(ahead.high, z, limit, corners);
+    tap_sum edges = both(both(same_layer(row.low, z, limit), same_layer(row.high, z, limit)),
+                         both(same_layer(behind.middle, z, limit), same_layer(ahead.middle, z, limit)));
+    tap_sum first = same_layer(behind.low, z, limit), last = same_layer(ahead.high, z, limit);
+    tap_sum higher = same_layer(behind.high, z, limit), further = same_layer(ahead.low, z, limit);
+    tap_sum corners = PT_UPWARDS ? both(both(first, further), both(higher, last)) // of columns
+                                 : both(both(first, higher), both(further, last));
     precise float weights = (args.center + edges.count * args.edge) + corners.count * args.corner;
     precise vec4 total = (row.middle.color * args.center + edges.color * args.edge) + corners.color * args.corner;
     precise vec4 mean = total * pt_rcp(weights);

@@ -45,7 +45,7 @@ struct walk {
     struct pt_seen_row seen[SEEN_MOST];
     struct pt_color_row shaded[RING], smoothed[RING];
     float *shown[RING][5];          // normals, opacities, what arrives of the lights
-    float *hi, *lo;                 // room for pt_find_flat
+    float *blended[3];              // sums of normals of the row at hand, where it is flat
     struct pt_tile_sum *tiles;      // of the row of tiles at hand
 };
 
@@ -68,8 +68,8 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
         for (uint32_t k = 0; k < 5; k++)
             walk->shown[i][k] = at + (8 + k) * s;
     }
-    walk->hi = at;
-    walk->lo = at + s;
+    for (uint32_t k = 0; k < 3; k++)
+        walk->blended[k] = at + k * s;
 }
 
 // ---- 1. colours and normals -------------------------------------------------------------------------------------------------
@@ -120,7 +120,7 @@ static void find_flat(const struct finish *finish, struct walk *walk, int32_t y)
     const struct pt_seen_row *const rows[3] = { seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
                                                 seen_row(finish, walk, y + 1) };
     if (rows[1]->end)
-        pt_find_flat(rows, finish->planes.view->width, walk->hi, walk->lo);
+        pt_find_flat(rows, finish->planes.view->width);
 }
 
 // Opacity into the row's colours.
@@ -160,8 +160,9 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
                                  pt_lanes_left(x, view->width), &id);
         if (!vm_bits(ours))
             continue;
-        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, shadows, x, (uint32_t)y, id, ours, plain, color,
-                                   normal);
+        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights,
+                                   finish->reach == 1 && pt_flat(around[reach], x) ? walk->blended : NULL, shadows, x, (uint32_t)y, id, ours,
+                                   plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
             vf_store(out->color[k] + x, color[k], ours);
         for (uint32_t k = 0; k < 3 && finish->extract && finish->extract->normal; k++)
@@ -236,11 +237,36 @@ static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *
     }
 }
 
+// Where the row's next part that is flat, or is not, ends.
+static uint32_t end_of_part(const struct pt_seen_row *seen, uint32_t x)
+{
+    const int flat = pt_flat(seen, x);
+    while (x < seen->end && pt_flat(seen, x) == flat)
+        x += PT_LANES;
+    return x;
+}
+
+static void blend_flat(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *const rows[3] = { seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
+                                                seen_row(finish, walk, y + 1) };
+    const struct pt_nine nine = pt_blend_nine(finish->weights);
+    for (uint32_t x = rows[1]->first, end; x < rows[1]->end; x = end) {
+        end = end_of_part(rows[1], x);
+        for (uint32_t k = 0; k < 3 && pt_flat(rows[1], x); k++) {
+            const float *const normals[3] = { rows[0]->normal[k], rows[1]->normal[k], rows[2]->normal[k] };
+            pt_nine_flat(&nine, normals, (int32_t)x, (int32_t)end, vf_set(1.0f), vf_set(pt_float(PT_KEY_EMPTY_Z)), walk->blended[k]);
+        }
+    }
+}
+
 static void shade(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
     struct pt_color_row *out = &walk->shaded[slot(y)];
     out->z = seen->z;
+    if (finish->reach == 1 && seen->end)
+        blend_flat(finish, walk, y);
     for (uint32_t i = 0; i < finish->shade_count && seen->end; i++) {
         const struct pt_cpu_call *call = &finish->shades[i].call;
         const struct shade_args *args = call->arguments;
@@ -269,22 +295,23 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         return;
     }
     out->z = rows[1]->z;
-    const vf whole = vf_set(pt_smooth_scale(finish->smooth));
-    for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
+    const vf scale = vf_set(pt_smooth_scale(finish->smooth));
+    const struct pt_nine nine = pt_smooth_weights(finish->smooth);
+    for (uint32_t x = seen->first, end; x < seen->end; x = end) {
+        const int flat = pt_flat(seen, x);
+        end = flat ? end_of_part(seen, x) : x + PT_LANES;
+        for (int k = 0; k < finish->channels && flat; k++) {
+            const float *const colors[3] = { rows[0]->color[k], rows[1]->color[k], rows[2]->color[k] };
+            pt_nine_flat(&nine, colors, (int32_t)x, (int32_t)end, scale, vf_set(k < 3 ? pt_float(PT_KEY_EMPTY_Z) : 1.0f), out->color[k]);
+        }
         vm some = vf_lt(vf_load(out->z + x), empty); // +inf behind the row's end
         vf color[4];
-        if (!vm_bits(some))
+        if (flat || !vm_bits(some))
             continue;
-        const vf limit = vf_load(seen->limit + x);
-        const int flat = pt_flat(seen, x);
-        if (finish->channels == 3 && flat)
-            pt_smooth_pixels(finish->smooth, rows, 3, &whole, x, limit, some, color);
-        else if (finish->channels == 3)
-            pt_smooth_pixels(finish->smooth, rows, 3, NULL, x, limit, some, color);
-        else if (flat)
-            pt_smooth_pixels(finish->smooth, rows, 4, &whole, x, limit, some, color);
+        if (finish->channels == 3)
+            pt_smooth_pixels(finish->smooth, rows, 3, x, vf_load(seen->limit + x), some, color);
         else
-            pt_smooth_pixels(finish->smooth, rows, 4, NULL, x, limit, some, color);
+            pt_smooth_pixels(finish->smooth, rows, 4, x, vf_load(seen->limit + x), some, color);
         for (int k = 0; k < finish->channels; k++)
             vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
     }
@@ -517,7 +544,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
     finish.channels = finish.peel ? 4 : 3;
     finish.stride = pt_row_stride(finish.planes.view->width);
     finish.ring = (uint32_t)(2 * finish.reach > finish.reach + 3 ? 2 * finish.reach : finish.reach + 3) + 1;
-    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR + 2) * finish.stride;
+    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR + 3) * finish.stride;
     pt_blend_weights(finish.weights);
     uint32_t threads = pt_pool_threads(shared->pool);
     finish.memory = pt_cpu_scratch(shared, 0, threads * finish.thread_floats * sizeof(float));

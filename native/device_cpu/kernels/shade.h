@@ -18,24 +18,39 @@ static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_M
         weights[i] = pt_rcp((float)(1 + i));
 }
 
-// Normals of those of PT_LANES pixels from x on that `filled` names, blended over (2 reach + 1)^2 pixels; the others keep n.
-// around[reach]: the pixels' own row. flat: all those pixels are one layer.
-static inline void pt_blend_normals(const struct pt_seen_row *const *around, int reach, int flat, const float *weights,
-                                    uint32_t x, vm filled, vf n[3])
+static inline struct pt_nine pt_blend_nine(const float *weights) { return (struct pt_nine){ weights[0], weights[1], weights[2] }; }
+
+// Sums of the normals of (2 reach + 1)^2 pixels around those of PT_LANES pixels from x on that `filled` names, as far as they
+// are of their layer. around[reach]: the pixels' own row.
+static inline void pt_blend_sum(const struct pt_seen_row *const *around, int reach, const float *weights, uint32_t x, vm filled,
+                                vf sum[3])
 {
-    const struct pt_seen_row *own = around[reach];
-    const vf z = vf_load(own->z + x), limit = vf_load(own->limit + x);
-    vf sum[3] = { vf_zero(), vf_zero(), vf_zero() };
+    const vf z = vf_load(around[reach]->z + x), limit = vf_load(around[reach]->limit + x);
+    if (reach == 1) {
+        const float *const depths[3] = { around[0]->z + x, around[1]->z + x, around[2]->z + x };
+        const struct pt_nine nine = pt_blend_nine(weights);
+        vm same[3][3];
+        pt_same_layer(depths, limit, filled, same);
+        for (int k = 0; k < 3; k++) {
+            const float *const rows[3] = { around[0]->normal[k] + x, around[1]->normal[k] + x, around[2]->normal[k] + x };
+            sum[k] = pt_nine_pixels(&nine, rows, same);
+        }
+        return;
+    }
+    sum[0] = sum[1] = sum[2] = vf_zero();
     for (int dy = -reach; dy <= reach; dy++)
         for (int dx = -reach; dx <= reach; dx++) {
             const struct pt_seen_row *row = around[reach + dy];
             vf weight = vf_set(weights[dx * dx + dy * dy]);
-            vm take = flat ? filled : vm_and(filled, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit));
-            for (int k = 0; k < 3 && flat; k++)
-                sum[k] = sum[k] + vf_load(row->normal[k] + x + dx) * weight;
-            for (int k = 0; k < 3 && !flat; k++)
+            vm take = vm_and(filled, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit));
+            for (int k = 0; k < 3; k++)
                 sum[k] = sum[k] + vf_mul_where(take, vf_load(row->normal[k] + x + dx), weight);
         }
+}
+
+// Normals of pixels that `filled` names: their sums as units; the others keep n.
+static inline void pt_blend_normals(const vf sum[3], vm filled, vf n[3])
+{
     vf square = (sum[0] * sum[0] + sum[1] * sum[1]) + sum[2] * sum[2];
     vm blended = vf_lt(vf_set(1e-12f), square);
     vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
@@ -266,11 +281,12 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
 }
 
 // Light on, and shown normals of, PT_LANES pixels of the instance from (x, y) on. color: in albedo. around: rows
-// y - blend ... y + blend. Returns the mean share of the casting lights that arrives.
+// y - blend ... y + blend. blended: sums of normals at x, where all are one layer; NULL: not known. Returns the mean share of
+// the casting lights that arrives.
 static inline __attribute__((always_inline)) vf
 pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes, const struct pt_seen_row *const *around,
-                const float *weights, const uint32_t *shadows, uint32_t x, uint32_t y, vi id, vm ours, int plain, vf color[3],
-                vf normal[3])
+                const float *weights, float *const *blended, const uint32_t *shadows, uint32_t x, uint32_t y, vi id, vm ours,
+                int plain, vf color[3], vf normal[3])
 {
     size_t at = (size_t)y * args->view.width + x;
     const struct pt_seen_row *own = around[args->blend];
@@ -280,10 +296,14 @@ pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes, c
         normal[k] = vf_load(own->normal[k] + x);
     if (args->blend) {
         vm filled = pt_filled(pt_source(planes, at), at, ours);
-        if (vm_bits(filled) && args->blend == 1 && pt_flat(own, x))
-            pt_blend_normals(around, 1, 1, weights, x, filled, normal);
-        else if (vm_bits(filled))
-            pt_blend_normals(around, (int)args->blend, 0, weights, x, filled, normal);
+        if (vm_bits(filled)) {
+            vf sum[3];
+            for (int k = 0; k < 3 && blended; k++)
+                sum[k] = vf_load(blended[k] + x);
+            if (!blended)
+                pt_blend_sum(around, (int)args->blend, weights, x, filled, sum);
+            pt_blend_normals(sum, filled, normal);
+        }
     }
     if (args->instance.lit)
         return pt_phong(args, plain, shadows, x, y, id, ours, vf_load(own->z + x), normal, color);

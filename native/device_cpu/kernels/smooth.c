@@ -41,7 +41,7 @@ static void smooth_row(const struct smooth *smooth, const struct pt_color_row *c
         if (!vm_bits(some))
             continue; // nothing reads the colour of an empty pixel
         vf color[4], limit = vf_gather(smooth->planes.deff, pt_source(&smooth->planes, at), some);
-        pt_smooth_pixels(smooth->args, rows, smooth->args->translucent ? 4 : 3, NULL, x, limit, some, color);
+        pt_smooth_pixels(smooth->args, rows, smooth->args->translucent ? 4 : 3, x, limit, some, color);
         vf_store4(out + 4 * at, color, vm_bits(some));
     }
 }

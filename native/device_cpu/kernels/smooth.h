@@ -16,33 +16,30 @@ static inline float pt_smooth_scale(const struct smooth_args *args)
     return pt_rcp((args->center + 4.0f * args->edge) + 4.0f * args->corner);
 }
 
-// rows: y - 1, y, y + 1. limit: d_eff of the pixels from x on. `some` are not empty. channels: 3, or 4 with alpha. whole:
-// where all of them and those around are one layer pt_smooth_scale, else NULL.
-static inline void pt_smooth_pixels(const struct smooth_args *args, const struct pt_color_row *const rows[3], int channels,
-                                    const vf *whole, uint32_t x, vf limit, vm some, vf out[4])
+static inline struct pt_nine pt_smooth_weights(const struct smooth_args *args)
 {
-    const vf zero = vf_zero(), one = vf_set(1.0f), z = vf_load(rows[1]->z + x);
-    vf edges[5] = { zero, zero, zero, zero, zero }, corners[5] = { zero, zero, zero, zero, zero }; // the last counts
-    for (int dy = -1; dy <= 1; dy++)
-        for (int dx = -1; dx <= 1; dx++) {
-            if (!dx && !dy)
-                continue;
-            const struct pt_color_row *row = rows[1 + dy];
-            vf *sum = dx && dy ? corners : edges;
-            for (int k = 0; k < channels && whole; k++)
-                sum[k] = sum[k] + vf_load(row->color[k] + x + dx);
-            if (whole)
-                continue;
-            vm same = vm_and(some, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit)); // else another layer, or nothing
-            for (int k = 0; k < channels; k++)
-                sum[k] = vf_add_where(same, sum[k], vf_load(row->color[k] + x + dx));
-            sum[4] = vf_add_where(same, sum[4], one);
+    return (struct pt_nine){ args->center, args->edge, args->corner };
+}
+
+// rows: y - 1, y, y + 1. limit: d_eff of the pixels from x on. `some` are not empty. channels: 3, or 4 with alpha.
+static inline void pt_smooth_pixels(const struct smooth_args *args, const struct pt_color_row *const rows[3], int channels,
+                                    uint32_t x, vf limit, vm some, vf out[4])
+{
+    const float *const z[3] = { rows[0]->z + x, rows[1]->z + x, rows[2]->z + x };
+    const struct pt_nine weights = pt_smooth_weights(args);
+    const vf one = vf_set(1.0f);
+    vf edges = vf_zero(), corners = vf_zero(); // how many there are
+    vm same[3][3];
+    pt_same_layer(z, limit, some, same);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) {
+            edges = vf_add_where((r + c) % 2 ? same[r][c] : vm_of_bits(0), edges, one);
+            corners = vf_add_where(r != 1 && c != 1 ? same[r][c] : vm_of_bits(0), corners, one);
         }
-    const vf center = vf_set(args->center), edge = vf_set(args->edge), corner = vf_set(args->corner);
-    vf scale = whole ? *whole : vf_rcp((center + edges[4] * edge) + corners[4] * corner);
+    const vf scale = vf_rcp((vf_set(weights.center) + edges * vf_set(weights.edge)) + corners * vf_set(weights.corner));
     for (int k = 0; k < channels; k++) {
-        vf own = vf_load(rows[1]->color[k] + x) * center;
-        out[k] = ((own + edges[k] * edge) + corners[k] * corner) * scale;
+        const float *const row[3] = { rows[0]->color[k] + x, rows[1]->color[k] + x, rows[2]->color[k] + x };
+        out[k] = pt_nine_pixels(&weights, row, same) * scale;
     }
     out[3] = channels == 4 ? vf_min(out[3], one) : one; // the reciprocal is off by an ulp or two
 }
