@@ -159,13 +159,12 @@ static void scan_row(const struct fill *fill, uint32_t y)
 static void scan_band(struct fill *fill, uint32_t band)
 {
     uint64_t *const planes[] = { fill->covered, fill->suspect, fill->dirty, fill->touched };
-    struct span words = band_words(fill, band);
+    const struct span span = band_words(fill, band);
     uint32_t first, last;
     band_rows(fill, band, &first, &last);
-    words.begin -= band ? 0 : fill->words + 1;
-    words.end += last < fill->view->rect[3] ? 0 : fill->words + 1;
+    const size_t before = band ? 0 : fill->words + 1, behind = last < fill->view->rect[3] ? 0 : fill->words + 1;
     for (size_t i = 0; i < sizeof planes / sizeof *planes; i++)
-        memset(planes[i] + words.begin, 0, (words.end - words.begin) * 8);
+        memset(planes[i] + span.begin - before, 0, (before + span.end - span.begin + behind) * 8);
     for (uint32_t y = first - (first && !band); y < last || (y == fill->view->rect[3] && y < fill->view->height); y++)
         scan_row(fill, y);
     const size_t base = band * fill->band_entries;
