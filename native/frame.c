@@ -315,22 +315,23 @@ static int run_pass(struct render *render, const struct pt_pass *pass)
 // Planes that pass from layer to layer.
 static int peeled(enum pt_plane plane) { return plane >= PT_PLANE_LIMIT && plane <= PT_PLANE_TILES; }
 
-static int runs_together(const struct patina_device *device, const struct pt_pass *passes)
+// How many passes from here on the device runs as one; 0: none.
+static uint32_t together(const struct patina_device *device, const struct pt_pass *passes)
 {
-    enum pt_kernel kernels[64];
-    if (!passes->together || !device->ops->finish_picture || !device->ops->finishes)
-        return passes->together && device->ops->finish_picture;
-    if (passes->together > sizeof kernels / sizeof *kernels)
+    struct pt_bound_pass some[64]; // not bound yet
+    if (!device->ops->finish_picture || (device->ops->finishes && passes->together > sizeof some / sizeof *some))
         return 0;
+    if (!device->ops->finishes)
+        return passes->together;
     for (uint32_t i = 0; i < passes->together; i++)
-        kernels[i] = passes[i].kernel;
-    return device->ops->finishes(kernels, passes->together);
+        some[i] = (struct pt_bound_pass){ .kernel = passes[i].kernel, .arguments = passes[i].arguments };
+    return device->ops->finishes(some, passes->together);
 }
 
 // Passes as one: the planes between them are neither made nor written.
-static int run_together(struct render *render, const struct pt_pass *passes)
+static int run_together(struct render *render, const struct pt_pass *passes, uint32_t count)
 {
-    uint32_t count = passes->together, refs = 0;
+    uint32_t refs = 0;
     for (uint32_t i = 0; i < count; i++)
         refs += passes[i].ref_count;
     struct pt_bound_pass *bound = calloc(count, sizeof *bound);
@@ -382,14 +383,15 @@ static int run_plan(struct render *render)
         if (!writing && atomic_load(&frame->cancel))
             return PATINA_ERROR_CANCELLED;
         const struct pt_pass *pass = &plan->passes[i], *last = pass;
-        if (runs_together(frame->device, pass))
-            last += pass->together - 1;
+        const uint32_t count = together(frame->device, pass);
+        if (count)
+            last += count - 1;
         if (!writing && is_output(last)) {
             if ((error = ensure_picture(frame, plan)))
                 return error;
             writing = 1;
         }
-        if ((error = last > pass ? run_together(render, pass) : run_pass(render, pass))) {
+        if ((error = last > pass ? run_together(render, pass, count) : run_pass(render, pass))) {
             frame->picture_valid &= !writing; // half a picture is none: the device failed
             return error;
         }

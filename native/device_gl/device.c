@@ -402,16 +402,24 @@ static int op_run(struct patina_device *device, enum pt_kernel kernel, const voi
                                    .cancel = cancel});
 }
 
-// What pt_gl_finish_picture is made for.
-static int op_finishes(const enum pt_kernel *kernels, uint32_t count)
+// What pt_gl_finish_picture is made for; z comes from the keys, what else is extracted from planes that it does not make.
+static uint32_t op_finishes(const struct pt_bound_pass *passes, uint32_t count)
 {
     static const enum pt_kernel tail[] = {PT_KERNEL_smooth, PT_KERNEL_antialias, PT_KERNEL_compose};
-    if (count < 4 || memcmp(kernels + count - 3, tail, sizeof tail) != 0)
+    enum { TAIL = sizeof tail / sizeof *tail };
+    uint32_t shades = 0, follow = 0;
+    while (shades < count && passes[shades].kernel == PT_KERNEL_shade)
+        shades++;
+    while (follow < TAIL && shades + follow < count && passes[shades + follow].kernel == tail[follow])
+        follow++;
+    if (!shades || follow < TAIL)
         return 0;
-    for (uint32_t i = 0; i < count - 3; i++)
-        if (kernels[i] != PT_KERNEL_shade)
+    for (uint32_t i = shades + TAIL; i < count; i++) {
+        const struct extract_args *extract = passes[i].arguments;
+        if (passes[i].kernel != PT_KERNEL_extract || extract->normal || extract->source || extract->shadow)
             return 0;
-    return 1;
+    }
+    return shades + TAIL;
 }
 
 static int op_finish_picture(struct patina_device *device, const struct pt_bound_pass *passes, uint32_t count)
