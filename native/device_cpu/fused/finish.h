@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the walk of finish.c knows, and where it is.
+#ifndef PT_FINISH_H
+#define PT_FINISH_H
+
+#include "device_cpu/kernels/antialias.h"
+#include "device_cpu/kernels/compose.h"
+#include "device_cpu/kernels/extract.h"
+#include "device_cpu/kernels/peel.h"
+#include "device_cpu/kernels/shade.h"
+#include "device_cpu/kernels/smooth.h"
+
+enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 6, CHANNELS_COLOR = 13 }; // shaded 4, smoothed 4, shown 5
+// Row s is shaded when s + reach has been seen, s - 1 is smoothed then, s - 2 finished: anti-aliasing reads s - 3 too.
+enum { SEEN_MOST = 2 * PT_BLEND_MOST + 1 };
+
+struct finish {
+    const struct pt_cpu_pass *shades;
+    uint32_t shade_count;
+    const struct smooth_args *smooth;         // NULL: off
+    const struct antialias_args *antialias;   // NULL: off
+    const struct compose_args *compose;
+    const struct extract_args *extract;       // NULL: nothing beside the colour
+    float *combined, *depth, *normals, *source, *shadow;
+    const struct peel_args *peel;             // NULL: the picture is composed
+    const float *through;                     // of the layers before; NULL before the first
+    const float *line;                        // lines, which anti-aliasing leaves to ink; NULL: none
+    struct pt_peeled peeled;
+    struct pt_tile_value *tiles;
+    int channels;                             // of colours: 3, or 4 with alpha
+    int32_t base, end;                        // rows that are finished
+    struct pt_planes planes;
+    int32_t reach;
+    int with_normals;
+    float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1];
+    float *memory; // per thread
+    size_t stride, thread_floats;
+    uint32_t ring; // of rows seen
+    struct walk *walks; // per thread
+};
+
+// Where a thread is: it goes on where it stopped when its next rows follow.
+struct walk {
+    int32_t first, next;            // row of the picture that it began with; that comes next
+    struct pt_seen_row seen[SEEN_MOST];
+    struct pt_color_row shaded[RING], smoothed[RING];
+    float *shown[RING][5];          // normals, opacities, what arrives of the lights
+    float *blended[3];              // sums of normals of the row at hand, where it is flat
+    struct pt_tile_sum *tiles;      // of the row of tiles at hand
+};
+
+static struct pt_seen_row *seen_row(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    return &walk->seen[(uint32_t)(y + 4 * SEEN_MOST) % finish->ring];
+}
+
+static uint32_t slot(int32_t y) { return (uint32_t)(y + RING) % RING; }
+
+#endif
