@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # tests/FOLDER/test_NAME.c -> target FOLDER_test_NAME, program tests/FOLDER/test_NAME in the binary folder.
-# `all_tests` builds them all; build/test runs them.
+# `all_tests` builds them all, `FOLDER_tests` those of a folder, `fuzz_tests` the fuzzers; build/test runs them.
 add_custom_target(all_tests)
+add_custom_target(fuzz_tests)
+add_dependencies(all_tests fuzz_tests)
 find_library(CMOCKA cmocka)
 if(NOT CMOCKA)
     message(STATUS "cmocka not found: no C tests")
@@ -26,6 +28,8 @@ if(SUPPORT_SOURCES)
 endif()
 
 foreach(folder kernels unit scenes hard)
+    add_custom_target(${folder}_tests)
+    add_dependencies(all_tests ${folder}_tests)
     file(GLOB sources CONFIGURE_DEPENDS ${TESTS}/${folder}/test_*.c)
     foreach(source IN LISTS sources)
         get_filename_component(name ${source} NAME_WE)
@@ -43,7 +47,7 @@ foreach(folder kernels unit scenes hard)
             endif()
             target_link_libraries(${target} PRIVATE patina_test)
         endif()
-        add_dependencies(all_tests ${target})
+        add_dependencies(${folder}_tests ${target})
     endforeach()
 endforeach()
 
@@ -57,6 +61,6 @@ if(CMAKE_C_COMPILER_ID MATCHES "Clang" AND PATINA_SANITIZE)
         target_compile_options(${name} PRIVATE -Wno-missing-prototypes)
         target_link_options(${name} PRIVATE -fsanitize=fuzzer)
         target_link_libraries(${name} PRIVATE patina_test)
-        add_dependencies(all_tests ${name})
+        add_dependencies(fuzz_tests ${name})
     endforeach()
 endif()
