@@ -58,7 +58,7 @@ static inline void pt_find_flat(const struct pt_seen_row *const rows[3], uint32_
         vf far = vf_max(vf_max(vf_west(west.far, here.far), vf_east(here.far, east.far)), here.far);
         vm same = vm_and(vf_le(far - z, limit), vf_le(z - near, limit)); // as smoothing compares, then as anti-aliasing does
         same = vm_and(same, vf_le(far, z + limit));
-        rows[1]->flat[x / PT_LANES] = vm_bits(same) == vm_bits(vm_first(PT_LANES));
+        rows[1]->flat[x / PT_LANES] = vm_bits(same) == PT_ALL;
     }
 }
 
@@ -119,7 +119,7 @@ static inline void pt_nine_flat(const struct pt_nine *weights, const float *cons
         east = pt_column_at(rows, x + PT_LANES);
         vf edges = (vf_west(west.own, here.own) + vf_east(here.own, east.own)) + here.beside;
         vf corners = vf_west(west.beside, here.beside) + vf_east(here.beside, east.beside);
-        vf_store(out + x, vf_min(pt_nine_sum(weights, here.own, edges, corners) * scale, most), vm_first(PT_LANES));
+        vf_store(out + x, vf_min(pt_nine_sum(weights, here.own, edges, corners) * scale, most));
     }
 }
 
@@ -128,8 +128,8 @@ static inline void pt_empty_columns(float *z, int32_t x, int32_t end)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     for (; x < end - PT_LANES; x += PT_LANES)
-        vf_store(z + x, empty, vm_first(PT_LANES));
-    vf_store(z + end - PT_LANES, empty, vm_first(PT_LANES));
+        vf_store(z + x, empty);
+    vf_store(z + end - PT_LANES, empty);
 }
 
 static inline void pt_empty_row(float *z, uint32_t width)
@@ -167,7 +167,7 @@ static inline void pt_see_row(const struct pt_planes *planes, int32_t y, float s
         size_t at = (size_t)y * width + x;
         vf z = vi_float(vi_load_z(planes->keys + at));
         vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])), vf_lt(z, empty));
-        vf_store(row->z + x, z, vm_first(PT_LANES));
+        vf_store(row->z + x, z);
         if (!vm_bits(some))
             continue;
         row->first = row->end ? row->first : x;
@@ -186,9 +186,9 @@ static inline void pt_see_row(const struct pt_planes *planes, int32_t y, float s
                 vf_load4(planes->normals + 4 * at, n);
             n[3] = vf_load(planes->deff + at);
         }
-        vf_store(row->limit + x, n[3], vm_first(PT_LANES));
+        vf_store(row->limit + x, n[3]);
         for (uint32_t k = 0; k < 3 && with_normals; k++)
-            vf_store(row->normal[k] + x, n[k] * factor, vm_first(PT_LANES));
+            vf_store(row->normal[k] + x, n[k] * factor);
     }
     pt_empty_columns(row->z, (int32_t)rect[2], (int32_t)width + PT_ROW_PAD);
 }

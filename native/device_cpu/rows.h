@@ -58,6 +58,23 @@ static inline void pt_fetch_ahead(const uint64_t *row, uint32_t x, uint32_t end,
     }
 }
 
+// Writes to a row that no other thread writes to: those of PT_LANES pixels from x on that m names.
+static inline void pt_row_put(uint32_t *row, uint32_t width, uint32_t x, vi a, vm m)
+{
+    if (x + PT_LANES <= width)
+        vi_merge(row + x, a, m);
+    else
+        vi_store_where(row + x, a, m);
+}
+
+static inline void pt_row_put_keys(uint64_t *row, uint32_t width, uint32_t x, vi z, vi id, vm m)
+{
+    if (x + PT_LANES <= width)
+        vi_merge_keys(row + x, z, id, m);
+    else
+        vi_store_keys(row + x, z, id, vm_bits(m));
+}
+
 // Which of the next `lanes` pixels show a point of this instance, and its index in the cloud.
 static inline vm pt_of_instance(const uint64_t *keys, const struct instance_args *instance, uint32_t lanes, vi *id)
 {

@@ -61,6 +61,8 @@ static inline vi vf_int(vf a) { return _mm512_cvttps_epi32(a); }
 static inline vf vf_floor(vf a) { return _mm512_roundscale_ps(a, 9); }
 static inline vf vi_convert(vi a) { return _mm512_cvtepi32_ps(a); }
 static inline vi vi_load(const void *p) { return _mm512_loadu_si512(p); }
+static inline void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
+static inline void vi_store(void *p, vi a) { _mm512_storeu_si512(p, a); }
 static inline vi vi_set(uint32_t x) { return _mm512_set1_epi32((int)x); }
 static inline vi vi_lanes(void) { return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
 static inline vi vi_add(vi a, vi b) { return _mm512_add_epi32(a, b); }
@@ -85,8 +87,7 @@ static inline vm vm_of_bits(uint32_t bits) { return (vm)bits; }
 static inline vm vm_and(vm a, vm b) { return a & b; }
 static inline vm vm_or(vm a, vm b) { return a | b; }
 static inline vm vm_not(vm a) { return (vm)~a; }
-static inline void vf_store(float *p, vf a, vm m) { _mm512_mask_storeu_ps(p, m, a); }
-static inline void vi_store(void *p, vi a, vm m) { _mm512_mask_storeu_epi32(p, m, a); }
+static inline void vi_store_where(void *p, vi a, vm m) { _mm512_mask_storeu_epi32(p, m, a); }
 static inline void vf_swap_quarters(vf r[4]) // quarter j of vector k <-> quarter k of vector j
 {
     vf a = _mm512_shuffle_f32x4(r[0], r[1], 0x44), b = _mm512_shuffle_f32x4(r[2], r[3], 0x44);
@@ -214,6 +215,8 @@ static inline vi vf_int(vf a) { return _mm256_cvttps_epi32(a); }
 static inline vf vf_floor(vf a) { return _mm256_floor_ps(a); }
 static inline vf vi_convert(vi a) { return _mm256_cvtepi32_ps(a); }
 static inline vi vi_load(const void *p) { return _mm256_loadu_si256(p); }
+static inline void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
+static inline void vi_store(void *p, vi a) { _mm256_storeu_si256(p, a); }
 static inline vi vi_set(uint32_t x) { return _mm256_set1_epi32((int)x); }
 static inline vi vi_lanes(void) { return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7); }
 static inline vi vi_add(vi a, vi b) { return _mm256_add_epi32(a, b); }
@@ -228,14 +231,28 @@ static inline vm vi_lt_unsigned(vi a, vi b)
     const vi flip = _mm256_set1_epi32(INT32_MIN);
     return _mm256_cmpgt_epi32(_mm256_xor_si256(b, flip), _mm256_xor_si256(a, flip));
 }
-static inline vi vi_gather(const void *base, vi i, vm m)
+static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
+static inline int avx_word(const char *base, size_t at)
 {
-    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), base, i, m, 4);
+    int word;
+    memcpy(&word, base + at, 4);
+    return word;
 }
-static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m)
+// Loads of a word each: AVX2's own gather is 40 operations and more on AMD's processors, and on Intel's that hide what it reads
+// ahead. Lanes that are not asked for read the first word.
+static inline vi avx_gather(const void *base, vi i, vm m, size_t scale)
 {
-    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), (const int *)keys + 1, i, m, 8);
+    uint32_t at[8];
+    if (!vm_bits(m)) // there may be no first word
+        return _mm256_setzero_si256();
+    vi_store(at, _mm256_and_si256(i, m));
+    vi words = _mm256_setr_epi32(avx_word(base, scale * at[0]), avx_word(base, scale * at[1]), avx_word(base, scale * at[2]),
+                                 avx_word(base, scale * at[3]), avx_word(base, scale * at[4]), avx_word(base, scale * at[5]),
+                                 avx_word(base, scale * at[6]), avx_word(base, scale * at[7]));
+    return _mm256_and_si256(words, m);
 }
+static inline vi vi_gather(const void *base, vi i, vm m) { return avx_gather(base, i, m, 4); }
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return avx_gather((const char *)keys + 4, i, m, 8); }
 static inline vi vi_evens(vi a, vi b)
 {
     __m256 mixed = _mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), 0x88);
@@ -257,10 +274,14 @@ static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
     const vi each = _mm256_setr_epi64x(1, 2, 4, 8), low = _mm256_set1_epi64x(lanes), high = _mm256_set1_epi64x(lanes >> 4);
     vi words[2];
     vi_zip(id, z, words);
+    if (lanes == 255u) {
+        vi_store(keys, words[0]);
+        vi_store(keys + 4, words[1]);
+        return;
+    }
     _mm256_maskstore_epi64((long long *)keys, _mm256_cmpeq_epi64(_mm256_and_si256(low, each), each), words[0]);
     _mm256_maskstore_epi64((long long *)keys + 4, _mm256_cmpeq_epi64(_mm256_and_si256(high, each), each), words[1]);
 }
-static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
 static inline vm vm_first(uint32_t n) { return _mm256_cmpgt_epi32(_mm256_set1_epi32((int)n), vi_lanes()); }
 static inline vm vm_of_bits(uint32_t bits)
 {
@@ -270,8 +291,13 @@ static inline vm vm_of_bits(uint32_t bits)
 static inline vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
 static inline vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
 static inline vm vm_not(vm a) { return _mm256_xor_si256(a, _mm256_set1_epi32(-1)); }
-static inline void vf_store(float *p, vf a, vm m) { _mm256_maskstore_ps(p, m, a); }
-static inline void vi_store(void *p, vi a, vm m) { _mm256_maskstore_epi32(p, m, a); }
+static inline void vi_store_where(void *p, vi a, vm m) // AMD's processors take 40 operations for a store of some lanes
+{
+    if (vm_bits(m) == 255u)
+        vi_store(p, a);
+    else
+        _mm256_maskstore_epi32(p, m, a);
+}
 static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vector k: pixels k, 4 + k
 {
     for (int k = 0; k < 4; k++)
@@ -289,6 +315,13 @@ static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
             _mm_storeu_ps(p + 4 * k, _mm256_castps256_ps128(r[k]));
         if (lanes >> (4 + k) & 1u)
             _mm_storeu_ps(p + 16 + 4 * k, _mm256_extractf128_ps(r[k], 1));
+    }
+}
+static inline void vf_stream_pixels(float *p, vf r[4])
+{
+    for (int k = 0; k < 2; k++) {
+        _mm256_stream_ps(p + 8 * k, _mm256_permute2f128_ps(r[2 * k], r[2 * k + 1], 0x20));
+        _mm256_stream_ps(p + 16 + 8 * k, _mm256_permute2f128_ps(r[2 * k], r[2 * k + 1], 0x31));
     }
 }
 static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm256_and_ps(a * b, _mm256_castsi256_ps(m)); }
@@ -321,6 +354,8 @@ static inline vi vf_int(vf a) { return _mm_cvttps_epi32(a); }
 static inline vf vf_floor(vf a) { return _mm_floor_ps(a); }
 static inline vf vi_convert(vi a) { return _mm_cvtepi32_ps(a); }
 static inline vi vi_load(const void *p) { return _mm_loadu_si128(p); }
+static inline void vf_store(float *p, vf a) { _mm_storeu_ps(p, a); }
+static inline void vi_store(void *p, vi a) { _mm_storeu_si128(p, a); }
 static inline vi vi_set(uint32_t x) { return _mm_set1_epi32((int)x); }
 static inline vi vi_lanes(void) { return _mm_setr_epi32(0, 1, 2, 3); }
 static inline vi vi_add(vi a, vi b) { return _mm_add_epi32(a, b); }
@@ -378,19 +413,18 @@ static inline vm vm_of_bits(uint32_t bits)
 static inline vm vm_and(vm a, vm b) { return _mm_and_si128(a, b); }
 static inline vm vm_or(vm a, vm b) { return _mm_or_si128(a, b); }
 static inline vm vm_not(vm a) { return _mm_xor_si128(a, _mm_set1_epi32(-1)); }
-static inline void vi_store(void *p, vi a, vm m)
+static inline void vi_store_where(void *p, vi a, vm m)
 {
     uint32_t lanes = vm_bits(m), value[4];
     if (lanes == 15u) {
-        _mm_storeu_si128(p, a);
+        vi_store(p, a);
         return;
     }
-    _mm_storeu_si128((__m128i *)value, a);
+    vi_store(value, a);
     for (int k = 0; k < 4; k++)
         if (lanes >> k & 1u)
             memcpy((char *)p + 4 * k, &value[k], 4);
 }
-static inline void vf_store(float *p, vf a, vm m) { vi_store(p, vf_bits(a), m); }
 static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vector k: pixel k
 {
     for (int k = 0; k < 4; k++)
@@ -406,6 +440,11 @@ static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
     for (int k = 0; k < 4; k++)
         if (lanes >> k & 1u)
             _mm_storeu_ps(p + 4 * k, r[k]);
+}
+static inline void vf_stream_pixels(float *p, vf r[4])
+{
+    for (int k = 0; k < 4; k++)
+        _mm_stream_ps(p + 4 * k, r[k]);
 }
 static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm_and_ps(a * b, _mm_castsi128_ps(m)); }
 static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm_and_ps(b, _mm_castsi128_ps(m)); }
@@ -465,12 +504,9 @@ static inline vm vm_of_bits(uint32_t bits) { return bits & 1u; }
 static inline vm vm_and(vm a, vm b) { return a & b; }
 static inline vm vm_or(vm a, vm b) { return a | b; }
 static inline vm vm_not(vm a) { return !a; }
-static inline void vf_store(float *p, vf a, vm m)
-{
-    if (m)
-        *p = a;
-}
-static inline void vi_store(void *p, vi a, vm m)
+static inline void vf_store(float *p, vf a) { *p = a; }
+static inline void vi_store(void *p, vi a) { memcpy(p, &a, 4); }
+static inline void vi_store_where(void *p, vi a, vm m)
 {
     if (m)
         memcpy(p, &a, 4);
@@ -518,7 +554,7 @@ static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m)
 #elif defined(PT_ISA_AVX2)
 static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m)
 {
-    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), (const int *)(const void *)base, i, m, 1);
+    return avx_gather(base, i, m, 1);
 }
 #elif defined(PT_ISA_SSE42)
 static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return sse_gather((const char *)base, i, m, 1); }
@@ -526,8 +562,28 @@ static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return sse_g
 static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return m ? vi_load(base + i) : 0; }
 #endif
 
-// PT_LANES float4 pixels <-> four vectors; bit i of lanes: pixel i is written.
+#define PT_ALL ((1u << PT_LANES) - 1u) // bits of all lanes
 static inline vi vi_select(vm m, vi a, vi b) { return vf_bits(vf_select(m, vi_float(a), vi_float(b))); }
+static inline void vf_store_where(float *p, vf a, vm m) { vi_store_where(p, vf_bits(a), m); }
+// The same where nobody else writes the other lanes meanwhile: what they hold may be written again.
+static inline void vi_merge(void *p, vi a, vm m)
+{
+#if defined(PT_ISA_AVX512)
+    vi_store_where(p, a, m);
+#else
+    vi_store(p, vi_select(m, a, vi_load(p)));
+#endif
+}
+static inline void vi_merge_keys(uint64_t *keys, vi z, vi id, vm m)
+{
+#if defined(PT_ISA_AVX512)
+    vi_store_keys(keys, z, id, vm_bits(m));
+#else
+    vi_store_keys(keys, vi_select(m, z, vi_load_z(keys)), vi_select(m, id, vi_load_id(keys)), PT_ALL);
+#endif
+}
+
+// PT_LANES float4 pixels <-> four vectors; bit i of lanes: pixel i is written.
 #if PT_LANES > 1
 static inline void vf_transpose(vf r[4]) // 4 x 4 within each quarter
 {
@@ -548,7 +604,7 @@ static inline void vf_load4(const float *pixels, vf out[4])
 static inline void vf_gather3_1(const float *pixels, const float *fourth, vi i, vm lanes, vf out[4])
 {
     uint32_t twice[PT_LANES];
-    vi_store(twice, vi_select(lanes, vi_add(i, i), vi_set(0)), vm_first(PT_LANES));
+    vi_store(twice, vi_select(lanes, vi_add(i, i), vi_set(0)));
     vf_pick_pixels(pixels, fourth, twice, out);
     vf_transpose(out);
 }
@@ -576,8 +632,8 @@ static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 static inline void vf_gather4(const float *pixels, vi i, vm lanes, vf out[4]) { vf_gather3_1(pixels, NULL, i, lanes, out); }
 
 // Writes to the picture, which is read later and by others. count <= PT_LANES pixels of one, four or three floats. Past the
-// caches where a vector is a line of theirs: a line of which some is stored and some streamed costs a trip to memory for
-// each (finish took 35 ms with AVX2 in place of 10.5).
+// caches where whole lines of theirs are at hand: a line of which some is stored and some streamed costs a trip to memory
+// for each (finish took 35 ms with AVX2 in place of 10.5).
 static inline void vf_put(float *p, vf a, uint32_t count)
 {
 #if defined(PT_ISA_AVX512)
@@ -586,12 +642,12 @@ static inline void vf_put(float *p, vf a, uint32_t count)
         return;
     }
 #endif
-    vf_store(p, a, vm_first(count));
+    vf_store_where(p, a, vm_first(count));
 }
 
 static inline void vf_put4(float *p, const vf pixels[4], uint32_t count)
 {
-#if defined(PT_ISA_AVX512)
+#if PT_LANES > 1
     if (count == PT_LANES && (uintptr_t)p % 64 == 0) {
         vf r[4] = { pixels[0], pixels[1], pixels[2], pixels[3] };
         vf_transpose(r);
@@ -614,7 +670,7 @@ static inline void vf_put3(float *p, const vf n[3], uint32_t count)
 #else
     float pixels[4 * PT_LANES];
     const vf four[4] = { n[0], n[1], n[2], vf_set(0.0f) };
-    vf_store4(pixels, four, vm_bits(vm_first(PT_LANES)));
+    vf_store4(pixels, four, PT_ALL);
     for (uint32_t i = 0; i + 1 < count; i++) // each store's fourth float is overwritten by the next point's first
         memcpy(p + 3 * i, pixels + 4 * i, 16);
     memcpy(p + 3 * (count - 1), pixels + 4 * (count - 1), 12);

@@ -53,7 +53,7 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         else
             pt_smooth_pixels(finish->smooth, rows, 4, x, vf_load(seen->limit + x), some, color);
         for (int k = 0; k < finish->channels; k++)
-            vf_store(out->color[k] + x, color[k], vm_first(PT_LANES));
+            vf_store(out->color[k] + x, color[k]);
     }
 }
 

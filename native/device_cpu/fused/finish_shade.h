@@ -29,7 +29,7 @@ static void ask_for_colors(const struct finish *finish, const struct pt_seen_row
             if (!vm_bits(ours))
                 continue;
             uint32_t points[PT_LANES]; // all of them, the first point where there is none: no branch depends on the pixels
-            vi_store(points, vi_select(ours, id, vi_set(0)), vm_first(PT_LANES));
+            vi_store(points, vi_select(ours, id, vi_set(0)));
             for (uint32_t k = 0; k < PT_LANES && size; k++)
                 __builtin_prefetch(colors + size * points[k], 0, 1); // into the second level
             for (uint32_t l = 0; l < casting; l++)
@@ -67,9 +67,9 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
             continue;
         vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 4), pt_cpu_data(call, 7), id, (size_t)y * width + x, ours);
         for (uint32_t k = 0; k < 3; k++)
-            vf_store(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
-        vf_store(row->color[3] + x, opacity, ours);
-        vf_store(opacities + x, opacity, ours);
+            vf_store_where(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
+        vf_store_where(row->color[3] + x, opacity, ours);
+        vf_store_where(opacities + x, opacity, ours);
     }
 }
 
@@ -95,11 +95,11 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
                                    finish->reach == 1 && pt_flat(around[reach], x) ? walk->blended : NULL, shadows, x, (uint32_t)y, id, ours,
                                    plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
-            vf_store(out->color[k] + x, color[k], ours);
+            vf_store_where(out->color[k] + x, color[k], ours);
         for (uint32_t k = 0; k < 3 && finish->extract && finish->extract->normal; k++)
-            vf_store(walk->shown[slot(y)][k] + x, normal[k], ours);
+            vf_store_where(walk->shown[slot(y)][k] + x, normal[k], ours);
         if (finish->extract && finish->extract->shadow)
-            vf_store(walk->shown[slot(y)][4] + x, share, ours);
+            vf_store_where(walk->shown[slot(y)][4] + x, share, ours);
     }
 }
 
@@ -129,7 +129,7 @@ static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *c
         for (uint32_t i = 0; i < count; i++) {
             uint32_t x = first + i * PT_LANES, points[PT_LANES];
             ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &words[i]);
-            vi_store(points, vi_select(ours[i], words[i], vi_set(0)), vm_first(PT_LANES));
+            vi_store(points, vi_select(ours[i], words[i], vi_set(0)));
             for (uint32_t k = 0; near && k < PT_LANES; k++)
                 __builtin_prefetch(colors + 3 * (size_t)points[k]);
         }
@@ -142,7 +142,7 @@ static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *c
                 continue;
             pt_decode_srgb(words[i], albedo);
             for (uint32_t k = 0; k < 3; k++)
-                vf_store(out->color[k] + first + i * PT_LANES, albedo[k], ours[i]);
+                vf_store_where(out->color[k] + first + i * PT_LANES, albedo[k], ours[i]);
         }
     }
 }
@@ -164,7 +164,7 @@ static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *
         if (pt_recolors(args))
             pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
         for (uint32_t k = 0; k < 3; k++)
-            vf_store(out->color[k] + x, albedo[k], ours);
+            vf_store_where(out->color[k] + x, albedo[k], ours);
     }
 }
 

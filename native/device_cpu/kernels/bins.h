@@ -102,17 +102,16 @@ struct pt_bin_batch {
 static inline void pt_bin_list(const struct pt_bins *bins, struct pt_bin_batch *batch, uint32_t at, const struct pt_discs *discs,
                                vi id, vi word, uint32_t drawn)
 {
-    const vm all = vm_first(PT_LANES);
     const vf place[4] = { discs->x, discs->y, discs->z, vi_float(id) };
     vi tiles[4];
     for (int k = 0; k < 4; k++)
         tiles[k] = vi_shr(discs->box[k], PT_DISC_TILE_SHIFT);
     const vi columns = vi_sub(tiles[2], tiles[0]), rows = vi_sub(tiles[3], tiles[1]);
-    vf_store4(batch->places[at], place, vm_bits(all));
-    vi_store(batch->words + at, word, all);
-    vi_store(batch->bins + at, vi_add(vi_mul(tiles[1], vi_set(bins->columns)), tiles[0]), all);
-    vi_store(batch->columns + at, columns, all);
-    vi_store(batch->rows + at, rows, all);
+    vf_store4(batch->places[at], place, PT_ALL);
+    vi_store(batch->words + at, word);
+    vi_store(batch->bins + at, vi_add(vi_mul(tiles[1], vi_set(bins->columns)), tiles[0]));
+    vi_store(batch->columns + at, columns);
+    vi_store(batch->rows + at, rows);
     batch->wide[at / PT_LANES] = drawn & ~vm_bits(vi_eq(vi_or(columns, rows), vi_set(0)));
     batch->drawn[at / PT_LANES] = drawn;
 }

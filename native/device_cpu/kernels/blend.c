@@ -56,12 +56,12 @@ static inline void set_terms(const struct pt_bins *bins, uint32_t instance, cons
     }
     normal[3] = scale;
     float halves[2][PT_LANES][4];
-    vf_store4(halves[0][0], color, vm_bits(vm_first(PT_LANES)));
-    vf_store4(halves[1][0], normal, vm_bits(vm_first(PT_LANES)));
+    vf_store4(halves[0][0], color, PT_ALL);
+    vf_store4(halves[1][0], normal, PT_ALL);
     for (uint32_t i = 0; i < PT_LANES; i++)
         for (uint32_t k = 0; k < 2; k++)
             memcpy(out->each[i] + 4 * k, halves[k][i], sizeof halves[k][i]);
-    vf_store(out->most, largest, vm_first(PT_LANES));
+    vf_store(out->most, largest);
 }
 
 static void empty_sums(struct tile *tile)
@@ -106,7 +106,7 @@ static void add_up(void *context, struct pt_patches *list)
         const vi behind = vi_sub(vf_bits(shown.z), vf_bits(pt_patch_load(tile->nearest + at)));
         const vi most = vf_bits(pt_patch_load(tile->behind + at));
         const vm some = vm_and(shown.covered, vm_not(vi_lt_unsigned(most, behind)));
-        vf_store(weights + i * PT_LANES, pt_shown_weight(&shown), vm_first(PT_LANES));
+        vf_store(weights + i * PT_LANES, pt_shown_weight(&shown));
         count_pixels(&taken, list, i, some);
         count_pixels(&nearest, list, i, vm_and(some, vi_eq(behind, vi_set(0))));
     }
@@ -139,10 +139,10 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
     set_terms(tile->bins, instance, discs, &tile->terms);
     for (uint32_t i = 0; i < PT_LANES; i++)
         size += tile->terms.most[i] + 1.0f;
-    vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)), vm_first(PT_LANES));
+    vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)));
     vi_zip(discs->column, discs->row, places);
-    vi_store(tile->places, places[0], vm_first(PT_LANES));
-    vi_store((uint32_t *)(void *)tile->places + PT_LANES, places[1], vm_first(PT_LANES));
+    vi_store(tile->places, places[0]);
+    vi_store((uint32_t *)(void *)tile->places + PT_LANES, places[1]);
     const uint32_t each = size <= SUM_ROOM ? PT_LANES : 1; // so bright that they have room one by one only
     for (uint32_t i = 0; i < PT_LANES; i += each) {
         take_room(tile, each > 1 ? size : tile->terms.most[i] + 1.0f);
@@ -162,9 +162,9 @@ static int load(struct tile *tile, const uint64_t *keys, const float *deff)
         for (uint32_t x = 0; x < (uint32_t)tile->patches.tile.width; x += PT_LANES) { // tiles are whole vectors wide
             vf z = vi_float(vi_load_z(keys + from + x));
             any |= vm_bits(vm_and(vf_lt(z, empty), vm_first(pt_lanes_left(x, (uint32_t)tile->patches.tile.width)))) != 0;
-            vf_store(tile->nearest + to + x, z, vm_first(PT_LANES));
-            vi_store(tile->behind + to + x, vi_sub(vf_bits(z + vf_load(deff + from + x)), vf_bits(z)), vm_first(PT_LANES));
-            vi_store(tile->id + to + x, vi_load_id(keys + from + x), vm_first(PT_LANES));
+            vf_store(tile->nearest + to + x, z);
+            vi_store(tile->behind + to + x, vi_sub(vf_bits(z + vf_load(deff + from + x)), vf_bits(z)));
+            vi_store(tile->id + to + x, vi_load_id(keys + from + x));
         }
     }
     return any;

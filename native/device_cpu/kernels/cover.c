@@ -106,9 +106,8 @@ static void write_shown(const struct pt_cpu_call *call, const struct triangle *t
     }
     for (uint32_t k = 0; k < 3; k++)
         vf_store(color[k],
-                 mesh->has_colors ? between(t, vertices, 3 + 3 * mesh->has_normals + k, front) : vf_set(mesh->color[k]),
-                 vm_first(PT_LANES));
-    vi_store(zs, z, vm_first(PT_LANES));
+                 mesh->has_colors ? between(t, vertices, 3 + 3 * mesh->has_normals + k, front) : vf_set(mesh->color[k]));
+    vi_store(zs, z);
     vf_store4(normals + 4 * at, smooth, vm_bits(front));
     for (uint32_t left = vm_bits(front); left; left &= left - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(left);
@@ -134,13 +133,13 @@ static void cover_pixels(const struct pt_cpu_call *call, uint32_t x, uint32_t y,
     plane_normal(args, &t, ray, n);
     // 3. layer distance of what is as dense as the pixels
     n[3] = vf_rcp(vf_max(vf_cosine(view, n, ray), vf_set(PT_COSINE_FLOOR)));
-    vf_store(deff + at, vf_layer_distance(view, 0.0f, vf_footprint(view, vi_float(z)), vi_float(z), n[3]), front);
+    vf_store_where(deff + at, vf_layer_distance(view, 0.0f, vf_footprint(view, vi_float(z)), vi_float(z), n[3]), front);
     // 4. a point's normal stays: pixels around may show it
     vi own = vi_add(vi_set((uint32_t)at), vi_lanes());
     vm measured = vm_and(vi_eq(vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED)), own),
                          vm_not(vi_eq(vi_load_z(keys + at), vi_set(PT_KEY_EMPTY_Z))));
     vf_store4(normals + 4 * at, n, vm_bits(vm_and(front, vm_not(measured))));
-    vi_store(from + at, own, front);
+    vi_store_where(from + at, own, front);
     for (uint32_t left = vm_bits(front); left; left &= left - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(left);
         keys[at + i] = mesh_keys[at + i];

@@ -257,7 +257,6 @@ static inline void pt_patches_turn(struct pt_patches *out, const struct view_arg
 static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_discs *d, uint32_t step)
 {
     const struct view_args *view = out->view;
-    const vm all = vm_first(PT_LANES);
     // in its own pixel, less than 0.71 from its middle, a disc with e dx^2 + f dx dy + g dy^2 <= 1.9 (dx^2 + dy^2) and q > 0.99
     // lies over the middle, and the weight is its own
     const vf steep = vf_max(d->e, d->g) + vf_abs(d->f) * vf_set(0.5f), slope = vf_abs(d->gx) + vf_abs(d->gy);
@@ -276,23 +275,23 @@ static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_
     out->gentle = vm_bits(d->gentle);
     out->wide = vm_bits(wide);
     out->small = ~vm_bits(vm_and(vf_le(steep, vf_set(1.9f)), vf_le(slope, vf_set(0.02f))));
-    vf_store(out->x, d->x, all);
-    vf_store(out->y, d->y, all);
-    vf_store(out->z, d->z, all);
-    vf_store(out->gx, d->gx, all);
-    vf_store(out->gy, d->gy, all);
-    vf_store(out->e, d->e, all);
-    vf_store(out->f, d->f, all);
-    vf_store(out->g, d->g, all);
-    vi_store(out->x0, vi_sub(x0, tile_x), all);
-    vi_store(out->y0, vi_sub(y0, tile_y), all);
-    vi_store(out->x1, vi_sub(x1, tile_x), all);
-    vi_store(out->y1, vi_sub(y1, tile_y), all);
-    vi_store(out->first, vi_add(vi_mul(vi_sub(y0, tile_y), vi_set(PT_DISC_TILE)), vi_sub(first, tile_x)), all);
-    vi_store(out->columns, columns, all);
-    vi_store(out->rows, rows, all);
-    vi_store(out->column, vi_sub(d->column, tile_x), all);
-    vi_store(out->row, vi_sub(d->row, tile_y), all);
+    vf_store(out->x, d->x);
+    vf_store(out->y, d->y);
+    vf_store(out->z, d->z);
+    vf_store(out->gx, d->gx);
+    vf_store(out->gy, d->gy);
+    vf_store(out->e, d->e);
+    vf_store(out->f, d->f);
+    vf_store(out->g, d->g);
+    vi_store(out->x0, vi_sub(x0, tile_x));
+    vi_store(out->y0, vi_sub(y0, tile_y));
+    vi_store(out->x1, vi_sub(x1, tile_x));
+    vi_store(out->y1, vi_sub(y1, tile_y));
+    vi_store(out->first, vi_add(vi_mul(vi_sub(y0, tile_y), vi_set(PT_DISC_TILE)), vi_sub(first, tile_x)));
+    vi_store(out->columns, columns);
+    vi_store(out->rows, rows);
+    vi_store(out->column, vi_sub(d->column, tile_x));
+    vi_store(out->row, vi_sub(d->row, tile_y));
     return vm_bits(vm_and(d->drawn, vm_and(vi_lt_unsigned(x0, x1), vi_lt_unsigned(y0, y1))));
 }
 

@@ -27,14 +27,14 @@ static void load_row(const struct edl *edl, int32_t y, float *row)
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), beyond = vf_set(PT_EDL_BEYOND);
     const uint32_t inside = y < 0 || y >= (int32_t)view->height ? 0 : view->width;
     for (int32_t x = -PT_ROW_PAD; x < 0; x += PT_LANES)
-        vf_store(row + x, beyond, vm_first(PT_LANES));
+        vf_store(row + x, beyond);
     for (uint32_t x = 0; x < inside; x += PT_LANES) {
         vf z = vi_float(vi_load_z(keys + x));
         vm some = vf_lt(z, empty);
         vf depth = vf_set(PT_EDL_EMPTY);
         if (vm_bits(some))
             depth = vf_select(some, view->perspective ? vf_log2(vf_select(some, z, vf_set(1.0f))) : z, depth);
-        vf_store(row + x, depth, vm_first(PT_LANES));
+        vf_store(row + x, depth);
     }
     for (uint32_t x = inside; x < view->width + PT_ROW_PAD; x++)
         row[x] = PT_EDL_BEYOND;

@@ -12,14 +12,14 @@ static void extract_source(const struct extract_args *args, const uint64_t *keys
         vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
         vm some = vm_and(lanes, vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z))));
         if (!vm_bits(some)) {
-            vf_store(out + x, vf_zero(), lanes);
+            vf_store_where(out + x, vf_zero(), lanes);
             continue;
         }
         vi word = vi_load(from + x), source = vi_and(word, vi_set(~PT_FROM_MIXED));
         vm mixed = vm_not(vi_eq(word, source));
         vf value = args->discs ? pt_source_of_discs(keys + x, normals + 4 * (size_t)x, args->discs, mixed, some)
                                : pt_source_value(view->width, source, mixed, some, args->crop_x + x, args->crop_y + y);
-        vf_store(out + x, value, lanes);
+        vf_store_where(out + x, value, lanes);
     }
 }
 
@@ -45,7 +45,7 @@ static void extract_shadow(const struct extract_args *args, const uint64_t *keys
     for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
         vm some = vm_not(vi_eq(vi_load_z(keys + x), vi_set(PT_KEY_EMPTY_Z)));
-        vf_store(out + x, vf_select(some, vf_load(arrived + x), vf_set(1.0f)), lanes);
+        vf_store_where(out + x, vf_select(some, vf_load(arrived + x), vf_set(1.0f)), lanes);
     }
 }
 
@@ -57,7 +57,7 @@ static void extract_row(void *context, uint32_t y)
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
     float *depth = (float *)pt_cpu_data(call, 3) + out;
     for (uint32_t x = 0; args->depth && x < args->crop_width; x += PT_LANES)
-        vf_store(depth + x, vi_float(vi_load_z(keys + x)), vm_first(pt_lanes_left(x, args->crop_width)));
+        vf_store_where(depth + x, vi_float(vi_load_z(keys + x)), vm_first(pt_lanes_left(x, args->crop_width)));
     if (args->normal)
         extract_normal(args, keys, (const float *)pt_cpu_data(call, 2) + 4 * row,
                        (float *)pt_cpu_data(call, 4) + 3 * out);

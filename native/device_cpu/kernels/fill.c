@@ -43,9 +43,9 @@ static void take_least(const struct fill *fill, size_t at, size_t end)
         qx = vi_select(less, q.x, qx);
         qy = vi_select(less, q.y, qy);
     }
-    vi_store(e->qx + at, qx, lanes);
-    vi_store(e->qy + at, qy, lanes);
-    vi_store(e->from + at, vi_gather(fill->from, from, lanes), lanes);
+    vi_store_where(e->qx + at, qx, lanes);
+    vi_store_where(e->qy + at, qy, lanes);
+    vi_store_where(e->from + at, vi_gather(fill->from, from, lanes), lanes);
     vi_store_keys(e->key + at, z, id, vm_bits(lanes));
     for (size_t i = at; i < end && i < at + PT_LANES; i++) {
         __builtin_prefetch(fill->normals + 4 * (size_t)e->from[i]);

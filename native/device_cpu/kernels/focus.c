@@ -59,14 +59,14 @@ static void load_row(const struct focus *focus, int32_t y, const struct row *row
         row->largest[b] = 0.0f;
     for (uint32_t x = 0; x < inside; x += PT_LANES) {
         vf z = vi_float(vi_load_z(keys + x)), color[4];
-        vm all = vm_first(PT_LANES), some = vf_lt(z, empty);
+        vm some = vf_lt(z, empty);
         vf circle = circle_of(focus->args, z, some), wide = vf_max(circle, vf_set(PT_FOCUS_SHARP));
-        vf_store(row->z + x, z, all);
-        vf_store(row->circle + x, circle, all);
-        vf_store(row->density + x, vf_rcp(wide * wide) * vf_set(PT_FOCUS_DENSITY), all);
+        vf_store(row->z + x, z);
+        vf_store(row->circle + x, circle);
+        vf_store(row->density + x, vf_rcp(wide * wide) * vf_set(PT_FOCUS_DENSITY));
         vf_load4(colors + 4 * (size_t)x, color);
         for (int k = 0; k < 4; k++)
-            vf_store(row->color[k] + x, vf_select(some, color[k], zero), all);
+            vf_store(row->color[k] + x, vf_select(some, color[k], zero));
     }
     for (uint32_t x = 0; x < inside; x++) // empty pixels spread nothing
         if (row->z[x] < pt_float(PT_KEY_EMPTY_Z))
@@ -115,7 +115,7 @@ static float distance_to(int dx, int dy)
     for (int i = 0; i < PT_LANES; i++)
         square[i] = (float)(dx * dx + dy * dy);
     vf s = vf_load(square);
-    vf_store(root, s * vf_rsqrt(vf_max(s, vf_set(1.0f))), vm_first(PT_LANES));
+    vf_store(root, s * vf_rsqrt(vf_max(s, vf_set(1.0f))));
     return root[0];
 }
 

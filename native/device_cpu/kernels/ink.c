@@ -68,7 +68,7 @@ static void ink_pixels(const struct ink *ink, size_t at, size_t to, vf share, ui
     if (args->blank)
         blank(ink, at, to, count);
     if (args->mask)
-        vf_store(ink->mask + to, share * vf_set(args->opacity), vm_first(count));
+        vf_store_where(ink->mask + to, share * vf_set(args->opacity), vm_first(count));
     vm some = vf_lt(vf_zero(), share);
     if (!vm_bits(some) || !(args->color_target || args->depth))
         return;
@@ -80,7 +80,7 @@ static void ink_pixels(const struct ink *ink, size_t at, size_t to, vf share, ui
     if (args->color_target)
         blend(ink, to, id, z, ours, share);
     if (args->depth)
-        vf_store(ink->depth + to, z, vm_and(ours, vf_le(vf_set(0.5f), share)));
+        vf_store_where(ink->depth + to, z, vm_and(ours, vf_le(vf_set(0.5f), share)));
 }
 
 static void ink_row(void *context, uint32_t y)

@@ -26,7 +26,7 @@ static void limit_row(void *context, uint32_t y)
             vi source = vi_and(vi_load(from + x), vi_set(~PT_FROM_MIXED));
             next = vf_select(some, z + vf_gather(pt_cpu_data(call, 2), source, some), finished);
         }
-        vf_store(limit + x, next, lanes);
+        vf_store_where(limit + x, next, lanes);
         any |= vm_bits(some);
     }
     if (any)

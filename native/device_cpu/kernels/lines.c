@@ -70,7 +70,7 @@ static void load_row(const struct lines *lines, int32_t y, const struct line_row
                 z = vf_select(some, z, vf_select(open, empty, vf_zero()));
             }
         }
-        vf_store(row->z + x, z, vm_first(PT_LANES));
+        vf_store(row->z + x, z);
     }
     for (uint32_t i = 0; i < 2; i++) // nothing is known there
         row->z[-1 - (int32_t)i] = row->z[lines->width + i] = 0.0f;
@@ -82,12 +82,12 @@ static void least_along(const struct lines *lines, const float *disc, float *win
     const int32_t reach = (int32_t)lines->args->reach, width = (int32_t)lines->width;
     int32_t size = 1;
     for (int32_t x = -PAD; x < width + PAD; x += PT_LANES)
-        vf_store(windows + x, vf_load(disc + x), vm_first(PT_LANES));
+        vf_store(windows + x, vf_load(disc + x));
     for (; 2 * size <= 2 * reach + 1; size *= 2)
         for (int32_t x = -PAD; x < width + PAD - size; x += PT_LANES)
-            vf_store(windows + x, vf_min(vf_load(windows + x), vf_load(windows + x + size)), vm_first(PT_LANES));
+            vf_store(windows + x, vf_min(vf_load(windows + x), vf_load(windows + x + size)));
     for (int32_t x = 0; x < width; x += PT_LANES)
-        vf_store(least + x, vf_min(vf_load(windows + x - reach), vf_load(windows + x + reach + 1 - size)), vm_first(PT_LANES));
+        vf_store(least + x, vf_min(vf_load(windows + x - reach), vf_load(windows + x + reach + 1 - size)));
 }
 
 // ---- discs ----------------------------------------------------------------------------------------------------------------
@@ -197,12 +197,12 @@ static int put_steps(const struct lines *lines, const struct line_row *rows, uin
             vf coverage = vf_max(vf_set(PT_COVERAGE_NONE) - count * vf_set(PT_COVERAGE_STEP), vf_set(PT_COVERAGE_LEAST));
             vf radius = radius_of(lines->args, z, some);
             step = vf_select(some, v, empty);
-            vf_store(rows->own + x, vf_min(one - coverage, radius), vm_first(PT_LANES));
+            vf_store(rows->own + x, vf_min(one - coverage, radius));
             if (lines->args->world)
-                vf_store(rows->radius + x, radius, vm_first(PT_LANES));
+                vf_store(rows->radius + x, radius);
         }
     }
-    vf_store(rows->step + x, step, vm_first(PT_LANES));
+    vf_store(rows->step + x, step);
     return vm_bits(vf_lt(step, empty)) != 0;
 }
 
@@ -227,7 +227,7 @@ static void disc_row(const struct lines *lines, struct line_row *rows, float *wi
                 count = vf_add_where(vf_lt(vf_load(rows[dy].step + (int32_t)x + dx), empty), count, one); // itself, too
         vf disc = vf_select(vf_lt(vf_set(PT_LINE_SUPPORT), count), step, empty);
         uint32_t found = vm_bits(vf_lt(disc, empty));
-        vf_store(rows->disc + x, disc, vm_first(PT_LANES));
+        vf_store(rows->disc + x, disc);
         rows->bits[1 + x / 64] |= (uint64_t)found << x % 64;
         rows->any |= found != 0;
     }
@@ -326,16 +326,16 @@ static void line_row(const struct lines *lines, const struct line_row *rows, uin
         if (vm_bits(some)) {
             struct found found = search(lines, rows, x, y, z, some);
             share = share_of(lines->args, &found);
-            vi_store(lines->nearest + at, found.nearest, vm_and(some, vf_lt(vf_zero(), share)));
+            vi_store_where(lines->nearest + at, found.nearest, vm_and(some, vf_lt(vf_zero(), share)));
         }
         if (lines->args->antialias && rows->any) {
             some = vm_and(lanes, vf_lt(vf_load(rows->disc + x), vf_set(pt_float(PT_KEY_EMPTY_Z))));
             vf own = vf_load(rows->own + x);
             some = vm_and(some, vf_lt(share, own));
             share = vf_select(some, own, share);
-            vi_store(lines->nearest + at, vi_add(vi_set((uint32_t)at), vi_lanes()), some);
+            vi_store_where(lines->nearest + at, vi_add(vi_set((uint32_t)at), vi_lanes()), some);
         }
-        vf_store(lines->line + at, share, lanes);
+        vf_store_where(lines->line + at, share, lanes);
     }
 }
 
@@ -387,7 +387,7 @@ int PT_KERNEL_ENTRY(lines)(const struct pt_cpu_call *call)
         return PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < args->tap_count; i += PT_LANES) {
         vf square = vi_convert(vi_shr(vi_load(args->taps + i), 16));
-        vf_store(lines.distances + i, square * vf_rsqrt(square), vm_first(PT_LANES));
+        vf_store(lines.distances + i, square * vf_rsqrt(square));
     }
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, line_bands, &lines);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;

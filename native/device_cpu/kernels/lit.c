@@ -214,7 +214,7 @@ static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk
     struct fall fall = fall_of(lit, chunk, p, lanes);
     uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, vi_add(slot, vi_set(chunk->first))) : 0;
     uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed;
-    vi_store(texels, fall.texel, vm_first(PT_LANES));
+    vi_store(texels, fall.texel);
     for (; left; left &= left - 1) {
         uint32_t k = (uint32_t)__builtin_ctz(left);
         differs |= note(args, words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(lit, texels[k]) : 0);

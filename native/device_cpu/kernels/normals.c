@@ -147,7 +147,7 @@ static void normal_pixels(const struct normals_args *args, const struct pt_cpu_c
     scale = vf_select(away, vf_zero() - scale, scale);
     float out[3][PT_LANES];
     for (int k = 0; k < 3; k++)
-        vf_store(out[k], vf_select(found, n[k] * scale, vf_zero()), vm_first(PT_LANES));
+        vf_store(out[k], vf_select(found, n[k] * scale, vf_zero()));
     for (uint32_t i = 0; i < lanes; i++) {
         float *normal = normals + 4 * (size_t)pixels[i];
         normal[0] = out[0][i], normal[1] = out[1][i], normal[2] = out[2][i], normal[3] = 0.0f;

@@ -90,7 +90,7 @@ static void gather_row(void *context, uint32_t y)
         place(obscure, x, y, some, &p);
         for (int i = 0; i < PT_OBSCURE_TAPS; i++)
             sum = sum + tap(obscure, &p, i, x, y, some);
-        vf_store(out + at, vf_min(sum * vf_set(PT_OBSCURE_GAIN / PT_OBSCURE_TAPS), vf_set(1.0f)), some);
+        vf_store_where(out + at, vf_min(sum * vf_set(PT_OBSCURE_GAIN / PT_OBSCURE_TAPS), vf_set(1.0f)), some);
     }
 }
 
@@ -112,8 +112,8 @@ static void load_row(const struct obscure *obscure, int32_t y, const struct row 
     const float *from = (const float *)pt_cpu_data(obscure->call, 5) + (size_t)y * width;
     for (uint32_t x = 0; x < width; x += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(x, width));
-        vf_store(row->z + x, vi_float(vi_load_z(obscure->planes.keys + (size_t)y * width + x)), lanes);
-        vf_store(row->obscured + x, vf_load(from + x), lanes);
+        vf_store_where(row->z + x, vi_float(vi_load_z(obscure->planes.keys + (size_t)y * width + x)), lanes);
+        vf_store_where(row->obscured + x, vf_load(from + x), lanes);
     }
 }
 

@@ -47,8 +47,8 @@ static inline vm pt_peel_pixels(const struct peel_args *args, const struct pt_pe
     if (args->stop)
         next = vf_select(vf_lt(light, vf_set(PT_SPENT)), finished, next);
     vf beyond = vf_select(behind, next, vf_select(some, before, finished));
-    vf_store(planes->through + at, light, lanes);
-    vf_store(planes->limit + at, beyond, lanes);
+    vf_store_where(planes->through + at, light, lanes);
+    vf_store_where(planes->limit + at, beyond, lanes);
     // 4. of the tile
     tile->covered += (uint32_t)__builtin_popcount(vm_bits(behind));
     tile->least = vf_min(tile->least, vf_select(some, beyond, finished));
@@ -63,7 +63,7 @@ static inline struct pt_tile_sum pt_tile_begin(void)
 static inline struct pt_tile_value pt_tile_end(const struct pt_tile_sum *sum)
 {
     float least[PT_LANES];
-    vf_store(least, sum->least, vm_first(PT_LANES));
+    vf_store(least, sum->least);
     for (int i = 1; i < PT_LANES; i++)
         least[0] = pt_min(least[0], least[i]);
     return (struct pt_tile_value){ least[0], sum->covered };

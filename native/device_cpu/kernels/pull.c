@@ -49,8 +49,8 @@ static uint32_t pull_vectors(const struct pull_args *args, const uint64_t *fine_
         size_t at = (size_t)(2 * y) * args->fine_width + 2 * x, out = (size_t)y * args->view.width + x;
         struct cells cells = least(least_of_row(fine_keys, fine_from, at, measured),
                                    least_of_row(fine_keys, fine_from, at + args->fine_width, measured));
-        vi_store_keys(keys + out, cells.z, cells.id, (1u << PT_LANES) - 1u);
-        vi_store(from + out, cells.from, vm_first(PT_LANES));
+        vi_store_keys(keys + out, cells.z, cells.id, PT_ALL);
+        vi_store(from + out, cells.from);
     }
     return x;
 }

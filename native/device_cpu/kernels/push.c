@@ -126,12 +126,15 @@ static void take(const struct push *push, const struct parents *p, uint32_t y, c
     vi_zip(pixel_z(push, p, 0, y), pixel_z(push, p, 1, y), z);
     vi_zip(p->id, p->id, id);
     vi_zip(p->source, p->source, source);
+    const uint32_t width = push->args->view.width;
+    uint64_t *keys = (uint64_t *)pt_cpu_data(push->call, 2) + (size_t)y * width;
+    uint32_t *from = (uint32_t *)pt_cpu_data(push->call, 3) + (size_t)y * width;
     for (uint32_t half = 0; half < 2; half++) {
+        const uint32_t x = 2 * p->x + half * PT_LANES;
         if (!bits[half])
             continue;
-        size_t at = (size_t)y * push->args->view.width + 2 * p->x + half * PT_LANES;
-        vi_store_keys((uint64_t *)pt_cpu_data(push->call, 2) + at, z[half], id[half], bits[half]);
-        vi_store((uint32_t *)pt_cpu_data(push->call, 3) + at, source[half], vm_of_bits(bits[half]));
+        pt_row_put_keys(keys, width, x, z[half], id[half], vm_of_bits(bits[half]));
+        pt_row_put(from, width, x, source[half], vm_of_bits(bits[half]));
     }
 }
 

@@ -67,7 +67,7 @@ static void draw_row(const struct view_args *view, const struct pt_facet *facet,
         if (!nearer)
             continue;
         uint32_t zs[PT_LANES];
-        vi_store(zs, bits, vm_first(PT_LANES));
+        vi_store(zs, bits);
         for (; nearer; nearer &= nearer - 1) {
             uint32_t k = (uint32_t)__builtin_ctz(nearer);
             store_least(target.keys + at + k, (uint64_t)zs[k] << 32 | id);

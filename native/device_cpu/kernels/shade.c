@@ -51,7 +51,7 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         vf_store4(shading + 4 * at, normal, vm_bits(ours));
         vf_store4(colors + 4 * at, color, vm_bits(ours));
         if (args->arrived)
-            vf_store(arrived + at, share, ours);
+            vf_store_where(arrived + at, share, ours);
     }
 }
 

@@ -97,7 +97,7 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
     float rgb[3][PT_LANES];
     uint32_t ids[PT_LANES], lanes = vm_bits(ours);
     memset(rgb, 0, sizeof rgb);
-    vi_store(ids, id, vm_first(PT_LANES));
+    vi_store(ids, id);
     for (; lanes; lanes &= lanes - 1)
         for (int k = 0, i = __builtin_ctz(lanes); k < 3; k++) {
             size_t channel = 3 * (size_t)ids[i] + (size_t)k;

@@ -40,7 +40,7 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
         vi class = vi_and(vi_gather_bytes(pt_cpu_data(sift->call, 2), slot, all), vi_set(255));
         cut = vm_or(cut, vi_lt_unsigned(vi_set(0), vi_gather(sift->hides, class, all)));
     }
-    return vm_bits(vm_and(keep, vm_not(cut))) & ((1u << PT_LANES) - 1u);
+    return vm_bits(vm_and(keep, vm_not(cut))) & PT_ALL;
 }
 
 static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)

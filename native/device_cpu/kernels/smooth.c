@@ -22,12 +22,12 @@ static void load_row(const struct smooth *smooth, int32_t y, const struct pt_col
     for (uint32_t x = 0; x < width; x += PT_LANES) {
         vf z = vi_float(vi_load_z(smooth->planes.keys + (size_t)y * width + x)), color[4];
         vm lanes = vm_first(pt_lanes_left(x, width));
-        vf_store(row->z + x, z, lanes);
+        vf_store_where(row->z + x, z, lanes);
         if (!vm_bits(vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))))))
             continue;
         vf_load4(colors + 4 * (size_t)x, color);
         for (uint32_t k = 0; k < 3 + smooth->args->translucent; k++)
-            vf_store(row->color[k] + x, color[k], vm_first(PT_LANES));
+            vf_store(row->color[k] + x, color[k]);
     }
 }
 

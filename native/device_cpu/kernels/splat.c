@@ -33,7 +33,7 @@ static void take_least(void *context, struct pt_patches *list)
 static inline void draw(void *context, uint32_t instance, const struct pt_discs *discs)
 {
     struct tile *tile = context;
-    vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)), vm_first(PT_LANES));
+    vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)));
     pt_patches_draw(&tile->patches, discs, ~0u, PT_KEYS_AT_ONCE, take_least, tile);
 }
 

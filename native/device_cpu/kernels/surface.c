@@ -57,8 +57,8 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     // 4. cosine and layer distance
     n[3] = vf_select(none, one, vf_rcp(vf_max(vf_cosine(view, n, ray), vf_set(PT_COSINE_FLOOR))));
     float pixels[4 * PT_LANES], distances[PT_LANES];
-    vf_store4(pixels, n, vm_bits(vm_first(PT_LANES)));
-    vf_store(distances, vf_layer_distance(view, instance->d_min, spacing, z, n[3]), vm_first(PT_LANES));
+    vf_store4(pixels, n, PT_ALL);
+    vf_store(distances, vf_layer_distance(view, instance->d_min, spacing, z, n[3]));
     for (uint32_t k = 0; k < count; k++) {
         memcpy(normals + 4 * (size_t)x[k], pixels + 4 * k, 16);
         deff[x[k]] = distances[k];
@@ -87,12 +87,12 @@ static void surface_row(void *context, uint32_t y)
             vi_pack(measured.z + count, vi_load_z(keys + x), lanes);
             vi_pack(measured.word + count, id, lanes);
             count += (uint32_t)__builtin_popcount(lanes);
-            vi_store(from + x, vi_add(vi_set((uint32_t)row), at), ours);
+            pt_row_put(from, args->view.width, x, vi_add(vi_set((uint32_t)row), at), ours);
         }
         // words are fetched at random: a tight loop gathers those of a block, so that many are under way at a time
         for (uint32_t i = 0; i < count; i += PT_LANES) {
             vm lanes = vm_first(pt_lanes_left(i, count));
-            vi_store(measured.word + i, vi_gather(pt_cpu_data(call, 1), vi_load(measured.word + i), lanes), vm_first(PT_LANES));
+            vi_store(measured.word + i, vi_gather(pt_cpu_data(call, 1), vi_load(measured.word + i), lanes));
         }
         for (uint32_t i = 0; i < count; i += PT_LANES)
             surface_pixels(args, call, y, &measured, i, pt_lanes_left(i, count));
