@@ -36,6 +36,26 @@ static inline int pt_cpu_cancelled(const struct pt_cpu_call *call)
 // The memory of the n-th buffer of kernels.def.
 static inline void *pt_cpu_data(const struct pt_cpu_call *call, uint32_t n) { return call->buffers[n]->data; }
 
+// Where the chunks of each instance begin in the list of all chunks; begins[instances]: how many there are. Those of instance
+// i are the buffer first + i stride.
+static inline void pt_chunk_begins(const struct pt_cpu_call *call, uint32_t first, uint32_t stride, uint32_t instances,
+                                   uint32_t *begins)
+{
+    begins[0] = 0;
+    for (uint32_t i = 0; i < instances; i++)
+        begins[i + 1] = begins[i] + (uint32_t)(call->buffers[first + i * stride]->size / sizeof(struct chunk_view));
+}
+
+// The instance that a chunk of the list is of, sought from instance `near` on: threads walk the list nearly in order.
+static inline uint32_t pt_chunk_instance(const uint32_t *begins, uint32_t chunk, uint32_t near)
+{
+    while (chunk < begins[near])
+        near--;
+    while (chunk >= begins[near + 1])
+        near++;
+    return near;
+}
+
 // A kernel returns PATINA_OK, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED.
 typedef int pt_cpu_kernel(const struct pt_cpu_call *call);
 

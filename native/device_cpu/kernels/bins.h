@@ -42,7 +42,7 @@ struct pt_bins {
     uint32_t room;
     _Atomic uint32_t used;
     // while they are filled
-    uint32_t *begins; // first chunk of each instance in the list of all chunks
+    uint32_t *begins; // see pt_chunk_begins
     struct pt_bin_thread *threads;
 };
 
@@ -50,8 +50,7 @@ struct pt_bins {
 
 static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, uint32_t chunk, uint32_t *instance)
 {
-    while (chunk >= bins->begins[*instance + 1])
-        ++*instance;
+    *instance = pt_chunk_instance(bins->begins, chunk, *instance);
     const uint32_t at = bins->first + *instance * bins->stride;
     const struct chunk_view *view = (const struct chunk_view *)pt_cpu_data(bins->call, at) + (chunk - bins->begins[*instance]);
     return (struct pt_disc_source){ bins->view,
@@ -178,8 +177,7 @@ static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
 {
     const uint32_t threads = pt_pool_threads(bins->call->pool);
     const size_t list_bytes = threads * sizeof *bins->threads, head_bytes = ((size_t)threads * bins->bins * 4 + 63) / 64 * 64;
-    const size_t begin_bytes = ((size_t)bins->instances + 1) * 4, own_bytes = (sizeof *bins + 63) / 64 * 64;
-    const size_t fixed = own_bytes + list_bytes + head_bytes + begin_bytes;
+    const size_t own_bytes = (sizeof *bins + 63) / 64 * 64, fixed = own_bytes + list_bytes + head_bytes;
     char *memory = pt_cpu_scratch(bins->call, PT_CPU_BINS, fixed + (size_t)blocks * sizeof *bins->blocks);
     if (!memory)
         return PATINA_ERROR_MEMORY;
@@ -189,7 +187,6 @@ static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
     bins->threads = (struct pt_bin_thread *)(void *)(memory + own_bytes);
     bins->heads = (uint32_t *)(void *)(memory + own_bytes + list_bytes);
     bins->blocks = (struct pt_bin_block *)(void *)(memory + own_bytes + list_bytes + head_bytes);
-    bins->begins = (uint32_t *)(void *)(bins->blocks + bins->room);
     memset(bins->threads, 0, list_bytes);
     memset(bins->heads, 0xFF, head_bytes);
     atomic_store(&bins->used, 0);
@@ -202,14 +199,14 @@ static inline int pt_bins_fill(struct pt_bins *bins)
     bins->columns = (bins->view->width + PT_DISC_TILE - 1) / PT_DISC_TILE;
     bins->rows = (bins->view->height + PT_DISC_TILE - 1) / PT_DISC_TILE;
     bins->bins = bins->columns * bins->rows + 1;
+    bins->begins = pt_cpu_scratch(bins->call, 0, ((size_t)bins->instances + 1) * sizeof *bins->begins);
+    if (!bins->begins)
+        return PATINA_ERROR_MEMORY;
+    pt_chunk_begins(bins->call, bins->first, bins->stride, bins->instances, bins->begins);
     for (uint32_t needed = 1024;; needed += needed / 4) {
         int error = pt_bins_lay_out(bins, needed);
         if (error)
             return error;
-        bins->begins[0] = 0;
-        for (uint32_t i = 0; i < bins->instances; i++)
-            bins->begins[i + 1] = bins->begins[i] + (uint32_t)(bins->call->buffers[bins->first + i * bins->stride]->size /
-                                                               sizeof(struct chunk_view));
         pt_parallel(bins->call->pool, bins->begins[bins->instances], 4, pt_bin_chunks, bins);
         if (pt_cpu_cancelled(bins->call))
             return PATINA_ERROR_CANCELLED;

@@ -17,12 +17,11 @@ struct stripe { // its chunks, of scatter.order
 
 struct scatter {
     const struct pt_cpu_call *call;
-    const struct view_args *view;
     const struct scatter_args *args;
-    uint32_t *begins; // begins[i]: first chunk of instance i in the list of all chunks
-    uint32_t *order;  // chunks by stripes; last those across several
+    uint32_t *begins;       // see pt_chunk_begins
     struct stripe *stripes; // one a thread, and one of those last
-    atomic_int over;  // a stripe is done
+    uint32_t *order;        // chunks by stripes; last those across several
+    atomic_int over;        // a stripe is done
 };
 
 struct target {
@@ -159,16 +158,13 @@ static void begin_walk(const struct scatter *scatter, int shared, struct walk *w
                                     .limit = behind ? pt_cpu_data(call, 1 + 3 * instances) : NULL,
                                     .drawn = scatter->args->sifted ? pt_cpu_data(call, 1 + 3 * instances + behind) : NULL,
                                     .shared = shared };
-    walk->window = window_of(scatter->view);
+    walk->window = window_of(&scatter->args->view);
     walk->instance = walk->count = 0;
 }
 
 static const struct chunk_view *chunk_at(const struct scatter *scatter, uint32_t c, uint32_t *instance)
 {
-    while (c < scatter->begins[*instance])
-        --*instance;
-    while (c >= scatter->begins[*instance + 1])
-        ++*instance;
+    *instance = pt_chunk_instance(scatter->begins, c, *instance);
     return (const struct chunk_view *)pt_cpu_data(scatter->call, 1 + 3 * *instance) + c - scatter->begins[*instance];
 }
 
@@ -179,7 +175,7 @@ static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *w
     const uint32_t *surface = (const uint32_t *)pt_cpu_data(scatter->call, 3 + 3 * walk->instance) + chunk->first;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK, walk->count++) {
         const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-        project(scatter->view, &walk->window, walk->target, chunk, positions, surface, first, last,
+        project(&scatter->args->view, &walk->window, walk->target, chunk, positions, surface, first, last,
                 &walk->blocks[walk->count % 2]);
         if (walk->count)
             put(walk->target, &walk->blocks[(walk->count - 1) % 2]);
@@ -230,7 +226,7 @@ static void divide_rows(const struct scatter *scatter, uint32_t chunks, uint32_t
     uint64_t points[BINS] = { 0 }, all = 1, before = 0;
     for (uint32_t c = 0, instance = 0; c < chunks; c++) {
         const struct chunk_view *chunk = chunk_at(scatter, c, &instance);
-        points[bin_of(scatter->view, (chunk->row_first + chunk->row_end) / 2)] += chunk->count;
+        points[bin_of(&scatter->args->view, (chunk->row_first + chunk->row_end) / 2)] += chunk->count;
         all += chunk->count;
     }
     for (uint32_t bin = 0; bin < BINS; before += points[bin++])
@@ -241,8 +237,9 @@ static void divide_rows(const struct scatter *scatter, uint32_t chunks, uint32_t
 static uint32_t stripe_of_chunk(const struct scatter *scatter, const struct chunk_view *chunk, uint32_t stripes,
                                 const uint16_t stripe_of[BINS])
 {
-    uint32_t end = chunk->row_end ? chunk->row_end : scatter->view->height;
-    uint32_t first = stripe_of[bin_of(scatter->view, chunk->row_first)], last = stripe_of[bin_of(scatter->view, end - 1)];
+    const struct view_args *view = &scatter->args->view;
+    uint32_t end = chunk->row_end ? chunk->row_end : view->height;
+    uint32_t first = stripe_of[bin_of(view, chunk->row_first)], last = stripe_of[bin_of(view, end - 1)];
     return first == last ? first : stripes;
 }
 
@@ -269,18 +266,17 @@ int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
 {
     const struct scatter_args *args = call->arguments;
     const uint32_t stripes = pt_pool_threads(call->pool);
-    struct scatter scatter = { .call = call, .view = &args->view, .args = args };
-    uint32_t chunks = 0, left = 0;
-    for (uint32_t i = 0; i < args->instances; i++)
-        chunks += (uint32_t)(call->buffers[1 + 3 * i]->size / sizeof(struct chunk_view));
-    scatter.begins = pt_cpu_scratch(call, 0, (args->instances + 1 + chunks) * sizeof(uint32_t));
-    scatter.stripes = pt_cpu_scratch(call, 1, (stripes + 1) * sizeof *scatter.stripes);
-    if (!scatter.begins || !scatter.stripes)
+    struct scatter scatter = { .call = call, .args = args };
+    uint32_t left = 0;
+    scatter.begins = pt_cpu_scratch(call, 0, ((size_t)args->instances + 1) * sizeof *scatter.begins);
+    if (!scatter.begins)
         return PATINA_ERROR_MEMORY;
-    scatter.order = scatter.begins + args->instances + 1;
-    scatter.begins[0] = 0;
-    for (uint32_t i = 0; i < args->instances; i++)
-        scatter.begins[i + 1] = scatter.begins[i] + (uint32_t)(call->buffers[1 + 3 * i]->size / sizeof(struct chunk_view));
+    pt_chunk_begins(call, 1, 3, args->instances, scatter.begins);
+    const uint32_t chunks = scatter.begins[args->instances];
+    scatter.stripes = pt_cpu_scratch(call, 1, (stripes + 1) * sizeof *scatter.stripes + chunks * sizeof *scatter.order);
+    if (!scatter.stripes)
+        return PATINA_ERROR_MEMORY;
+    scatter.order = (uint32_t *)(void *)(scatter.stripes + stripes + 1);
     sort_chunks(&scatter, chunks, stripes);
     pt_parallel(call->pool, stripes, 1, scatter_stripes, &scatter);
     for (uint32_t s = 0; s <= stripes; s++)
