@@ -42,7 +42,8 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         end = flat ? end_of_part(seen, x) : x + PT_LANES;
         for (int k = 0; k < finish->channels && flat; k++) {
             const float *const colors[3] = { rows[0]->color[k], rows[1]->color[k], rows[2]->color[k] };
-            pt_nine_flat(&nine, colors, (int32_t)x, (int32_t)end, scale, vf_set(k < 3 ? pt_float(PT_KEY_EMPTY_Z) : 1.0f), out->color[k]);
+            pt_nine_flat(&nine, colors, (int32_t)x, (int32_t)end, scale, vf_set(k < 3 ? pt_float(PT_KEY_EMPTY_Z) : 1.0f),
+                         out->color[k]);
         }
         vm some = vf_lt(vf_load(out->z + x), empty); // +inf behind the row's end
         vf color[4];

@@ -91,8 +91,8 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
                                  pt_lanes_left(x, view->width), &id);
         if (!vm_bits(ours))
             continue;
-        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights,
-                                   finish->reach == 1 && pt_flat(around[reach], x) ? walk->blended : NULL, shadows, x, (uint32_t)y, id, ours,
+        float *const *blended = finish->reach == 1 && pt_flat(around[reach], x) ? walk->blended : NULL;
+        vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, blended, shadows, x, (uint32_t)y, id, ours,
                                    plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(out->color[k] + x, color[k], ours);
@@ -128,7 +128,8 @@ static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *c
         count = count < BLOCK ? count : BLOCK;
         for (uint32_t i = 0; i < count; i++) {
             uint32_t x = first + i * PT_LANES, points[PT_LANES];
-            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &words[i]);
+            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width),
+                                     &words[i]);
             vi_store(points, vi_select(ours[i], words[i], vi_set(0)));
             for (uint32_t k = 0; near && k < PT_LANES; k++)
                 __builtin_prefetch(colors + 3 * (size_t)points[k]);
@@ -186,7 +187,8 @@ static void blend_flat(const struct finish *finish, struct walk *walk, int32_t y
         end = end_of_part(rows[1], x);
         for (uint32_t k = 0; k < 3 && pt_flat(rows[1], x); k++) {
             const float *const normals[3] = { rows[0]->normal[k], rows[1]->normal[k], rows[2]->normal[k] };
-            pt_nine_flat(&nine, normals, (int32_t)x, (int32_t)end, vf_set(1.0f), vf_set(pt_float(PT_KEY_EMPTY_Z)), walk->blended[k]);
+            pt_nine_flat(&nine, normals, (int32_t)x, (int32_t)end, vf_set(1.0f), vf_set(pt_float(PT_KEY_EMPTY_Z)),
+                         walk->blended[k]);
         }
     }
 }
@@ -196,7 +198,7 @@ static void shade(const struct finish *finish, struct walk *walk, int32_t y)
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
     struct pt_color_row *out = &walk->shaded[slot(y)];
     out->z = seen->z;
-    if (finish->reach == 1 && seen->end)
+    if (finish->with_normals && finish->reach == 1 && seen->end)
         blend_flat(finish, walk, y);
     for (uint32_t i = 0; i < finish->shade_count && seen->end; i++) {
         const struct pt_cpu_call *call = &finish->shades[i].call;

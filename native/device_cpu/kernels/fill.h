@@ -51,6 +51,7 @@ static void band_rows(const struct fill *fill, uint32_t band, uint32_t *first, u
 }
 
 // ---- planes of bits --------------------------------------------------------------------------------------------------------
+
 struct span { // of words
     size_t begin, end;
 };

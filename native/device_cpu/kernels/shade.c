@@ -43,8 +43,8 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, at, ours, color);
         if (pt_recolors(args))
             pt_recolor(args, x, y, vf_load(around[args->blend]->z + x), ours, color);
-        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, pt_cpu_data(shade->call, 8), x, y, id, ours, 0,
-                                   color, normal);
+        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, pt_cpu_data(shade->call, 8), x, y, id,
+                                   ours, 0, color, normal);
         normal[3] = color[3] = pt_opacity(&args->instance, pt_cpu_data(shade->call, 4), pt_cpu_data(shade->call, 7), id, at, ours);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * color[3];

@@ -66,7 +66,10 @@ static inline int pt_gathers_bytes(const struct instance_args *instance)
     return instance->color_format == 1 && instance->id_count < 1u << 29;
 }
 
-static inline vi pt_gather_rgb(const void *colors, vi id, vm ours) { return vi_gather_bytes(colors, vi_add(id, vi_add(id, id)), ours); }
+static inline vi pt_gather_rgb(const void *colors, vi id, vm ours)
+{
+    return vi_gather_bytes(colors, vi_add(id, vi_add(id, id)), ours);
+}
 
 static inline void pt_decode_srgb(vi rgb, vf linear[3])
 {
