@@ -158,11 +158,12 @@ static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffe
 void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size)
 {
     struct pt_cpu_scratch *scratch = &call->scratch[index];
-    if (scratch->size >= size && scratch->memory)
+    size += PT_SLACK;
+    if (scratch->size >= size)
         return scratch->memory;
     pt_pages_free(scratch->memory, scratch->size);
-    scratch->memory = pt_pages_alloc(size + PT_SLACK);
-    scratch->size = scratch->memory ? size + PT_SLACK : 0;
+    scratch->memory = pt_pages_alloc(size);
+    scratch->size = scratch->memory ? size : 0;
     return scratch->memory;
 }
 
