@@ -2,7 +2,7 @@
 // The CPU device: buffers are memory, kernels are functions of the best level that the processor has.
 #include "cpu.h"
 #include "memory.h"
-#include "srgb.h"
+#include "tables.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -65,15 +65,19 @@ static uint32_t available_levels(struct level levels[4])
     return count;
 }
 
-// ---- sRGB ------------------------------------------------------------------------------------------------------------
+// ---- tables ----------------------------------------------------------------------------------------------------------
 
 float pt_srgb_table[256];
+uint64_t pt_pack_table[256];
 
-static void fill_srgb_table(void)
+static void fill_tables(void)
 {
     for (int i = 0; i < 256; i++) {
         double c = i / 255.0;
         pt_srgb_table[i] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+        for (uint64_t lane = 0, count = 0; lane < 8; lane++)
+            if (i >> lane & 1)
+                pt_pack_table[i] |= lane << 8 * count++;
     }
 }
 
@@ -255,7 +259,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *level, stru
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     struct level levels[4];
     uint32_t count = available_levels(levels), chosen = 0;
-    pthread_once(&once, fill_srgb_table);
+    pthread_once(&once, fill_tables);
     while (chosen < count && strcmp(level, "cpu") != 0 && strcmp(level, levels[chosen].name) != 0)
         chosen++;
     if (chosen == count)

@@ -6,6 +6,7 @@
 #define PT_SIMD_H
 
 #include "math.h"
+#include "tables.h"
 
 #if !defined(PT_ISA_SCALAR)
 #include <immintrin.h>
@@ -15,21 +16,6 @@
 #define PT_CONCAT(a, b) PT_CONCAT_(a, b)
 // The name of this level's variant of a kernel's entry: pt_kernel_scatter_avx2.
 #define PT_KERNEL_ENTRY(name) PT_CONCAT(pt_kernel_##name##_, PT_ISA)
-
-#if defined(PT_ISA_AVX2) || defined(PT_ISA_SSE42)
-// Those of four lanes, one behind another.
-static inline void sse_pack(uint32_t *p, __m128i a, uint32_t lanes)
-{
-#define FROM(i, j, k, l) { 0x03020100 + i * 0x04040404, 0x03020100 + j * 0x04040404, 0x03020100 + k * 0x04040404, \
-                           0x03020100 + l * 0x04040404 }
-    static const int32_t from[16][4] = { FROM(0, 0, 0, 0), FROM(0, 0, 0, 0), FROM(1, 0, 0, 0), FROM(0, 1, 0, 0),
-                                         FROM(2, 0, 0, 0), FROM(0, 2, 0, 0), FROM(1, 2, 0, 0), FROM(0, 1, 2, 0),
-                                         FROM(3, 0, 0, 0), FROM(0, 3, 0, 0), FROM(1, 3, 0, 0), FROM(0, 1, 3, 0),
-                                         FROM(2, 3, 0, 0), FROM(0, 2, 3, 0), FROM(1, 2, 3, 0), FROM(0, 1, 2, 3) };
-#undef FROM
-    _mm_storeu_si128((__m128i *)p, _mm_shuffle_epi8(a, _mm_loadu_si128((const __m128i *)from[lanes])));
-}
-#endif
 
 #if !defined(PT_ISA_SCALAR)
 // The float4 pixel of half this number; fourth: where its last float comes from, NULL for its own.
@@ -328,8 +314,8 @@ static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm256_and_ps(a * b, _m
 static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm256_and_ps(b, _mm256_castsi256_ps(m)); }
 static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
 {
-    sse_pack(p, _mm256_castsi256_si128(a), lanes & 15u);
-    sse_pack(p + __builtin_popcount(lanes & 15u), _mm256_extracti128_si256(a, 1), lanes >> 4);
+    const vi from = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)&pt_pack_table[lanes]));
+    vi_store(p, _mm256_permutevar8x32_epi32(a, from));
 }
 static inline vi vi_west(vi before, vi own) { return _mm256_alignr_epi8(own, _mm256_permute2x128_si256(before, own, 0x21), 12); }
 static inline vi vi_east(vi own, vi behind) { return _mm256_alignr_epi8(_mm256_permute2x128_si256(own, behind, 0x21), own, 4); }
@@ -448,7 +434,17 @@ static inline void vf_stream_pixels(float *p, vf r[4])
 }
 static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm_and_ps(a * b, _mm_castsi128_ps(m)); }
 static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm_and_ps(b, _mm_castsi128_ps(m)); }
-static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes) { sse_pack(p, a, lanes); }
+static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
+{
+#define FROM(i, j, k, l) { 0x03020100 + i * 0x04040404, 0x03020100 + j * 0x04040404, 0x03020100 + k * 0x04040404, \
+                           0x03020100 + l * 0x04040404 }
+    static const int32_t from[16][4] = { FROM(0, 0, 0, 0), FROM(0, 0, 0, 0), FROM(1, 0, 0, 0), FROM(0, 1, 0, 0),
+                                         FROM(2, 0, 0, 0), FROM(0, 2, 0, 0), FROM(1, 2, 0, 0), FROM(0, 1, 2, 0),
+                                         FROM(3, 0, 0, 0), FROM(0, 3, 0, 0), FROM(1, 3, 0, 0), FROM(0, 1, 3, 0),
+                                         FROM(2, 3, 0, 0), FROM(0, 2, 3, 0), FROM(1, 2, 3, 0), FROM(0, 1, 2, 3) };
+#undef FROM
+    _mm_storeu_si128((__m128i *)p, _mm_shuffle_epi8(a, _mm_loadu_si128((const __m128i *)from[lanes])));
+}
 static inline vi vi_west(vi before, vi own) { return _mm_alignr_epi8(own, before, 12); }
 static inline vi vi_east(vi own, vi behind) { return _mm_alignr_epi8(behind, own, 4); }
 #define PT_VECTOR(name) _mm_##name

@@ -5,7 +5,6 @@
 
 #include "device_cpu/kernels/recolor.h"
 #include "device_cpu/picture_rows.h"
-#include "device_cpu/srgb.h"
 
 enum { PT_BLEND_MOST = 8 };
 
