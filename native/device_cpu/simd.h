@@ -26,6 +26,13 @@ static inline __m128 sse_pixel(const float *p, const float *fourth, uint32_t twi
         return pixel;
     return _mm_insert_ps(pixel, _mm_load_ss((const float *)(const void *)((const char *)fourth + 2 * (size_t)twice)), 0x30);
 }
+
+static inline int pt_word(const char *base, size_t at)
+{
+    int word;
+    memcpy(&word, base + at, 4);
+    return word;
+}
 #endif
 
 #if defined(PT_ISA_AVX512)
@@ -218,12 +225,6 @@ static inline vm vi_lt_unsigned(vi a, vi b)
     return _mm256_cmpgt_epi32(_mm256_xor_si256(b, flip), _mm256_xor_si256(a, flip));
 }
 static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
-static inline int avx_word(const char *base, size_t at)
-{
-    int word;
-    memcpy(&word, base + at, 4);
-    return word;
-}
 // Loads of a word each: AVX2's own gather is 40 operations and more on AMD's processors, and on Intel's that hide what it reads
 // ahead. Lanes that are not asked for read the first word.
 static inline vi avx_gather(const void *base, vi i, vm m, size_t scale)
@@ -232,9 +233,9 @@ static inline vi avx_gather(const void *base, vi i, vm m, size_t scale)
     if (!vm_bits(m)) // there may be no first word
         return _mm256_setzero_si256();
     vi_store(at, _mm256_and_si256(i, m));
-    vi words = _mm256_setr_epi32(avx_word(base, scale * at[0]), avx_word(base, scale * at[1]), avx_word(base, scale * at[2]),
-                                 avx_word(base, scale * at[3]), avx_word(base, scale * at[4]), avx_word(base, scale * at[5]),
-                                 avx_word(base, scale * at[6]), avx_word(base, scale * at[7]));
+    vi words = _mm256_setr_epi32(pt_word(base, scale * at[0]), pt_word(base, scale * at[1]), pt_word(base, scale * at[2]),
+                                 pt_word(base, scale * at[3]), pt_word(base, scale * at[4]), pt_word(base, scale * at[5]),
+                                 pt_word(base, scale * at[6]), pt_word(base, scale * at[7]));
     return _mm256_and_si256(words, m);
 }
 static inline vi vi_gather(const void *base, vi i, vm m) { return avx_gather(base, i, m, 4); }
@@ -357,14 +358,15 @@ static inline vm vi_lt_unsigned(vi a, vi b)
     return _mm_cmplt_epi32(_mm_xor_si128(a, flip), _mm_xor_si128(b, flip));
 }
 static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm_movemask_ps(_mm_castsi128_ps(m)); }
-static inline vi sse_gather(const char *base, vi i, vm m, int scale)
+static inline vi sse_gather(const void *base, vi i, vm m, size_t scale)
 {
-    uint32_t index[4], value[4] = { 0, 0, 0, 0 }, lanes = vm_bits(m);
-    _mm_storeu_si128((__m128i *)index, i);
-    for (int k = 0; k < 4; k++)
-        if (lanes >> k & 1u)
-            memcpy(&value[k], base + (size_t)index[k] * (size_t)scale, 4);
-    return vi_load(value);
+    uint32_t at[4];
+    if (!vm_bits(m))
+        return _mm_setzero_si128();
+    vi_store(at, _mm_and_si128(i, m));
+    vi words = _mm_setr_epi32(pt_word(base, scale * at[0]), pt_word(base, scale * at[1]), pt_word(base, scale * at[2]),
+                              pt_word(base, scale * at[3]));
+    return _mm_and_si128(words, m);
 }
 static inline vi vi_gather(const void *base, vi i, vm m) { return sse_gather(base, i, m, 4); }
 static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return sse_gather((const char *)keys + 4, i, m, 8); }
@@ -553,7 +555,7 @@ static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m)
     return avx_gather(base, i, m, 1);
 }
 #elif defined(PT_ISA_SSE42)
-static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return sse_gather((const char *)base, i, m, 1); }
+static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return sse_gather(base, i, m, 1); }
 #else
 static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return m ? vi_load(base + i) : 0; }
 #endif
