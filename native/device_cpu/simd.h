@@ -627,6 +627,23 @@ static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 }
 #endif
 
+// Upper words of keys i and i + 1.
+static inline void vi_gather_two_z(const uint64_t *keys, vi i, vm m, vi z[2])
+{
+#if defined(PT_ISA_AVX2) || defined(PT_ISA_SSE42) // one load for both
+    uint32_t at[PT_LANES];
+    vf words[4];
+    vi_store(at, vi_select(m, i, vi_set(0)));
+    vf_pick_pixels((const float *)(const void *)keys, NULL, at, words);
+    vf_transpose(words);
+    z[0] = vf_bits(words[1]);
+    z[1] = vf_bits(words[3]);
+#else
+    z[0] = vi_gather_z(keys, i, m);
+    z[1] = vi_gather_z(keys, vi_add(i, vi_set(1)), m);
+#endif
+}
+
 static inline void vf_gather4(const float *pixels, vi i, vm lanes, vf out[4]) { vf_gather3_1(pixels, NULL, i, lanes, out); }
 
 // Writes to the picture, which is read later and by others. count <= PT_LANES pixels of one, four or three floats. Past the

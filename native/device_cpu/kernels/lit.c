@@ -9,19 +9,20 @@ struct lit {
     struct lit_args args; // with the wider texel
 };
 
-// Slots of a chunk's points that may be in shadow: few of a block are, and they are tested side by side.
-enum { BLOCK = 128 };
-
-struct queue {
-    uint32_t count, slot[BLOCK + PT_LANES];
-};
-
 // Where PT_LANES points fall: z, pixel and texel, and which of them lie behind what the map shows there by more than their
 // least d_eff.
 struct fall {
     vf at[2], z, map;
     vi column, row, texel;
     vm behind;
+};
+
+// Points of a chunk that may be in shadow, and where they fall: few of a block are, and they are tested side by side.
+enum { BLOCK = 128, QUEUE = BLOCK + PT_LANES };
+
+struct queue {
+    uint32_t count, slot[QUEUE], column[QUEUE], row[QUEUE], texel[QUEUE], behind[QUEUE];
+    uint32_t at[2][QUEUE], z[QUEUE], map[QUEUE]; // floats
 };
 
 // 1. project and compare.
@@ -58,12 +59,21 @@ struct around {
 
 static void look_around(const struct view_args *view, const uint64_t *keys, vi column, vi row, vm lanes, struct around *around)
 {
-    static const int32_t ring[8][2] = { { -1, -1 }, { 0, -1 }, { 1, -1 }, { -1, 0 }, { 1, 0 }, { -1, 1 }, { 0, 1 }, { 1, 1 } };
-    for (uint32_t i = 0; i < 8; i++) {
-        vi x = vi_add(column, vi_set((uint32_t)ring[i][0])), y = vi_add(row, vi_set((uint32_t)ring[i][1]));
-        around->known[i] =
-            vm_and(lanes, vm_and(vi_lt_unsigned(x, vi_set(view->width)), vi_lt_unsigned(y, vi_set(view->height))));
-        around->z[i] = vi_float(vi_gather_z(keys, vi_add(vi_mul(y, vi_set(view->width)), x), around->known[i]));
+    const vi next = vi_set(1), columns = vi_set(view->width), rows = vi_set(view->height);
+    const vm west = vm_and(lanes, vi_lt_unsigned(vi_sub(column, next), columns));
+    const vm east = vm_and(lanes, vi_lt_unsigned(vi_add(column, next), columns));
+    for (uint32_t i = 0, k = 0; i < 3; i++) {
+        const vi y = vi_sub(vi_add(row, vi_set(i)), next), at = vi_add(vi_mul(y, columns), column);
+        const vm on = vi_lt_unsigned(y, rows), known[3] = { vm_and(west, on), vm_and(lanes, on), vm_and(east, on) };
+        vi first[2], then[2]; // of the columns -1 and 0, and of 0 and 1
+        vi_gather_two_z(keys, vi_sub(at, next), known[0], first);
+        vi_gather_two_z(keys, at, known[1], then);
+        const vi z[3] = { first[0], then[0], then[1] };
+        for (uint32_t j = 0; j < 3; j++)
+            if (i != 1 || j != 1) {
+                around->known[k] = known[j];
+                around->z[k++] = vi_float(z[j]);
+            }
     }
 }
 
@@ -174,6 +184,34 @@ static void load_points(const float *positions, uint32_t padded, uint32_t i, vf 
         p[k] = vf_load(positions + k * (size_t)padded + i);
 }
 
+// Queues the points of PT_LANES slots from i on that `lanes` names.
+static void enqueue(struct queue *queue, uint32_t i, const struct fall *fall, uint32_t lanes)
+{
+    const uint32_t count = queue->count;
+    vi_pack(queue->slot + count, vi_add(vi_set(i), vi_lanes()), lanes);
+    vi_pack(queue->column + count, fall->column, lanes);
+    vi_pack(queue->row + count, fall->row, lanes);
+    vi_pack(queue->texel + count, fall->texel, lanes);
+    vi_pack(queue->behind + count, vi_select(fall->behind, vi_set(1), vi_set(0)), lanes);
+    for (uint32_t k = 0; k < 2; k++)
+        vi_pack(queue->at[k] + count, vf_bits(fall->at[k]), lanes);
+    vi_pack(queue->z + count, vf_bits(fall->z), lanes);
+    vi_pack(queue->map + count, vf_bits(fall->map), lanes);
+    queue->count += (uint32_t)__builtin_popcount(lanes);
+}
+
+// PT_LANES queued points from i on.
+static struct fall queued(const struct queue *queue, uint32_t i, vm lanes)
+{
+    return (struct fall){ .at = { vi_float(vi_load(queue->at[0] + i)), vi_float(vi_load(queue->at[1] + i)) },
+                          .z = vi_float(vi_load(queue->z + i)),
+                          .map = vi_float(vi_load(queue->map + i)),
+                          .column = vi_load(queue->column + i),
+                          .row = vi_load(queue->row + i),
+                          .texel = vi_load(queue->texel + i),
+                          .behind = vm_and(lanes, vi_eq(vi_load(queue->behind + i), vi_set(1))) };
+}
+
 // Queues those of BLOCK slots from `first` on that have to be tested, or looked at in any case.
 static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, const float *positions, uint32_t first,
                        struct queue *queue)
@@ -181,43 +219,37 @@ static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, co
     const struct lit_args *args = &lit->args;
     const uint8_t *marks = pt_cpu_data(lit->call, 6); // none where none are asked for
     const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
-    uint32_t count = 0;
+    queue->count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(i, last));
-        vi slot = vi_add(vi_set(i), vi_lanes());
         if (args->marked) {
-            vi mark = vi_and(vi_gather_bytes(marks, vi_add(slot, vi_set(chunk->first)), lanes), vi_set(255));
+            vi slot = vi_add(vi_set(chunk->first + i), vi_lanes());
+            vi mark = vi_and(vi_gather_bytes(marks, slot, lanes), vi_set(255));
             lanes = vm_and(lanes, vm_not(vi_eq(mark, vi_set(0))));
         }
-        if (vm_bits(lanes) && !args->close && !args->compare) { // else lit points have to be looked at too
-            vf p[3];
-            load_points(positions, chunk->padded, i, p);
-            lanes = fall_of(lit, chunk, p, lanes).behind;
-        }
-        vi_pack(queue->slot + count, slot, vm_bits(lanes));
-        count += (uint32_t)__builtin_popcount(vm_bits(lanes));
+        if (!vm_bits(lanes))
+            continue;
+        vf p[3];
+        load_points(positions, chunk->padded, i, p);
+        const struct fall fall = fall_of(lit, chunk, p, lanes);
+        const uint32_t wanted = vm_bits(args->close || args->compare ? lanes : fall.behind); // lit ones too, to look at
+        if (wanted)
+            enqueue(queue, i, &fall, wanted);
     }
-    queue->count = count;
 }
 
 // Tests PT_LANES queued points from `at` on.
-static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk, const float *positions,
-                           const struct queue *queue, uint32_t at)
+static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk, const struct queue *queue, uint32_t at)
 {
     const struct lit_args *args = &lit->args;
-    uint32_t *words = (uint32_t *)pt_cpu_data(lit->call, 7) + args->base + chunk->first, texels[PT_LANES], differs = 0;
-    vm lanes = vm_first(queue->count - at < PT_LANES ? queue->count - at : PT_LANES);
-    vi slot = vi_load(queue->slot + at);
-    vf p[3];
-    for (uint32_t k = 0; k < 3; k++)
-        p[k] = vf_gather(positions + k * (size_t)chunk->padded, slot, lanes);
-    struct fall fall = fall_of(lit, chunk, p, lanes);
-    uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, vi_add(slot, vi_set(chunk->first))) : 0;
-    uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed;
-    vi_store(texels, fall.texel);
-    for (; left; left &= left - 1) {
-        uint32_t k = (uint32_t)__builtin_ctz(left);
-        differs |= note(args, words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(lit, texels[k]) : 0);
+    uint32_t *words = (uint32_t *)pt_cpu_data(lit->call, 7) + args->base + chunk->first, differs = 0;
+    const vm lanes = vm_first(pt_lanes_left(at, queue->count));
+    const struct fall fall = queued(queue, at, lanes);
+    const vi id = vi_add(vi_load(queue->slot + at), vi_set(chunk->first));
+    const uint32_t shadowed = vm_bits(fall.behind) ? in_shadow(lit, &fall, id) : 0;
+    for (uint32_t left = args->close || args->compare ? vm_bits(lanes) : shadowed; left; left &= left - 1) {
+        const uint32_t k = (uint32_t)__builtin_ctz(left);
+        differs |= note(args, words + queue->slot[at + k], shadowed >> k & 1u ? loss_at(lit, queue->texel[at + k]) : 0);
     }
     return differs;
 }
@@ -230,7 +262,7 @@ static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
     for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
         fill_queue(lit, chunk, positions, first, &queue);
         for (uint32_t at = 0; at < queue.count; at += PT_LANES)
-            differs |= lit_points(lit, chunk, positions, &queue, at);
+            differs |= lit_points(lit, chunk, &queue, at);
     }
     return differs;
 }
