@@ -26,13 +26,6 @@ static inline __m128 sse_pixel(const float *p, const float *fourth, uint32_t twi
         return pixel;
     return _mm_insert_ps(pixel, _mm_load_ss((const float *)(const void *)((const char *)fourth + 2 * (size_t)twice)), 0x30);
 }
-
-static inline int pt_word(const char *base, size_t at)
-{
-    int word;
-    memcpy(&word, base + at, 4);
-    return word;
-}
 #endif
 
 #if defined(PT_ISA_AVX512)
@@ -225,21 +218,6 @@ static inline vm vi_lt_unsigned(vi a, vi b)
     return _mm256_cmpgt_epi32(_mm256_xor_si256(b, flip), _mm256_xor_si256(a, flip));
 }
 static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(m)); }
-// Loads of a word each: AVX2's own gather is 40 operations and more on AMD's processors, and on Intel's that hide what it reads
-// ahead. Lanes that are not asked for read the first word.
-static inline vi avx_gather(const void *base, vi i, vm m, size_t scale)
-{
-    uint32_t at[8];
-    if (!vm_bits(m)) // there may be no first word
-        return _mm256_setzero_si256();
-    vi_store(at, _mm256_and_si256(i, m));
-    vi words = _mm256_setr_epi32(pt_word(base, scale * at[0]), pt_word(base, scale * at[1]), pt_word(base, scale * at[2]),
-                                 pt_word(base, scale * at[3]), pt_word(base, scale * at[4]), pt_word(base, scale * at[5]),
-                                 pt_word(base, scale * at[6]), pt_word(base, scale * at[7]));
-    return _mm256_and_si256(words, m);
-}
-static inline vi vi_gather(const void *base, vi i, vm m) { return avx_gather(base, i, m, 4); }
-static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return avx_gather((const char *)keys + 4, i, m, 8); }
 static inline vi vi_evens(vi a, vi b)
 {
     __m256 mixed = _mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), 0x88);
@@ -358,18 +336,6 @@ static inline vm vi_lt_unsigned(vi a, vi b)
     return _mm_cmplt_epi32(_mm_xor_si128(a, flip), _mm_xor_si128(b, flip));
 }
 static inline uint32_t vm_bits(vm m) { return (uint32_t)_mm_movemask_ps(_mm_castsi128_ps(m)); }
-static inline vi sse_gather(const void *base, vi i, vm m, size_t scale)
-{
-    uint32_t at[4];
-    if (!vm_bits(m))
-        return _mm_setzero_si128();
-    vi_store(at, _mm_and_si128(i, m));
-    vi words = _mm_setr_epi32(pt_word(base, scale * at[0]), pt_word(base, scale * at[1]), pt_word(base, scale * at[2]),
-                              pt_word(base, scale * at[3]));
-    return _mm_and_si128(words, m);
-}
-static inline vi vi_gather(const void *base, vi i, vm m) { return sse_gather(base, i, m, 4); }
-static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return sse_gather((const char *)keys + 4, i, m, 8); }
 static inline vi vi_evens(vi a, vi b)
 {
     return _mm_castps_si128(_mm_shuffle_ps(_mm_castsi128_ps(a), _mm_castsi128_ps(b), 0x88));
@@ -543,21 +509,45 @@ static inline vf vf_mul_where(vm m, vf a, vf b) { return m ? a * b : 0.0f; }
 static inline vf vf_add_where(vm m, vf a, vf b) { return m ? a + b : a; }
 #endif
 
+#if defined(PT_ISA_AVX2) || defined(PT_ISA_SSE42)
+static inline int sse_word(const char *base, size_t at)
+{
+    int word;
+    memcpy(&word, base + at, 4);
+    return word;
+}
+// Loads of a word each: AVX2's own gather is 40 operations and more on AMD's processors, and on Intel's that hide what it reads
+// ahead. Lanes that are not asked for read the first word.
+static inline vi sse_gather(const void *base, vi i, vm m, size_t scale)
+{
+    uint32_t at[PT_LANES];
+    if (!vm_bits(m)) // there may be no first word
+        return vi_set(0);
+    vi_store(at, vi_and(i, m));
+#if defined(PT_ISA_AVX2)
+    vi words = _mm256_setr_epi32(sse_word(base, scale * at[0]), sse_word(base, scale * at[1]), sse_word(base, scale * at[2]),
+                                 sse_word(base, scale * at[3]), sse_word(base, scale * at[4]), sse_word(base, scale * at[5]),
+                                 sse_word(base, scale * at[6]), sse_word(base, scale * at[7]));
+#else
+    vi words = _mm_setr_epi32(sse_word(base, scale * at[0]), sse_word(base, scale * at[1]), sse_word(base, scale * at[2]),
+                              sse_word(base, scale * at[3]));
+#endif
+    return vi_and(words, m);
+}
+static inline vi vi_gather(const void *base, vi i, vm m) { return sse_gather(base, i, m, 4); }
+static inline vi vi_gather_z(const uint64_t *keys, vi i, vm m) { return sse_gather((const char *)keys + 4, i, m, 8); }
+#endif
+
 // Bytes at base + i: the word that starts there (three bytes beyond the last may be read).
 #if defined(PT_ISA_AVX512)
 static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m)
 {
     return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, base, 1);
 }
-#elif defined(PT_ISA_AVX2)
-static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m)
-{
-    return avx_gather(base, i, m, 1);
-}
-#elif defined(PT_ISA_SSE42)
-static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return sse_gather(base, i, m, 1); }
-#else
+#elif defined(PT_ISA_SCALAR)
 static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return m ? vi_load(base + i) : 0; }
+#else
+static inline vi vi_gather_bytes(const uint8_t *base, vi i, vm m) { return sse_gather(base, i, m, 1); }
 #endif
 
 #define PT_ALL ((1u << PT_LANES) - 1u) // bits of all lanes
