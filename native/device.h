@@ -21,6 +21,7 @@ extern const char *const pt_kernel_names[PT_KERNEL_COUNT];
 // Device memory. CPU: data points to it. Owned by the device that made it.
 struct pt_buffer {
     size_t size;      // bytes
+    size_t room;      // bytes there are: at least size
     void *data;       // CPU device: the memory. GL device: NULL
     uint32_t name;    // GL device: buffer object
     uint32_t wrapped; // CPU device: data belongs to somebody else

@@ -37,7 +37,7 @@ static uint64_t plane_total(const struct patina_frame *frame)
     uint64_t total = 0;
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int level = 0; level < PT_SLOTS; level++)
-            total += frame->planes[p][level].size + frame->shadows.planes[p][level].size;
+            total += frame->planes[p][level].room + frame->shadows.planes[p][level].room;
     return total;
 }
 
@@ -58,22 +58,32 @@ static int check_cap(const struct patina_frame *frame, const struct pt_plan *pla
                    plan->crop[2], plan->crop[3], (unsigned long long)(cap >> 20));
 }
 
+// Frames of a moving camera differ by some pixels of margin, maps of one light by a texel or two: that is not worth new memory
+// each time, so who asks again for more gets an eighth above. Near the cap memory counts for more.
+static size_t room_for(const struct patina_frame *frame, const struct pt_buffer *plane, size_t bytes, int varies)
+{
+    const uint64_t cap = frame->device->memory_cap, total = plane_total(frame);
+    if ((!varies && !plane->room) || (cap && total + total / 4 > cap))
+        return bytes;
+    return bytes + bytes / 128 * 16;
+}
+
 int pt_frame_ensure_plane(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
                           enum pt_plane which, uint32_t level)
 {
     struct pt_buffer *plane = &planes[which][level];
-    size_t bytes = size_of(plan, which, level);
-    int roomy = planes != frame->planes; // maps of one light differ by a texel or two: not worth new memory each time
-    if ((plane->size == bytes || (roomy && plane->size > bytes && plane->size < 2 * bytes)) && (plane->data || plane->name))
+    const size_t bytes = size_of(plan, which, level), room = room_for(frame, plane, bytes, planes != frame->planes);
+    if (plane->room >= bytes && plane->room < 2 * bytes) {
+        plane->size = bytes;
         return PATINA_OK;
-    bytes += roomy ? bytes / 8 : 0;
-    bytes -= bytes % plane_bytes[which];
+    }
     frame->device->ops->buffer_destroy(frame->device, plane);
-    int error = check_cap(frame, plan, plane_total(frame) + bytes);
+    int error = check_cap(frame, plan, plane_total(frame) + room);
     if (!error)
-        error = frame->device->ops->buffer_create(frame->device, bytes, NULL, 0, plane);
+        error = frame->device->ops->buffer_create(frame->device, room, NULL, 0, plane);
     if (error)
         return pt_fail_again(&frame->handle, error);
+    plane->size = bytes;
     return PATINA_OK;
 }
 
@@ -179,12 +189,12 @@ int pt_frame_clear_keys(struct patina_frame *frame, struct pt_buffer (*planes)[P
     int error = pt_frame_ensure_plane(frame, planes, plan, which, 0);
     if (!error)
         error = frame->device->ops->buffer_fill(frame->device, plane, plane->clean[0],
-                                                plane->size - plane->clean[0] - plane->clean[1],
+                                                plane->room - plane->clean[0] - plane->clean[1],
                                                 (uint64_t)PT_KEY_EMPTY_Z << 32 | PT_KEY_EMPTY_ID, 8);
     if (error)
         return error;
     plane->clean[0] = 8 * (size_t)plan->view.width * plan->view.rect[1]; // no pass writes beyond the rectangle
-    plane->clean[1] = plane->size - 8 * (size_t)plan->view.width * plan->view.rect[3];
+    plane->clean[1] = plane->room - 8 * (size_t)plan->view.width * plan->view.rect[3];
     return PATINA_OK;
 }
 

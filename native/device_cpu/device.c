@@ -86,7 +86,7 @@ static void fill_tables(void)
 static int cpu_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow,
                              struct pt_buffer *out)
 {
-    *out = (struct pt_buffer){ .size = size, .wrapped = source && borrow };
+    *out = (struct pt_buffer){ .size = size, .room = size, .wrapped = source && borrow };
     if (out->wrapped) {
         out->data = (void *)source;
         return PATINA_OK;
@@ -106,7 +106,7 @@ static void cpu_buffer_destroy(struct patina_device *device, struct pt_buffer *b
 {
     (void)device;
     if (!buffer->wrapped && buffer->data)
-        pt_pages_free(buffer->data, buffer->size + PT_SLACK);
+        pt_pages_free(buffer->data, buffer->room + PT_SLACK);
     *buffer = (struct pt_buffer){ 0 };
 }
 
@@ -165,6 +165,7 @@ void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size
     size += PT_SLACK;
     if (scratch->size >= size)
         return scratch->memory;
+    size += scratch->size ? size / 8 : 0; // a moving camera asks for a little more every time
     pt_pages_free(scratch->memory, scratch->size);
     scratch->memory = pt_pages_alloc(size);
     scratch->size = scratch->memory ? size : 0;

@@ -248,7 +248,7 @@ static int create_buffer(struct pt_gl_device *d, void *context)
         gl->DeleteBuffers(1, &name);
         return result;
     }
-    *b->buffer = (struct pt_buffer){.size = b->size, .name = name};
+    *b->buffer = (struct pt_buffer){.size = b->size, .room = b->size, .name = name};
     return PATINA_OK;
 }
 

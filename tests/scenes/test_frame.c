@@ -33,21 +33,34 @@ static patina_frame *frame_of(patina_device *device, struct stage *stage)
     return frame;
 }
 
-// What a frame keeps from view to view never shows: keys, and where it left them empty.
+static uint64_t plane_bytes_of(patina_frame *frame)
+{
+    patina_frame_stats stats = {.struct_size = sizeof stats};
+    CHECK(patina_frame_get_stats(frame, &stats), frame);
+    return stats.plane_bytes;
+}
+
+// What a frame keeps from view to view never shows: keys, where it left them empty, planes larger than this view's.
 static void test_view_after_view(void **state)
 {
-    static const double shifts[] = {0.0, 0.4, -0.7, 5.0, 0.3, 0.0}; // of the picture's height; at 5 nothing is in view
+    static const struct {
+        double shift, zoom; // of the picture's height; a closer view has wider margins around the picture
+    } views[] = {{0.0, 1.0}, {0.4, 1.0}, {-0.7, 1.0}, {5.0, 1.0}, {0.3, 1.0}, {0.2, 0.3}, {0.0, 0.1}, {0.1, 0.25}, {0.0, 1.0}};
     (void)state;
     for (uint32_t k = 0; k < support_device_count(); k++) {
         patina_device *device = support_device_open(support_device_name(k), 0, 0);
         if (!device)
             continue;
         struct stage stage = stage_build(staging_named("small, 1 point a pixel"));
-        const double bottom = stage.camera.bottom, height = stage.camera.top - bottom;
+        const patina_camera camera = stage.camera;
+        const double height = camera.top - camera.bottom;
         patina_frame *kept = frame_of(device, &stage);
-        for (uint32_t i = 0; i < sizeof shifts / sizeof shifts[0]; i++) {
-            stage.camera.bottom = bottom + shifts[i] * height;
-            stage.camera.top = stage.camera.bottom + height;
+        uint32_t wider = 0;
+        for (uint32_t i = 0; i < sizeof views / sizeof views[0]; i++) {
+            stage.camera.left = camera.left * views[i].zoom;
+            stage.camera.right = camera.right * views[i].zoom;
+            stage.camera.bottom = camera.bottom * views[i].zoom + views[i].shift * height;
+            stage.camera.top = camera.top * views[i].zoom + views[i].shift * height;
             patina_frame *fresh = frame_of(device, &stage);
             CHECK(patina_frame_render(kept, stage.scene), kept);
             CHECK(patina_frame_render(fresh, stage.scene), fresh);
@@ -55,8 +68,12 @@ static void test_view_after_view(void **state)
             picture_assert_identical(&got, &expected, 0, 0, "after another view");
             picture_free(&got);
             picture_free(&expected);
+            const uint64_t bytes = plane_bytes_of(kept), least = plane_bytes_of(fresh);
+            assert_true(bytes >= least && (bytes <= 2 * least || views[i].shift == 5.0)); // there, no pass needs planes
+            wider += bytes > least;
             patina_frame_destroy(fresh);
         }
+        assert_true(wider > 0); // else nothing was kept
         patina_frame_destroy(kept);
         stage_free(&stage);
         patina_device_destroy(device);
@@ -475,9 +492,7 @@ static void test_memory_cap(void **state)
             } else {
                 truth = picture;
             }
-            patina_frame_stats stats = {.struct_size = sizeof stats};
-            CHECK(patina_frame_get_stats(frame, &stats), frame);
-            needed = stats.plane_bytes;
+            needed = plane_bytes_of(frame);
         }
         patina_frame_destroy(frame);
         patina_device_destroy(device);
