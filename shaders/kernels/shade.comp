@@ -106,20 +106,27 @@ vec3 blend_nine(tap_row behind, tap_row row, tap_row ahead, float z, float limit
 }
 
 #if WIDE
-void add_tap(vec4 tap, float z, float limit, float weight, inout vec3 sum)
+vec3 column(ivec2 size, int x, int y, int dy, float z, float limit)
 {
-    precise float apart = tap.w - z;
-    precise vec3 more = sum + tap.xyz * weight;
-    sum = pt_abs(apart) <= limit ? more : sum;
+    vec3 below = same_layer(read_tap(size, x, y - dy), z, limit);
+    if (dy == 0)
+        return below;
+    precise vec3 both = below + same_layer(read_tap(size, x, y + dy), z, limit);
+    return both;
 }
 
+// The four pixels at (+-dx, +-dy) are summed first, columns before rows.
 vec3 blend_wide(view_args view, ivec2 size, int x, int y, float z, float limit)
 {
-    vec3 sum = vec3(0.0);
+    precise vec3 sum = vec3(0.0);
     int reach = int(args.blend);
-    for (int dy = -reach; dy <= reach; dy++)
-        for (int dx = -reach; dx <= reach; dx++)
-            add_tap(read_tap(size, x + dx, y + dy), z, limit, pt_rcp(float(1 + dx * dx + dy * dy)), sum);
+    for (int dy = 0; dy <= reach; dy++)
+        for (int dx = 0; dx <= reach; dx++) {
+            precise vec3 four = column(size, x - dx, y, dy, z, limit);
+            if (dx != 0)
+                four = four + column(size, x + dx, y, dy, z, limit);
+            sum = sum + four * pt_rcp(float(1 + dx * dx + dy * dy));
+        }
     return sum;
 }
 #endif

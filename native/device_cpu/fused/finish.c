@@ -19,6 +19,7 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
     }
     for (uint32_t k = 0; k < 3; k++)
         walk->blended[k] = at + k * s;
+    walk->wide = (uint8_t *)(at + 3 * s);
 }
 
 // ---- smoothing -------------------------------------------------------------------------------------------------------------
@@ -285,7 +286,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
     finish.channels = finish.peel ? 4 : 3;
     finish.stride = pt_row_stride(finish.planes.view->width);
     finish.ring = (uint32_t)(2 * finish.reach > finish.reach + 3 ? 2 * finish.reach : finish.reach + 3) + 1;
-    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR + 3) * finish.stride;
+    finish.thread_floats = (finish.ring * CHANNELS_SEEN + RING * CHANNELS_COLOR + 4) * finish.stride;
     pt_blend_weights(finish.weights);
     uint32_t threads = pt_pool_threads(shared->pool);
     finish.memory = pt_cpu_scratch(shared, 0, threads * finish.thread_floats * sizeof(float));

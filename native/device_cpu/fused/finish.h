@@ -45,7 +45,9 @@ struct walk {
     struct pt_seen_row seen[SEEN_MOST];
     struct pt_color_row shaded[RING], smoothed[RING];
     float *shown[RING][5];          // normals, opacities, what arrives of the lights
-    float *blended[3];              // sums of normals of the row at hand, where it is flat
+    float *blended[3];              // sums of normals of the row at hand, where one_layer[x / PT_LANES] says so
+    const uint8_t *one_layer;       // whether all that the blend's window shows is one layer
+    uint8_t *wide;                  // what one_layer is of windows of more than 3 x 3 pixels
     struct pt_tile_sum *tiles;      // of the row of tiles at hand
 };
 

@@ -91,7 +91,7 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
                                  pt_lanes_left(x, view->width), &id);
         if (!vm_bits(ours))
             continue;
-        float *const *blended = finish->reach == 1 && pt_flat(around[reach], x) ? walk->blended : NULL;
+        float *const *blended = reach && reach == finish->reach && walk->one_layer[x / PT_LANES] ? walk->blended : NULL;
         vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, blended, shadows, x, (uint32_t)y, id, ours,
                                    plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
@@ -178,11 +178,13 @@ static uint32_t end_of_part(const struct pt_seen_row *seen, uint32_t x)
     return x;
 }
 
-static void blend_flat(const struct finish *finish, struct walk *walk, int32_t y)
+// Sums of normals wherever the blend's whole window is one layer.
+static void blend_nine(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *const rows[3] = { seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
                                                 seen_row(finish, walk, y + 1) };
     const struct pt_nine nine = pt_blend_nine(finish->weights);
+    walk->one_layer = rows[1]->flat;
     for (uint32_t x = rows[1]->first, end; x < rows[1]->end; x = end) {
         end = end_of_part(rows[1], x);
         for (uint32_t k = 0; k < 3 && pt_flat(rows[1], x); k++) {
@@ -193,13 +195,27 @@ static void blend_flat(const struct finish *finish, struct walk *walk, int32_t y
     }
 }
 
+static void blend_wide(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
+    const int32_t end = (int32_t)seen_row(finish, walk, y)->end;
+    for (int32_t k = -finish->reach; k <= finish->reach; k++)
+        around[finish->reach + k] = seen_row(finish, walk, y + k);
+    walk->one_layer = walk->wide;
+    for (int32_t x = (int32_t)seen_row(finish, walk, y)->first; x < end; x += PT_BLEND_COLUMNS)
+        pt_blend_flat(around, finish->reach, finish->weights, x, x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end,
+                      walk->wide, walk->blended);
+}
+
 static void shade(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
     struct pt_color_row *out = &walk->shaded[slot(y)];
     out->z = seen->z;
     if (finish->with_normals && finish->reach == 1 && seen->end)
-        blend_flat(finish, walk, y);
+        blend_nine(finish, walk, y);
+    else if (finish->with_normals && finish->reach && seen->end)
+        blend_wide(finish, walk, y);
     for (uint32_t i = 0; i < finish->shade_count && seen->end; i++) {
         const struct pt_cpu_call *call = &finish->shades[i].call;
         const struct shade_args *args = call->arguments;

@@ -3,61 +3,10 @@
 #ifndef PT_SHADE_H
 #define PT_SHADE_H
 
+#include "device_cpu/kernels/blend_normals.h"
 #include "device_cpu/kernels/recolor.h"
-#include "device_cpu/picture_rows.h"
-
-enum { PT_BLEND_MOST = 8 };
 
 static const uint32_t pt_color_bytes[] = { 0, 3, 12, 0, 4 }; // of a point, by color_format
-
-// Weights of the blend by squared distance.
-static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1])
-{
-    for (int i = 0; i <= 2 * PT_BLEND_MOST * PT_BLEND_MOST; i++)
-        weights[i] = pt_rcp((float)(1 + i));
-}
-
-static inline struct pt_nine pt_blend_nine(const float *weights) { return (struct pt_nine){ weights[0], weights[1], weights[2] }; }
-
-// Sums of the normals of (2 reach + 1)^2 pixels around those of PT_LANES pixels from x on that `filled` names, as far as they
-// are of their layer. around[reach]: the pixels' own row.
-static inline void pt_blend_sum(const struct pt_seen_row *const *around, int reach, const float *weights, uint32_t x, vm filled,
-                                vf sum[3])
-{
-    const vf z = vf_load(around[reach]->z + x), limit = vf_load(around[reach]->limit + x);
-    if (reach == 1) {
-        const float *const depths[3] = { around[0]->z + x, around[1]->z + x, around[2]->z + x };
-        const struct pt_nine nine = pt_blend_nine(weights);
-        vm same[3][3];
-        pt_same_layer(depths, limit, filled, same);
-        for (int k = 0; k < 3; k++) {
-            const float *const rows[3] = { around[0]->normal[k] + x, around[1]->normal[k] + x, around[2]->normal[k] + x };
-            sum[k] = pt_nine_pixels(&nine, rows, same);
-        }
-        return;
-    }
-    sum[0] = sum[1] = sum[2] = vf_zero();
-    for (int dy = -reach; dy <= reach; dy++)
-        for (int dx = -reach; dx <= reach; dx++) {
-            const struct pt_seen_row *row = around[reach + dy];
-            vf weight = vf_set(weights[dx * dx + dy * dy]);
-            vm take = vm_and(filled, vf_le(vf_abs(vf_load(row->z + x + dx) - z), limit));
-            for (int k = 0; k < 3; k++)
-                sum[k] = sum[k] + vf_mul_where(take, vf_load(row->normal[k] + x + dx), weight);
-        }
-}
-
-// Normals of pixels that `filled` names: their sums as units; the others keep n.
-static inline void pt_blend_normals(const vf sum[3], vm filled, vf n[3])
-{
-    vf square = (sum[0] * sum[0] + sum[1] * sum[1]) + sum[2] * sum[2];
-    vm blended = vf_lt(vf_set(1e-12f), square);
-    vf scale = vf_rsqrt(vf_select(blended, square, vf_set(1.0f)));
-    for (int k = 0; k < 3; k++) {
-        vf whole = n[k] * vf_set(1.0f / PT_BLEND_FILLED); // where the blend is nothing, the source's own
-        n[k] = vf_select(filled, vf_select(blended, sum[k] * scale, whole), n[k]);
-    }
-}
 
 // Colours of three bytes, gathered as words: byte offsets fit a signed index.
 static inline int pt_gathers_bytes(const struct instance_args *instance)
