@@ -20,7 +20,7 @@
 #define TOL_RAY (2.0 * TOL_UNIT)
 // n . r: product and two sums; share of the terms.
 #define TOL_DOT (3.0 * TOL_UNIT)
-// z dq / dp: product, reciprocal within 2 ulp, product; share of the result.
+// z dq / dp, d_eff / footprint: product, reciprocal within 2 ulp, product; share of the result.
 #define TOL_QUOTIENT (7.0 * TOL_UNIT)
 // A sum or difference of two float32: the rounding itself, nothing else.
 #define TOL_SUM TOL_UNIT

@@ -106,6 +106,14 @@ vec3 blend_nine(tap_row behind, tap_row row, tap_row ahead, float z, float limit
 }
 
 #if WIDE
+// Radius of a pixel's window: kernel_args.h.
+int reach_of(view_args view, float z, float limit)
+{
+    precise float spacings = limit * pt_rcp(pt_footprint(view, z));
+    precise float reach = floor(spacings * (1.0 / PT_SPACING_FACTOR) + 0.5);
+    return int(pt_max(pt_min(reach, float(args.blend)), 1.0));
+}
+
 vec3 column(ivec2 size, int x, int y, int dy, float z, float limit)
 {
     vec3 below = same_layer(read_tap(size, x, y - dy), z, limit);
@@ -119,7 +127,7 @@ vec3 column(ivec2 size, int x, int y, int dy, float z, float limit)
 vec3 blend_wide(view_args view, ivec2 size, int x, int y, float z, float limit)
 {
     precise vec3 sum = vec3(0.0);
-    int reach = int(args.blend);
+    int reach = reach_of(view, z, limit);
     for (int dy = 0; dy <= reach; dy++)
         for (int dx = 0; dx <= reach; dx++) {
             precise vec3 four = column(size, x - dx, y, dy, z, limit);

@@ -291,14 +291,15 @@ struct recolor_args {
 };
 
 // shade: id -> colour, normal, Phong. [D 3.1], deferred. A filled pixel's normal (SPEC 2.2, refined) is the blend, over the
-// (2 blend + 1)^2 window, of the surfaces of the same layer that its pixels show: normal[from], |z_q - z| <= deff[from of
-// this pixel], weight 1 / (1 + distance^2), an eighth of it where q is filled itself; with blend = 0 (paper), and where the blend is nothing, its own source's.
+// (2 r + 1)^2 window, of the surfaces of the same layer that its pixels show: normal[from], |z_q - z| <= deff[from of this
+// pixel], weight 1 / (1 + distance^2), an eighth of it where q is filled itself; with blend = 0 (paper), and where the blend is
+// nothing, its own source's. r = deff / (K footprint(z)), one spacing there in pixels, rounded, from 1 to blend.
 struct shade_args {
     struct view_args view;
     struct instance_args instance;
     float world[3];     // ambient radiance
     float eye_z;        // orthographic: near, so that view z = -(z + near); perspective: 0
-    uint32_t blend;     // radius, 0..8
+    uint32_t blend;     // the window's radius at most, 0..8
     uint32_t arrived;   // 1: written
     uint32_t light_count;
     struct light_args lights[PT_MAX_LIGHTS];

@@ -104,8 +104,18 @@ static void recolor(const struct shade_args *args, const struct ref_planes *plan
     }
 }
 
+static int window_radius(double spacings, int most) { return (int)fmax(fmin(floor(spacings + 0.5), most), 1.0); }
+
+// Of the window over which a pixel's normal is blended.
+static int blend_radius(const struct view_args *view, double z, double deff, int most, int *unsure)
+{
+    double spacings = deff / ((double)PT_SPACING_FACTOR * ref_footprint(view, z)), off = TOL_QUOTIENT * (spacings + 0.5);
+    *unsure |= window_radius(spacings - off, most) != window_radius(spacings + off, most);
+    return window_radius(spacings, most);
+}
+
 // Blends the normals of the surfaces that the pixels of the same layer around a filled one show.
-static void blend(const struct view_args *view, const struct ref_planes *planes, int radius, int x, int y,
+static void blend(const struct view_args *view, const struct ref_planes *planes, int most, int x, int y,
                   struct ref_shade *out)
 {
     size_t pixel = (size_t)y * view->width + (size_t)x;
@@ -113,6 +123,7 @@ static void blend(const struct view_args *view, const struct ref_planes *planes,
     double z = ref_key_z(planes->keys[pixel]), weights = 0.0;
     struct ref_range d = ref_level_distance(view, planes->normal, planes->deff, from, ref_exactly(z));
     struct ref_vec sum = {0.0, 0.0, 0.0};
+    int radius = blend_radius(view, z, (double)planes->deff[from & ~PT_FROM_MIXED], most, &out->unsure);
     for (int qy = y - radius; qy <= y + radius; qy++) {
         for (int qx = x - radius; qx <= x + radius; qx++) {
             if (qx < 0 || qy < 0 || qx >= (int)view->width || qy >= (int)view->height)

@@ -203,8 +203,8 @@ static void blend_wide(const struct finish *finish, struct walk *walk, int32_t y
         around[finish->reach + k] = seen_row(finish, walk, y + k);
     walk->one_layer = walk->wide;
     for (int32_t x = (int32_t)seen_row(finish, walk, y)->first; x < end; x += PT_BLEND_COLUMNS)
-        pt_blend_flat(around, finish->reach, finish->weights, x, x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end,
-                      walk->wide, walk->blended);
+        pt_blend_flat(finish->planes.view, finish->reach, around, finish->weights, x,
+                      x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end, walk->wide, walk->blended);
 }
 
 static void shade(const struct finish *finish, struct walk *walk, int32_t y)

@@ -10,12 +10,19 @@
 #include "device_cpu/picture_rows.h"
 
 enum {
-    PT_BLEND_MOST = 8,                                             // radius
+    PT_BLEND_MOST = 8, // radius
     PT_BLEND_PAD = PT_LANES > PT_BLEND_MOST ? PT_LANES : PT_BLEND_MOST,
-    PT_BLEND_AT_ONCE = 4,                                          // vectors, so that sums need not wait for each other
-    PT_BLEND_COLUMNS = PT_LANES > 8 ? 192 : 128,                   // that the first-level cache holds all rows of
+    PT_BLEND_COLUMNS = 128, // that the first-level cache holds all rows of
     PT_BLEND_ROW = PT_BLEND_COLUMNS + 2 * PT_BLEND_PAD,
 };
+
+// Radius of a pixel's window, of a wide blend: kernel_args.h.
+static inline vf pt_blend_reach(const struct view_args *view, int blend, vf z, vf limit)
+{
+    vf spacings = limit * vf_rcp(vf_footprint(view, z));
+    vf reach = vf_floor(spacings * vf_set(1.0f / PT_SPACING_FACTOR) + vf_set(0.5f));
+    return vf_max(vf_min(reach, vf_set((float)blend)), vf_set(1.0f));
+}
 
 // Weights of the blend by squared distance.
 static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1])
@@ -26,43 +33,54 @@ static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_M
 
 static inline struct pt_nine pt_blend_nine(const float *weights) { return (struct pt_nine){ weights[0], weights[1], weights[2] }; }
 
-// Of the rows dy below and above: which of the pixels dx to the side are of the layer.
-static inline vm pt_blend_takes(const struct pt_seen_row *row, int32_t x, vf z, vf limit, vm filled)
+// Which pixels of PT_LANES, at x, are of the layer.
+static inline vm pt_blend_takes(const struct pt_seen_row *row, int32_t x, vf z, vf limit, vm within)
 {
-    return vm_and(filled, vf_le(vf_abs(vf_load(row->z + x) - z), limit));
+    return vm_and(within, vf_le(vf_abs(vf_load(row->z + x) - z), limit));
 }
 
-// Sums of the normals of (2 reach + 1)^2 pixels around those of PT_LANES pixels from x on that `filled` names, as far as they
-// are of their layer. around[reach]: the pixels' own row.
-static inline void pt_blend_sum(const struct pt_seen_row *const *around, int reach, const float *weights, uint32_t x, vm filled,
-                                vf sum[3])
+static inline void pt_blend_nine_sum(const struct pt_seen_row *const rows[3], const float *weights, uint32_t x, vf limit, vm filled,
+                                     vf sum[3])
 {
-    const vf z = vf_load(around[reach]->z + x), limit = vf_load(around[reach]->limit + x), zero = vf_zero();
-    if (reach == 1) {
-        const float *const depths[3] = { around[0]->z + x, around[1]->z + x, around[2]->z + x };
-        const struct pt_nine nine = pt_blend_nine(weights);
-        vm same[3][3];
-        pt_same_layer(depths, limit, filled, same);
-        for (int k = 0; k < 3; k++) {
-            const float *const rows[3] = { around[0]->normal[k] + x, around[1]->normal[k] + x, around[2]->normal[k] + x };
-            sum[k] = pt_nine_pixels(&nine, rows, same);
-        }
+    const float *const depths[3] = { rows[0]->z + x, rows[1]->z + x, rows[2]->z + x };
+    const struct pt_nine nine = pt_blend_nine(weights);
+    vm same[3][3];
+    pt_same_layer(depths, limit, filled, same);
+    for (int k = 0; k < 3; k++) {
+        const float *const normals[3] = { rows[0]->normal[k] + x, rows[1]->normal[k] + x, rows[2]->normal[k] + x };
+        sum[k] = pt_nine_pixels(&nine, normals, same);
+    }
+}
+
+// Sums of the normals of the pixels around those of PT_LANES pixels from x on that `filled` names, as far as they are of their
+// layer. around[blend]: the pixels' own row.
+static inline void pt_blend_sum(const struct view_args *view, int blend, const struct pt_seen_row *const *around, const float *weights,
+                                uint32_t x, vm filled, vf sum[3])
+{
+    const struct pt_seen_row *own = around[blend];
+    const vf z = vf_load(own->z + x), limit = vf_load(own->limit + x), zero = vf_zero();
+    if (blend == 1) {
+        pt_blend_nine_sum(around, weights, x, limit, filled, sum);
         return;
     }
+    const vf reach = vf_select(filled, pt_blend_reach(view, blend, z, limit), zero);
+    int most = blend;
+    while (most && !vm_bits(vf_le(vf_set((float)most), reach)))
+        most--;
     sum[0] = sum[1] = sum[2] = zero;
-    for (int dy = 0; dy <= reach; dy++)
-        for (int dx = 0; dx <= reach; dx++) {
-            const struct pt_seen_row *below = around[reach - dy], *above = around[reach + dy];
+    for (int dy = 0; dy <= most; dy++)
+        for (int dx = 0; dx <= most; dx++) {
+            const struct pt_seen_row *below = around[blend - dy], *above = around[blend + dy];
             const int32_t west = (int32_t)x - dx, east = (int32_t)x + dx;
             const vf weight = vf_set(weights[dx * dx + dy * dy]);
-            const vm none = vm_of_bits(0);
-            vm low = pt_blend_takes(below, west, z, limit, filled), high = none, low_east = none, high_east = none;
+            const vm none = vm_of_bits(0), within = vm_and(filled, vf_le(vf_set((float)(dx > dy ? dx : dy)), reach));
+            vm low = pt_blend_takes(below, west, z, limit, within), high = none, low_east = none, high_east = none;
             if (dy)
-                high = pt_blend_takes(above, west, z, limit, filled);
+                high = pt_blend_takes(above, west, z, limit, within);
             if (dx)
-                low_east = pt_blend_takes(below, east, z, limit, filled);
+                low_east = pt_blend_takes(below, east, z, limit, within);
             if (dx && dy)
-                high_east = pt_blend_takes(above, east, z, limit, filled);
+                high_east = pt_blend_takes(above, east, z, limit, within);
             for (int k = 0; k < 3; k++) {
                 vf column = vf_select(low, vf_load(below->normal[k] + west), zero), other = zero;
                 if (dy)
@@ -76,69 +94,91 @@ static inline void pt_blend_sum(const struct pt_seen_row *const *around, int rea
         }
 }
 
-// Which of the vectors from x to end the window tells no layers apart in: all around each of their pixels is of its layer.
-static inline int pt_blend_find_flat(const struct pt_seen_row *const *around, int reach, int32_t x, int32_t end, uint8_t *flat)
+// ---- where the window tells no layers apart ------------------------------------------------------------------------------
+
+// The radius that PT_LANES pixels share, 0 where they do not.
+static inline int pt_blend_shared_reach(const struct view_args *view, int blend, const struct pt_seen_row *own, int32_t x)
 {
-    float near[PT_BLEND_ROW], far[PT_BLEND_ROW];
-    int some = 0;
-    for (int32_t i = x - PT_BLEND_PAD; i < end + PT_BLEND_PAD; i += PT_LANES) {
-        vf low = vf_load(around[0]->z + i), high = low;
-        for (int k = 1; k <= 2 * reach; k++) {
-            vf z = vf_load(around[k]->z + i);
-            low = vf_min(low, z);
-            high = vf_max(high, z);
-        }
-        vf_store(near + (i - x + PT_BLEND_PAD), low);
-        vf_store(far + (i - x + PT_BLEND_PAD), high);
-    }
-    for (int32_t i = x; i < end; i += PT_LANES) {
-        const float *first = near + (i - x + PT_BLEND_PAD - reach), *last = far + (i - x + PT_BLEND_PAD - reach);
-        vf low = vf_load(first), high = vf_load(last);
-        for (int k = 1; k <= 2 * reach; k++) {
-            low = vf_min(low, vf_load(first + k));
-            high = vf_max(high, vf_load(last + k));
-        }
-        vf z = vf_load(around[reach]->z + i), limit = vf_load(around[reach]->limit + i);
-        flat[i / PT_LANES] = vm_bits(vm_and(vf_le(high - z, limit), vf_le(z - low, limit))) == PT_ALL;
-        some |= flat[i / PT_LANES];
-    }
-    return some;
+    vf reach = pt_blend_reach(view, blend, vf_load(own->z + x), vf_load(own->limit + x));
+    float lanes[PT_LANES];
+    vf_store(lanes, reach);
+    const int first = (int)lanes[0];
+    return vm_bits(vm_and(vf_le(reach, vf_set((float)first)), vf_le(vf_set((float)first), reach))) == PT_ALL ? first : 0;
 }
 
-// The sums of pt_blend_sum from x to end, at most PT_BLEND_COLUMNS, wherever flat[] says that they are whole windows'.
-static inline void pt_blend_flat(const struct pt_seen_row *const *around, int reach, const float *weights, int32_t x,
-                                 int32_t end, uint8_t *flat, float *const sums[3])
+// flat: the radius of vectors from x to end where all around each pixel is of its layer, else 0. Returns the greatest.
+static inline int pt_blend_find_flat(const struct view_args *view, int blend, const struct pt_seen_row *const *around, int32_t x, int32_t end,
+                                     uint8_t *flat)
 {
-    enum { STEP = PT_BLEND_AT_ONCE * PT_LANES };
-    float pairs[PT_BLEND_MOST + 1][PT_BLEND_ROW];
-    if (!pt_blend_find_flat(around, reach, x, end, flat))
-        return;
-    for (int k = 0; k < 3; k++) {
-        for (int32_t i = -PT_BLEND_PAD; i < end - x + PT_BLEND_PAD; i += PT_LANES)
-            vf_store(pairs[0] + PT_BLEND_PAD + i, vf_load(around[reach]->normal[k] + x + i));
-        for (int dy = 1; dy <= reach; dy++) {
-            const float *below = around[reach - dy]->normal[k] + x, *above = around[reach + dy]->normal[k] + x;
-            for (int32_t i = -PT_BLEND_PAD; i < end - x + PT_BLEND_PAD; i += PT_LANES)
-                vf_store(pairs[dy] + PT_BLEND_PAD + i, vf_load(below + i) + vf_load(above + i));
+    const struct pt_seen_row *own = around[blend];
+    float near[PT_BLEND_ROW], far[PT_BLEND_ROW];
+    int most = 0, flat_most = 0;
+    for (int32_t i = x; i < end; i += PT_LANES) {
+        flat[i / PT_LANES] = (uint8_t)pt_blend_shared_reach(view, blend, own, i);
+        most = flat[i / PT_LANES] > most ? flat[i / PT_LANES] : most;
+    }
+    for (int32_t i = -PT_BLEND_PAD; most && i < end - x + PT_BLEND_PAD; i += PT_LANES) {
+        vf low = vf_load(own->z + x + i), high = low;
+        for (int k = 1; k <= most; k++) {
+            vf below = vf_load(around[blend - k]->z + x + i), above = vf_load(around[blend + k]->z + x + i);
+            low = vf_min(vf_min(low, below), above);
+            high = vf_max(vf_max(high, below), above);
         }
-        for (int32_t first = 0; first < end - x; first += STEP) {
-            vf sum[PT_BLEND_AT_ONCE];
-            for (int i = 0; i < PT_BLEND_AT_ONCE; i++)
-                sum[i] = vf_zero();
-            for (int dy = 0; dy <= reach; dy++) {
-                const float *row = pairs[dy] + PT_BLEND_PAD + first;
-                const vf own = vf_set(weights[dy * dy]);
-                for (int i = 0; i < PT_BLEND_AT_ONCE; i++)
-                    sum[i] = sum[i] + vf_load(row + i * PT_LANES) * own;
-                for (int dx = 1; dx <= reach; dx++) {
-                    const vf weight = vf_set(weights[dx * dx + dy * dy]);
-                    for (int i = 0; i < PT_BLEND_AT_ONCE; i++)
-                        sum[i] = sum[i] + (vf_load(row + i * PT_LANES - dx) + vf_load(row + i * PT_LANES + dx)) * weight;
-                }
+        vf_store(near + PT_BLEND_PAD + i, low);
+        vf_store(far + PT_BLEND_PAD + i, high);
+    }
+    for (int32_t i = x; i < end; i += PT_LANES) {
+        const int reach = flat[i / PT_LANES];
+        const float *lows = near + PT_BLEND_PAD + (i - x), *highs = far + PT_BLEND_PAD + (i - x);
+        if (!reach)
+            continue;
+        vf low = vf_load(lows), high = vf_load(highs), z = vf_load(own->z + i), limit = vf_load(own->limit + i);
+        for (int k = 1; k <= reach; k++) {
+            low = vf_min(vf_min(low, vf_load(lows - k)), vf_load(lows + k));
+            high = vf_max(vf_max(high, vf_load(highs - k)), vf_load(highs + k));
+        }
+        if (vm_bits(vm_and(vf_le(high - z, limit), vf_le(z - low, limit))) != PT_ALL)
+            flat[i / PT_LANES] = 0;
+        flat_most = flat[i / PT_LANES] > flat_most ? flat[i / PT_LANES] : flat_most;
+    }
+    return flat_most;
+}
+
+// The sums of pt_blend_sum from x to end, at most PT_BLEND_COLUMNS, wherever they are whole windows'; flat says where.
+static inline void pt_blend_flat(const struct view_args *view, int blend, const struct pt_seen_row *const *around, const float *weights,
+                                 int32_t x, int32_t end, uint8_t *flat, float *const sums[3])
+{
+    float pairs[PT_BLEND_MOST + 1][3][PT_BLEND_ROW]; // of rows dy below and above, sums
+    const int most = pt_blend_find_flat(view, blend, around, x, end, flat);
+    for (int dy = 0; most && dy <= most; dy++)
+        for (int k = 0; k < 3; k++) {
+            const float *below = around[blend - dy]->normal[k] + x, *above = around[blend + dy]->normal[k] + x;
+            float *out = pairs[dy][k] + PT_BLEND_PAD;
+            for (int32_t i = -PT_BLEND_PAD; i < end - x + PT_BLEND_PAD; i += PT_LANES) {
+                vf pair = vf_load(below + i);
+                if (dy)
+                    pair = pair + vf_load(above + i);
+                vf_store(out + i, pair);
             }
-            for (int32_t i = 0; i < PT_BLEND_AT_ONCE && first + i * PT_LANES < end - x; i++)
-                vf_store(sums[k] + x + first + i * PT_LANES, sum[i]);
         }
+    for (int32_t i = 0; i < end - x; i += PT_LANES) {
+        const int reach = flat[(x + i) / PT_LANES];
+        vf sum[3] = { vf_zero(), vf_zero(), vf_zero() };
+        if (!reach)
+            continue;
+        for (int dy = 0; dy <= reach; dy++) {
+            const float *const rows[3] = { pairs[dy][0] + PT_BLEND_PAD + i, pairs[dy][1] + PT_BLEND_PAD + i,
+                                           pairs[dy][2] + PT_BLEND_PAD + i };
+            for (int k = 0; k < 3; k++)
+                sum[k] = sum[k] + vf_load(rows[k]) * vf_set(weights[dy * dy]);
+            for (int dx = 1; dx <= reach; dx++) {
+                const vf weight = vf_set(weights[dx * dx + dy * dy]);
+                for (int k = 0; k < 3; k++)
+                    sum[k] = sum[k] + (vf_load(rows[k] - dx) + vf_load(rows[k] + dx)) * weight;
+            }
+        }
+        for (int k = 0; k < 3; k++)
+            vf_store(sums[k] + x + i, sum[k]);
     }
 }
 
