@@ -26,6 +26,7 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_PIXELS, // fill: this step's changes; shade: filled pixels; antialias: edges; lines: steps
     PT_GL_SCRATCH_COLORS, // antialias: of edges; lines: discs
     PT_GL_SCRATCH_SHADED, // finish: colours before they are smoothed
+    PT_GL_SCRATCH_SHOWN,  // shade: what pixels give to a wide blend of normals
     PT_GL_SCRATCH_SAVED,  // fill: pixels as they were before the phase
     PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
     PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
@@ -79,6 +80,7 @@ struct pt_gl_device {
     char shade_definitions[PT_GL_VARIANTS][256]; // of shade's programs, shade_count of them
     uint32_t shade_count;
     GLuint tile_programs[2];
+    GLuint shown; // the key plane that PT_GL_SCRATCH_SHOWN is of, as long as no kernel writes planes; else 0
     GLuint textures[PT_GL_TEXTURES];
     struct pt_gl_tiles tiles;
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
@@ -122,6 +124,8 @@ void pt_gl_tiles_forget(struct pt_gl_device *d); // keys changed
 int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list);
 // Workgroups for `count` tiles of the list bound at PT_GL_BINDING_TILES.
 int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count);
+// Workgroups for every pixel, of programs whose invocations take several of a row each (lib/planes.glsl).
+int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height);
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 

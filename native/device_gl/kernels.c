@@ -118,14 +118,17 @@ static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t vari
                           (height + (uint32_t)group[1] - 1) / (uint32_t)group[1]);
 }
 
-// Of kernels whose invocations take several pixels each: llvmpipe spends as much on an invocation as on a pixel.
-static int run_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t width, uint32_t height)
+// llvmpipe spends as much on an invocation as on a pixel.
+int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height)
 {
     enum { COLUMNS = 64, ROWS = 4 }; // of a workgroup, as in lib/planes.glsl
+    return pt_gl_dispatch(d, kernel, variant, (width + COLUMNS - 1) / COLUMNS, (height + ROWS - 1) / ROWS);
+}
+
+static int run_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t width, uint32_t height)
+{
     int result = pt_gl_kernel_program(d, kernel, 0, "");
-    return result == PATINA_OK
-               ? pt_gl_dispatch(d, kernel, 0, (width + COLUMNS - 1) / COLUMNS, (height + ROWS - 1) / ROWS)
-               : result;
+    return result == PATINA_OK ? pt_gl_dispatch_rows(d, kernel, 0, width, height) : result;
 }
 
 static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
@@ -267,6 +270,8 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
 {
     const struct view_args *view = arguments;
     pt_gl_arguments(d, arguments, argument_size);
+    if (kernel != PT_KERNEL_shade) // it writes nothing that normals are blended from
+        d->shown = 0;
     if (kernel == PT_KERNEL_scatter) {
         pt_gl_tiles_forget(d);
         return pt_gl_scatter(d, arguments, buffers, count, cancel);

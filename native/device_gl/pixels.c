@@ -45,7 +45,8 @@ static int dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 
 // ---- shade -----------------------------------------------------------------------------------------------------
 
-enum { MOST_UNROLLED = 8 }; // lights
+enum { MOST_UNROLLED = 8 };          // lights
+enum { SHOWN = PT_GL_VARIANTS - 1 }; // among shade's programs: lib/shown.glsl
 
 // What a light kernel must know: llvmpipe runs every branch that any lane may take.
 static int plain_lights(const struct shade_args *args)
@@ -79,7 +80,7 @@ static int shade_program(struct pt_gl_device *d, const char *definitions, uint32
     uint32_t v = 0;
     while (v < d->shade_count && strcmp(d->shade_definitions[v], definitions) != 0)
         v++;
-    if (v == PT_GL_VARIANTS) {
+    if (v == SHOWN) {
         d->gl.DeleteProgram(d->programs[PT_KERNEL_shade][--v]);
         d->programs[PT_KERNEL_shade][v] = 0;
     }
@@ -108,6 +109,24 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
     d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][variant], 16, 3 * PT_MAX_LIGHTS, &lights[0][0]);
 }
 
+// What a wide blend of normals fetches, once for all instances.
+static int bind_shown(struct pt_gl_device *d, const struct view_args *view, const struct pt_buffer *keys)
+{
+    const size_t size = (size_t)view->width * view->height * 16;
+    GLuint *program = &d->programs[PT_KERNEL_shade][SHOWN];
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_SHOWN, size, 0);
+    const GLuint name = d->scratch[PT_GL_SCRATCH_SHOWN].name;
+    if (result == PATINA_OK && d->shown != keys->name) {
+        result = *program ? PATINA_OK : pt_gl_program(d, "lib/shown.glsl", "", program);
+        if (result == PATINA_OK)
+            result = pt_gl_bind(d, 1, name, 0, size, "shade");
+        if (result == PATINA_OK)
+            result = pt_gl_dispatch_rows(d, PT_KERNEL_shade, SHOWN, view->width, view->height);
+        d->shown = result == PATINA_OK ? keys->name : 0;
+    }
+    return result == PATINA_OK ? pt_gl_bind_texels(d, 4, name, 0, size) : result;
+}
+
 int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt_buffer *const *buffers)
 {
     char definitions[sizeof d->shade_definitions[0]];
@@ -118,6 +137,8 @@ int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt
     int result = shade_program(d, definitions, &variant);
     if (result == PATINA_OK && !d->base.info.hardware && buffers[4] && buffers[4]->name)
         result = pt_gl_bind_texture(d, 5, buffers[4]);
+    if (result == PATINA_OK && args->blend > 1)
+        result = bind_shown(d, &args->view, buffers[0]);
     if (result == PATINA_OK && args->instance.lit)
         set_lights(d, args, variant);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, variant, PT_GL_TILES_POINTS) : result;

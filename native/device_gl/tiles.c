@@ -9,6 +9,7 @@ enum { TILE = 8, GROUP = 32, LISTS = 2, GROUPS_IN_ROW = 16384 }; // as in lib/ti
 void pt_gl_tiles_forget(struct pt_gl_device *d)
 {
     d->tiles.valid = 0;
+    d->shown = 0;
 }
 
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y)

@@ -106,6 +106,14 @@ vec3 blend_nine(tap_row behind, tap_row row, tap_row ahead, float z, float limit
 }
 
 #if WIDE
+// Of lib/shown.glsl.
+vec4 read_shown(ivec2 size, int x, int y)
+{
+    bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
+    vec4 tap = texelFetch(other_float4_plane, inside ? y * size.x + x : 0);
+    return vec4(tap.xyz, inside ? tap.w : pt_float(PT_KEY_EMPTY_Z));
+}
+
 // Radius of a pixel's window: kernel_args.h.
 int reach_of(view_args view, float z, float limit)
 {
@@ -116,10 +124,10 @@ int reach_of(view_args view, float z, float limit)
 
 vec3 column(ivec2 size, int x, int y, int dy, float z, float limit)
 {
-    vec3 below = same_layer(read_tap(size, x, y - dy), z, limit);
+    vec3 below = same_layer(read_shown(size, x, y - dy), z, limit);
     if (dy == 0)
         return below;
-    precise vec3 both = below + same_layer(read_tap(size, x, y + dy), z, limit);
+    precise vec3 both = below + same_layer(read_shown(size, x, y + dy), z, limit);
     return both;
 }
 
