@@ -71,7 +71,7 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
         args.steep = !builder->layer;
         PT_REASON(PT_ADD(builder, normals, args,
                          {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0)}),
-                  "instance %u has no normals: estimated from the depth of %u x %u pixels", i, 2 * args.radius + 1,
+                  "instance %u has no normals: estimated from the depth of at most %u x %u pixels", i, 2 * args.radius + 1,
                   2 * args.radius + 1);
     }
     struct surface_args args = {.view = pt_view_of(plan, instance, 0), .instance = instance->args};

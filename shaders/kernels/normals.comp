@@ -35,6 +35,13 @@ float step_along(float before, float z, float after)
     return (known_before || known_after) && alike ? (pt_abs(first) < pt_abs(second) ? first : second) : 0.0;
 }
 
+// Radius of a pixel's window: kernel_args.h.
+int reach_of(view_args view, int radius, float distance_limit, float z)
+{
+    precise float wanted = 0.0 - floor(0.0 - distance_limit * pt_rcp(pt_footprint(view, z)));
+    return int(pt_min(pt_max(wanted, PT_ESTIMATE_LEAST), float(radius)));
+}
+
 // 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32. Which pixels: kernel_args.h.
 window_sums gather(view_args view, int radius, int x, int y, float z, float w, float distance_limit, float slope,
                    vec2 steps)
@@ -114,7 +121,8 @@ void normal_pixel(view_args view, int radius, bool steep, uint id_base, uint id_
         steps.x = step_along(depth_at(view, column - 1, row), z, depth_at(view, column + 1, row));
         steps.y = step_along(depth_at(view, column, row - 1), z, depth_at(view, column, row + 1));
     }
-    window_sums s = gather(view, radius, column, row, z, w, distance_limit, slope, steps);
+    int reach = reach_of(view, radius, distance_limit, z);
+    window_sums s = gather(view, reach, column, row, z, w, distance_limit, slope, steps);
     normals[at] = vec4(fit(view, s, w, pt_ray(view, int(x), int(y))), 0.0);
 }
 

@@ -37,6 +37,12 @@ static double step_along(double before, double z, double after)
     return fabs(into) < fabs(out) ? into : out;
 }
 
+// Radius of a window that reaches two spacings, `spacings` in pixels.
+static int window_radius(double spacings, uint32_t most)
+{
+    return (int)fmin(fmax(ceil(spacings), (double)PT_ESTIMATE_LEAST), most);
+}
+
 static enum ref_truth gather(const struct normals_args *args, const struct ref_planes *planes, int x, int y,
                              struct samples *out)
 {
@@ -46,12 +52,15 @@ static enum ref_truth gather(const struct normals_args *args, const struct ref_p
     double z = ref_key_z(key);
     uint32_t word = planes->surface[ref_key_id(key) - instance->id_base];
     double m = ref_layer_minimum(view, instance->d_min, instance->spacing[word >> PT_SPACING_SHIFT], z);
-    int radius = (int)args->radius;
+    double spacings = m / ref_footprint(view, z), off = TOL_QUOTIENT * spacings;
+    int radius = window_radius(spacings, args->radius);
     double steps[2] = {0.0, 0.0};
     if (args->steep) {
         steps[0] = step_along(depth_at(view, planes, x - 1, y), z, depth_at(view, planes, x + 1, y));
         steps[1] = step_along(depth_at(view, planes, x, y - 1), z, depth_at(view, planes, x, y + 1));
     }
+    if (window_radius(spacings - off, args->radius) != window_radius(spacings + off, args->radius))
+        return REF_UNSURE;
     out->count = 0;
     out->centre = linear(view, z);
     out->greatest = 0.0;
@@ -66,11 +75,11 @@ static enum ref_truth gather(const struct normals_args *args, const struct ref_p
             // The same surface: within a layer distance, or no steeper than four pixels' width a pixel; from where the
             // pixel's own steps lead, give or take half as far.
             double along = steps[0] * dx, up = steps[1] * dy, far = fabs(along) + fabs(up);
-            double off = fabs(ref_key_z(neighbour) - z - along - up);
+            double apart = fabs(ref_key_z(neighbour) - z - along - up);
             double most = fmax(fmax(m, 4.0 * ref_footprint(view, z) * fmax(abs(dx), abs(dy))), (double)PT_STEEP * far);
             double error = most * TOL_WINDOW + TOL_WINDOW * (far + fabs(ref_key_z(neighbour) - z)) * (far > 0.0);
             struct ref_range threshold = {most - error, most + error};
-            enum ref_truth taken = ref_less_equal(ref_exactly(off), threshold);
+            enum ref_truth taken = ref_less_equal(ref_exactly(apart), threshold);
             if (taken == REF_UNSURE)
                 return REF_UNSURE;
             if (taken == REF_NO)

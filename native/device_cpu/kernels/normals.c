@@ -10,6 +10,7 @@ struct center { // PT_LANES pixels
     vi x, y, pixel;
     vf z, w;
     vf distance, slope, step[2]; // what belongs to the same surface: kernel_args.h
+    vf reach;                    // radius of the window
     vm ours;
 };
 
@@ -52,22 +53,33 @@ static uint32_t larger(int32_t a, int32_t b)
     return p > q ? p : q;
 }
 
+// Radius of the pixels' windows: kernel_args.h.
+static vf reach_of(const struct normals_args *args, vf distance, vf z)
+{
+    const vf zero = vf_zero();
+    vf wanted = zero - vf_floor(zero - distance * vf_rcp(vf_footprint(&args->view, z)));
+    return vf_min(vf_max(wanted, vf_set(PT_ESTIMATE_LEAST)), vf_set((float)args->radius));
+}
+
 // 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32.
 static struct sums gather(const struct normals_args *args, const uint64_t *keys, const struct center *c)
 {
     const struct view_args *view = &args->view;
-    const int32_t r = (int32_t)args->radius;
+    int32_t r = (int32_t)args->radius;
+    while (r && !vm_bits(vm_and(c->ours, vf_le(vf_set((float)r), c->reach))))
+        r--;
     const vf zero = vf_zero(), one = vf_set(1.0f);
     struct sums s = { zero, zero, zero, zero, zero, zero, zero, zero, zero };
     for (int32_t dy = -r; dy <= r; dy++)
         for (int32_t dx = -r; dx <= r; dx++) {
             vi qx = vi_add(c->x, vi_set((uint32_t)dx)), qy = vi_add(c->y, vi_set((uint32_t)dy));
-            vm inside = vm_and(c->ours, vm_and(vi_lt_unsigned(qx, vi_set(view->width)),
-                                               vi_lt_unsigned(qy, vi_set(view->height))));
+            const vf far = vf_set((float)larger(dx, dy));
+            vm inside = vm_and(vm_and(c->ours, vf_le(far, c->reach)),
+                               vm_and(vi_lt_unsigned(qx, vi_set(view->width)), vi_lt_unsigned(qy, vi_set(view->height))));
             vi q = vi_add(c->pixel, vi_set((uint32_t)(dy * (int32_t)view->width + dx)));
             vf zq = vi_float(vi_gather_z(keys, q, inside));
             const vf along = c->step[0] * vf_set((float)dx), up = c->step[1] * vf_set((float)dy);
-            vf tolerance = vf_max(c->distance, c->slope * vf_set((float)larger(dx, dy)));
+            vf tolerance = vf_max(c->distance, c->slope * far);
             tolerance = vf_max(tolerance, vf_set(PT_STEEP) * (vf_abs(along) + vf_abs(up)));
             vm same = vm_and(inside, vf_le(vf_abs((zq - c->z) - (along + up)), tolerance));
             if (!vm_bits(same))
@@ -121,6 +133,7 @@ static void normal_pixels(const struct normals_args *args, const struct pt_cpu_c
     vi word = vi_gather(pt_cpu_data(call, 1), vi_load(ids), center.ours);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
     center.distance = vf_layer_distance(view, instance->d_min, spacing, center.z, vf_set(1.0f));
+    center.reach = reach_of(args, center.distance, center.z);
     center.slope = vf_set(4.0f) * vf_footprint(view, center.z); // 76 degrees
     for (int k = 0; k < 2; k++)
         center.step[k] = args->steep ? step_along(view, keys, &center, 1 - k, k) : vf_zero();
