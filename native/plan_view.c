@@ -26,12 +26,18 @@ struct camera {
     double width, height;  // padded picture, pixels
 };
 
+// Where a box lies.
+struct extent {
+    double rect[4];            // on screen, pixels
+    double z_middle, z_beyond; // of its part before the eye; nothing lies beyond
+    double share;              // how much of it lies before the eye
+};
+
 // One chunk in view, before it is known which window the planes get.
 struct seen {
     uint32_t chunk;
     uint32_t cull, away; // test each point's normal; every point faces away
-    double rect[4];        // bounds on screen, pixels of the picture without its padding
-    double z_beyond;       // nothing lies beyond it
+    struct extent extent;  // on screen in pixels of the picture without its padding
     double spacing_px, area_px;
 };
 
@@ -161,11 +167,31 @@ static double disc_reach(const struct patina_scene *scene, const struct pt_insta
     return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
 }
 
-// Bounds on screen of the chunk's box and what lies within `reach` of it, a pixel wider than exact and not cut off at the
-// picture's, its middle depth and one that nothing lies beyond; 0 when it is outside the view.
-static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chunk, const double rows[9],
-                        const double translation[3], double reach, double rect[4], double *z_middle, double *z_beyond)
+// Whether a box lies beyond one side of the view, its part behind the camera too, where the screen bounds nothing. q: of its
+// corners, screen X and Y times z, and z, each off by `error` at most. A pixel narrower than exact.
+static int lies_beside(const struct camera *camera, double q[3][8], const double error[3], double reach)
 {
+    for (int k = 0; k < 2; k++) {
+        const double size = k ? camera->height : camera->width, scale = 1.0 / (k ? camera->ys : camera->xs);
+        const double wide = error[k] + reach * scale * (1.0 + fabs(k ? camera->bottom : camera->left)), deep = error[2] + reach;
+        int before = 0, behind = 0;
+        for (int i = 0; i < 8; i++) {
+            const double pixel = fabs(q[2][i]) + deep;
+            before += q[k][i] + pixel + wide < 0.0;
+            behind += q[k][i] - size * (q[2][i] + deep) - pixel - wide > 0.0;
+        }
+        if (before == 8 || behind == 8)
+            return 1;
+    }
+    return 0;
+}
+
+// Extent of the chunk's box and what lies within `reach` of it, on screen a pixel wider than exact and not cut off at the
+// picture's; 0 when it is outside the view.
+static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chunk, const double rows[9],
+                        const double translation[3], double reach, struct extent *out)
+{
+    double *const rect = out->rect;
     const double z_far = camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip;
     const double z_near = camera->orthographic ? 0.0 : camera->near_clip;
     double z_min = INFINITY, z_max = -INFINITY, q[3][8]; // of the corners
@@ -195,8 +221,9 @@ static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chun
         }
     }
     slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
-    *z_middle = 0.5 * (most(z_min, z_near) + most(z_max, z_near)); // of the part before the eye
-    *z_beyond = z_max + slop + reach;
+    out->z_middle = 0.5 * (most(z_min, z_near) + most(z_max, z_near));
+    out->z_beyond = z_max + slop + reach;
+    out->share = z_min < z_near ? (z_max - z_near) / (z_max - z_min) : 1.0;
     const double nearest_z = z_min - reach;
     if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
         return 0;
@@ -218,6 +245,7 @@ static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chun
     if (!camera->orthographic && nearest_z < z_near) { // corners behind the camera bound nothing
         rect[0] = rect[1] = -INFINITY;
         rect[2] = rect[3] = INFINITY;
+        return !lies_beside(camera, q, error, reach);
     }
     // what is not a number bounds nothing
     return !(rect[0] >= camera->width || rect[1] >= camera->height || rect[2] <= 0.0 || rect[3] <= 0.0);
@@ -331,7 +359,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         struct seen seen = { .chunk = c };
-        double translation[3], eye[4], z, angle = 0.0, spread = 0.0;
+        double translation[3], eye[4], angle = 0.0, spread = 0.0;
         if (pt_sieve_chunk(&survey->sieves[i], chunk, NULL, NULL) == PT_CUT_AWAY) {
             plan->chunks_clipped++;
             continue;
@@ -342,19 +370,19 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (cull && facing == FACES_AWAY)
             continue;
         chunk_translation(camera, object, chunk, translation);
-        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart), seen.rect, &z,
-                          &seen.z_beyond))
+        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart), &seen.extent))
             continue;
         for (int k = 0; k < 4; k++)
-            seen.rect[k] -= AROUND;
+            seen.extent.rect[k] -= AROUND;
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered;
-        double footprint = most(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : z);
+        double footprint = most(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : seen.extent.z_middle);
         uint32_t count = drawn_points(scene, chunk);
         double thinned = sqrt((double)chunk->count / count);
         seen.spacing_px = thinned * (double)chunk->spacing * object->scale / footprint *
                           sqrt(chunk_cosine(known, angle, spread));
-        seen.area_px = count * seen.spacing_px * seen.spacing_px;
+        // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
+        seen.area_px = least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         list[survey->seen_count[i]++] = seen;
     }
     plan->transparent |= transparent && survey->seen_count[i] > 0;
@@ -601,10 +629,10 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         const struct seen *seen = &survey->seen[i][k];
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
         uint32_t *rect = out->bounds[out->chunk_count].rect;
-        if (!rect_in_window(&plan->view, seen->rect, plan->guard, rect))
+        if (!rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
             continue;
         uint32_t count = drawn_points(scene, chunk);
-        out->bounds[out->chunk_count].z_far = nextafterf((float)seen->z_beyond, INFINITY);
+        out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
         set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
                   &out->chunks[out->chunk_count]);
         out->chunks[out->chunk_count].row_first = rect[1];
@@ -626,13 +654,14 @@ static void place_mesh(struct pt_plan *plan, const struct camera *camera, const 
 {
     const struct patina_mesh *mesh = instance->mesh;
     struct object object;
-    double rows[9], translation[3], bounds[4], z, beyond;
+    double rows[9], translation[3];
+    struct extent extent;
     *out = (struct pt_plan_mesh){ .instance = instance };
     set_object(camera, instance->style.world_from_object, &object);
     product_rows(camera, &object, rows);
     chunk_translation(camera, &object, &mesh->box, translation);
-    if (!pt_mesh_drawn(mesh) || !chunk_bounds(camera, &mesh->box, rows, translation, 0.0, bounds, &z, &beyond) ||
-        !rect_in_window(&plan->view, bounds, 0, out->rect))
+    if (!pt_mesh_drawn(mesh) || !chunk_bounds(camera, &mesh->box, rows, translation, 0.0, &extent) ||
+        !rect_in_window(&plan->view, extent.rect, 0, out->rect))
         return;
     struct mesh_args *args = &out->args;
     set_product(rows, translation, args->row, args->hi, args->lo);

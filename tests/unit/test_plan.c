@@ -197,6 +197,107 @@ static void test_nothing_in_view_is_said(void **state)
     patina_cloud_destroy(cloud);
 }
 
+struct eye {
+    double at[3], axes[3][3]; // right, up, back
+};
+
+// A camera among the points, 2048 x 1536 pixels, 60 degrees wide.
+static struct eye look(patina_scene *scene, const double at[3], const double to[3])
+{
+    struct eye eye;
+    double *x = eye.axes[0], *y = eye.axes[1], *z = eye.axes[2], length = 0.0;
+    for (int k = 0; k < 3; k++)
+        z[k] = (eye.at[k] = at[k]) - to[k];
+    for (int k = 0; k < 3; k++)
+        length += z[k] * z[k];
+    for (int k = 0; k < 3; k++)
+        z[k] /= sqrt(length);
+    double flat = sqrt(z[0] * z[0] + z[1] * z[1]); // never straight down
+    x[0] = -z[1] / flat, x[1] = z[0] / flat, x[2] = 0.0;
+    y[0] = z[1] * x[2] - z[2] * x[1], y[1] = z[2] * x[0] - z[0] * x[2], y[2] = z[0] * x[1] - z[1] * x[0];
+    const double half = tan(30.0 * 0.017453292519943295);
+    patina_camera camera = { .struct_size = sizeof camera,
+                             .left = -half,
+                             .right = half,
+                             .bottom = -0.75 * half,
+                             .top = 0.75 * half,
+                             .near_clip = 0.001,
+                             .far_clip = 10 };
+    patina_settings settings = { .struct_size = sizeof settings, .width = 2048, .height = 1536 };
+    for (int r = 0; r < 3; r++) {
+        for (int c = 0; c < 3; c++)
+            camera.world_from_camera[4 * r + c] = eye.axes[c][r];
+        camera.world_from_camera[4 * r + 3] = at[r];
+    }
+    camera.world_from_camera[15] = 1.0;
+    assert_int_equal(patina_scene_set_camera(scene, &camera), PATINA_OK);
+    assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+    return eye;
+}
+
+static int shows(const struct eye *eye, const float point[3])
+{
+    double p[3] = { 0 }, half = tan(30.0 * 0.017453292519943295);
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++)
+            p[c] += eye->axes[c][k] * ((double)point[k] - eye->at[k]);
+    return p[2] < -0.001 && fabs(p[0]) < half * -p[2] && fabs(p[1]) < 0.75 * half * -p[2];
+}
+
+// What lies around the camera, partly behind it, is culled where none of it shows, and never where some does.
+static void test_chunks_around_the_camera(void **state)
+{
+    (void)state;
+    uint32_t seed = 1, kept = 0, culled = 0;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    uint8_t *drawn = malloc(cloud->slots);
+    assert_non_null(drawn);
+    for (int i = 0; i < 300; i++) {
+        double at[2][3];
+        for (int k = 0; k < 6; k++) {
+            seed = seed * 1664525u + 1013904223u;
+            at[k / 3][k % 3] = (double)(seed >> 8) / (1 << 24) * (k % 3 == 2 ? 0.3 : 2.0) - (k % 3 == 2 ? -0.01 : 1.0);
+        }
+        struct eye eye = look(scene, at[0], at[1]);
+        struct pt_plan plan = plan_of(scene);
+        memset(drawn, 0, cloud->slots);
+        for (uint32_t c = 0; c < plan.instances[0].chunk_count; c++)
+            memset(drawn + plan.instances[0].chunks[c].first, 1, plan.instances[0].chunks[c].count);
+        for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+            const struct pt_chunk *chunk = &cloud->chunks[c];
+            for (uint32_t slot = chunk->first; slot < chunk->first + chunk->count; slot++)
+                assert_true(drawn[slot] || !shows(&eye, positions[cloud->order[slot]]));
+            kept += drawn[chunk->first];
+            culled += !drawn[chunk->first];
+        }
+        pt_plan_destroy(&plan);
+    }
+    assert_true(4 * culled > 3 * kept); // 2213 and 2587; by bounds on screen alone 1254 and 3546
+    free(drawn);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+// The ground below and behind a camera does not show: what is filled is chosen by what does, 12 to 28 pixels apart.
+static void test_spacing_is_of_what_shows(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    look(scene, (const double[]){ 0.1, -0.5, 0.6 }, (const double[]){ 0.1, 0.4, 0.0 });
+    struct pt_plan plan = plan_of(scene);
+    assert_true(plan.spacing_px > 12.0 && plan.spacing_px < 40.0); // 112 with what lies behind the eye
+    pt_plan_destroy(&plan);
+    // in the middle of it: as much as the nearest ground that shows, not what lies at the lens
+    look(scene, (const double[]){ 0.0, 0.0, 0.1 }, (const double[]){ 1.0, 0.0, 0.1 });
+    plan = plan_of(scene);
+    assert_true(plan.spacing_px > 12.0 && plan.spacing_px < 80.0);
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 static void test_region_decides_as_the_whole(void **state)
 {
     (void)state;
@@ -319,6 +420,7 @@ int main(void)
         cmocka_unit_test(test_lines_are_planned_where_asked_for),
         cmocka_unit_test(test_every_pass_runs_or_has_a_reason), cmocka_unit_test(test_missing_normals_are_estimated),
         cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
+        cmocka_unit_test(test_chunks_around_the_camera),        cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
         cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),
         cmocka_unit_test(test_layers),
