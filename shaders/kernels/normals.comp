@@ -42,35 +42,44 @@ int reach_of(view_args view, int radius, float distance_limit, float z)
     return int(pt_min(pt_max(wanted, PT_ESTIMATE_LEAST), float(radius)));
 }
 
-// 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32. Which pixels: kernel_args.h.
+// 1. Sums over the window, of rows first. Pixel counts and offsets are small integers: exact in float32. Which pixels:
+// kernel_args.h.
 window_sums gather(view_args view, int radius, int x, int y, float z, float w, float distance_limit, float slope,
                    vec2 steps)
 {
     precise window_sums s = window_sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for (int dy = -radius; dy <= radius; dy++)
+    for (int dy = -radius; dy <= radius; dy++) {
+        precise float n = 0.0, sum_x = 0.0, sum_xx = 0.0, sum_w = 0.0, sum_xw = 0.0;
         for (int dx = -radius; dx <= radius; dx++) {
             int qx = x + dx, qy = y + dy;
             if (qx < 0 || qy < 0 || qx >= int(view.width) || qy >= int(view.height))
                 continue;
             float zq = read_z(uint(qy) * view.width + uint(qx));
-            float fx = float(dx), fy = float(dy);
-            precise float along = steps.x * fx, up = steps.y * fy;
+            float fx = float(dx);
+            precise float along = steps.x * fx, up = steps.y * float(dy);
             precise float apart = (zq - z) - (along + up);
             precise float reach = slope * float(max(abs(dx), abs(dy)));
             precise float steep = PT_STEEP * (pt_abs(along) + pt_abs(up));
             if (!(pt_abs(apart) <= pt_max(pt_max(distance_limit, reach), steep)))
                 continue; // another surface, or nothing
             precise float dw = linear_depth(view, zq) - w;
-            s.n = s.n + 1.0;
-            s.x = s.x + fx;
-            s.y = s.y + fy;
-            s.xx = s.xx + fx * fx;
-            s.xy = s.xy + fx * fy;
-            s.yy = s.yy + fy * fy;
-            s.w = s.w + dw;
-            s.xw = s.xw + fx * dw;
-            s.yw = s.yw + fy * dw;
+            n = n + 1.0;
+            sum_x = sum_x + fx;
+            sum_xx = sum_xx + fx * fx;
+            sum_w = sum_w + dw;
+            sum_xw = sum_xw + fx * dw;
         }
+        float fy = float(dy);
+        s.n = s.n + n;
+        s.x = s.x + sum_x;
+        s.y = s.y + n * fy;
+        s.xx = s.xx + sum_xx;
+        s.xy = s.xy + sum_x * fy;
+        s.yy = s.yy + n * (fy * fy);
+        s.w = s.w + sum_w;
+        s.xw = s.xw + sum_xw;
+        s.yw = s.yw + fy * sum_w;
+    }
     return s;
 }
 

@@ -3,14 +3,23 @@
 //
 // A plane is linear in the picture as 1/z (perspective) or z (orthographic). Least squares over the window's pixels that
 // can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
-// The pixels of a row that are asked for are gathered, so that sparse clouds fill the lanes too.
-#include "device_cpu/rows.h"
+// Rows are seen as depths and what is linear in them. Where most pixels of a vector are asked for it takes its neighbours by
+// plain loads; of the others those that are asked for are packed and gather, so that sparse clouds fill the lanes too.
+#include "device_cpu/picture_rows.h"
 
-struct center { // PT_LANES pixels
-    vi x, y, pixel;
+enum { BAND_ROWS = 32, ROWS_MOST = 2 * 16 + 1 };
+
+struct depth_row {
+    float *z, *w; // by column, from -PT_ROW_PAD on; +inf and anything where nothing is
+};
+
+struct center { // PT_LANES pixels of a row
+    uint32_t x;    // column of the first; packed: any
+    vi at;         // columns, from the row's beginning
     vf z, w;
     vf distance, slope, step[2]; // what belongs to the same surface: kernel_args.h
     vf reach;                    // radius of the window
+    int32_t least, most;         // of reach
     vm ours;
 };
 
@@ -25,21 +34,34 @@ static vf linear_depth(const struct view_args *view, vf z)
     return z;
 }
 
-// Depths 1 and 2 pixels on along (dx, dy), those before the pixel with -dx, -dy; and which of them show something.
-static vf depth_at(const struct view_args *view, const uint64_t *keys, const struct center *c, int32_t dx, int32_t dy, vm *known)
+static void see_row(const struct view_args *view, const uint64_t *keys, int32_t y, const struct depth_row *row)
 {
-    vi x = vi_add(c->x, vi_set((uint32_t)dx)), y = vi_add(c->y, vi_set((uint32_t)dy));
-    vm inside = vm_and(c->ours, vm_and(vi_lt_unsigned(x, vi_set(view->width)), vi_lt_unsigned(y, vi_set(view->height))));
-    vf z = vi_float(vi_gather_z(keys, vi_add(c->pixel, vi_set((uint32_t)(dy * (int32_t)view->width + dx))), inside));
-    *known = vm_and(inside, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
-    return z;
+    if (y < 0 || y >= (int32_t)view->height) {
+        pt_empty_row(row->z, view->width);
+        return;
+    }
+    pt_empty_columns(row->z, -PT_ROW_PAD, 0);
+    for (uint32_t x = 0; x < view->width; x += PT_LANES) {
+        vf z = vi_float(vi_load_z(keys + (size_t)y * view->width + x));
+        vf_store(row->z + x, z);
+        vf_store(row->w + x, linear_depth(view, z));
+    }
+    pt_empty_columns(row->z, (int32_t)view->width, (int32_t)view->width + PT_ROW_PAD);
 }
 
-// What z changes by from pixel to pixel along (dx, dy), as far as both sides agree.
-static vf step_along(const struct view_args *view, const uint64_t *keys, const struct center *c, int32_t dx, int32_t dy)
+// What lies dx columns on.
+static inline vf taps(const float *row, const struct center *c, int32_t dx, int packed)
 {
-    vm known_before, known_after;
-    vf before = depth_at(view, keys, c, -dx, -dy, &known_before), after = depth_at(view, keys, c, dx, dy, &known_after);
+    if (packed) // the same columns at every tap: they are taken apart once
+        return vf_gather(row - PT_ROW_PAD + dx, c->at, c->ours);
+    return vf_load(row + (int32_t)c->x + dx);
+}
+
+// What z changes by from what lies before a pixel to what lies after it, as far as both sides agree.
+static vf step_along(const struct center *c, vf before, vf after)
+{
+    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
+    vm known_before = vm_and(c->ours, vf_lt(before, empty)), known_after = vm_and(c->ours, vf_lt(after, empty));
     vf a = c->z - before, b = after - c->z;
     a = vf_select(known_before, a, b);
     b = vf_select(known_after, b, a);
@@ -54,48 +76,61 @@ static uint32_t larger(int32_t a, int32_t b)
 }
 
 // Radius of the pixels' windows: kernel_args.h.
-static vf reach_of(const struct normals_args *args, vf distance, vf z)
+static void find_reach(const struct normals_args *args, struct center *c)
 {
     const vf zero = vf_zero();
-    vf wanted = zero - vf_floor(zero - distance * vf_rcp(vf_footprint(&args->view, z)));
-    return vf_min(vf_max(wanted, vf_set(PT_ESTIMATE_LEAST)), vf_set((float)args->radius));
+    vf wanted = zero - vf_floor(zero - c->distance * vf_rcp(vf_footprint(&args->view, c->z)));
+    c->reach = vf_min(vf_max(wanted, vf_set(PT_ESTIMATE_LEAST)), vf_set((float)args->radius));
+    c->most = c->least = (int32_t)args->radius;
+    while (c->most && !vm_bits(vm_and(c->ours, vf_le(vf_set((float)c->most), c->reach))))
+        c->most--;
+    while (vm_bits(vm_and(c->ours, vf_lt(c->reach, vf_set((float)c->least)))))
+        c->least--;
 }
 
-// 1. Sums over the window. Pixel counts and offsets are small integers: exact in float32.
-static struct sums gather(const struct normals_args *args, const uint64_t *keys, const struct center *c)
+// 1. Sums over the window, of rows first. Pixel counts and offsets are small integers: exact in float32. around: rows from
+// `radius` below on.
+static inline __attribute__((always_inline)) struct sums sum_window(const struct normals_args *args,
+                                                                    const struct depth_row *const *around,
+                                                                    const struct center *c, int packed, int steep)
 {
-    const struct view_args *view = &args->view;
-    int32_t r = (int32_t)args->radius;
-    while (r && !vm_bits(vm_and(c->ours, vf_le(vf_set((float)r), c->reach))))
-        r--;
     const vf zero = vf_zero(), one = vf_set(1.0f);
     struct sums s = { zero, zero, zero, zero, zero, zero, zero, zero, zero };
-    for (int32_t dy = -r; dy <= r; dy++)
-        for (int32_t dx = -r; dx <= r; dx++) {
-            vi qx = vi_add(c->x, vi_set((uint32_t)dx)), qy = vi_add(c->y, vi_set((uint32_t)dy));
-            const vf far = vf_set((float)larger(dx, dy));
-            vm inside = vm_and(vm_and(c->ours, vf_le(far, c->reach)),
-                               vm_and(vi_lt_unsigned(qx, vi_set(view->width)), vi_lt_unsigned(qy, vi_set(view->height))));
-            vi q = vi_add(c->pixel, vi_set((uint32_t)(dy * (int32_t)view->width + dx)));
-            vf zq = vi_float(vi_gather_z(keys, q, inside));
-            const vf along = c->step[0] * vf_set((float)dx), up = c->step[1] * vf_set((float)dy);
-            vf tolerance = vf_max(c->distance, c->slope * far);
-            tolerance = vf_max(tolerance, vf_set(PT_STEEP) * (vf_abs(along) + vf_abs(up)));
-            vm same = vm_and(inside, vf_le(vf_abs((zq - c->z) - (along + up)), tolerance));
+    for (int32_t dy = -c->most; dy <= c->most; dy++) {
+        const struct depth_row *row = around[(int32_t)args->radius + dy];
+        vf n = zero, x = zero, xx = zero, w = zero, xw = zero;
+        for (int32_t dx = -c->most; dx <= c->most; dx++) {
+            const int32_t far = (int32_t)larger(dx, dy);
+            const vf fx = vf_set((float)dx);
+            vf apart = taps(row->z, c, dx, packed) - c->z, tolerance = vf_max(c->distance, c->slope * vf_set((float)far));
+            if (steep) {
+                const vf along = c->step[0] * fx, up = c->step[1] * vf_set((float)dy);
+                apart = apart - (along + up);
+                tolerance = vf_max(tolerance, vf_set(PT_STEEP) * (vf_abs(along) + vf_abs(up)));
+            }
+            vm same = vm_and(c->ours, vf_le(vf_abs(apart), tolerance));
+            if (far > c->least)
+                same = vm_and(same, vf_le(vf_set((float)far), c->reach));
             if (!vm_bits(same))
                 continue; // other surfaces, or nothing
-            const vf fx = vf_set((float)dx), fy = vf_set((float)dy);
-            vf dw = vf_select(same, linear_depth(view, zq) - c->w, zero), some = vf_select(same, one, zero);
-            s.n = s.n + some;
-            s.x = s.x + some * fx;
-            s.y = s.y + some * fy;
-            s.xx = s.xx + some * (fx * fx);
-            s.xy = s.xy + some * (fx * fy);
-            s.yy = s.yy + some * (fy * fy);
-            s.w = s.w + dw;
-            s.xw = s.xw + fx * dw;
-            s.yw = s.yw + fy * dw;
+            vf dw = vf_select(same, taps(row->w, c, dx, packed) - c->w, zero);
+            n = vf_add_where(same, n, one);
+            x = vf_add_where(same, x, fx);
+            xx = vf_add_where(same, xx, vf_set((float)(dx * dx)));
+            w = w + dw;
+            xw = xw + fx * dw;
         }
+        const vf fy = vf_set((float)dy);
+        s.n = s.n + n;
+        s.x = s.x + x;
+        s.y = s.y + n * fy;
+        s.xx = s.xx + xx;
+        s.xy = s.xy + x * fy;
+        s.yy = s.yy + n * (fy * fy);
+        s.w = s.w + w;
+        s.xw = s.xw + xw;
+        s.yw = s.yw + fy * w;
+    }
     return s;
 }
 
@@ -113,41 +148,46 @@ static vm solve(const struct center *center, const struct sums *s, vf *a, vf *b,
     return vf_lt(vf_set(0.5f), det);
 }
 
-static void normal_pixels(const struct normals_args *args, const struct pt_cpu_call *call, const uint32_t *x, uint32_t y,
-                          uint32_t lanes)
+struct job {
+    const struct pt_cpu_call *call;
+    const struct normals_args *args;
+    float *memory; // per thread: a ring of rows, PT_ROW_PAD floats behind the first
+    size_t stride; // floats of a row's z, and of its w
+};
+
+// Normals of PT_LANES pixels of row y, of which c.x, c.at and c.ours are known. id: of their points in the instance.
+static inline __attribute__((always_inline)) void normal_pixels(const struct job *job, const struct depth_row *const *around,
+                                                                uint32_t y, struct center c, vi id, int packed)
 {
+    const struct normals_args *args = job->args;
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
-    const uint64_t *keys = pt_cpu_data(call, 0);
-    float *normals = pt_cpu_data(call, 2);
-    uint32_t ids[PT_LANES], pixels[PT_LANES];
-    struct center center = { .x = vi_load(x), .y = vi_set(y), .ours = vm_first(lanes) };
-    for (uint32_t i = 0; i < PT_LANES; i++) {
-        pixels[i] = i < lanes ? y * view->width + x[i] : 0;
-        ids[i] = i < lanes ? (uint32_t)keys[pixels[i]] - instance->id_base : 0;
-    }
-    center.pixel = vi_load(pixels);
-    center.z = vi_float(vi_gather_z(keys, center.pixel, center.ours));
-    center.z = vf_select(center.ours, center.z, vf_set(1.0f));
-    center.w = linear_depth(view, center.z);
-    vi word = vi_gather(pt_cpu_data(call, 1), vi_load(ids), center.ours);
+    const struct depth_row *own = around[args->radius], *below = around[args->radius - 1], *above = around[args->radius + 1];
+    c.z = vf_select(c.ours, taps(own->z, &c, 0, packed), vf_set(1.0f));
+    c.w = linear_depth(view, c.z);
+    vi word = vi_gather(pt_cpu_data(job->call, 1), id, c.ours);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
-    center.distance = vf_layer_distance(view, instance->d_min, spacing, center.z, vf_set(1.0f));
-    center.reach = reach_of(args, center.distance, center.z);
-    center.slope = vf_set(4.0f) * vf_footprint(view, center.z); // 76 degrees
-    for (int k = 0; k < 2; k++)
-        center.step[k] = args->steep ? step_along(view, keys, &center, 1 - k, k) : vf_zero();
-
-    struct sums sums = gather(args, keys, &center);
-    vf a, b, c, n[3], ray[2] = { vf_zero(), vf_zero() };
-    vm found = vm_and(center.ours, solve(&center, &sums, &a, &b, &c));
+    c.distance = vf_layer_distance(view, instance->d_min, spacing, c.z, vf_set(1.0f));
+    c.slope = vf_set(4.0f) * vf_footprint(view, c.z); // 76 degrees
+    find_reach(args, &c);
+    struct sums sums;
+    if (args->steep) {
+        c.step[0] = step_along(&c, taps(own->z, &c, -1, packed), taps(own->z, &c, 1, packed));
+        c.step[1] = step_along(&c, taps(below->z, &c, 0, packed), taps(above->z, &c, 0, packed));
+        sums = sum_window(args, around, &c, packed, 1);
+    } else {
+        sums = sum_window(args, around, &c, packed, 0);
+    }
+    vf a, b, w, n[3], ray[2] = { vf_zero(), vf_zero() };
+    vm found = vm_and(c.ours, solve(&c, &sums, &a, &b, &w));
     // 3. the plane's normal from dw/dx = a, dw/dy = b a pixel
+    vi column = vi_sub(c.at, vi_set(PT_ROW_PAD));
     n[0] = a * vf_set(view->ray_ys);
     n[1] = b * vf_set(view->ray_xs);
     n[2] = vf_set(view->ray_xs * view->ray_ys);
     if (view->perspective) {
-        vf_ray_of(view, center.x, center.y, ray);
-        n[2] = (n[0] * ray[0] + n[1] * ray[1]) - c * n[2];
+        vf_ray_of(view, column, vi_set(y), ray);
+        n[2] = (n[0] * ray[0] + n[1] * ray[1]) - w * n[2];
     }
     // 4. unit, towards the viewer: n . (u, v, -1) < 0. Largest component first, so that no square over- or underflows.
     vf largest = vf_max(vf_max(vf_abs(n[0]), vf_abs(n[1])), vf_abs(n[2]));
@@ -158,37 +198,90 @@ static void normal_pixels(const struct normals_args *args, const struct pt_cpu_c
     scale = vf_rsqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
     vm away = vf_lt(vf_zero(), (n[0] * ray[0] + n[1] * ray[1]) - n[2]);
     scale = vf_select(away, vf_zero() - scale, scale);
-    float out[3][PT_LANES];
+    float out[3][PT_LANES], *normals = (float *)pt_cpu_data(job->call, 2) + 4 * (size_t)y * view->width;
+    uint32_t columns[PT_LANES];
+    vi_store(columns, column);
     for (int k = 0; k < 3; k++)
         vf_store(out[k], vf_select(found, n[k] * scale, vf_zero()));
-    for (uint32_t i = 0; i < lanes; i++) {
-        float *normal = normals + 4 * (size_t)pixels[i];
+    for (uint32_t lanes = vm_bits(c.ours); lanes; lanes &= lanes - 1) {
+        const int i = __builtin_ctz(lanes);
+        float *normal = normals + 4 * (size_t)columns[i];
         normal[0] = out[0][i], normal[1] = out[1][i], normal[2] = out[2][i], normal[3] = 0.0f;
     }
 }
 
-static void normals_row(void *context, uint32_t y)
+struct packed { // pixels of a row that wait for others
+    uint32_t at[2 * PT_LANES], id[2 * PT_LANES], count;
+};
+
+static void normal_packed(const struct job *job, const struct depth_row *const *around, uint32_t y, struct packed *packed)
 {
-    const struct pt_cpu_call *call = context;
-    const struct normals_args *args = call->arguments;
-    const uint64_t *row = (const uint64_t *)pt_cpu_data(call, 0) + (size_t)y * args->view.width;
-    uint32_t x[PT_LANES] = { 0 }, lanes = 0;
-    for (uint32_t i = args->view.rect[0]; i < args->view.rect[2]; i++) {
-        uint32_t id = (uint32_t)row[i] - args->instance.id_base;
-        if ((uint32_t)(row[i] >> 32) == PT_KEY_EMPTY_Z || id >= args->instance.id_count)
+    const uint32_t count = packed->count < PT_LANES ? packed->count : PT_LANES;
+    const struct center c = { .ours = vm_first(count), .at = vi_load(packed->at) };
+    if (count)
+        normal_pixels(job, around, y, c, vi_load(packed->id), 1);
+    packed->count -= count;
+    vi_store(packed->at, vi_load(packed->at + PT_LANES));
+    vi_store(packed->id, vi_load(packed->id + PT_LANES));
+}
+
+static void normals_row(const struct job *job, const struct depth_row *const *around, uint32_t y)
+{
+    const struct view_args *view = &job->args->view;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(job->call, 0) + (size_t)y * view->width;
+    struct packed packed = { .count = 0 };
+    for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
+        vi id, at = vi_add(vi_set(x + PT_ROW_PAD), vi_lanes());
+        vm ours = pt_of_instance(keys + x, &job->args->instance, pt_lanes_left(x, view->rect[2]), &id);
+        const uint32_t lanes = vm_bits(ours), count = (uint32_t)__builtin_popcount(lanes);
+        if (2 * count > PT_LANES) { // a load is a fifth of a gather
+            normal_pixels(job, around, y, (struct center){ .x = x, .at = at, .ours = ours }, id, 0);
             continue;
-        x[lanes++] = i;
-        if (lanes == PT_LANES) {
-            normal_pixels(args, call, x, y, lanes);
-            lanes = 0;
+        }
+        vi_pack(packed.at + packed.count, at, lanes);
+        vi_pack(packed.id + packed.count, id, lanes);
+        packed.count += count;
+        if (packed.count >= PT_LANES)
+            normal_packed(job, around, y, &packed);
+    }
+    normal_packed(job, around, y, &packed);
+}
+
+static void normals_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    const struct job *job = context;
+    const struct view_args *view = &job->args->view;
+    const int32_t reach = (int32_t)job->args->radius, ring = 2 * reach + 1;
+    struct depth_row rows[ROWS_MOST];
+    for (int32_t k = 0; k < ring; k++) {
+        float *row = job->memory + ((size_t)thread * (uint32_t)ring + (uint32_t)k) * 2 * job->stride + 2 * PT_ROW_PAD;
+        rows[k] = (struct depth_row){ row, row + job->stride };
+    }
+    for (uint32_t band = begin; band < end && !pt_cpu_cancelled(job->call); band++) {
+        const int32_t first = (int32_t)(view->rect[1] + band * BAND_ROWS);
+        const int32_t last = first + BAND_ROWS < (int32_t)view->rect[3] ? first + BAND_ROWS : (int32_t)view->rect[3];
+        for (int32_t y = first - 2 * reach; y < last; y++) { // the last row seen is y + reach
+            const struct depth_row *around[ROWS_MOST];
+            see_row(view, pt_cpu_data(job->call, 0), y + reach, &rows[(y + reach + ring) % ring]);
+            for (int32_t k = -reach; k <= reach && y >= first; k++)
+                around[reach + k] = &rows[(y + k + ring) % ring];
+            if (y >= first)
+                normals_row(job, around, (uint32_t)y);
         }
     }
-    if (lanes)
-        normal_pixels(args, call, x, y, lanes);
 }
 
 int PT_KERNEL_ENTRY(normals)(const struct pt_cpu_call *call)
 {
     const struct normals_args *args = call->arguments;
-    return pt_rows(call, &args->view, normals_row);
+    const uint32_t *rect = args->view.rect, threads = pt_pool_threads(call->pool);
+    struct job job = { .call = call, .args = args, .stride = pt_row_stride(args->view.width) };
+    if (rect[0] >= rect[2] || rect[1] >= rect[3])
+        return PATINA_OK;
+    const size_t rows = (size_t)threads * (2 * args->radius + 1);
+    job.memory = pt_cpu_scratch(call, 0, (2 * rows * job.stride + PT_ROW_PAD) * sizeof(float));
+    if (!job.memory)
+        return PATINA_ERROR_MEMORY;
+    pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, normals_bands, &job);
+    return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
