@@ -198,13 +198,13 @@ static void blend_nine(const struct finish *finish, struct walk *walk, int32_t y
 static void blend_wide(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
+    const struct pt_blend blend = { finish->planes.view, finish->reach, finish->weights, around };
     const int32_t end = (int32_t)seen_row(finish, walk, y)->end;
     for (int32_t k = -finish->reach; k <= finish->reach; k++)
         around[finish->reach + k] = seen_row(finish, walk, y + k);
     walk->one_layer = walk->wide;
     for (int32_t x = (int32_t)seen_row(finish, walk, y)->first; x < end; x += PT_BLEND_COLUMNS)
-        pt_blend_flat(finish->planes.view, finish->reach, around, finish->weights, x,
-                      x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end, walk->wide, walk->blended);
+        pt_blend_flat(&blend, x, x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end, walk->wide, walk->blended);
 }
 
 static void shade(const struct finish *finish, struct walk *walk, int32_t y)

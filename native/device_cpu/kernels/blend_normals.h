@@ -16,22 +16,31 @@ enum {
     PT_BLEND_ROW = PT_BLEND_COLUMNS + 2 * PT_BLEND_PAD,
 };
 
+struct pt_blend { // of the pixels of a row
+    const struct view_args *view;
+    int most;                                // radius of their windows
+    const float *weights;                    // by squared distance
+    const struct pt_seen_row *const *around; // rows from `most` below on
+};
+
 // Radius of a pixel's window, of a wide blend: kernel_args.h.
-static inline vf pt_blend_reach(const struct view_args *view, int blend, vf z, vf limit)
+static inline vf pt_blend_reach(const struct pt_blend *blend, vf z, vf limit)
 {
-    vf spacings = limit * vf_rcp(vf_footprint(view, z));
+    vf spacings = limit * vf_rcp(vf_footprint(blend->view, z));
     vf reach = vf_floor(spacings * vf_set(1.0f / PT_SPACING_FACTOR) + vf_set(0.5f));
-    return vf_max(vf_min(reach, vf_set((float)blend)), vf_set(1.0f));
+    return vf_max(vf_min(reach, vf_set((float)blend->most)), vf_set(1.0f));
 }
 
-// Weights of the blend by squared distance.
 static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1])
 {
     for (int i = 0; i <= 2 * PT_BLEND_MOST * PT_BLEND_MOST; i++)
         weights[i] = pt_rcp((float)(1 + i));
 }
 
-static inline struct pt_nine pt_blend_nine(const float *weights) { return (struct pt_nine){ weights[0], weights[1], weights[2] }; }
+static inline struct pt_nine pt_blend_nine(const float *weights)
+{
+    return (struct pt_nine){ weights[0], weights[1], weights[2] };
+}
 
 // Which pixels of PT_LANES, at x, are of the layer.
 static inline vm pt_blend_takes(const struct pt_seen_row *row, int32_t x, vf z, vf limit, vm within)
@@ -39,11 +48,11 @@ static inline vm pt_blend_takes(const struct pt_seen_row *row, int32_t x, vf z, 
     return vm_and(within, vf_le(vf_abs(vf_load(row->z + x) - z), limit));
 }
 
-static inline void pt_blend_nine_sum(const struct pt_seen_row *const rows[3], const float *weights, uint32_t x, vf limit, vm filled,
-                                     vf sum[3])
+static inline void pt_blend_nine_sum(const struct pt_blend *blend, uint32_t x, vf limit, vm filled, vf sum[3])
 {
+    const struct pt_seen_row *const *rows = blend->around;
     const float *const depths[3] = { rows[0]->z + x, rows[1]->z + x, rows[2]->z + x };
-    const struct pt_nine nine = pt_blend_nine(weights);
+    const struct pt_nine nine = pt_blend_nine(blend->weights);
     vm same[3][3];
     pt_same_layer(depths, limit, filled, same);
     for (int k = 0; k < 3; k++) {
@@ -53,26 +62,25 @@ static inline void pt_blend_nine_sum(const struct pt_seen_row *const rows[3], co
 }
 
 // Sums of the normals of the pixels around those of PT_LANES pixels from x on that `filled` names, as far as they are of their
-// layer. around[blend]: the pixels' own row.
-static inline void pt_blend_sum(const struct view_args *view, int blend, const struct pt_seen_row *const *around, const float *weights,
-                                uint32_t x, vm filled, vf sum[3])
+// layer.
+static inline void pt_blend_sum(const struct pt_blend *blend, uint32_t x, vm filled, vf sum[3])
 {
-    const struct pt_seen_row *own = around[blend];
-    const vf z = vf_load(own->z + x), limit = vf_load(own->limit + x), zero = vf_zero();
-    if (blend == 1) {
-        pt_blend_nine_sum(around, weights, x, limit, filled, sum);
+    const struct pt_seen_row *const *own = blend->around + blend->most;
+    const vf z = vf_load(own[0]->z + x), limit = vf_load(own[0]->limit + x), zero = vf_zero();
+    if (blend->most == 1) {
+        pt_blend_nine_sum(blend, x, limit, filled, sum);
         return;
     }
-    const vf reach = vf_select(filled, pt_blend_reach(view, blend, z, limit), zero);
-    int most = blend;
+    const vf reach = vf_select(filled, pt_blend_reach(blend, z, limit), zero);
+    int most = blend->most;
     while (most && !vm_bits(vf_le(vf_set((float)most), reach)))
         most--;
     sum[0] = sum[1] = sum[2] = zero;
     for (int dy = 0; dy <= most; dy++)
         for (int dx = 0; dx <= most; dx++) {
-            const struct pt_seen_row *below = around[blend - dy], *above = around[blend + dy];
+            const struct pt_seen_row *below = own[-dy], *above = own[dy];
             const int32_t west = (int32_t)x - dx, east = (int32_t)x + dx;
-            const vf weight = vf_set(weights[dx * dx + dy * dy]);
+            const vf weight = vf_set(blend->weights[dx * dx + dy * dy]);
             const vm none = vm_of_bits(0), within = vm_and(filled, vf_le(vf_set((float)(dx > dy ? dx : dy)), reach));
             vm low = pt_blend_takes(below, west, z, limit, within), high = none, low_east = none, high_east = none;
             if (dy)
@@ -97,9 +105,10 @@ static inline void pt_blend_sum(const struct view_args *view, int blend, const s
 // ---- where the window tells no layers apart ------------------------------------------------------------------------------
 
 // The radius that PT_LANES pixels share, 0 where they do not.
-static inline int pt_blend_shared_reach(const struct view_args *view, int blend, const struct pt_seen_row *own, int32_t x)
+static inline int pt_blend_shared_reach(const struct pt_blend *blend, int32_t x)
 {
-    vf reach = pt_blend_reach(view, blend, vf_load(own->z + x), vf_load(own->limit + x));
+    const struct pt_seen_row *own = blend->around[blend->most];
+    vf reach = pt_blend_reach(blend, vf_load(own->z + x), vf_load(own->limit + x));
     float lanes[PT_LANES];
     vf_store(lanes, reach);
     const int first = (int)lanes[0];
@@ -107,20 +116,19 @@ static inline int pt_blend_shared_reach(const struct view_args *view, int blend,
 }
 
 // flat: the radius of vectors from x to end where all around each pixel is of its layer, else 0. Returns the greatest.
-static inline int pt_blend_find_flat(const struct view_args *view, int blend, const struct pt_seen_row *const *around, int32_t x, int32_t end,
-                                     uint8_t *flat)
+static inline int pt_blend_find_flat(const struct pt_blend *blend, int32_t x, int32_t end, uint8_t *flat)
 {
-    const struct pt_seen_row *own = around[blend];
+    const struct pt_seen_row *const *own = blend->around + blend->most;
     float near[PT_BLEND_ROW], far[PT_BLEND_ROW];
     int most = 0, flat_most = 0;
     for (int32_t i = x; i < end; i += PT_LANES) {
-        flat[i / PT_LANES] = (uint8_t)pt_blend_shared_reach(view, blend, own, i);
+        flat[i / PT_LANES] = (uint8_t)pt_blend_shared_reach(blend, i);
         most = flat[i / PT_LANES] > most ? flat[i / PT_LANES] : most;
     }
     for (int32_t i = -PT_BLEND_PAD; most && i < end - x + PT_BLEND_PAD; i += PT_LANES) {
-        vf low = vf_load(own->z + x + i), high = low;
+        vf low = vf_load(own[0]->z + x + i), high = low;
         for (int k = 1; k <= most; k++) {
-            vf below = vf_load(around[blend - k]->z + x + i), above = vf_load(around[blend + k]->z + x + i);
+            vf below = vf_load(own[-k]->z + x + i), above = vf_load(own[k]->z + x + i);
             low = vf_min(vf_min(low, below), above);
             high = vf_max(vf_max(high, below), above);
         }
@@ -132,7 +140,7 @@ static inline int pt_blend_find_flat(const struct view_args *view, int blend, co
         const float *lows = near + PT_BLEND_PAD + (i - x), *highs = far + PT_BLEND_PAD + (i - x);
         if (!reach)
             continue;
-        vf low = vf_load(lows), high = vf_load(highs), z = vf_load(own->z + i), limit = vf_load(own->limit + i);
+        vf low = vf_load(lows), high = vf_load(highs), z = vf_load(own[0]->z + i), limit = vf_load(own[0]->limit + i);
         for (int k = 1; k <= reach; k++) {
             low = vf_min(vf_min(low, vf_load(lows - k)), vf_load(lows + k));
             high = vf_max(vf_max(high, vf_load(highs - k)), vf_load(highs + k));
@@ -145,14 +153,14 @@ static inline int pt_blend_find_flat(const struct view_args *view, int blend, co
 }
 
 // The sums of pt_blend_sum from x to end, at most PT_BLEND_COLUMNS, wherever they are whole windows'; flat says where.
-static inline void pt_blend_flat(const struct view_args *view, int blend, const struct pt_seen_row *const *around, const float *weights,
-                                 int32_t x, int32_t end, uint8_t *flat, float *const sums[3])
+static inline void pt_blend_flat(const struct pt_blend *blend, int32_t x, int32_t end, uint8_t *flat, float *const sums[3])
 {
+    const struct pt_seen_row *const *own = blend->around + blend->most;
     float pairs[PT_BLEND_MOST + 1][3][PT_BLEND_ROW]; // of rows dy below and above, sums
-    const int most = pt_blend_find_flat(view, blend, around, x, end, flat);
+    const int most = pt_blend_find_flat(blend, x, end, flat);
     for (int dy = 0; most && dy <= most; dy++)
         for (int k = 0; k < 3; k++) {
-            const float *below = around[blend - dy]->normal[k] + x, *above = around[blend + dy]->normal[k] + x;
+            const float *below = own[-dy]->normal[k] + x, *above = own[dy]->normal[k] + x;
             float *out = pairs[dy][k] + PT_BLEND_PAD;
             for (int32_t i = -PT_BLEND_PAD; i < end - x + PT_BLEND_PAD; i += PT_LANES) {
                 vf pair = vf_load(below + i);
@@ -170,9 +178,9 @@ static inline void pt_blend_flat(const struct view_args *view, int blend, const 
             const float *const rows[3] = { pairs[dy][0] + PT_BLEND_PAD + i, pairs[dy][1] + PT_BLEND_PAD + i,
                                            pairs[dy][2] + PT_BLEND_PAD + i };
             for (int k = 0; k < 3; k++)
-                sum[k] = sum[k] + vf_load(rows[k]) * vf_set(weights[dy * dy]);
+                sum[k] = sum[k] + vf_load(rows[k]) * vf_set(blend->weights[dy * dy]);
             for (int dx = 1; dx <= reach; dx++) {
-                const vf weight = vf_set(weights[dx * dx + dy * dy]);
+                const vf weight = vf_set(blend->weights[dx * dx + dy * dy]);
                 for (int k = 0; k < 3; k++)
                     sum[k] = sum[k] + (vf_load(rows[k] - dx) + vf_load(rows[k] + dx)) * weight;
             }

@@ -252,7 +252,7 @@ pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes, c
             for (int k = 0; k < 3 && blended; k++)
                 sum[k] = vf_load(blended[k] + x);
             if (!blended)
-                pt_blend_sum(&args->view, (int)args->blend, around, weights, x, filled, sum);
+                pt_blend_sum(&(struct pt_blend){ &args->view, (int)args->blend, weights, around }, x, filled, sum);
             pt_blend_normals(sum, filled, normal);
         }
     }
