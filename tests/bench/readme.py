@@ -82,6 +82,16 @@ def effects(result: dict[str, Any]) -> str:
     return table(["what", "quality", "ms", "peer", "ms", "ratio"], body)
 
 
+def inside(result: dict[str, Any]) -> str:
+    """A camera among the points, with and without their normals."""
+    body = [[NAMES.get(name_of(row), name_of(row)), count(row["points"]), "no" if row.get("bare") else "yes",
+             f"{row['ms_median']:.1f}", f"{row['error']['normal_mean_degrees']:.2f}",
+             f"{row['error']['normal_p99_degrees']:.1f}", f"{row['error']['color_psnr']:.1f}"]
+            for row in joined(result, "inside")]
+    return (f"{result['date']}, {result['processor']}, {result['cores']} cores.\n\n" +
+            table(["device", "points", "with normals", "ms a frame", "normal mean, °", "normal 99%, °", "PSNR, dB"], body))
+
+
 def cues(result: dict[str, Any]) -> str:
     """What each depth cue or means of drawing adds to the headline's picture, whole and in its own pass."""
     rows = joined(result, "cues")
@@ -141,7 +151,7 @@ def update(result: dict[str, Any], root: Path) -> str:
     against = [row for row in joined(result, "headline", "peers") if row["points"] == 1_000_000 and row["error"]]
     title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
     parts = {}
-    if result["rows"]:  # else only groups with a table of their own were measured
+    if joined(result, "headline"):
         plots.pareto(against, root / ".pictures/pareto.png", title)
         parts["speed"] = speed(result)
     if joined(result, "headline"):
@@ -150,6 +160,8 @@ def update(result: dict[str, Any], root: Path) -> str:
             parts["others"] = others(result)
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
             parts["effects"] = effects(result)
+    if joined(result, "inside"):
+        parts["inside"] = inside(result)
     if joined(result, "cues"):
         parts["cues"] = cues(result)
     if joined(result, "styles"):

@@ -101,7 +101,7 @@ def markdown(result: dict[str, Any]) -> str:
     if joined(result, "peers"):
         text += ["## Other programs, the same points, camera and truth", "", errors_table(against), "",
                  *notes(joined(result, "peers")), ""]
-    for group, title in (("effects", "Layers and shadows of the torus"),
+    for group, title in (("inside", "Among the points"), ("effects", "Layers and shadows of the torus"),
                          ("cues", "Depth cues and means of drawing on the torus, one by one"),
                          ("lines", "Lines around the torus"),
                          ("styles", "Styles, one row each"),

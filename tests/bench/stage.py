@@ -58,11 +58,11 @@ def kept(name: str, make: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.n
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """position, normal float32 (n, 3); color uint8 sRGB (n, 3) or None; spacing: world units. style, lights: fields of
+    """position, normal float32 (n, 3), normal None where points have none; color uint8 sRGB (n, 3) or None; spacing: world units. style, lights: fields of
     the descriptors. camera: of a turn in degrees. scene: the surfaces, None where they are not known."""
 
     position: np.ndarray
-    normal: np.ndarray
+    normal: np.ndarray | None
     color: np.ndarray | None
     spacing: float
     camera: Callable[[float], Camera]
@@ -111,16 +111,17 @@ def density_count(name: str, density: float, height: int) -> int:
 
 
 def analytic(case: dict[str, Any]) -> Stage:
-    name, clear = case["surface"], bool(case.get("clear"))
+    name, clear, distance = case["surface"], bool(case.get("clear")), case.get("distance", DISTANCE)
     scene = scenes.build(name)
     points = points_of(name, scene, case["points"], case.get("pattern", "random"), case.get("noise", 0.0))
     opacity = scene.opacities.astype(np.float32)[points.surface][:, None] if clear else None
     if not clear:
         scene = Scene(tuple(replace(one, opacity=1.0) for one in scene.surfaces), scene.lights)
-    return Stage(points.position, points.normal, points.color, points.spacing,
-                 lambda turn: orbit(turn, ELEVATION, DISTANCE, FOV),
+    return Stage(points.position, None if case.get("bare") else points.normal, points.color, points.spacing,
+                 lambda turn: orbit(turn, ELEVATION, distance, FOV),
                  {"lighting": 2, "cull_back": int(name in CLOSED and not clear)},
-                 tuple(light.fields() for light in scene.lights), scene, name + "-clear" * clear, opacity)
+                 tuple(light.fields() for light in scene.lights), scene,
+                 name + "-clear" * clear + f"-from-{distance:g}" * (distance != DISTANCE), opacity)
 
 
 def stage_of(case: dict[str, Any]) -> Stage:
