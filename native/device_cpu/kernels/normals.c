@@ -4,7 +4,7 @@
 // A plane is linear in the picture as 1/z (perspective) or z (orthographic). Least squares over the window's pixels that
 // can belong to the same surface give w = w_p + a dx + b dy + c, hence the plane n . (u, v, -1) = w, hence n.
 // Rows are seen as depths and what is linear in them. Where most pixels of a vector are asked for it takes its neighbours by
-// plain loads; of the others those that are asked for are packed and gather, so that sparse clouds fill the lanes too.
+// plain loads; of the others those that are asked for are packed, so that sparse clouds fill the lanes too.
 #include "device_cpu/picture_rows.h"
 
 enum { BAND_ROWS = 32, ROWS_MOST = 2 * 16 + 1 };
@@ -14,12 +14,11 @@ struct depth_row {
 };
 
 struct center { // PT_LANES pixels of a row
-    uint32_t x;    // column of the first; packed: any
-    vi at;         // columns, from the row's beginning
+    uint32_t at[PT_LANES]; // columns, counted from the row's pad on; any where nobody asks
     vf z, w;
     vf distance, slope, step[2]; // what belongs to the same surface: kernel_args.h
     vf reach;                    // radius of the window
-    int32_t least, most;         // of reach
+    int32_t most;                // of reach
     vm ours;
 };
 
@@ -49,12 +48,14 @@ static void see_row(const struct view_args *view, const uint64_t *keys, int32_t 
     pt_empty_columns(row->z, (int32_t)view->width, (int32_t)view->width + PT_ROW_PAD);
 }
 
-// What lies dx columns on.
-static inline vf taps(const float *row, const struct center *c, int32_t dx, int packed)
+// What lies at PT_LANES columns from dx on; packed: the pixels do not follow each other.
+static inline void load_columns(const float *row, const struct center *c, int32_t dx, int packed, vf out[PT_LANES])
 {
-    if (packed) // the same columns at every tap: they are taken apart once
-        return vf_gather(row - PT_ROW_PAD + dx, c->at, c->ours);
-    return vf_load(row + (int32_t)c->x + dx);
+    row += dx - PT_ROW_PAD;
+    if (packed)
+        vf_columns(row, c->at, out);
+    for (uint32_t k = 0; k < PT_LANES && !packed; k++)
+        out[k] = vf_load(row + c->at[0] + k);
 }
 
 // What z changes by from what lies before a pixel to what lies after it, as far as both sides agree.
@@ -81,11 +82,9 @@ static void find_reach(const struct normals_args *args, struct center *c)
     const vf zero = vf_zero();
     vf wanted = zero - vf_floor(zero - c->distance * vf_rcp(vf_footprint(&args->view, c->z)));
     c->reach = vf_min(vf_max(wanted, vf_set(PT_ESTIMATE_LEAST)), vf_set((float)args->radius));
-    c->most = c->least = (int32_t)args->radius;
+    c->most = (int32_t)args->radius;
     while (c->most && !vm_bits(vm_and(c->ours, vf_le(vf_set((float)c->most), c->reach))))
         c->most--;
-    while (vm_bits(vm_and(c->ours, vf_lt(c->reach, vf_set((float)c->least)))))
-        c->least--;
 }
 
 // 1. Sums over the window, of rows first. Pixel counts and offsets are small integers: exact in float32. around: rows from
@@ -98,27 +97,29 @@ static inline __attribute__((always_inline)) struct sums sum_window(const struct
     struct sums s = { zero, zero, zero, zero, zero, zero, zero, zero, zero };
     for (int32_t dy = -c->most; dy <= c->most; dy++) {
         const struct depth_row *row = around[(int32_t)args->radius + dy];
-        vf n = zero, x = zero, xx = zero, w = zero, xw = zero;
-        for (int32_t dx = -c->most; dx <= c->most; dx++) {
-            const int32_t far = (int32_t)larger(dx, dy);
-            const vf fx = vf_set((float)dx);
-            vf apart = taps(row->z, c, dx, packed) - c->z, tolerance = vf_max(c->distance, c->slope * vf_set((float)far));
-            if (steep) {
-                const vf along = c->step[0] * fx, up = c->step[1] * vf_set((float)dy);
-                apart = apart - (along + up);
-                tolerance = vf_max(tolerance, vf_set(PT_STEEP) * (vf_abs(along) + vf_abs(up)));
+        vf n = zero, x = zero, xx = zero, w = zero, xw = zero, up = c->step[1] * vf_set((float)dy);
+        for (int32_t first = -c->most; first <= c->most; first += PT_LANES) {
+            vf zs[PT_LANES], ws[PT_LANES];
+            load_columns(row->z, c, first, packed, zs);
+            load_columns(row->w, c, first, packed, ws);
+            for (int32_t k = 0; k < PT_LANES && first + k <= c->most; k++) {
+                const int32_t dx = first + k, far = (int32_t)larger(dx, dy);
+                const vf fx = vf_set((float)dx);
+                vf apart = zs[k] - c->z, tolerance = vf_max(c->distance, c->slope * vf_set((float)far));
+                if (steep) {
+                    const vf along = c->step[0] * fx;
+                    apart = apart - (along + up);
+                    tolerance = vf_max(tolerance, vf_set(PT_STEEP) * (vf_abs(along) + vf_abs(up)));
+                }
+                vm same = vm_and(vm_and(c->ours, vf_le(vf_set((float)far), c->reach)), vf_le(vf_abs(apart), tolerance));
+                // no branch: whether a few pixels hold any of the surface is as good as random
+                vf dw = vf_select(same, ws[k] - c->w, zero);
+                n = vf_add_where(same, n, one);
+                x = vf_add_where(same, x, fx);
+                xx = vf_add_where(same, xx, fx * fx);
+                w = w + dw;
+                xw = xw + fx * dw;
             }
-            vm same = vm_and(c->ours, vf_le(vf_abs(apart), tolerance));
-            if (far > c->least)
-                same = vm_and(same, vf_le(vf_set((float)far), c->reach));
-            if (!vm_bits(same))
-                continue; // other surfaces, or nothing
-            vf dw = vf_select(same, taps(row->w, c, dx, packed) - c->w, zero);
-            n = vf_add_where(same, n, one);
-            x = vf_add_where(same, x, fx);
-            xx = vf_add_where(same, xx, vf_set((float)(dx * dx)));
-            w = w + dw;
-            xw = xw + fx * dw;
         }
         const vf fy = vf_set((float)dy);
         s.n = s.n + n;
@@ -151,19 +152,24 @@ static vm solve(const struct center *center, const struct sums *s, vf *a, vf *b,
 struct job {
     const struct pt_cpu_call *call;
     const struct normals_args *args;
-    float *memory; // per thread: a ring of rows, PT_ROW_PAD floats behind the first
+    float *memory; // per thread: a ring of rows; PT_ROW_PAD floats more before the first and behind the last
     size_t stride; // floats of a row's z, and of its w
 };
 
-// Normals of PT_LANES pixels of row y, of which c.x, c.at and c.ours are known. id: of their points in the instance.
+// Depths at the pixels' columns, or beside them.
+static vf depths_at(const struct depth_row *row, vi at, vm ours) { return vf_gather(row->z - PT_ROW_PAD, at, ours); }
+
+// Normals of PT_LANES pixels of row y, `ours` of them: columns, as in center, and the numbers of their points in the instance.
 static inline __attribute__((always_inline)) void normal_pixels(const struct job *job, const struct depth_row *const *around,
-                                                                uint32_t y, struct center c, vi id, int packed)
+                                                                uint32_t y, vi at, vi id, vm ours, int packed)
 {
     const struct normals_args *args = job->args;
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
     const struct depth_row *own = around[args->radius], *below = around[args->radius - 1], *above = around[args->radius + 1];
-    c.z = vf_select(c.ours, taps(own->z, &c, 0, packed), vf_set(1.0f));
+    struct center c = { .ours = ours };
+    vi_store(c.at, vi_select(ours, at, packed ? vi_set(PT_ROW_PAD) : at));
+    c.z = vf_select(c.ours, depths_at(own, at, ours), vf_set(1.0f));
     c.w = linear_depth(view, c.z);
     vi word = vi_gather(pt_cpu_data(job->call, 1), id, c.ours);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
@@ -172,8 +178,9 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     find_reach(args, &c);
     struct sums sums;
     if (args->steep) {
-        c.step[0] = step_along(&c, taps(own->z, &c, -1, packed), taps(own->z, &c, 1, packed));
-        c.step[1] = step_along(&c, taps(below->z, &c, 0, packed), taps(above->z, &c, 0, packed));
+        const vi one = vi_set(1);
+        c.step[0] = step_along(&c, depths_at(own, vi_sub(at, one), ours), depths_at(own, vi_add(at, one), ours));
+        c.step[1] = step_along(&c, depths_at(below, at, ours), depths_at(above, at, ours));
         sums = sum_window(args, around, &c, packed, 1);
     } else {
         sums = sum_window(args, around, &c, packed, 0);
@@ -181,7 +188,7 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     vf a, b, w, n[3], ray[2] = { vf_zero(), vf_zero() };
     vm found = vm_and(c.ours, solve(&c, &sums, &a, &b, &w));
     // 3. the plane's normal from dw/dx = a, dw/dy = b a pixel
-    vi column = vi_sub(c.at, vi_set(PT_ROW_PAD));
+    vi column = vi_sub(at, vi_set(PT_ROW_PAD));
     n[0] = a * vf_set(view->ray_ys);
     n[1] = b * vf_set(view->ray_xs);
     n[2] = vf_set(view->ray_xs * view->ray_ys);
@@ -217,9 +224,8 @@ struct packed { // pixels of a row that wait for others
 static void normal_packed(const struct job *job, const struct depth_row *const *around, uint32_t y, struct packed *packed)
 {
     const uint32_t count = packed->count < PT_LANES ? packed->count : PT_LANES;
-    const struct center c = { .ours = vm_first(count), .at = vi_load(packed->at) };
     if (count)
-        normal_pixels(job, around, y, c, vi_load(packed->id), 1);
+        normal_pixels(job, around, y, vi_load(packed->at), vi_load(packed->id), vm_first(count), 1);
     packed->count -= count;
     vi_store(packed->at, vi_load(packed->at + PT_LANES));
     vi_store(packed->id, vi_load(packed->id + PT_LANES));
@@ -234,8 +240,8 @@ static void normals_row(const struct job *job, const struct depth_row *const *ar
         vi id, at = vi_add(vi_set(x + PT_ROW_PAD), vi_lanes());
         vm ours = pt_of_instance(keys + x, &job->args->instance, pt_lanes_left(x, view->rect[2]), &id);
         const uint32_t lanes = vm_bits(ours), count = (uint32_t)__builtin_popcount(lanes);
-        if (2 * count > PT_LANES) { // a load is a fifth of a gather
-            normal_pixels(job, around, y, (struct center){ .x = x, .at = at, .ours = ours }, id, 0);
+        if (2 * count > PT_LANES) {
+            normal_pixels(job, around, y, at, id, ours, 0);
             continue;
         }
         vi_pack(packed.at + packed.count, at, lanes);
@@ -279,7 +285,7 @@ int PT_KERNEL_ENTRY(normals)(const struct pt_cpu_call *call)
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     const size_t rows = (size_t)threads * (2 * args->radius + 1);
-    job.memory = pt_cpu_scratch(call, 0, (2 * rows * job.stride + PT_ROW_PAD) * sizeof(float));
+    job.memory = pt_cpu_scratch(call, 0, (2 * rows * job.stride + 2 * PT_ROW_PAD) * sizeof(float));
     if (!job.memory)
         return PATINA_ERROR_MEMORY;
     pt_parallel(call->pool, (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS, 1, normals_bands, &job);
