@@ -60,29 +60,27 @@ static int check_cap(const struct patina_frame *frame, const struct pt_plan *pla
 
 // Frames of a moving camera differ by some pixels of margin, maps of one light by a texel or two: that is not worth new memory
 // each time, so who asks again for more gets an eighth above. Near the cap memory counts for more.
-static size_t room_for(const struct patina_frame *frame, const struct pt_buffer *plane, size_t bytes, int varies)
+static size_t room_for(const struct patina_frame *frame, size_t bytes)
 {
     const uint64_t cap = frame->device->memory_cap, total = plane_total(frame);
-    if ((!varies && !plane->room) || (cap && total + total / 4 > cap))
-        return bytes;
-    return bytes + bytes / 128 * 16;
+    return cap && total + total / 4 > cap ? bytes : bytes + bytes / 8;
 }
 
 int pt_frame_ensure_plane(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
                           enum pt_plane which, uint32_t level)
 {
     struct pt_buffer *plane = &planes[which][level];
-    const size_t bytes = size_of(plan, which, level), room = room_for(frame, plane, bytes, planes != frame->planes);
-    if (plane->room >= bytes && plane->room < 2 * bytes) {
-        plane->size = bytes;
-        return PATINA_OK;
+    const size_t bytes = size_of(plan, which, level);
+    if (plane->room < bytes || plane->room >= 2 * bytes) {
+        const int varies = planes != frame->planes || plane->room;
+        const size_t room = varies ? room_for(frame, bytes) : bytes;
+        frame->device->ops->buffer_destroy(frame->device, plane);
+        int error = check_cap(frame, plan, plane_total(frame) + room);
+        if (!error)
+            error = frame->device->ops->buffer_create(frame->device, room, NULL, 0, plane);
+        if (error)
+            return pt_fail_again(&frame->handle, error);
     }
-    frame->device->ops->buffer_destroy(frame->device, plane);
-    int error = check_cap(frame, plan, plane_total(frame) + room);
-    if (!error)
-        error = frame->device->ops->buffer_create(frame->device, room, NULL, 0, plane);
-    if (error)
-        return pt_fail_again(&frame->handle, error);
     plane->size = bytes;
     return PATINA_OK;
 }

@@ -10,7 +10,8 @@
 #include <string.h>
 
 // Radius of the window for image-space normals: two spacings, at least 3 pixels so that a point's place within its pixel
-// averages out, at most 16 (beyond, points are too far apart on screen for a surface to be seen anyway).
+// averages out, at most 16 (beyond, points are too far apart on screen for a surface to be seen anyway). Pixels take less of it
+// where points lie nearer together, PT_ESTIMATE_LEAST at least.
 enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16, BLEND_MOST = 8 };
 // Of each filling filter in a light's map, at most: more widen steep surfaces (tests/scenes/test_shadow: 0.20% in place of
 // 0.18% wrong), one leaves holes that light leaks through.

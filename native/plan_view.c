@@ -174,13 +174,13 @@ static int lies_beside(const struct camera *camera, double q[3][8], const double
     for (int k = 0; k < 2; k++) {
         const double size = k ? camera->height : camera->width, scale = 1.0 / (k ? camera->ys : camera->xs);
         const double wide = error[k] + reach * scale * (1.0 + fabs(k ? camera->bottom : camera->left)), deep = error[2] + reach;
-        int before = 0, behind = 0;
+        int low = 0, high = 0;
         for (int i = 0; i < 8; i++) {
             const double pixel = fabs(q[2][i]) + deep;
-            before += q[k][i] + pixel + wide < 0.0;
-            behind += q[k][i] - size * (q[2][i] + deep) - pixel - wide > 0.0;
+            low += q[k][i] + pixel + wide < 0.0;
+            high += q[k][i] - size * (q[2][i] + deep) - pixel - wide > 0.0;
         }
-        if (before == 8 || behind == 8)
+        if (low == 8 || high == 8)
             return 1;
     }
     return 0;

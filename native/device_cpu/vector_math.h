@@ -117,6 +117,14 @@ static inline vf vf_cosine(const struct view_args *view, const vf n[3], const vf
     return vf_abs(dot) * vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f));
 }
 
+// The greatest of whole numbers in some lanes, from 0 to `most`; 0 in none.
+static inline int vf_greatest(vf a, vm lanes, int most)
+{
+    while (most && !vm_bits(vm_and(lanes, vf_le(vf_set((float)most), a))))
+        most--;
+    return most;
+}
+
 // Width of a pixel of this view's level at z.
 static inline vf vf_footprint(const struct view_args *view, vf z)
 {

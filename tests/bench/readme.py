@@ -153,9 +153,7 @@ def update(result: dict[str, Any], root: Path) -> str:
     parts = {}
     if joined(result, "headline"):
         plots.pareto(against, root / ".pictures/pareto.png", title)
-        parts["speed"] = speed(result)
-    if joined(result, "headline"):
-        parts |= {"aims": aims(result), "memory": memory(result)}
+        parts |= {"speed": speed(result), "aims": aims(result), "memory": memory(result)}
         if joined(result, "peers"):
             parts["others"] = others(result)
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):

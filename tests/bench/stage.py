@@ -58,8 +58,9 @@ def kept(name: str, make: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.n
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """position, normal float32 (n, 3), normal None where points have none; color uint8 sRGB (n, 3) or None; spacing: world units. style, lights: fields of
-    the descriptors. camera: of a turn in degrees. scene: the surfaces, None where they are not known."""
+    """position, normal float32 (n, 3), normal None where points have none; color uint8 sRGB (n, 3) or None; spacing:
+    world units. style, lights: fields of the descriptors. camera: of a turn in degrees. scene: the surfaces, None where
+    they are not known."""
 
     position: np.ndarray
     normal: np.ndarray | None

@@ -2,6 +2,7 @@
 // The plan without a device: which passes a scene calls for, why the others are left out, what is culled, and that a
 // region decides as the whole picture does (DESIGN rule 3, SPEC 8).
 #include "plan.h"
+#include "scenes/support.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -35,7 +36,7 @@ static patina_cloud *square(int with_normals)
 }
 
 // An orthographic camera above (or with up = -1 below) the square, `width` units wide.
-static patina_scene *scene_of(const patina_cloud *cloud, double width, double up, int cull_back)
+static patina_scene *scene_above(const patina_cloud *cloud, double width, double up, int cull_back)
 {
     patina_scene *scene = NULL;
     patina_cloud_style style = { .struct_size = sizeof style, .cull_back = (uint32_t)cull_back };
@@ -82,7 +83,7 @@ static void test_every_pass_runs_or_has_a_reason(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(1);
-    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
     struct pt_plan plan = plan_of(scene);
     for (int k = 0; k < PT_KERNEL_COUNT; k++)
         assert_true((passes_of(&plan, (enum pt_kernel)k) > 0) != (skipped(&plan, pt_kernel_names[k]) != NULL));
@@ -98,7 +99,7 @@ static void test_missing_normals_are_estimated(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(0);
-    patina_scene *scene = scene_of(cloud, 2.5, 1, 1);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 1);
     struct pt_plan plan = plan_of(scene);
     assert_int_equal(passes_of(&plan, PT_KERNEL_normals), 1);
     assert_true(plan.points_scattered == COUNT); // back faces are never culled without normals
@@ -111,7 +112,7 @@ static void test_settings_leave_passes_out(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(1);
-    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
     patina_settings settings = { .struct_size = sizeof settings,
                                  .fill = PATINA_FILL_OFF,
                                  .smooth = PATINA_SMOOTH_OFF,
@@ -137,7 +138,7 @@ static void test_spacing_chooses_levels(void **state)
     } cases[] = { { 20.0, 0, 0 }, { 10.0, 0, 0 }, { 3.0, 1, 2 }, { 1.0, 3, 4 }, { 0.1, 5, 5 } };
     patina_cloud *cloud = square(1);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        patina_scene *scene = scene_of(cloud, cases[i].width, 1, 0);
+        patina_scene *scene = scene_above(cloud, cases[i].width, 1, 0);
         struct pt_plan plan = plan_of(scene);
         double spacing = 0.01 * 1024 / cases[i].width;
         assert_true(fabs(plan.spacing_px / spacing - 1.0) < 0.1);
@@ -165,7 +166,7 @@ static void test_normals_are_blended_where_they_show(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(1);
-    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
     patina_settings settings = { .struct_size = sizeof settings };
     patina_cloud_style unlit = { .struct_size = sizeof unlit, .lighting = PATINA_LIGHTING_UNLIT };
     assert_true(blend_of(scene) > 0); // lit
@@ -183,7 +184,7 @@ static void test_nothing_in_view_is_said(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(1);
-    patina_scene *behind = scene_of(cloud, 2.5, -1, 1), *empty = scene_of(NULL, 2.5, 1, 0);
+    patina_scene *behind = scene_above(cloud, 2.5, -1, 1), *empty = scene_above(NULL, 2.5, 1, 0);
     struct pt_plan plan = plan_of(behind); // from below every chunk faces away
     assert_string_equal(skipped(&plan, "scatter"), "no cloud is in view");
     assert_true(plan.chunks_culled == plan.chunks && plan.chunks > 0);
@@ -197,51 +198,24 @@ static void test_nothing_in_view_is_said(void **state)
     patina_cloud_destroy(cloud);
 }
 
-struct eye {
-    double at[3], axes[3][3]; // right, up, back
-};
+enum { WIDTH = 2048, HEIGHT = 1536 };
 
-// A camera among the points, 2048 x 1536 pixels, 60 degrees wide.
-static struct eye look(patina_scene *scene, const double at[3], const double to[3])
+// A camera among the points.
+static patina_camera look(patina_scene *scene, const double at[3], const double to[3])
 {
-    struct eye eye;
-    double *x = eye.axes[0], *y = eye.axes[1], *z = eye.axes[2], length = 0.0;
-    for (int k = 0; k < 3; k++)
-        z[k] = (eye.at[k] = at[k]) - to[k];
-    for (int k = 0; k < 3; k++)
-        length += z[k] * z[k];
-    for (int k = 0; k < 3; k++)
-        z[k] /= sqrt(length);
-    double flat = sqrt(z[0] * z[0] + z[1] * z[1]); // never straight down
-    x[0] = -z[1] / flat, x[1] = z[0] / flat, x[2] = 0.0;
-    y[0] = z[1] * x[2] - z[2] * x[1], y[1] = z[2] * x[0] - z[0] * x[2], y[2] = z[0] * x[1] - z[1] * x[0];
-    const double half = tan(30.0 * 0.017453292519943295);
-    patina_camera camera = { .struct_size = sizeof camera,
-                             .left = -half,
-                             .right = half,
-                             .bottom = -0.75 * half,
-                             .top = 0.75 * half,
-                             .near_clip = 0.001,
-                             .far_clip = 10 };
-    patina_settings settings = { .struct_size = sizeof settings, .width = 2048, .height = 1536 };
-    for (int r = 0; r < 3; r++) {
-        for (int c = 0; c < 3; c++)
-            camera.world_from_camera[4 * r + c] = eye.axes[c][r];
-        camera.world_from_camera[4 * r + 3] = at[r];
-    }
-    camera.world_from_camera[15] = 1.0;
+    patina_camera camera = camera_perspective(at, to, 46.8, WIDTH, HEIGHT, 0.001, 10.0);
+    patina_settings settings = { .struct_size = sizeof settings, .width = WIDTH, .height = HEIGHT };
     assert_int_equal(patina_scene_set_camera(scene, &camera), PATINA_OK);
     assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
-    return eye;
+    return camera;
 }
 
-static int shows(const struct eye *eye, const float point[3])
+static int shows(const patina_camera *camera, const float point[3])
 {
-    double p[3] = { 0 }, half = tan(30.0 * 0.017453292519943295);
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < 3; k++)
-            p[c] += eye->axes[c][k] * ((double)point[k] - eye->at[k]);
-    return p[2] < -0.001 && fabs(p[0]) < half * -p[2] && fabs(p[1]) < 0.75 * half * -p[2];
+    const double world[3] = { (double)point[0], (double)point[1], (double)point[2] };
+    double x, y, z;
+    camera_project(camera, WIDTH, HEIGHT, world, &x, &y, &z);
+    return z > camera->near_clip && x > 0.0 && x < WIDTH && y > 0.0 && y < HEIGHT;
 }
 
 // What lies around the camera, partly behind it, is culled where none of it shows, and never where some does.
@@ -250,7 +224,7 @@ static void test_chunks_around_the_camera(void **state)
     (void)state;
     uint32_t seed = 1, kept = 0, culled = 0;
     patina_cloud *cloud = square(1);
-    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
     uint8_t *drawn = malloc(cloud->slots);
     assert_non_null(drawn);
     for (int i = 0; i < 300; i++) {
@@ -259,7 +233,7 @@ static void test_chunks_around_the_camera(void **state)
             seed = seed * 1664525u + 1013904223u;
             at[k / 3][k % 3] = (double)(seed >> 8) / (1 << 24) * (k % 3 == 2 ? 0.3 : 2.0) - (k % 3 == 2 ? -0.01 : 1.0);
         }
-        struct eye eye = look(scene, at[0], at[1]);
+        const patina_camera camera = look(scene, at[0], at[1]);
         struct pt_plan plan = plan_of(scene);
         memset(drawn, 0, cloud->slots);
         for (uint32_t c = 0; c < plan.instances[0].chunk_count; c++)
@@ -267,7 +241,7 @@ static void test_chunks_around_the_camera(void **state)
         for (uint32_t c = 0; c < cloud->chunk_count; c++) {
             const struct pt_chunk *chunk = &cloud->chunks[c];
             for (uint32_t slot = chunk->first; slot < chunk->first + chunk->count; slot++)
-                assert_true(drawn[slot] || !shows(&eye, positions[cloud->order[slot]]));
+                assert_true(drawn[slot] || !shows(&camera, positions[cloud->order[slot]]));
             kept += drawn[chunk->first];
             culled += !drawn[chunk->first];
         }
@@ -284,7 +258,7 @@ static void test_spacing_is_of_what_shows(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(1);
-    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
     look(scene, (const double[]){ 0.1, -0.5, 0.6 }, (const double[]){ 0.1, 0.4, 0.0 });
     struct pt_plan plan = plan_of(scene);
     assert_true(plan.spacing_px > 12.0 && plan.spacing_px < 40.0); // 112 with what lies behind the eye
@@ -302,7 +276,7 @@ static void test_region_decides_as_the_whole(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(1);
-    patina_scene *scene = scene_of(cloud, 1.5, 1, 0);
+    patina_scene *scene = scene_above(cloud, 1.5, 1, 0);
     struct pt_plan whole = plan_of(scene);
     patina_settings settings = { .struct_size = sizeof settings, .region = { 700, 650, 750, 660 } };
     assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
@@ -331,7 +305,7 @@ static void test_layers(void **state)
                   { 0.0f, 0, 1u << PATINA_PASS_DEPTH, 8 }, { 0.0f, 2, 1u << PATINA_PASS_COMBINED, 2 } };
     patina_cloud *cloud = square(1);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+        patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
         patina_cloud_style style = { .struct_size = sizeof style, .transparency = cases[i].transparency };
         patina_settings settings = { .struct_size = sizeof settings,
                                      .layers = cases[i].asked,
@@ -352,7 +326,7 @@ static void test_layers(void **state)
         pt_plan_destroy(&plan);
         patina_scene_destroy(scene);
     }
-    patina_scene *behind = scene_of(cloud, 2.5, -1, 1);
+    patina_scene *behind = scene_above(cloud, 2.5, -1, 1);
     patina_cloud_style glass = { .struct_size = sizeof glass, .cull_back = 1, .transparency = 0.5f };
     assert_int_equal(patina_scene_clear(behind), PATINA_OK);
     assert_int_equal(patina_scene_add_cloud(behind, cloud, &glass), PATINA_OK);
@@ -388,7 +362,7 @@ static void test_lines_are_planned_where_asked_for(void **state)
 {
     (void)state;
     patina_cloud *cloud = square(1);
-    patina_scene *scene = scene_of(cloud, 2.5, 1, 0);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
     patina_lines lines = { .struct_size = sizeof lines, .width = 3 };
     struct pt_plan without = plan_of(scene);
     assert_non_null(skipped(&without, "lines"));

@@ -45,9 +45,8 @@ struct walk {
     struct pt_seen_row seen[SEEN_MOST];
     struct pt_color_row shaded[RING], smoothed[RING];
     float *shown[RING][5];          // normals, opacities, what arrives of the lights
-    float *blended[3];              // sums of normals of the row at hand, where one_layer[x / PT_LANES] says so
-    const uint8_t *one_layer;       // not 0 where all that the blend's windows show is one layer
-    uint8_t *wide;                  // what one_layer is where windows are wider than 3 x 3 pixels: their radius, or 0
+    float *blended[3];              // sums of normals of the row at hand, where all that their windows show is one layer:
+    uint8_t *wide;                  // by `flat` of the row, or of windows wider than 3 x 3 pixels their radius, else 0
     struct pt_tile_sum *tiles;      // of the row of tiles at hand
 };
 

@@ -84,6 +84,7 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
     const int reach = (int)args->blend;
     for (int32_t k = -reach; k <= reach; k++)
         around[reach + k] = seen_row(finish, walk, y + k);
+    const uint8_t *one_layer = reach == 1 ? around[reach]->flat : walk->wide;
     for (uint32_t x = around[reach]->first; x < around[reach]->end; x += PT_LANES) {
         vf color[3] = { vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x) }, normal[3];
         vi id;
@@ -91,7 +92,7 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
                                  pt_lanes_left(x, view->width), &id);
         if (!vm_bits(ours))
             continue;
-        float *const *blended = reach && reach == finish->reach && walk->one_layer[x / PT_LANES] ? walk->blended : NULL;
+        float *const *blended = reach && reach == finish->reach && one_layer[x / PT_LANES] ? walk->blended : NULL;
         vf share = pt_shade_pixels(args, &finish->planes, around, finish->weights, blended, shadows, x, (uint32_t)y, id, ours,
                                    plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
@@ -184,7 +185,6 @@ static void blend_nine(const struct finish *finish, struct walk *walk, int32_t y
     const struct pt_seen_row *const rows[3] = { seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
                                                 seen_row(finish, walk, y + 1) };
     const struct pt_nine nine = pt_blend_nine(finish->weights);
-    walk->one_layer = rows[1]->flat;
     for (uint32_t x = rows[1]->first, end; x < rows[1]->end; x = end) {
         end = end_of_part(rows[1], x);
         for (uint32_t k = 0; k < 3 && pt_flat(rows[1], x); k++) {
@@ -202,7 +202,6 @@ static void blend_wide(const struct finish *finish, struct walk *walk, int32_t y
     const int32_t end = (int32_t)seen_row(finish, walk, y)->end;
     for (int32_t k = -finish->reach; k <= finish->reach; k++)
         around[finish->reach + k] = seen_row(finish, walk, y + k);
-    walk->one_layer = walk->wide;
     for (int32_t x = (int32_t)seen_row(finish, walk, y)->first; x < end; x += PT_BLEND_COLUMNS)
         pt_blend_flat(&blend, x, x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end, walk->wide, walk->blended);
 }

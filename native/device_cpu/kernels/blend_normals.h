@@ -71,10 +71,8 @@ static inline void pt_blend_sum(const struct pt_blend *blend, uint32_t x, vm fil
         pt_blend_nine_sum(blend, x, limit, filled, sum);
         return;
     }
-    const vf reach = vf_select(filled, pt_blend_reach(blend, z, limit), zero);
-    int most = blend->most;
-    while (most && !vm_bits(vf_le(vf_set((float)most), reach)))
-        most--;
+    const vf reach = pt_blend_reach(blend, z, limit);
+    const int most = vf_greatest(reach, filled, blend->most);
     sum[0] = sum[1] = sum[2] = zero;
     for (int dy = 0; dy <= most; dy++)
         for (int dx = 0; dx <= most; dx++) {
@@ -108,11 +106,9 @@ static inline void pt_blend_sum(const struct pt_blend *blend, uint32_t x, vm fil
 static inline int pt_blend_shared_reach(const struct pt_blend *blend, int32_t x)
 {
     const struct pt_seen_row *own = blend->around[blend->most];
-    vf reach = pt_blend_reach(blend, vf_load(own->z + x), vf_load(own->limit + x));
-    float lanes[PT_LANES];
-    vf_store(lanes, reach);
-    const int first = (int)lanes[0];
-    return vm_bits(vm_and(vf_le(reach, vf_set((float)first)), vf_le(vf_set((float)first), reach))) == PT_ALL ? first : 0;
+    const vf reach = pt_blend_reach(blend, vf_load(own->z + x), vf_load(own->limit + x));
+    const int most = vf_greatest(reach, vm_first(PT_LANES), blend->most);
+    return vm_bits(vf_le(vf_set((float)most), reach)) == PT_ALL ? most : 0;
 }
 
 // flat: the radius of vectors from x to end where all around each pixel is of its layer, else 0. Returns the greatest.

@@ -14,7 +14,7 @@ struct depth_row {
 };
 
 struct center { // PT_LANES pixels of a row
-    uint32_t at[PT_LANES]; // columns, counted from the row's pad on; any where nobody asks
+    uint32_t at[PT_LANES]; // columns, counted from the row's pad on; some of the row where nobody asks
     vf z, w;
     vf distance, slope, step[2]; // what belongs to the same surface: kernel_args.h
     vf reach;                    // radius of the window
@@ -82,9 +82,7 @@ static void find_reach(const struct normals_args *args, struct center *c)
     const vf zero = vf_zero();
     vf wanted = zero - vf_floor(zero - c->distance * vf_rcp(vf_footprint(&args->view, c->z)));
     c->reach = vf_min(vf_max(wanted, vf_set(PT_ESTIMATE_LEAST)), vf_set((float)args->radius));
-    c->most = (int32_t)args->radius;
-    while (c->most && !vm_bits(vm_and(c->ours, vf_le(vf_set((float)c->most), c->reach))))
-        c->most--;
+    c->most = vf_greatest(c->reach, c->ours, (int)args->radius);
 }
 
 // 1. Sums over the window, of rows first. Pixel counts and offsets are small integers: exact in float32. around: rows from
@@ -188,12 +186,11 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     vf a, b, w, n[3], ray[2] = { vf_zero(), vf_zero() };
     vm found = vm_and(c.ours, solve(&c, &sums, &a, &b, &w));
     // 3. the plane's normal from dw/dx = a, dw/dy = b a pixel
-    vi column = vi_sub(at, vi_set(PT_ROW_PAD));
     n[0] = a * vf_set(view->ray_ys);
     n[1] = b * vf_set(view->ray_xs);
     n[2] = vf_set(view->ray_xs * view->ray_ys);
     if (view->perspective) {
-        vf_ray_of(view, column, vi_set(y), ray);
+        vf_ray_of(view, vi_sub(at, vi_set(PT_ROW_PAD)), vi_set(y), ray);
         n[2] = (n[0] * ray[0] + n[1] * ray[1]) - w * n[2];
     }
     // 4. unit, towards the viewer: n . (u, v, -1) < 0. Largest component first, so that no square over- or underflows.
@@ -206,13 +203,11 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     vm away = vf_lt(vf_zero(), (n[0] * ray[0] + n[1] * ray[1]) - n[2]);
     scale = vf_select(away, vf_zero() - scale, scale);
     float out[3][PT_LANES], *normals = (float *)pt_cpu_data(job->call, 2) + 4 * (size_t)y * view->width;
-    uint32_t columns[PT_LANES];
-    vi_store(columns, column);
     for (int k = 0; k < 3; k++)
         vf_store(out[k], vf_select(found, n[k] * scale, vf_zero()));
     for (uint32_t lanes = vm_bits(c.ours); lanes; lanes &= lanes - 1) {
         const int i = __builtin_ctz(lanes);
-        float *normal = normals + 4 * (size_t)columns[i];
+        float *normal = normals + 4 * (size_t)(c.at[i] - PT_ROW_PAD);
         normal[0] = out[0][i], normal[1] = out[1][i], normal[2] = out[2][i], normal[3] = 0.0f;
     }
 }
