@@ -74,9 +74,9 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
     if not quick:
         found += [case_of("effects", device=main, points=1_000_000, quality=quality, mode=mode, frames=n)
                   for mode in peers.EFFECTS.values() for quality in ("refined", "paper")]
-    found += [case_of("inside", device=main, points=count, frames=n, distance=1.2, bare=bare,
-                      scene="torus from inside" + ", without normals" * bare)
-              for count in ([1_000_000] if quick else [1_000_000, 100_000]) for bare in (0, 1)]
+        found += [case_of("inside", device=main, points=count, frames=n, distance=1.2, bare=bare,
+                          scene="torus from inside" + ", without normals" * bare)
+                  for count in (1_000_000, 100_000) for bare in (0, 1)]
     found += [case_of("cues", device=main, points=1_000_000, mode=mode, frames=n) for mode in ("surface", *cases.CUES)]
     found += [case_of("lines", device=main, points=1_000_000, mode=mode, frames=n, scene=f"torus, {mode}")
               for mode in ("surface", "lines 2", "lines 8", "lines 16")]
