@@ -11,10 +11,11 @@ of them, in the same order; "absent" what could not be measured, and why.
 
     --quick   one size and density of each scene: within two minutes
     --full    scenes x devices x qualities x sizes x densities, and 10^8 points where memory allows: hours
+    --readme  every figure that README.md quotes, written into it: an hour; with --only, those of these groups
 
---only meshes: as triangles against as points; only --full does it too.
---only import: a LAZ of 30 million points into Blender, 1 million with --quick; else only --full does it.
---only viewport: orbiting 10 million points in Blender's window, 1 million with --quick; else only --full does it.
+Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
+into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), session (ten
+minutes of work in Blender). With --quick they take a million points, and one minute.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,7 @@ import page
 import papers
 import peers
 import plots
+import quoted
 import readme
 import report
 import soft
@@ -45,9 +48,10 @@ import window
 ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 20_000_000  # points of a case in the product of scenes and densities
 SURFACES = list(stage.scenes.SURFACES)
-GROUPS = ("headline", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns", "steady", "papers",
-          "effects", "lines", "styles", "peers", "hard", "import", "meshes", "cues",
-          "viewport")
+LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
+GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
+          "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
+          "leaves", "session")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -72,6 +76,9 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
     for quality in ("unfilled", "splats"):
         found.append(case_of("headline", device=main, points=1_000_000, quality=quality, frames=n))
     if not quick:
+        found += [case_of("levels", device=name, points=1_000_000, frames=n) for name in LEVELS]
+        found += [case_of("discs", device=main, points=count, quality=quality, frames=n)
+                  for count in (62_500, 250_000, 1_000_000) for quality in ("refined", "splats")]
         found += [case_of("effects", device=main, points=1_000_000, quality=quality, mode=mode, frames=n)
                   for mode in peers.EFFECTS.values() for quality in ("refined", "paper")]
         found += [case_of("inside", device=main, points=count, frames=n, distance=1.2, bare=bare,
@@ -134,6 +141,34 @@ def split(result: dict[str, Any], row: dict[str, Any]) -> None:
     result["details"].append({key: value for key, value in row.items() if key not in cases.FIELDS})
 
 
+def hard_cases(options: argparse.Namespace) -> str:
+    """The table of tests/hard/hard.py."""
+    devices = options.device[:1] if options.quick else options.device
+    done = subprocess.run([sys.executable, str(ROOT / "tests/hard/hard.py"), "--library", str(options.library),
+                           *(word for name in devices for word in ("--device", name))], capture_output=True, text=True)
+    return "\n".join(line for line in done.stdout.splitlines() if line.startswith("|")) or f"skip: {done.stderr}"
+
+
+# What stands on the page beside the rows: group, title, and what measures it, as Markdown.
+PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
+    "hard": ("hard", "Hard cases", hard_cases),
+    "holes": ("tests", "Holes against density", lambda options: quoted.holes(options.library)),
+    "outlines": ("tests", "Outlines", lambda options: quoted.outlines(options.library)),
+    "slopes": ("tests", "Slopes", lambda options: quoted.slopes(options.library)),
+    "layers": ("tests", "Layers", lambda options: quoted.layers(options.library)),
+    "line widths": ("tests", "Widths of lines", lambda options: quoted.line_widths(options.library)),
+    "sun": ("tests", "Shadows of a sun", lambda options: quoted.sun(options.library)),
+    "expected": ("tests", "Expected errors", lambda options: quoted.expected(options.library)),
+    "meshes": ("meshes", "Meshes", lambda options: meshes.measure(options.library)),
+    "import": ("import", "Large imports",
+               lambda options: imports.measure(1_000_000 if options.quick else 30_000_000, options.library)),
+    "viewport": ("viewport", "Viewport",
+                 lambda options: window.measure(1_000_000 if options.quick else 10_000_000, options.library)),
+    "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
+    "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
+}
+
+
 def measure(options: argparse.Namespace) -> dict[str, Any]:
     os.environ["PATINA_LIBRARY"] = str(options.library)
     stage.tidy()
@@ -143,7 +178,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
         "frames": options.frames,
         "distance": stage.DISTANCE, "elevation": stage.ELEVATION, "fov": stage.FOV,
         "bandwidth": machine.copy_bandwidth(machine.cores()), "bandwidth_one": machine.copy_bandwidth(1),
-        "rows": [], "details": [], "absent": [], "hard": "", "import": "", "meshes": "", "viewport": "",
+        "rows": [], "details": [], "absent": [], "parts": {},
     }
     for case in chosen(options):
         reason = too_large(case)
@@ -158,25 +193,16 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             split(result, row)
     if not options.only or "shadows" in options.only:
         result["soft"] = soft.measure(options.device[0])
-    if not options.only or "hard" in options.only:
-        result["hard"] = hard_cases(options)
-    if "meshes" in options.only or options.full:
-        result["meshes"] = meshes.measure(options.library)
-    if "import" in options.only or options.full:
-        result["import"] = imports.measure(1_000_000 if options.quick else 30_000_000, options.library)
-    if "viewport" in options.only or options.full:
-        result["viewport"] = window.measure(1_000_000 if options.quick else 10_000_000, options.library)
+    for name, (group, title, part) in PARTS.items():
+        everything = options.full or options.readme or group == "hard"
+        if group in options.only or (everything and not options.only):
+            try:
+                text = part(options)
+            except (OSError, subprocess.SubprocessError) as error:
+                text = f"skip: {error}"
+            print(f"{group}: {name}: {text.splitlines()[-1]}", file=sys.stderr)
+            result["parts"][name] = {"title": title, "text": text}
     return result
-
-
-def hard_cases(options: argparse.Namespace) -> str:
-    """The table of tests/hard/hard.py."""
-    devices = options.device[:1] if options.quick else options.device
-    done = subprocess.run([sys.executable, str(ROOT / "tests/hard/hard.py"), "--library", str(options.library),
-                           *(word for name in devices for word in ("--device", name))], capture_output=True, text=True)
-    lines = done.stdout.splitlines()
-    print(f"hard: {lines[-1] if lines else done.stderr}", file=sys.stderr)
-    return "\n".join(line for line in lines if line.startswith("|"))
 
 
 def say(row: dict[str, Any]) -> None:

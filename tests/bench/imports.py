@@ -22,14 +22,14 @@ PIECE = 1 << 20
 
 
 def measure(points: int, library: Path) -> str:
-    """A table, or why there is none."""
+    """A table, or "skip: " and why there is none."""
     with tempfile.TemporaryDirectory(prefix="patina-bench-") as name:
         folder = Path(name)
         python = ROOT / "build/out/bpy45/bin/python"
         wheels = [path for kind in ("laspy", "lazrs") for path in sorted(WHEELS.glob(f"{kind}-*"))
                   if "-none-any" in path.name or "-cp311-" in path.name]
         if not python.exists() or len(wheels) < 2:
-            return "Large imports: need build/out/bpy45 (build/setup test) and the wheels that build/package fetches."
+            return "skip: need build/out/bpy45 (build/setup test) and the wheels that build/package fetches."
         for wheel in wheels:
             zipfile.ZipFile(wheel).extractall(folder)
         (folder / "patina").symlink_to(ROOT / "addon")
@@ -45,7 +45,7 @@ def measure(points: int, library: Path) -> str:
             done = subprocess.run([*program, step, folder / "scan.laz", str(points)], env=environment,
                                   capture_output=True, text=True, check=False)
             if done.returncode:
-                return f"Large imports: {label or step}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}"
+                return f"skip: {label or step}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}"
             if label:
                 got = json.loads(done.stdout.splitlines()[-1])
                 if program is module:

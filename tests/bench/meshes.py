@@ -20,16 +20,16 @@ FRAMES = 9
 
 
 def measure(library: Path) -> str:
-    """A table, or why there is none."""
+    """A table, or "skip: " and why there is none."""
     python = ROOT / "build/out/bpy45/bin/python"
     if not python.exists():
-        return "Meshes: need build/out/bpy45 (build/setup test)."
+        return "skip: need build/out/bpy45 (build/setup test)."
     with tempfile.TemporaryDirectory(prefix="patina-bench-") as name:
         (Path(name) / "patina").symlink_to(ROOT / "addon")
         environment = {**os.environ, "PYTHONPATH": name, "PATINA_LIBRARY": str(library), "PYTHONDONTWRITEBYTECODE": "1"}
         done = subprocess.run([python, __file__], env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
-        return f"Meshes: {(done.stderr.strip().splitlines() or ['failed'])[-1]}"
+        return f"skip: {(done.stderr.strip().splitlines() or ['failed'])[-1]}"
     rows = json.loads(done.stdout.splitlines()[-1])
     lines = [f"| {shape} | {kind} | {wrong:.3f} | {depth:.3f} | {normal:.2f} | {color:.4f} | {build:.0f} | {ms:.1f} |"
              for shape, kind, wrong, depth, normal, color, build, ms in rows]

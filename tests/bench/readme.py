@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-import re
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ import plots
 from report import Row, count, joined, name_of, table
 
 NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2",
-         "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
+         "cpu-scalar": "processor, plain", "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
 QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs"}
 
 
@@ -28,8 +26,10 @@ def _line(row: Row) -> list[str]:
 
 
 def speed(result: dict[str, Any]) -> str:
-    rows = [row for row in joined(result, "headline", "points")
-            if row["group"] == "headline" or (row["points"] > 10_000 and row["device"] == result["rows"][0]["device"])]
+    first = joined(result, "headline")[0]
+    rows = [*joined(result, "headline"),
+            *(row for row in joined(result, "points") if row["points"] > 10_000 and row["device"] == first["device"]),
+            *(row for row in joined(result, "levels") if name_of(row) != name_of(first))]
     head = ["device", "points", "quality", "ms a frame", "open, %", "grown, % (off the outline)",
             "depth rms, spacings", "normal mean, °", "colour rms", "PSNR, dB", "SSIM"]
     return (f"Measured on {result['date']}, version {result['version']}: {result['processor']}, "
@@ -92,6 +92,21 @@ def inside(result: dict[str, Any]) -> str:
             table(["device", "points", "with normals", "ms a frame", "normal mean, °", "normal 99%, °", "PSNR, dB"], body))
 
 
+def discs(result: dict[str, Any]) -> str:
+    """Filling against discs, few points and many."""
+    body = [[count(row["points"]), QUALITIES[row["quality"]], f"{row['ms_median']:.1f}", f"{row['error']['color_psnr']:.1f}",
+             f"{row['error']['depth_rms_spacings']:.2f}", f"{row['error']['normal_mean_degrees']:.2f}"]
+            for row in joined(result, "discs")]
+    return table(["points", "surface", "ms", "PSNR, dB", "depth rms, spacings", "normal mean, °"], body)
+
+
+def lines(result: dict[str, Any]) -> str:
+    """What lines add to the headline's picture."""
+    plain, *wide = (row["ms_median"] for row in joined(result, "lines"))
+    return (f"One million points at 1024 × 1024 take {plain:.1f} ms without lines and {', '.join(f'{ms:.1f}' for ms in wide)} with "
+            f"lines of 2, 8 and 16 pixels.")
+
+
 def cues(result: dict[str, Any]) -> str:
     """What each depth cue or means of drawing adds to the headline's picture, whole and in its own pass."""
     rows = joined(result, "cues")
@@ -110,20 +125,6 @@ def styles(result: dict[str, Any]) -> str:
     body = [[row["quality"], f"{row['ms_median']:.1f}", f"{row['ms_median'] / plain:.1f}×",
              f"{100.0 * (1.0 - row['error']['coverage_iou']):.2f}", f"{row['error']['depth_rms_spacings']:.2f}"] for row in rows]
     return table(["style", "ms", "against As Scanned", "coverage wrong, %", "depth rms, spacings"], body)
-
-
-def holes(program: Path) -> str:
-    """The table that tests/scenes/test_holes prints."""
-    said = subprocess.run([str(program), "--device", "cpu"], capture_output=True, text=True).stdout
-    body = []
-    for line in said.splitlines():
-        cells = line.replace("|", " ").split()
-        if len(cells) == 8 and re.fullmatch(r"[\d.]+", cells[0]):
-            none, paper, paper_grown, closed, closed_grown = (float(cell) for cell in cells[1:6])
-            body.append([cells[0], f"{none:.2f}", f"{paper:.3f}", f"{paper_grown:.3f}", f"{closed:.3f}",
-                         f"{closed_grown:.3f}"])
-    return table(["points a pixel", "unfilled: open, %", "paper: open, %", "paper: grown, %", "closed: open, %",
-                  "closed: grown, %"], body)
 
 
 def hard(rows: str) -> str:
@@ -158,23 +159,15 @@ def update(result: dict[str, Any], root: Path) -> str:
             parts["others"] = others(result)
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
             parts["effects"] = effects(result)
-    if joined(result, "inside"):
-        parts["inside"] = inside(result)
-    if joined(result, "cues"):
-        parts["cues"] = cues(result)
-    if joined(result, "styles"):
-        parts["styles"] = styles(result)
+    for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("cues", cues), ("styles", styles)):
+        if joined(result, name):
+            parts[name] = part(result)
     for quality in ("paper", "refined"):
         if papers.ratios(result, quality):
             parts[f"papers {quality}"] = papers.table(result, quality)
-    program = root / "build/out/release/tests/scenes/test_holes"
-    if program.is_file() and result["rows"]:
-        parts["holes"] = holes(program)
-    for name in ("meshes", "viewport", "import"):
-        if result.get(name):
-            parts[name] = result[name]
-    if result.get("hard"):
-        parts["hard"] = hard(result["hard"])
+    for name, part in result["parts"].items():
+        if not any(line.startswith("skip") for line in part["text"].splitlines()):
+            parts[name] = hard(part["text"]) if name == "hard" else part["text"]
     path = root / "README.md"
     text, written = path.read_text(), []
     for name, part in parts.items():

@@ -101,7 +101,8 @@ def markdown(result: dict[str, Any]) -> str:
     if joined(result, "peers"):
         text += ["## Other programs, the same points, camera and truth", "", errors_table(against), "",
                  *notes(joined(result, "peers")), ""]
-    for group, title in (("inside", "Among the points"), ("effects", "Layers and shadows of the torus"),
+    for group, title in (("levels", "Processors that have less"), ("discs", "Filling or discs"),
+                         ("inside", "Among the points"), ("effects", "Layers and shadows of the torus"),
                          ("cues", "Depth cues and means of drawing on the torus, one by one"),
                          ("lines", "Lines around the torus"),
                          ("styles", "Styles, one row each"),
@@ -115,14 +116,8 @@ def markdown(result: dict[str, Any]) -> str:
         text += [soft.markdown(result["soft"]), ""]
     if joined(result, "papers"):
         text += [papers.markdown(result), ""]
-    if result.get("hard"):
-        text += ["## Hard cases", "", result["hard"], ""]
-    if result.get("meshes"):
-        text += ["## Meshes", "", result["meshes"], ""]
-    if result.get("import"):
-        text += ["## Large imports", "", result["import"], ""]
-    if result.get("viewport"):
-        text += ["## Viewport", "", result["viewport"], ""]
+    for part in result["parts"].values():
+        text += [f"## {part['title']}", "", part["text"], ""]
     skipped = {name: reason for row in joined(result) for name, reason in (row.get("skipped") or {}).items()}
     if skipped:
         text += ["Left out: " + "; ".join(f"*{name}*: {reason}" for name, reason in sorted(skipped.items())) + ".", ""]

@@ -33,16 +33,16 @@ ROWS = (
 
 
 def measure(points: int, library: Path) -> str:
-    """A table, or why there is none."""
+    """A table, or "skip: " and why there is none."""
     if not shutil.which("blender") or not shutil.which("xvfb-run"):
-        return "Viewport: needs Blender and xvfb-run (build/setup test)."
+        return "skip: needs Blender and xvfb-run (build/setup test)."
     command = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24", "blender", "--enable-event-simulate",
                "--factory-startup", "--python", str(ROOT / "tests/blender/test_window.py"), "--", "figures"]
     environment = {**os.environ, "PATINA_LIBRARY": str(library), "PATINA_FIGURES_POINTS": str(points)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     found = [line for line in done.stdout.splitlines() if line.startswith('{"points"')]
     if done.returncode or not found:
-        return f"Viewport: {(done.stdout.strip().splitlines() or ['failed'])[-1]}"
+        return f"skip: {(done.stdout.strip().splitlines() or ['failed'])[-1]}"
     got = json.loads(found[-1])
     head = (f"{got['points']:,} points, a view of {got['width']} × {got['height']} in a window of 1280 × 800, overlays hidden, "
             f"*{got['transform']}* view transform, Blender's settings of the factory else, the middle mouse button drags; while "

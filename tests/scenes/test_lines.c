@@ -234,7 +234,7 @@ static void test_slopes(void **state)
     (void)state;
     patina_device *device = support_device_first();
     printf("  of %d pixels of a tilted plane, so many show lines: with normals, without\n  tilt", SIZE * SIZE);
-    static const double densities[] = {1.0, 2.0, 4.0};
+    static const double densities[] = {1.0, 4.0, 30.0};
     for (int d = 0; d < 3; d++)
         printf(" | %g points a pixel", densities[d]);
     uint32_t wrong = 0;
