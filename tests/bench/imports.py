@@ -26,10 +26,14 @@ def measure(points: int, library: Path) -> str:
     with tempfile.TemporaryDirectory(prefix="patina-bench-") as name:
         folder = Path(name)
         python = ROOT / "build/out/bpy45/bin/python"
+        if not python.exists():
+            return "skip: needs build/out/bpy45 (build/setup test)."
+        if not WHEELS.is_dir():
+            subprocess.run([ROOT / "build/package"], capture_output=True, check=False)
         wheels = [path for kind in ("laspy", "lazrs") for path in sorted(WHEELS.glob(f"{kind}-*"))
                   if "-none-any" in path.name or "-cp311-" in path.name]
-        if not python.exists() or len(wheels) < 2:
-            return "skip: need build/out/bpy45 (build/setup test) and the wheels that build/package fetches."
+        if len(wheels) < 2:
+            return f"skip: needs wheels of laspy and lazrs, which build/package fetches into {WHEELS}."
         for wheel in wheels:
             zipfile.ZipFile(wheel).extractall(folder)
         (folder / "patina").symlink_to(ROOT / "addon")
