@@ -11,7 +11,7 @@ of them, in the same order; "absent" what could not be measured, and why.
 
     --quick   one size and density of each scene: within two minutes
     --full    scenes x devices x qualities x sizes x densities, and 10^8 points where memory allows: hours
-    --readme  every figure that README.md quotes, written into it: an hour; with --only, those of these groups
+    --readme  every figure that README.md quotes, written into it: half an hour; with --only, those of these groups
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), session (ten
