@@ -14,6 +14,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import plots  # noqa: E402
+import quoted  # noqa: E402
 import readme  # noqa: E402
 
 FIELDS = ["scene", "mode", "device", "width", "height", "points", "quality", "threads", "ms_median", "ms_min", "ms_max",
@@ -83,6 +84,20 @@ class Bench(unittest.TestCase):
         self.assertTrue(text.startswith("before\n<!-- bench speed -->\n") and text.endswith("\n<!-- end -->\nafter\n"))
         self.assertIn("depth rms", text)
         self.assertNotIn("old", text)
+
+    def test_readme_keeps_what_could_not_be_measured(self) -> None:
+        path = self.out / "README.md"
+        path.write_text("<!-- bench leaves -->\nold\n<!-- end -->\n<!-- bench slopes -->\nold\n<!-- end -->\n")
+        parts = {"leaves": {"title": "", "text": "| some |\nskip scan.las: there is no such file"},
+                 "slopes": {"title": "", "text": "new"}}
+        readme.update({**self.result, "parts": parts}, self.out)
+        self.assertEqual(path.read_text(), "<!-- bench leaves -->\nold\n<!-- end -->\n<!-- bench slopes -->\nnew\n<!-- end -->\n")
+
+    def test_quoted(self) -> None:
+        library = HERE.parents[1] / "build/out/release/libpatina.so"
+        table = quoted.holes(library).splitlines()
+        self.assertEqual([row.split()[1] for row in table[2:]], ["0.1", "0.2", "0.3", "0.5", "1", "2", "4", "8", "16", "30"])
+        self.assertRegex(quoted.slopes(library), r"from 5° to 85°, 0\.3 to 10 points a pixel, loses at most 0\.\d{3} % ")
 
 
 if __name__ == "__main__":
