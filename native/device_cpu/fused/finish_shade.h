@@ -112,37 +112,33 @@ static void shade_lit(const struct finish *finish, struct walk *walk, const stru
         light_row(finish, walk, call, y, 0);
 }
 
-// Colours of three bytes a point, fetched at random: a tight loop gathers those of a block, so that many are under way at a
-// time. More are when they are asked for first: a gather is 80 operations, of which a processor keeps some 300 in sight.
+// Colours of three bytes a point, fetched at random: a loop of plain loads does nothing else, so that many are under way at a
+// time.
 static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
                         const struct pt_color_row *out, int32_t y)
 {
     enum { BLOCK = 16 };
     const struct shade_args *args = call->arguments;
     const uint32_t width = finish->planes.view->width;
-    const char *colors = pt_cpu_data(call, 4);
-    const int near = !lies_far(&args->instance, 3);
+    const uint8_t *colors = pt_cpu_data(call, 4);
     for (uint32_t first = seen->first; first < seen->end; first += BLOCK * PT_LANES) {
-        vi words[BLOCK];
+        uint32_t words[BLOCK * PT_LANES];
         vm ours[BLOCK];
         uint32_t count = (seen->end - first) / PT_LANES;
         count = count < BLOCK ? count : BLOCK;
         for (uint32_t i = 0; i < count; i++) {
-            uint32_t x = first + i * PT_LANES, points[PT_LANES];
-            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width),
-                                     &words[i]);
-            vi_store(points, vi_select(ours[i], words[i], vi_set(0)));
-            for (uint32_t k = 0; near && k < PT_LANES; k++)
-                __builtin_prefetch(colors + 3 * (size_t)points[k]);
+            vi id;
+            uint32_t x = first + i * PT_LANES;
+            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
+            vi_store(words + i * PT_LANES, vi_select(ours[i], id, vi_set(0)));
         }
-        for (uint32_t i = 0; i < count; i++)
-            if (vm_bits(ours[i]))
-                words[i] = pt_gather_rgb(colors, words[i], ours[i]);
+        for (uint32_t i = 0; i < count * PT_LANES; i++)
+            memcpy(&words[i], colors + 3 * (size_t)words[i], sizeof words[i]);
         for (uint32_t i = 0; i < count; i++) {
             vf albedo[3];
             if (!vm_bits(ours[i]))
                 continue;
-            pt_decode_srgb(words[i], albedo);
+            pt_decode_srgb(vi_load(words + i * PT_LANES), albedo);
             for (uint32_t k = 0; k < 3; k++)
                 vf_store_where(out->color[k] + first + i * PT_LANES, albedo[k], ours[i]);
         }

@@ -73,6 +73,7 @@ static void surface_row(void *context, uint32_t y)
     const size_t row = (size_t)y * args->view.width;
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
     uint32_t *from = (uint32_t *)pt_cpu_data(call, 4) + row;
+    const uint32_t *words = pt_cpu_data(call, 1);
     struct measured measured;
     for (uint32_t first = rect[0]; first < rect[2]; first += BLOCK) {
         const uint32_t end = rect[2] - first < BLOCK ? rect[2] : first + BLOCK;
@@ -90,10 +91,8 @@ static void surface_row(void *context, uint32_t y)
             pt_row_put(from, args->view.width, x, vi_add(vi_set((uint32_t)row), at), ours);
         }
         // words are fetched at random: a tight loop gathers those of a block, so that many are under way at a time
-        for (uint32_t i = 0; i < count; i += PT_LANES) {
-            vm lanes = vm_first(pt_lanes_left(i, count));
-            vi_store(measured.word + i, vi_gather(pt_cpu_data(call, 1), vi_load(measured.word + i), lanes));
-        }
+        for (uint32_t i = 0; i < count; i++)
+            measured.word[i] = words[measured.word[i]];
         for (uint32_t i = 0; i < count; i += PT_LANES)
             surface_pixels(args, call, y, &measured, i, pt_lanes_left(i, count));
     }
