@@ -165,7 +165,8 @@ static void chunk_translation(const struct camera *camera, const struct object *
 static int knows_discs(const struct patina_scene *scene, const struct pt_instance *instance)
 {
     return scene->settings.surface == PATINA_SURFACE_SPLATS ||
-           (scene->settings.surface == PATINA_SURFACE_AUTO && instance->cloud->shapes && pt_disc_ids(scene));
+           (scene->settings.surface == PATINA_SURFACE_AUTO && scene->settings.fill == PATINA_FILL_CLOSED &&
+            instance->cloud->shapes && pt_disc_ids(scene));
 }
 
 // Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
