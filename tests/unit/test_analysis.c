@@ -37,7 +37,7 @@ static void compare_with_all(patina_cloud *cloud, uint32_t k, uint32_t looked_at
 {
     struct pt_neighbours tree;
     static struct pt_found found;
-    assert_int_equal(pt_neighbours_create(&tree, cloud, NULL, NULL, 0, 1), 0);
+    assert_int_equal(pt_neighbours_create(&tree, cloud, PT_STRATA, NULL, NULL, 0, 1), 0);
     const int best = tree.level;
     struct pcg random = pcg_seed(k);
     for (uint32_t q = 0; q < looked_at && tree.leaf_count; q++) {
@@ -49,7 +49,7 @@ static void compare_with_all(patina_cloud *cloud, uint32_t k, uint32_t looked_at
             double o[3];
             if (!(pt_leaf_lanes(&tree, place / PT_LEAF) >> place % PT_LEAF & 1u) || place == from)
                 continue;
-            pt_neighbours_offset(&tree, from, place, o);
+            pt_neighbours_offset(&tree, &tree, from, place, o);
             const double d = o[0] * o[0] + o[1] * o[1] + o[2] * o[2];
             const uint32_t n = cloud->order[tree.slots[place]];
             uint32_t at = count;
@@ -62,7 +62,7 @@ static void compare_with_all(patina_cloud *cloud, uint32_t k, uint32_t looked_at
             count += count < k;
         }
         for (tree.level = best; tree.level >= 0; tree.level--) {
-            pt_neighbours_find(&tree, leaf, lanes, k, &found);
+            pt_neighbours_find(&tree, &tree, leaf, lanes, k, &found);
             assert_int_equal(found.count[lane], count);
             for (uint32_t i = 0; i < count; i++) {
                 assert_true(found.square[lane][i] == square[i]);
