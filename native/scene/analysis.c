@@ -2,6 +2,7 @@
 #include "analysis.h"
 #include "kernel_args.h"
 #include "memory.h"
+#include "orient.h"
 #include "progress.h"
 
 #include <math.h>
@@ -211,7 +212,7 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         }
         finish_chunk(walk, &walk->out->chunks[c], spacings, known);
         uint32_t done = atomic_fetch_add_explicit(&walk->done, 1, memory_order_relaxed) + 1;
-        pt_progress_raise(walk->progress, 0.05 + 0.95 * done / walk->cloud->chunk_count);
+        pt_progress_raise(walk->progress, 0.05 + 0.8 * done / walk->cloud->chunk_count);
     }
 }
 
@@ -249,6 +250,28 @@ int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *des
     return pt_check_array(&station, "station", 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1);
 }
 
+// Sides that neither the caller nor a station told.
+static int vote_sides(struct walk *walk, struct pt_pool *pool)
+{
+    const patina_cloud *cloud = walk->cloud;
+    uint64_t unoriented = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        unoriented += walk->tallies[c].unoriented;
+    walk->out->oriented = 1;
+    if (!unoriented)
+        return PATINA_OK;
+    const size_t size = (cloud->slots / 32 + 1) * sizeof(uint32_t);
+    uint32_t *told = walk->given ? pt_pages_alloc(size) : NULL;
+    if (walk->given && !told)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t slot = 0; told && slot < cloud->slots; slot++)
+        told[slot / 32] |= (uint32_t)((cloud->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << slot % 32;
+    walk->out->oriented = PATINA_SIDES_VOTED;
+    const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surface, walk->out->shapes, pool, walk->progress, 0.85, 1.0);
+    pt_pages_free(told, size);
+    return error;
+}
+
 static int compute(struct walk *walk, struct pt_pool *pool)
 {
     const patina_cloud *cloud = walk->cloud;
@@ -270,16 +293,15 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         return error;
     }
     pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
-    pt_neighbours_destroy(&walk->tree);
     pt_neighbours_destroy(&walk->coarse);
-    if (pt_progress_cancelled(walk->progress))
-        return PATINA_ERROR_CANCELLED;
-    out->oriented = walk->given || walk->desc->station_count;
+    error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : vote_sides(walk, pool);
+    pt_neighbours_destroy(&walk->tree);
+    if (error)
+        return error;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         for (int kind = 0; kind < 6; kind++)
             out->kinds[kind] += walk->tallies[c].kinds[kind];
         out->estimated += walk->tallies[c].estimated;
-        out->oriented &= !walk->tallies[c].unoriented;
     }
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         out->chunks[c].cone_cosine = -2.0f;
@@ -301,7 +323,7 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
                          .out = out,
                          .progress = progress,
                          .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
-                         .given = cloud->info.has_normals && (cloud->info.normals_oriented || !cloud->info.estimated_normals) };
+                         .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED };
     *out = (struct pt_analysis){ .slots = cloud->slots };
     struct pt_pool *pool = pt_pool_create(desc->threads, 0);
     int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
@@ -338,7 +360,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->info.layer_distance = next.info.layer_distance;
     cloud->info.has_shapes = 1;
     cloud->info.has_normals |= analysis->estimated > 0;
-    cloud->info.normals_oriented = cloud->info.has_normals && analysis->oriented;
+    cloud->info.normals_oriented = cloud->info.has_normals ? (uint32_t)analysis->oriented : 0;
     cloud->info.estimated_normals = analysis->estimated;
     for (int kind = 0; kind < 6; kind++)
         cloud->info.kinds[kind] = analysis->kinds[kind];
