@@ -19,6 +19,7 @@
 
 #define FLATTEST 0.1        // thickness over width, squared: what still is a surface
 #define FLATTEST_AFAR 0.2    // from afar: noise of two spacings has 0.1
+#define FACING 0.35          // from afar: a volume's dots lie on its plane
 #define THICKEST 3.0         // spacings: what is thicker is a volume, however flat from afar
 #define SLIMMEST 0.03       // narrowness squared of a line
 #define BORDER_GAP -0.8660254 // cosine of 150 degrees without a neighbour: 16 random ones leave them by chance at 0.5 %
@@ -266,7 +267,14 @@ int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_p
                                struct pt_neighbourhood *out)
 {
     struct pt_neighbourhood surface = { .kind = 0 };
-    if (plane->value[0] >= FLATTEST_AFAR * plane->value[1] || plane->value[1] <= SLIMMEST * plane->value[2])
+    if (plane->value[0] >= FACING * plane->value[1] || plane->value[1] <= SLIMMEST * plane->value[2])
+        return 0;
+    out->has_normal = 1;
+    for (int k = 0; k < 3; k++) {
+        out->normal[k] = plane->axis[0][k];
+        out->axis[k] = plane->axis[2][k];
+    }
+    if (plane->value[0] >= FLATTEST_AFAR * plane->value[1])
         return 0;
     be_surface(sample, plane, &surface);
     const double scale = 1.0 / sqrt(thinning);

@@ -111,6 +111,7 @@ static void set_axes(struct orient *orient, int i, double turn[2])
 
 struct projected {
     float u[PT_CHUNK_POINTS], v[PT_CHUNK_POINTS], depth[PT_CHUNK_POINTS];
+    float facing[PT_CHUNK_POINTS], length[PT_CHUNK_POINTS]; // n . axis of normals this long
 };
 
 static void project(const struct orient *orient, const struct pt_chunk *chunk, struct projected *out)
@@ -126,6 +127,21 @@ static void project(const struct orient *orient, const struct pt_chunk *chunk, s
         float *restrict line = to[a];
         for (uint32_t i = 0; i < chunk->count; i++)
             line[i] = (ax * x[i] + ay * y[i] + az * z[i]) * scale + shift;
+    }
+}
+
+// As pt_decode_normal, but for their length, and many at a time.
+static void face(const struct orient *orient, const struct pt_chunk *chunk, struct projected *out)
+{
+    const uint32_t *surface = orient->surface + chunk->first;
+    const float ax = orient->axis[2][0], ay = orient->axis[2][1], az = orient->axis[2][2];
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        float x = (float)((int32_t)(surface[i] & 0x1FFFu) - 4095), y = (float)((int32_t)(surface[i] >> 13 & 0x1FFFu) - 4095);
+        const float z = 4095.0f - fabsf(x) - fabsf(y), fold = z < 0.0f ? -z : 0.0f;
+        x = x >= 0.0f ? x - fold : x + fold;
+        y = y >= 0.0f ? y - fold : y + fold;
+        out->facing[i] = ax * x + ay * y + az * z;
+        out->length[i] = sqrtf(x * x + y * y + z * z);
     }
 }
 
@@ -172,19 +188,17 @@ static void vote(void *context, uint32_t begin, uint32_t end, uint32_t thread)
     for (uint32_t c = begin; c < end; c++) {
         const struct pt_chunk *chunk = &orient->chunks[c];
         project(orient, chunk, &p);
+        face(orient, chunk, &p);
         for (uint32_t i = 0; i < chunk->count; i++) {
-            const uint32_t slot = chunk->first + i, bits = orient->surface[slot] & PT_NORMAL_BITS;
+            const uint32_t slot = chunk->first + i;
             size_t at;
-            if (bits == PT_NORMAL_NONE || !texel_of(orient, &p, i, &at))
+            if (fabsf(p.facing[i]) < STEEPEST * p.length[i] || (orient->surface[slot] & PT_NORMAL_BITS) == PT_NORMAL_NONE ||
+                !texel_of(orient, &p, i, &at))
                 continue;
-            double n[3];
-            pt_decode_normal(bits, n);
-            const float facing = (float)n[0] * orient->axis[2][0] + (float)n[1] * orient->axis[2][1] + (float)n[2] * orient->axis[2][2];
-            if (fabsf(facing) < STEEPEST)
-                continue;
+            const float facing = p.facing[i] / p.length[i];
             const uint32_t front = atomic_load_explicit(&orient->front[at], memory_order_relaxed);
             const uint32_t back = atomic_load_explicit(&orient->back[at], memory_order_relaxed);
-            const float reach = orient->texel * (BEHIND + 1.5f * sqrtf(1.0f - facing * facing) / fabsf(facing));
+            const float reach = orient->texel * (BEHIND + 1.5f * sqrtf(fmaxf(1.0f - facing * facing, 0.0f)) / fabsf(facing));
             float first, last;
             memcpy(&first, &front, 4);
             memcpy(&last, &back, 4);

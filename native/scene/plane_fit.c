@@ -40,7 +40,7 @@ static void solve_symmetric(double a[3][3], double value[3], double v[3][3])
         for (int k = 0; k < 3; k++)
             v[i][k] = i == k;
     const double size = fabs(a[0][0]) + fabs(a[1][1]) + fabs(a[2][2]);
-    for (int sweep = 0; sweep < 12 && fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]) > 1e-15 * size; sweep++) {
+    for (int sweep = 0; sweep < 12 && fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]) > 1e-13 * size; sweep++) {
         rotate(a, v, 0, 1);
         rotate(a, v, 0, 2);
         rotate(a, v, 1, 2);
