@@ -51,7 +51,7 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         { PT_POSITIONS, cloud->positions, cloud->slots * 12 },
         { PT_SURFACE, cloud->surface, cloud->slots * 4 },
         { PT_OPACITIES, cloud->opacities, cloud->slots },
-        { PT_RADII, cloud->radii, cloud->slots * 4 },
+        { PT_RADII, cloud->radii ? (const void *)cloud->radii : cloud->shapes, cloud->slots * 4 },
         { PT_CLASSES, cloud->classes, cloud->slots },
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {

@@ -20,9 +20,37 @@ void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene
         discs->instance.normal_matrix[k] = (float)camera->rotation[k];
     for (int k = 0; k < PT_SPACINGS; k++)
         discs->instance.spacing[k] = (float)(largest * k / PT_SPACINGS);
-    scene->radii[instance] = harness_alloc(h, 4 * (size_t)cloud->slots);
+    discs->instance.axis_scale = 1.0f;
+    float *radii = harness_alloc(h, 4 * (size_t)cloud->slots);
+    scene->radii[instance] = radii;
     for (uint32_t i = 0; i < cloud->slots; i++)
-        scene->radii[instance][i] = rng_below(rng, 8) ? (float)rng_range(rng, 0.0, largest) : 0.0f;
+        radii[i] = rng_below(rng, 8) ? (float)rng_range(rng, 0.0, largest) : 0.0f;
+}
+
+void discs_shape(struct harness *h, struct rng *rng, struct disc_scene *scene, uint32_t instance, const struct camera *camera,
+                 const double stretch[3])
+{
+    static const double as_it_is[3] = {1.0, 1.0, 1.0};
+    struct disc_args *discs = &scene->discs[instance];
+    const struct cloud *cloud = &scene->points.clouds[instance];
+    const double *by = stretch ? stretch : as_it_is;
+    double most = 0.0, largest = 0.0; // stretch, of the inverse transposed
+    for (int k = 0; k < 3; k++)
+        most = by[k] > most ? by[k] : most;
+    double inverse[9];
+    for (int k = 0; k < 9; k++) {
+        inverse[k] = camera->rotation[k] / by[k % 3];
+        largest = inverse[k] > largest ? inverse[k] : -inverse[k] > largest ? -inverse[k] : largest;
+    }
+    for (int k = 0; k < 9; k++)
+        discs->instance.normal_matrix[k] = (float)(inverse[k] / largest);
+    discs->instance.axis_scale = (float)(largest * most);
+    discs->has_radii = PT_RADII_SHAPES;
+    discs->radius = 0.0f;
+    uint32_t *words = harness_alloc(h, 4 * (size_t)cloud->slots);
+    scene->radii[instance] = words;
+    for (uint32_t i = 0; i < cloud->slots; i++) // ratios up to 4 are the most
+        words[i] = ((uint32_t)rng_next(rng) & ~(15u << PT_SHAPE_RATIO_SHIFT)) | rng_below(rng, i % 4 ? 9 : 16) << PT_SHAPE_RATIO_SHIFT;
 }
 
 struct view_args discs_window(uint32_t width, uint32_t height, int perspective, double focal)
