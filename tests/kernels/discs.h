@@ -23,6 +23,9 @@ void discs_shape(struct harness *h, struct rng *rng, struct disc_scene *scene, u
 struct view_args discs_window(uint32_t width, uint32_t height, int perspective, double focal);
 // A cloud in a window of any shape, its discs of radii up to `largest`.
 struct disc_scene discs_in_window(struct harness *h, struct rng *rng, uint32_t width, uint32_t height, double largest);
+// Adds an instance of 400 discs of this radius (0: of up to 0.25), far beside the view and hardly before the camera's plane, on
+// planes that pass the eye by millimetres.
+void discs_beside(struct harness *h, struct rng *rng, struct disc_scene *scene, double focal, float radius);
 // Runs splat; returns the key plane.
 struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene);
 // Every point of the scene, by rising id; count is the number of points.

@@ -211,17 +211,18 @@ static void ellipses(struct harness *h)
     }
 }
 
-// In the midst of leaves, half transparent, larger than they are far.
+// In the midst of leaves, half transparent, larger than they are far; and of discs beside the camera.
 static void camera_plane(struct harness *h)
 {
     struct rng rng = {10};
     struct disc_scene scene = {.points = {.view = discs_window(67, 45, 1, 60.0)}};
-    scene.points.view.z_near = 0.001f;
     struct camera camera = points_look(&rng, &scene.points.view, 60.0, 0.0);
     points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, 0), 1.0);
     discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.6, 1);
     for (uint32_t i = 0; i < scene.points.clouds[0].slots; i++)
         scene.points.clouds[0].surface[i] = (uint32_t)rng_next(&rng);
+    for (int i = 0; i < 2; i++)
+        discs_beside(h, &rng, &scene, 60.0, 0.25f);
     const struct paint colors = paint(h, &rng, &scene);
     scene.discs[0].instance.opacity = 0.5f;
     run_hard(h, &scene, &colors, TOL_UNSURE_HARD);
