@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Points as flat discs: where they lie on screen, and which pixels they cover how deep. SPEC 5, solid; twin of
 // native/device_cpu/kernels/disc.h, which says what the numbers are.
+//
+// LARGE 0: discs of at most DISC_SMALL pixels are drawn by an invocation each, larger ones listed. LARGE 1: those listed, by a
+// workgroup or more each. No invocation takes more than 30,000 steps through its loops: llvmpipe ends them at 65,535, and what
+// would have followed was not drawn.
 #ifndef PT_DISC_GLSL
 #define PT_DISC_GLSL
 
@@ -16,6 +20,15 @@ layout(std430, binding = 3) readonly buffer positions_block { float positions[];
 layout(std430, binding = 4) readonly buffer surface_block { uint surface[]; };
 layout(std430, binding = 5) readonly buffer radii_block { uint radii[]; }; // floats or shape words
 
+#if LARGE == 0
+layout(std430, binding = 10) buffer large_block { uint large_count; uint large[]; }; // chunk and slot of each
+#else
+layout(std430, binding = 10) readonly buffer large_block { uint large_count; uint large[]; };
+layout(location = 5) uniform uint parts; // workgroups that share a disc
+#endif
+
+#define DISC_SMALL 256u
+
 struct disc {
     float x, y, z, radius;
     uint shape;
@@ -23,6 +36,7 @@ struct disc {
     vec2 reach; // of the ball around, pixels
     float gx, gy, e, h, m;
     bool gentle;
+    float widest;
     ivec4 box; // x0, y0, x1, y1, both ends included
     ivec2 own;
     vec3 n;
@@ -93,16 +107,38 @@ void disc_near(view_args view, disc d, inout vec2 low, inout vec2 high)
 }
 
 // 2. box; false: outside the window.
-bool disc_box(view_args view, inout disc d)
+bool disc_window(view_args view, vec2 low, vec2 high, inout disc d)
+{
+    bool drawn = true;
+    for (int k = 0; k < 2; k++) {
+        float at = k == 0 ? d.x : d.y;
+        int origin = k == 0 ? view.origin_x : view.origin_y;
+        float lower = float(origin), upper = float(origin + int(k == 0 ? view.width : view.height) - 1);
+        precise float begin = low[k] + 0.5, end = high[k] - 0.5;
+        float own = floor(at), first = floor(pt_clamp_far(begin)), last = floor(pt_clamp_far(end));
+        first = pt_max(pt_min(first, own), lower);
+        last = pt_min(pt_max(last, own), upper);
+        drawn = drawn && first <= last;
+        d.box[k] = int(first) - origin;
+        d.box[2 + k] = int(last) - origin;
+        d.own[k] = int(own) - origin;
+    }
+    return drawn;
+}
+
+// of the ball around the disc
+bool disc_box(view_args view, inout disc d, out vec2 low, out vec2 high)
 {
     float before = 1.0;
     bool around = false;
-    vec2 low, high;
     precise float part = d.z * 0.03125;
+    d.widest = 1.0;
     if (view.perspective != 0u) {
         precise float nearest = d.z - d.radius;
         around = !(part < nearest);
         before = pt_rcp(around ? 1.0 : nearest);
+        precise float widest = (d.z * before) * 1.05;
+        d.widest = around ? PT_DISC_FAR : widest;
     }
     for (int k = 0; k < 2; k++) {
         float at = k == 0 ? d.x : d.y, start = k == 0 ? view.ray_x0 : view.ray_y0, size = k == 0 ? view.ray_xs : view.ray_ys;
@@ -122,21 +158,20 @@ bool disc_box(view_args view, inout disc d)
     }
     if (view.perspective != 0u && part < d.radius)
         disc_near(view, d, low, high);
-    bool drawn = true;
-    for (int k = 0; k < 2; k++) {
-        float at = k == 0 ? d.x : d.y;
-        int origin = k == 0 ? view.origin_x : view.origin_y;
-        float lower = float(origin), upper = float(origin + int(k == 0 ? view.width : view.height) - 1);
-        precise float begin = low[k] + 0.5, end = high[k] - 0.5;
-        float own = floor(at), first = floor(pt_clamp_far(begin)), last = floor(pt_clamp_far(end));
-        first = pt_max(pt_min(first, own), lower);
-        last = pt_min(pt_max(last, own), upper);
-        drawn = drawn && first <= last;
-        d.box[k] = int(first) - origin;
-        d.box[2 + k] = int(last) - origin;
-        d.own[k] = int(own) - origin;
-    }
-    return drawn;
+    return disc_window(view, low, high, d);
+}
+
+// 4. The ellipse's own box, which is smaller. It leaves out no pixel that is covered.
+bool disc_tight_box(view_args view, vec2 low, vec2 high, inout disc d)
+{
+    if (!(PT_DISC_LEAST <= d.e && PT_DISC_LEAST <= d.m))
+        return true;
+    float most = 1.0;
+    if (view.perspective != 0u)
+        most = pt_min((1.0 + pt_abs(d.gx) * (d.reach.x + 1.0)) + pt_abs(d.gy) * (d.reach.y + 1.0), d.widest);
+    float up = pt_rsqrt(d.m), beside = d.h * up, square = pt_max(beside * beside + pt_rcp(d.e), 1e-12);
+    vec2 reach = vec2(square * pt_rsqrt(square), up) * (most * 1.001) + 0.02;
+    return disc_window(view, max(vec2(d.x, d.y) - reach, low), min(vec2(d.x, d.y) + reach, high), d);
 }
 
 // The half axes of shapes in view space, see device_cpu/kernels/disc.h. normal: in the object, not yet unit.
@@ -264,11 +299,42 @@ bool disc_of(view_args view, chunk_view chunk, uint slot, out disc d)
             return false;
     }
     disc_size(d.id, word, d);
-    if (!disc_box(view, d))
+    vec2 low, high;
+    if (!disc_box(view, d, low, high))
         return false;
     disc_shape(view, word, d);
+    return disc_tight_box(view, low, high, d);
+}
+
+#if LARGE == 0
+
+// Lists a disc whose part in a box (empty where it ends before it begins) is too large; true: it is done with.
+bool disc_listed(ivec4 box, uint chunk, uint slot)
+{
+    if (box.x > box.z || box.y > box.w)
+        return true;
+    if (uint(box.z - box.x + 1) * uint(box.w - box.y + 1) <= DISC_SMALL)
+        return false;
+    uint at = 2u * atomicAdd(large_count, 1u);
+    if (at < uint(large.length())) {
+        large[at] = chunk;
+        large[at + 1u] = slot;
+    }
     return true;
 }
+
+#else
+
+// The disc that this workgroup takes part in: its place in the list, and which part. False: none.
+bool disc_large(out uint at, out uint part)
+{
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    at = group / parts;
+    part = group - at * parts;
+    return at < large_count;
+}
+
+#endif
 
 // Does the disc cover the pixel? square: distance over radius squared; beside: covered by the point alone.
 bool disc_pixel(view_args view, disc d, int x, int y, out float depth, out float square, out bool beside)

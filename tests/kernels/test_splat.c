@@ -212,6 +212,50 @@ static void beside_the_camera(struct harness *h)
     }
 }
 
+// Discs of 1 to 3000 pixels, as wide as no loop of a driver is long: the same keys everywhere, and of each its very middle and
+// pixels at its rim.
+static void large(struct harness *h)
+{
+    enum { WIDTH = 1500, HEIGHT = 1100, DISCS = 24 };
+    static const uint32_t many[] = {DISCS};
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {19};
+        struct disc_scene scene = {.points = {.view = discs_window(WIDTH, HEIGHT, p, 1000.0)}};
+        struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = 1000.0};
+        camera.center_x = scene.points.view.origin_x + 0.5 * WIDTH;
+        camera.center_y = scene.points.view.origin_y + 0.5 * HEIGHT;
+        struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 1, 0, 0);
+        for (uint32_t i = 0; i < DISCS; i++) {
+            *points_coordinate(cloud, 0, i, 0) = (float)rng_range(&rng, -0.8, 0.8);
+            *points_coordinate(cloud, 0, i, 1) = (float)rng_range(&rng, -0.5, 0.5);
+            *points_coordinate(cloud, 0, i, 2) = -1.0f - (float)i;
+            cloud->surface[i] = (4095u + rng_below(&rng, 1500)) | (4095u - rng_below(&rng, 1500)) << 13;
+        }
+        discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.0, 1);
+        for (uint32_t i = 0; i < DISCS; i++) // the nearer, the smaller
+            ((float *)scene.radii[0])[i] = (float)(5e-4 * pow(3000.0, i / (DISCS - 1.0)) * (p ? 1.0 + i : 1.0));
+        const uint64_t *keys = harness_read(h, discs_splat(h, &scene));
+        harness_same(h, "keys", keys, (size_t)WIDTH * HEIGHT, 8, 1, WIDTH);
+        uint32_t count;
+        const struct ref_disc *discs = discs_reference(h, &scene, &count);
+        for (uint32_t k = 0; k < 20000; k++) {
+            const int x = (int)rng_below(&rng, WIDTH), y = (int)rng_below(&rng, HEIGHT);
+            const uint64_t key = keys[(size_t)y * WIDTH + (size_t)x];
+            double farthest = INFINITY;
+            for (uint32_t i = 0; i < count; i++) {
+                const struct ref_met cover = ref_disc_at(&scene.points.view, &discs[i], x, y);
+                if (cover.covered == REF_YES)
+                    farthest = fmin(farthest, cover.z.hi);
+            }
+            if (ref_key_z(key) > farthest)
+                harness_fail(h, "keys", x, y, "got z %.9g, expected at most %.9g", ref_key_z(key), farthest);
+            const struct ref_disc *disc = discs_find(discs, count, ref_key_id(key));
+            if (key != REF_EMPTY_KEY && (!disc || ref_disc_at(&scene.points.view, disc, x, y).covered == REF_NO))
+                harness_fail(h, "keys", x, y, "got id %u, whose disc is not there", ref_key_id(key));
+        }
+    }
+}
+
 // One place, many discs: the least id wins where all have one normal, whichever thread, tile or lane.
 static void coincident(struct harness *h)
 {
@@ -352,6 +396,7 @@ int main(int argc, char **argv)
         {"NaN, Inf and huge positions", not_numbers, 0},
         {"discs through the camera plane", camera_plane, 0},
         {"discs beside the camera, before its plane", beside_the_camera, 0},
+        {"discs of 1 to 3000 pixels", large, 0},
         {"coincident discs, ids near 2^32 - 2", coincident, 0},
         {"seen from their edge", edge_on, 0},
         {"behind a layer", limits, 0},
