@@ -320,6 +320,7 @@ struct push_args {
     uint32_t coarse_width, coarse_height;
     uint32_t refined;
     float least; // no layer distance in view is below this
+    uint32_t background; // 1: empty pixels alone
 };
 
 // fill: hole filling. [D 3.2, 3.3], SPEC 2.2
