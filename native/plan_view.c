@@ -476,7 +476,7 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
 // exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.65 (0.37 points a pixel) n alone leaves holes open
 // (2.7% of a disc at 0.3 points a pixel), so coarser levels halve s down to 1 first: 0.14% open. Starting them earlier,
 // at 1.35, closes 0.5 points a pixel better (0.04% for 0.32%) but lets steep planes grow by up to 0.5% at 1 point a pixel.
-static void choose_filling(const patina_settings *settings, const struct survey *survey, struct pt_plan *plan)
+static void choose_filling(const patina_settings *settings, struct pt_plan *plan)
 {
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
@@ -762,7 +762,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     int error = look_around(scene, plan, &survey);
     if (error)
         return error;
-    choose_filling(&scene->settings, &survey, plan);
+    choose_filling(&scene->settings, plan);
     choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;
