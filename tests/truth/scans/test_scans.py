@@ -20,7 +20,7 @@ from truth.scans.scenes import Scene, Survey, View  # noqa: E402
 from truth.scans.solids import Solids, World  # noqa: E402
 
 # Scenes, scanners, cameras and thresholds are frozen: whoever changes one changes every figure that was ever told.
-FROZEN = ""
+FROZEN = "cde594c3c93da793"
 
 
 def frozen_sum() -> str:
