@@ -72,7 +72,7 @@ def main() -> None:
                 spent = 1e3 * (time.perf_counter() - start)
             times.setdefault(mode, []).append(spent)
             colors, depths = vtk.vtkUnsignedCharArray(), vtk.vtkFloatArray()
-            window.GetPixelData(0, 0, width - 1, height - 1, 0, colors)
+            window.GetPixelData(0, 0, width - 1, height - 1, 0, colors, 0)
             window.GetZbufferData(0, 0, width - 1, height - 1, depths)
             hyperbolic = vtk_to_numpy(depths).reshape(height, width).astype(np.float64)
             with np.errstate(divide="ignore"):

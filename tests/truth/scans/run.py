@@ -2,7 +2,8 @@
 """Draws the virtual scans with the library and holds the pictures against the exact ones.
 
     build/out/venv/bin/python tests/truth/scans/run.py [--scenes a,b | tuning | held | all] [--cameras 0,3]
-        [--set surface=1]... [--style radius=0.02]... [--effect ...]... [--hook FILE.py] [--pictures FOLDER] [--json FILE]
+        [--analysis off|on|stations] [--set surface=1]... [--style radius=0.02]... [--effect ...]... [--hook FILE.py]
+        [--pictures FOLDER] [--json FILE]
 
 The library is $PATINA_LIBRARY, else build/out/release/libpatina.so. A hook is a Python file with any of
     cloud(native, scan, scene) -> native.Cloud     the cloud that is drawn; scan: truth.scans.scanner.Scan
@@ -48,12 +49,17 @@ class Drawer:
         self.frame = native.Frame(self.device)
         self.settings, self.style, self.effects = (_fields(given) for given in (options.set, options.style, options.effect))
         self.hook = _hook(options.hook)
+        self.analysis = options.analysis
 
     def cloud(self, stage: Stage) -> Any:
         make = getattr(self.hook, "cloud", None)
         scan = stage.scan
         made = make(self.native, scan, stage.scene) if make else \
             self.native.Cloud(np.ascontiguousarray(scan.position, np.float32), None, np.ascontiguousarray(scan.color))
+        if self.analysis != "off" and hasattr(made, "analyse") and not make:
+            known = self.analysis == "stations" and len(scan.stations)
+            made.analyse(stations=scan.stations if known else None,
+                         station=scan.scan.astype(np.uint8)[:, None] if known else None)
         getattr(self.hook, "after", lambda *_: None)(self.native, made, stage.scene)
         return made
 
@@ -185,6 +191,8 @@ def main() -> int:
     parser.add_argument("--hook", help="a Python file, see above")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--analysis", choices=("off", "on", "stations"), default="on",
+                        help="what every point knows, where the library finds it out; with the scanners' places")
     parser.add_argument("--times", type=int, default=1, help="timed frames a camera; the least counts")
     parser.add_argument("--still", action="store_true", help="no flicker")
     parser.add_argument("--pictures", type=Path, help="truth, picture, errors and ceiling of each camera go here as PNG")
