@@ -181,7 +181,7 @@ void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct p
     if (!hood->has_normal || hood->certainty < CERTAIN) {
         hood->has_normal = 0;
         hood->major = hood->minor = CELL_DOT * width;
-        hood->spacing = fmin(hood->spacing, width);
+        hood->spacing = fmin(hood->spacing, hood->major);
         return;
     }
     for (int k = 0; k < 3; k++)

@@ -14,8 +14,9 @@ of them, in the same order; "absent" what could not be measured, and why.
     --readme  every figure that README.md quotes, written into it: half an hour; with --only, those of these groups
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
-into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), session (ten
-minutes of work in Blender), analysis (what every point knows, 10 million). With --quick they take a million points, and one minute.
+into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
+scans against exact views; half an hour more where these are not kept yet), session (ten minutes of work in Blender), analysis (what
+every point knows, 10 million). With --quick they take a million points, and one minute.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ import plots
 import quoted
 import readme
 import report
+import scans
 import soft
 import stage
 import window
@@ -52,7 +54,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "session", "analysis")
+           "leaves", "scans", "session", "analysis")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -196,6 +198,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             split(result, row)
     if not options.only or "shadows" in options.only:
         result["soft"] = soft.measure(options.device[0])
+    if "scans" in options.only or ((options.full or options.readme) and not options.only):
+        result["scans"] = scans.measure(options.quick)
     for name, (group, title, part) in PARTS.items():
         everything = options.full or options.readme or group == "hard"
         if group in options.only or (everything and not options.only):

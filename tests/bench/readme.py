@@ -162,6 +162,10 @@ def update(result: dict[str, Any], root: Path) -> str:
     for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("cues", cues), ("styles", styles)):
         if joined(result, name):
             parts[name] = part(result)
+    if result.get("scans"):
+        import scans
+        parts["scans"] = scans.markdown(result["scans"])
+        plots.scans(result["scans"], root / ".pictures/scans.png", title)
     for quality in ("paper", "refined"):
         if papers.ratios(result, quality):
             parts[f"papers {quality}"] = papers.table(result, quality)

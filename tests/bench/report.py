@@ -114,6 +114,10 @@ def markdown(result: dict[str, Any]) -> str:
             text += [f"## {title}", "", errors_table(rows), ""]
     if result.get("soft"):
         text += [soft.markdown(result["soft"]), ""]
+    if result.get("scans"):
+        import scans
+        text += ["## Virtual scans against exact views", "", scans.markdown(result["scans"]), "",
+                 *(f"- {name}: {meaning}" for name, meaning in scans.metrics.MEANING.items()), ""]
     if joined(result, "papers"):
         text += [papers.markdown(result), ""]
     for part in result["parts"].values():
