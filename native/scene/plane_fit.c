@@ -10,6 +10,7 @@
 #define FLAT_BEST 0.6 // more neighbours are better when they bring it below this part: noise falls to a third, creases stay
 #define BENT 7e-4     // a quadric may explain it: at less, sigma is below a thirtieth of the spacing
 #define TIGHT 0.4     // RMS in parts of a slab's half thickness; of points spread over it, 0.58
+#define TIGHTER 0.1   // nobody's noise: two in five are enough then
 #define LINEAR 0.1    // narrowness squared: 16 neighbours on one row of a scan
 
 static void rotate(double a[3][3], double v[3][3], int p, int q)
@@ -136,11 +137,14 @@ int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane 
                 best = inside;
         }
     const int found = __builtin_popcountll(best);
-    if (2 * found < (int)sample->count || 5 * found < 7 * known || found < 5)
+    if (5 * found < 2 * (int)sample->count || found < 5)
         return 0;
     pt_plane_fit(sample, best, out);
-    if (out->value[0] > TIGHT * TIGHT * within * within)
-        return 0; // they fill the slab, as any would: no plane
+    const double rms = sqrt(out->value[0]);
+    if (rms > TIGHT * within) // they fill the slab, as any would: no plane
+        return 0;
+    if (rms > TIGHTER * within && (2 * found < (int)sample->count || 5 * found < 7 * known))
+        return 0;
     const double place = along(out->axis[0], out->mean);
     const uint64_t again = within_of(sample, out->axis[0], place, within);
     if (__builtin_popcountll(again) >= found)
