@@ -41,6 +41,13 @@ def split_plane(plane: str) -> tuple[str, int]:
     return name, int(layer or 0)
 
 
+KINDS = ("UNKNOWN", "SURFACE", "BORDER", "LINE", "VOLUME", "STRAY")  # patina_kind
+
+# Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
+NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),
+                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "certainty": (np.float32, 0), "numbers": (np.uint32, -1),
+                  "distances": (np.float64, -1), "soft_radius": (np.float32, 0), "uncertainty": (np.float32, 0)}
+
 # patina_type by numpy type
 _TYPES = {"float32": 1, "float64": 2, "uint8": 3, "uint16": 4, "uint32": 5, "int8": 6, "int16": 7, "int32": 8}
 
@@ -99,7 +106,20 @@ class _CloudInfo(_Descriptor):
                 ("has_colors", c_uint32), ("has_opacities", c_uint32), ("origin", c_double * 3),
                 ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float),
                 ("has_scalars", c_uint32), ("has_classes", c_uint32), ("scalar_range", c_float * 2),
-                ("class_bits", c_uint32 * 8)]
+                ("class_bits", c_uint32 * 8), ("has_shapes", c_uint32), ("normals_oriented", c_uint32),
+                ("estimated_normals", c_uint64), ("kinds", c_uint64 * 6)]
+
+
+class _AnalysisDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("neighbours", c_uint32), ("threads", c_uint32), ("keep_normals", c_uint32),
+                ("station_count", c_uint32), ("stations", c_void_p), ("station", _Array)]
+
+
+class _Neighbourhoods(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("normal", c_void_p), ("axis", c_void_p), ("spacing", c_void_p),
+                ("half_axes", c_void_p), ("sigma", c_void_p), ("kind", c_void_p), ("certainty", c_void_p),
+                ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p), ("distances", c_void_p),
+                ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
 
 
 class _FileInfo(_Descriptor):
@@ -241,6 +261,8 @@ _CALLS = {
     "patina_scene_add_clip": (c_void_p, POINTER(_Clip)),
     "patina_ramp": (c_char_p, c_void_p),
     "patina_cloud_set_scalars": (c_void_p, POINTER(_Array)),
+    "patina_cloud_analyse": (c_void_p, POINTER(_AnalysisDesc), c_void_p),
+    "patina_cloud_neighbourhoods": (c_void_p, POINTER(_Neighbourhoods), c_void_p),
     "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
     "patina_scene_set_lines": (c_void_p, POINTER(_Lines)),
@@ -271,6 +293,8 @@ _CALLS = {
     "patina_task_save": (c_void_p, c_char_p, _OUT),
     "patina_task_take_file": (c_void_p, _OUT),
     "patina_task_done": (c_void_p,),
+    "patina_task_analyse": (c_void_p, POINTER(_AnalysisDesc), c_void_p, _OUT),
+    "patina_task_apply": (c_void_p,),
     "patina_task_wait": (c_void_p,),
     "patina_task_take_cloud": (c_void_p, _OUT),
     "patina_task_destroy": (c_void_p,),
@@ -521,6 +545,9 @@ class Cloud(_Handle):
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
         self.has_scalars = bool(info.has_scalars)
+        self.has_shapes = bool(info.has_shapes)  # analysed
+        self.normals_oriented = bool(info.normals_oriented)
+        self.kinds = tuple(info.kinds)  # points of each of KINDS
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))
 
@@ -528,6 +555,43 @@ class Cloud(_Handle):
         """Other colours for the same points; no picture of them may be drawn meanwhile."""
         return Task("set_colors", self._handle, byref(_view(colors, self.count)), keep=(self, colors))
 
+    def _describe_analysis(self, neighbours: int, stations: np.ndarray | None, station: np.ndarray | None,
+                           keep_normals: bool, threads: int) -> _AnalysisDesc:
+        count = 0 if stations is None else len(stations)
+        return _AnalysisDesc(neighbours=neighbours, threads=threads, keep_normals=keep_normals, station_count=count,
+                             stations=stations.ctypes.data if count else None, station=_view(station, self.count))
+
+    def analyse(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
+                keep_normals: bool = True, progress: Progress | None = None, threads: int = 0) -> None:
+        """Gives points normals, spacings and footprints of their own; as start_colors. stations: (n, 3) places of the
+        scanner that normals face, station: (count, 1) uint8 or uint16, which of them saw the point."""
+        stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
+        self._call("analyse", byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads)),
+                   _handle_of(progress))
+        self._learn()
+
+    def start_analysis(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
+                       keep_normals: bool = True, progress: Progress | None = None) -> Task:
+        """analyse, beside pictures: its result() changes the cloud, and no picture of it may be drawn then."""
+        def apply(task: Task) -> None:
+            task._call("apply")
+            self._learn()
+
+        stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
+        return Task("analyse", self._handle, byref(self._describe_analysis(neighbours, stations, station, keep_normals, 0)),
+                    _handle_of(progress), keep=(self, stations, station, progress), finish=apply)
+
+    def neighbourhoods(self, *names: str, neighbours: int = 16, progress: Progress | None = None,
+                       threads: int = 0) -> dict[str, np.ndarray]:
+        """Arrays by name: those of NEIGHBOURHOODS that are named, else all that need no walk to neighbours."""
+        arrays = {}
+        for name in names or list(NEIGHBOURHOODS)[:7]:
+            kind, width = NEIGHBOURHOODS[name]
+            arrays[name] = np.empty((self.count, neighbours if width < 0 else width) if width else self.count, kind)
+        self._call("neighbourhoods", byref(_Neighbourhoods(neighbours=neighbours, threads=threads,
+                                                           **{name: a.ctypes.data for name, a in arrays.items()})),
+                   _handle_of(progress))
+        return arrays
 
     def set_scalars(self, scalars: np.ndarray | None) -> None:
         """Other scalars for the same points; as start_colors."""

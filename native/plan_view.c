@@ -357,7 +357,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     struct object *object = &survey->objects[i];
     int transparent = is_transparent(instance), layered = transparent || scene->settings.layer_passes;
     set_object(camera, instance->style.world_from_object, object);
-    int cull = instance->style.cull_back && cloud->info.has_normals && !object->singular && !transparent;
+    int cull = instance->style.cull_back && cloud->info.normals_oriented && !object->singular && !transparent;
     struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
     struct pt_inverse_clip *clips = pt_arena_take(&plan->arena, (scene->clip_count + 1) * sizeof *clips);
     if (!list || !clips)

@@ -24,6 +24,19 @@ static void forget_dead(struct pt_residency *residency, struct patina_device *de
     }
 }
 
+// Surface words as they are now, and shapes where radii would lie, unless the cloud has its own.
+static int upload_shapes(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    const void *radii = cloud->radii ? (const void *)cloud->radii : cloud->shapes;
+    device->ops->buffer_destroy(device, &resident->buffers[PT_SURFACE]);
+    device->ops->buffer_destroy(device, &resident->buffers[PT_RADII]);
+    resident->shapes = atomic_load(&cloud->alive->shapes);
+    int error = device->ops->buffer_create(device, cloud->slots * 4, cloud->surface, 1, &resident->buffers[PT_SURFACE]);
+    if (error || !radii)
+        return error;
+    return device->ops->buffer_create(device, cloud->slots * 4, radii, 1, &resident->buffers[PT_RADII]);
+}
+
 // The colours and scalars as they are now, in place of what the buffer holds.
 static int upload_colors(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
@@ -49,9 +62,7 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         size_t size;
     } parts[] = {
         { PT_POSITIONS, cloud->positions, cloud->slots * 12 },
-        { PT_SURFACE, cloud->surface, cloud->slots * 4 },
         { PT_OPACITIES, cloud->opacities, cloud->slots },
-        { PT_RADII, cloud->radii ? (const void *)cloud->radii : cloud->shapes, cloud->slots * 4 },
         { PT_CLASSES, cloud->classes, cloud->slots },
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
@@ -61,6 +72,16 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         if (error)
             return error;
     }
+    int error = upload_shapes(device, cloud, resident);
+    return error ? error : upload_colors(device, cloud, resident);
+}
+
+// What changed since it was uploaded.
+static int renew(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    int error = resident->shapes == atomic_load(&cloud->alive->shapes) ? PATINA_OK : upload_shapes(device, cloud, resident);
+    if (error || resident->colors == atomic_load(&cloud->alive->colors))
+        return error;
     return upload_colors(device, cloud, resident);
 }
 
@@ -104,7 +125,7 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
 {
     struct pt_resident *resident = *out = find(residency, device, cloud->alive);
     if (resident)
-        return resident->colors == atomic_load(&cloud->alive->colors) ? PATINA_OK : upload_colors(device, cloud, resident);
+        return renew(device, cloud, resident);
     resident = begin(device, cloud->alive);
     return resident ? end(residency, device, resident, upload(device, cloud, resident), out) : PATINA_ERROR_MEMORY;
 }

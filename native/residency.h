@@ -8,7 +8,7 @@
 struct pt_resident {
     struct pt_resident *next;
     struct pt_alive *alive;
-    uint32_t colors; // the state of alive->colors that the buffers hold
+    uint32_t colors, shapes; // the states of alive->colors and alive->shapes that the buffers hold
     struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh by pt_mesh_buffer; PT_CHUNKS is unused
 };
 

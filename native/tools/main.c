@@ -13,6 +13,8 @@
 static const char usage[] =
     "patina info FILE                     what a file of points holds\n"
     "patina convert IN.ply OUT.ply        writes a binary PLY\n"
+    "patina analyse FILE -o OUT.ply       normal, spacing, radii, thickness, kind and certainty of every point, as columns\n"
+    "  --neighbours K                     3 to 64 (16, and 48 where 16 leave doubts)\n"
     "patina render FILE... -o OUT.png     draws clouds as surfaces\n"
     "  --size WxH                         of the picture (1024x1024)\n"
     "  --region X0,Y0,X1,Y1               only these pixels, from the bottom left\n"
@@ -24,6 +26,7 @@ static const char usage[] =
     "  --quality refined|paper            depth of filled pixels: tangent plane, or as in the paper\n"
     "  --fill closed|paper|off            hole filling; --iterations N (0: automatic)\n"
     "  --surface fill|splats              filling in the picture, or points as discs\n"
+    "  --analysis on|off                  points' own spacings and footprints, and normals where a file has none (on)\n"
     "  --radius R                         of the discs, world units (default: the points' own, else 1.75 spacings)\n"
     "  --smooth alleviated|gaussian|box|off\n"
     "  --antialias layers|background|off\n"
@@ -209,5 +212,7 @@ int main(int count, char **arguments)
         return tool_info(count - 2, arguments + 2);
     if (!strcmp(command, "convert"))
         return tool_convert(count - 2, arguments + 2);
+    if (!strcmp(command, "analyse"))
+        return tool_analyse(count - 2, arguments + 2);
     return tool_misuse("there is no command '%s'", command);
 }

@@ -261,6 +261,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_word(value, "closed|paper|off", &s->fill);
     else if (!strcmp(name, "--surface"))
         bad = parse_word(value, "fill|splats", &s->surface);
+    else if (!strcmp(name, "--analysis"))
+        bad = parse_word(value, "on|off", &o->analysis);
     else if (!strcmp(name, "--radius"))
         bad = parse_width(value, &o->radius);
     else if (!strcmp(name, "--iterations"))

@@ -11,6 +11,7 @@ enum tool_exit { TOOL_OK = 0, TOOL_FAILED = 1, TOOL_USAGE = 2, TOOL_CANCELLED = 
 int tool_render(int count, char **arguments);
 int tool_info(int count, char **arguments);
 int tool_convert(int count, char **arguments);
+int tool_analyse(int count, char **arguments);
 
 // ---- messages, on stderr -----------------------------------------------------------------------------------------
 
@@ -67,6 +68,7 @@ struct tool_options {
     int opacity_count;              // 0: all opaque
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;
+    uint32_t analysis;              // 0: clouds are analysed, 1: not
     int cull, transparent, shadows, sun, json, dump_plan, verbose;
     float ambient[3];
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
@@ -110,6 +112,6 @@ void tool_times_destroy(struct tool_times *times);
 int tool_times_add(struct tool_times *times, double ms, const patina_frame *frame);
 double tool_times_median(const struct tool_times *times);
 // Prints one JSON object on stdout.
-void tool_times_print(struct tool_times *times, const char *device, const patina_frame_stats *stats);
+void tool_times_print(struct tool_times *times, const char *device, const patina_frame_stats *stats, double analysis_ms);
 
 #endif

@@ -90,6 +90,28 @@ def ball(name, count=20000, origin=(0, 0, 0), kind="float", colors=None):
 FRONT = ("--look", "0,-6,0,0,0,0,30", "--size", "64x64")
 
 
+# ---- analysis --------------------------------------------------------------------------------------------------------
+
+def test_analyse_writes_columns():
+    ball("analyse.ply", 3000, origin=(1000, 0, 0))
+    done = run("analyse", "analyse.ply", "-o", "known.ply", "--neighbours", "12")
+    counts = dict(line.split() for line in done.stdout.splitlines())
+    assert int(counts["surface"]) > 2900, counts
+    header, rows = (FOLDER / "known.ply").read_bytes().split(b"end_header\n")
+    names = [line.split()[-1].decode() for line in header.splitlines() if line.startswith(b"property")]
+    assert names == ["x", "y", "z", "nx", "ny", "nz", "spacing", "radius", "radius_minor", "sigma", "certainty", "kind"], names
+    assert b"element vertex 3000" in header and len(rows) % 3000 == 0
+    assert "points      3000" in run("info", "known.ply").stdout
+    for arguments in (["analyse"], ["analyse", "analyse.ply"], ["analyse", "analyse.ply", "-o", "x.ply", "--neighbours", "99"]):
+        run(*arguments, code=2)
+
+
+def test_analysis_is_timed_and_can_be_left_out():
+    ball("timed.ply", 5000)
+    on, off = (json.loads(run("render", "timed.ply", *FRONT, "--stats", "json", "--analysis", word).stdout) for word in ("on", "off"))
+    assert on["analysis_ms"] > 0 and off["analysis_ms"] == 0
+
+
 # ---- wrong use -----------------------------------------------------------------------------------------------------
 
 def test_help_and_version():

@@ -184,6 +184,10 @@ typedef struct patina_cloud_info {
     uint32_t has_scalars, has_classes;
     float scalar_range[2];   // least and greatest finite scalar; 0, 0 without one
     uint32_t class_bits[8];  // classes that drawn points have: class c is bit c % 32 of word c / 32
+    uint32_t has_shapes;     // the cloud was analysed: patina_cloud_analyse
+    uint32_t normals_oriented; // 1: every normal knows its side, as given or by a station; PATINA_SIDES_VOTED: some by votes
+    uint64_t estimated_normals; // of points whose normal the analysis found
+    uint64_t kinds[6];       // drawn points of each patina_kind
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -192,13 +196,66 @@ typedef struct patina_cloud_info {
 PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
 PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 // Gives a cloud other colours (as in the descriptor, count elements; NULL data: none) and leaves all else as it is, so
-// that painting uploads colours alone. The one change a cloud allows: no frame may be rendering it meanwhile.
+// that painting uploads colours alone. No frame may be rendering it meanwhile.
 PATINA_API int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
 // The same for scalars.
 PATINA_API int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar);
 // The scalars that `share` of the points lie below and above, 0 <= share < 0.5; 0: the least and the greatest. What is not
 // finite does not count. PATINA_ERROR_EMPTY without a finite scalar.
 PATINA_API int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2]);
+// What every point knows (SPEC 11), from its nearest neighbours among all points: normal, spacing, footprint, thickness, kind.
+enum patina_kind {
+    PATINA_KIND_UNKNOWN = 0, // not analysed, alone, or all neighbours at its own place
+    PATINA_KIND_SURFACE = 1,
+    PATINA_KIND_BORDER = 2,  // of a surface: neighbours on one side only
+    PATINA_KIND_LINE = 3,    // a wire, a railing's bar
+    PATINA_KIND_VOLUME = 4,  // foliage
+    PATINA_KIND_STRAY = 5,   // far from what its neighbours are part of
+};
+
+// Where nothing tells the side of a surface, 64 views from outside vote for the one that is seen; sheets face up.
+#define PATINA_SIDES_VOTED 2
+
+typedef struct patina_analysis_desc {
+    size_t struct_size;
+    uint32_t neighbours;     // 3..64; 0 = 16, and 48 where 16 leave doubts
+    uint32_t threads;        // 0 = one per core
+    uint32_t keep_normals;   // 1 = normals that the cloud has stay, and only missing ones are estimated. 0 = all are
+                             // estimated, on the side of those that it has
+    uint32_t station_count;  // places of the scanner, in object units: estimated normals face the one that ...
+    const double *stations;  // 3 each
+    patina_array station;    // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
+} patina_analysis_desc;
+
+// The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
+// a picture follows from them (8 bytes a point, 4 of them new, 20 more meanwhile). No frame may be rendering it meanwhile. desc may be
+// NULL. On failure or cancel the cloud stays as it was. Any number of threads gives the same bytes.
+PATINA_API int patina_cloud_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress);
+
+// Arrays of the caller's, patina_cloud_info.count elements in the given order; NULL = not wanted. Points that are not drawn
+// read 0. Those of the first group are as the analysis left them, in steps of what 8 bytes hold; without one, 0 but for what
+// the cloud was given.
+typedef struct patina_neighbourhoods {
+    size_t struct_size;
+    float *normal;      // 3 each; 0 = none
+    float *axis;        // 3 each: direction of the greater half axis; 0 without a normal
+    float *spacing;     // about 1 / sqrt(points per area) where the point lies
+    float *half_axes;   // 2 each, of its footprint, the greater first
+    float *sigma;       // thickness: noise, and disagreement of scans; 0 = unknown
+    uint8_t *kind;      // patina_kind
+    float *certainty;   // 0..1: how well that explains the neighbours
+    // From the `neighbours` nearest, walked anew for any cloud.
+    uint32_t neighbours; // 1..64
+    uint32_t threads;    // 0 = one per core
+    uint32_t *numbers;   // `neighbours` each: of the points, nearest first, equal distances by number; 2^32 - 1 = there is none
+    double *distances;   // likewise; +inf
+    float *soft_radius;  // [S Eq. 20], with the farthest distance outside the root
+    float *uncertainty;  // [S Eq. 21], in parts of its 99th percentile, at most 1. From the cloud's normals
+} patina_neighbourhoods;
+
+PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbourhoods *wanted,
+                                           patina_progress *progress);
+
 // Writes the built cloud to a file, and opens it again by mapping: nothing is read but what is drawn, and the memory stays
 // the file's. A file of another version or machine, or a damaged one, is PATINA_ERROR_FORMAT: build the cloud anew. While a
 // cloud is open its file may be replaced (patina_cloud_save does), not written into.
@@ -651,6 +708,11 @@ PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress 
                                  patina_task **out); // patina_cloud_create
 PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
                                       patina_task **out); // patina_cloud_set_colors
+// patina_cloud_analyse beside frames: the cloud stays as it is, and may be drawn, until patina_task_apply takes what was found;
+// no frame may be rendering it then. stations and station must live until the task is done.
+PATINA_API int patina_task_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
+                                   patina_task **out);
+PATINA_API int patina_task_apply(patina_task *task); // waits; PATINA_ERROR_EMPTY the second time or for other tasks
 // Two numbers that tell whether points changed: of count, positions, normals, opacities, radii and classes; of count, colours
 // and scalars. Not
 // against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
