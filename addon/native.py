@@ -460,6 +460,7 @@ class Device(_Handle):
         self._call("get_info", byref(info))
         self.name = info.name.decode()
         self.description = info.description.decode("utf-8", "replace")
+        self.hardware = bool(info.hardware)
 
 
 def _view(array: np.ndarray | None, count: int) -> _Array:
