@@ -46,6 +46,7 @@ struct ply_target {
     uint32_t type; // of the column: any patina_type
     uint32_t step; // in elements, from point to point
     double scale;  // values are multiplied by it
+    double offset; // and this is added, of 8-bit columns
     bool wrap;     // negative values are bytes that a writer called signed: -1 is 255
 };
 

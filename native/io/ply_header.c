@@ -33,7 +33,7 @@ static const struct {
     { "float", PATINA_FLOAT32 },   { "double", PATINA_FLOAT64 }, { "int8", PATINA_INT8 },
     { "uint8", PATINA_UINT8 },     { "int16", PATINA_INT16 },    { "uint16", PATINA_UINT16 },
     { "int32", PATINA_INT32 },     { "uint32", PATINA_UINT32 },  { "float32", PATINA_FLOAT32 },
-    { "float64", PATINA_FLOAT64 },
+    { "float64", PATINA_FLOAT64 }, { "bool", PATINA_UINT8 }, // 0 or 1: no type of the format, but written
 };
 
 const char *ply_type_name(uint32_t type)

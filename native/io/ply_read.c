@@ -3,8 +3,9 @@
 //
 // Only the elements up to the points are read: faces and range grids behind them are neither needed nor checked.
 // Integer colours of type char, short, int and uint are taken as 0..255 (their writers meant bytes), uchar is 0..255,
-// ushort 0..65535, float and double are linear. What is no position, normal or colour becomes an attribute; lists are
-// left out.
+// ushort 0..65535, float and double are linear. A Gaussian splat without colours has the sRGB colour of its base, the
+// constant term of its spherical harmonics (Kerbl et al., 3D Gaussian Splatting, 2023). What is no position, normal or
+// colour becomes an attribute; lists are left out.
 #include "../progress.h"
 #include "ply.h"
 
@@ -22,6 +23,8 @@ static const char *const color_names[][FAMILY] = { { "red", "green", "blue", "al
                                                    { "r", "g", "b", "a" },
                                                    { "diffuse_red", "diffuse_green", "diffuse_blue",
                                                      "diffuse_alpha" } };
+static const char *const splat_names[][FAMILY] = { { "f_dc_0", "f_dc_1", "f_dc_2", NULL } };
+static const double harmonic = 0.28209479177387814; // Y00 = sqrt(1 / (4 pi))
 
 struct plan {
     const struct pt_input *input;
@@ -156,13 +159,32 @@ static void fill_alpha(struct patina_file *file)
     }
 }
 
+static int plan_splat_colors(struct plan *plan)
+{
+    struct patina_file *file = plan->file;
+    int64_t found[FAMILY];
+    if (!find_family(plan, splat_names, 1, found))
+        return PATINA_OK;
+    file->color_type = PATINA_UINT8;
+    file->color = column(plan, 4);
+    if (!file->color)
+        return out_of_memory(plan);
+    fill_alpha(file);
+    for (int c = 0; c < 3; c++) {
+        aim(plan, found[c], (uint8_t *)file->color + c, PATINA_UINT8, 4);
+        plan->targets[found[c]].scale = 255 * harmonic;
+        plan->targets[found[c]].offset = 127.5;
+    }
+    return PATINA_OK;
+}
+
 static int plan_colors(struct plan *plan)
 {
     struct patina_file *file = plan->file;
     const struct ply_property *p = plan->properties;
     int64_t found[FAMILY];
     if (!find_family(plan, color_names, sizeof color_names / sizeof *color_names, found))
-        return PATINA_OK;
+        return plan_splat_colors(plan);
     uint32_t type = color_class(p[found[0]].type);
     if (type != color_class(p[found[1]].type) || type != color_class(p[found[2]].type))
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: properties %s, %s and %s mix the types %s, %s and %s",

@@ -18,7 +18,7 @@ static double clamp(double value, double low, double high)
 
 static double to_byte(const struct ply_target *target, double value)
 {
-    value *= target->scale;
+    value = value * target->scale + target->offset;
     return clamp(target->wrap && value < 0 ? value + 256 : value, 0, 255) + 0.5;
 }
 
