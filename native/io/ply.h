@@ -36,8 +36,20 @@ struct ply_header {
     struct ply_element elements[PLY_MOST_ELEMENTS];
     uint32_t property_count;
     struct ply_property properties[PLY_MOST_PROPERTIES];
+    bool crlf;          // the header's lines end with CR LF
     uint64_t body;      // offset of the first byte behind the header
     uint64_t body_line; // its line number
+};
+
+// What a fault in the rows is: an error, a line in the log, nothing.
+enum ply_tone { PLY_REFUSE, PLY_WARN, PLY_QUIET };
+
+// A place in the rows; elements are read one after the other.
+struct ply_cursor {
+    const struct pt_input *input;
+    const struct ply_header *header;
+    uint64_t offset, line; // of the next row
+    enum ply_tone tone;
 };
 
 // Where the values of one vertex property go. data NULL: nowhere.
@@ -52,17 +64,23 @@ struct ply_target {
 
 int ply_read_header(const struct pt_input *input, struct ply_header *header);
 
-// Read the rows up to and with header->elements[vertex], of which property i goes to targets[i].
-int ply_read_binary(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
-                    const struct ply_target *targets);
-int ply_read_ascii(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
-                   const struct ply_target *targets);
+// Reads the rows of the element that begins at the cursor, which comes behind them; property i goes to targets[i].
+// targets NULL: the rows are passed over, those of a text without a look at what they hold.
+int ply_read_rows(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets);
+int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets);
+int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets);
+// Tells what is behind the last element, where the cursor is.
+void ply_warn_of_rest(struct ply_cursor at);
+
+// Refuses a binary body in which each line feed became carriage return and line feed, as copying it as text makes it.
+int ply_check_line_ends(const struct pt_input *input, const struct ply_header *header);
 
 // Puts n values at points first, first + 1, ... of a column; integers are clamped to what their type holds.
 void ply_store(const struct ply_target *target, uint64_t first, size_t n, const double *values);
-// Error when the file, from offset on, cannot hold the rows that the element declares.
-int ply_check_count(const struct pt_input *input, const struct ply_header *header, const struct ply_element *element,
-                    uint64_t offset);
+// Error when the file, from the cursor on, cannot hold the rows that the element declares.
+int ply_check_count(const struct ply_cursor *at, const struct ply_element *element);
+// Says what is wrong in the cursor's tone. Returns PATINA_ERROR_FORMAT.
+int ply_fault(const struct ply_cursor *at, const char *format, ...) __attribute__((format(printf, 2, 3)));
 // Copies bytes of a file into a message: at most 40 of them, what is not printable ASCII as '?'.
 const char *ply_quote(char quoted[44], const void *bytes, size_t size);
 // Sets the progress to offset / size. PATINA_ERROR_CANCELLED when the caller wants no more.

@@ -135,6 +135,7 @@ static int read_magic(struct reader *r)
     for (i += 3; i < size && i < PLY_LONGEST_HEADER && !pt_is_line_end(data[i]); i++)
         ;
     r->mac = i < size && data[i] == '\r' && (i + 1 == size || data[i + 1] != '\n');
+    r->header->crlf = i < size && data[i] == '\r' && !r->mac;
     return next_line(r);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // From header to columns: which property is what, room for the columns, then the rows of either kind.
 //
-// Only the elements up to the points are read: faces and range grids behind them are neither needed nor checked.
+// Elements behind the points are not needed: where the file ends in one of them, that is told and the points stay.
 // Integer colours of type char, short, int and uint are taken as 0..255 (their writers meant bytes), uchar is 0..255,
 // ushort 0..65535, float and double are linear. A Gaussian splat without colours has the sRGB colour of its base, the
 // constant term of its spherical harmonics (Kerbl et al., 3D Gaussian Splatting, 2023). What is no position, normal or
@@ -245,13 +245,27 @@ static const struct ply_element *find_points(const struct ply_header *header)
     return NULL;
 }
 
+// Reads the points, and passes over the other elements. A fault behind the points is no loss of any: a line in the log.
+static int read_elements(const struct plan *plan, struct ply_cursor *at)
+{
+    int code = PATINA_OK;
+    for (const struct ply_element *e = plan->header->elements; e < plan->header->elements + plan->header->element_count; e++) {
+        at->tone = e > plan->points ? PLY_WARN : PLY_REFUSE;
+        code = ply_read_rows(at, e, e == plan->points ? plan->targets : NULL);
+        if (code)
+            return code == PATINA_ERROR_FORMAT && e > plan->points ? PATINA_OK : code;
+    }
+    ply_warn_of_rest(*at);
+    return PATINA_OK;
+}
+
 static int read_points(struct plan *plan)
 {
     static const char *const formats[] = { "", "PLY ascii", "PLY binary_little_endian", "PLY binary_big_endian" };
     struct patina_file *file = plan->file;
-    uint32_t vertex = (uint32_t)(plan->points - plan->header->elements);
+    struct ply_cursor at = { plan->input, plan->header, plan->header->body, plan->header->body_line, PLY_REFUSE };
     // Before a byte is allocated; again by the readers of the rows, where elements stand before the points.
-    int code = ply_check_count(plan->input, plan->header, plan->points, plan->header->body);
+    int code = ply_check_count(&at, plan->points);
     if (code)
         return code;
     if (plan->points->count > UINT32_MAX - 1)
@@ -267,9 +281,7 @@ static int read_points(struct plan *plan)
     if ((code = plan_positions(plan)) || (code = plan_normals(plan)) || (code = plan_colors(plan)) ||
         (code = plan_attributes(plan)))
         return code;
-    code = plan->header->format == PLY_ASCII ? ply_read_ascii(plan->input, plan->header, vertex, plan->targets)
-                                             : ply_read_binary(plan->input, plan->header, vertex, plan->targets);
-    if (code)
+    if ((code = ply_check_line_ends(plan->input, plan->header)) || (code = read_elements(plan, &at)))
         return code;
     if (plan->staged) {
         pt_file_place(file, plan->staged);

@@ -93,4 +93,21 @@ static inline struct blob blob(const char *header, const void *body, size_t size
     return b;
 }
 
+// The log is emptied before a call; behind it a line must hold these words, or there must be none (NULL).
+static inline void empty_log(void)
+{
+    while (patina_log_next(NULL, 0, NULL))
+        ;
+}
+
+static inline void expect_log(const char *words)
+{
+    char line[512], all[2048] = "";
+    int level;
+    while (patina_log_next(line, sizeof line, &level))
+        snprintf(all + strlen(all), sizeof all - strlen(all), "%d %s\n", level, line);
+    if (words ? !strstr(all, words) : *all)
+        fail_msg("the log should hold '%s', not '%s'", words ? words : "nothing", all);
+}
+
 #endif

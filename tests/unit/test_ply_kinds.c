@@ -45,11 +45,84 @@ static void test_splat_colors(void **state)
     patina_file_destroy(file);
 }
 
+// ---- bytes too many, too few, or other ones -------------------------------------------------------------------------
+
+// What a copy as text makes of bytes. unix2dos leaves carriage returns with their line feeds alone.
+static struct blob as_text(const struct blob *b, int leaves_pairs)
+{
+    struct blob out = { .size = 0 };
+    for (size_t i = 0; i < b->size; i++) {
+        if (b->bytes[i] == '\n' && !(leaves_pairs && i && b->bytes[i - 1] == '\r'))
+            out.bytes[out.size++] = '\r';
+        out.bytes[out.size++] = b->bytes[i];
+    }
+    return out;
+}
+
+static void test_copied_as_text(void **state)
+{
+    (void)state;
+    const char *faces = "element face 2\nproperty list uchar uchar vertex_indices\n";
+    uint8_t body[44] = { 1, 10, 0, 13, 10, 7, 10, 10 };
+    char header[256];
+    for (int kind = 0; kind < 4; kind++) { // a face of 10 corners has a line feed for its count
+        snprintf(header, sizeof header, LITTLE "element vertex 2\n" XYZ "%send_header\n", kind & 1 ? faces : "");
+        body[24] = 10;
+        body[35] = 2;
+        struct blob b = blob(header, body, kind & 1 ? 38 : 24), mangled = as_text(&b, kind & 2);
+        patina_file_destroy(open_bytes(b.bytes, b.size));
+        refuse_bytes(mangled.bytes, mangled.size, PATINA_ERROR_FORMAT, "damaged by being copied as text: each of the");
+    }
+    snprintf(header, sizeof header, "ply\r\nformat binary_little_endian 1.0\r\nelement vertex 2\r\nproperty float x\r\n"
+                                    "property float y\r\nproperty float z\r\nend_header\r\n");
+    uint8_t honest[26] = { 1, 13, 10, 0, 13, 10 };
+    struct blob b = blob(header, honest, 24);
+    patina_file_destroy(open_bytes(b.bytes, b.size)); // its rows end where it does
+    honest[24] = 13, honest[25] = 10;
+    b = blob(header, (uint8_t[24]){ 1 }, 24);
+    memcpy(b.bytes + b.size, honest + 24, 2); // an editor's last line end
+    patina_file_destroy(open_bytes(b.bytes, b.size + 2));
+}
+
+static void test_too_many_bytes(void **state)
+{
+    (void)state;
+    uint8_t body[24] = { 0 };
+    struct blob b = blob(LITTLE "element vertex 1\n" XYZ "end_header\n", body, 24);
+    empty_log();
+    patina_file_destroy(open_bytes(b.bytes, b.size - 12));
+    expect_log(NULL);
+    patina_file_destroy(open_bytes(b.bytes, b.size));
+    char words[96];
+    snprintf(words, sizeof words, "1 (memory): 12 bytes follow behind byte %zu, where the header's rows end", b.size - 12);
+    expect_log(words);
+}
+
+// The points are whole: they open, and the log says what is not.
+static void test_faces_cut_short(void **state)
+{
+    (void)state;
+    static const uint8_t body[] = { 1, 2, 3, 4, 5, 6, 2, 0, 1, 3, 0, 1 };
+    struct blob b = blob(LITTLE "element vertex 2\nproperty char x\nproperty char y\nproperty char z\n"
+                                "element face 2\nproperty list uchar uchar vertex_indices\nend_header\n",
+                         body, sizeof body);
+    char words[96];
+    empty_log();
+    patina_file *file = open_bytes(b.bytes, b.size);
+    snprintf(words, sizeof words, "1 (memory): the file ends at byte %zu, inside row 1 of the 2 of element face", b.size);
+    expect_log(words);
+    expect_positions(file, (float[]){ 1, 2, 3, 4, 5, 6 }, 6);
+    patina_file_destroy(file);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bool),
         cmocka_unit_test(test_splat_colors),
+        cmocka_unit_test(test_copied_as_text),
+        cmocka_unit_test(test_too_many_bytes),
+        cmocka_unit_test(test_faces_cut_short),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
