@@ -64,16 +64,47 @@ struct ply_target {
 
 int ply_read_header(const struct pt_input *input, struct ply_header *header);
 
+// The lists of one property, handed on row by row.
+struct ply_lists {
+    uint32_t property; // of the element
+    void (*take)(void *context, uint64_t row, const double *items, size_t count);
+    void *context;
+    double *items; // of the row, from malloc; NULL at first
+    size_t room;
+};
+
 // Reads the rows of the element that begins at the cursor, which comes behind them; property i goes to targets[i].
-// targets NULL: the rows are passed over, those of a text without a look at what they hold.
-int ply_read_rows(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets);
-int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets);
-int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets);
+// targets NULL: values go nowhere; without lists, too, the rows of a text are passed over without a look at what they hold.
+int ply_read_rows(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                  struct ply_lists *lists);
+int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                    struct ply_lists *lists);
+int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                   struct ply_lists *lists);
+// Room for the items of a row. PATINA_ERROR_MEMORY.
+int ply_make_room(const struct ply_cursor *at, struct ply_lists *lists, size_t count);
 // Tells what is behind the last element, where the cursor is.
 void ply_warn_of_rest(struct ply_cursor at);
 
 // Refuses a binary body in which each line feed became carriage return and line feed, as copying it as text makes it.
 int ply_check_line_ends(const struct pt_input *input, const struct ply_header *header);
+
+// Normals from faces: each corner's face normal by the corner's angle (Thuermer and Wuethrich, Computing Vertex Normals
+// from Polygonal Facets, 1998), so that they do not depend on how a polygon was cut into triangles.
+struct ply_faces {
+    const float *position; // 3 a point
+    uint64_t points;
+    float *normal; // 3 a point, zeros at first
+    bool strips;   // a row is a strip of triangles; -1 begins the next one (Stanford's tristrips)
+    uint64_t used, bad; // faces
+    uint64_t bad_row;   // of the first bad one
+    double bad_point;   // that it names
+};
+
+// The list of the element that names points; -1 without one.
+int64_t ply_find_corners(const struct ply_header *header, const struct ply_element *element);
+void ply_take_face(void *faces, uint64_t row, const double *corners, size_t count); // ply_lists.take
+void ply_finish_faces(struct ply_faces *faces); // unit lengths; points without a face keep 0
 
 // Puts n values at points first, first + 1, ... of a column; integers are clamped to what their type holds.
 void ply_store(const struct ply_target *target, uint64_t first, size_t n, const double *values);

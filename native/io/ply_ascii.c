@@ -94,43 +94,49 @@ static int short_line(const struct text *t, const char *property)
                      (unsigned long long)t->line, property);
 }
 
-static int skip_list(struct text *t, const struct ply_property *property)
+// The items of a list, handed on or passed over.
+static int read_list(struct text *t, const struct ply_property *property, struct ply_lists *lists, uint64_t i)
 {
     double count = 0;
+    size_t got = 0;
     int code = read_value(t, property->count_type, false, property->name, &count);
     if (code)
         return code;
     if (count < 0)
         return ply_fault(t->cursor, "%s: line %llu: list %s has the count %.0f", t->input->name,
                          (unsigned long long)t->line, property->name, count);
-    for (; count > 0; count--) {
+    for (; (double)got < count && !code; got++) {
         skip_blanks(t);
         if (line_ends(t))
             return short_line(t, property->name);
-        t->at += token_length(t);
+        if (!lists)
+            t->at += token_length(t);
+        else if (!(code = ply_make_room(t->cursor, lists, got + 1)))
+            code = read_value(t, property->type, false, property->name, &lists->items[got]);
     }
-    return PATINA_OK;
+    if (lists && !code)
+        lists->take(lists->context, i, lists->items, got);
+    return code;
 }
 
 static int read_row(struct text *t, const struct ply_property *properties, uint32_t property_count,
-                    const struct ply_target *targets, uint64_t i)
+                    const struct ply_target *targets, struct ply_lists *lists, uint64_t i)
 {
     for (uint32_t k = 0; k < property_count; k++) {
         const struct ply_property *property = &properties[k];
         skip_blanks(t);
         if (line_ends(t)) {
-            // A list that the rows lack is no loss: lists are not kept.
-            if (property->count_type != PATINA_NONE)
+            if (property->count_type != PATINA_NONE) // a list that the rows lack is no loss
                 continue;
             return short_line(t, property->name);
         }
         double value = 0;
         int code = property->count_type != PATINA_NONE
-                       ? skip_list(t, property)
-                       : read_value(t, property->type, targets[k].wrap, property->name, &value);
+                       ? read_list(t, property, lists && lists->property == k ? lists : NULL, i)
+                       : read_value(t, property->type, targets && targets[k].wrap, property->name, &value);
         if (code)
             return code;
-        if (targets[k].data)
+        if (targets && targets[k].data)
             ply_store(&targets[k], i, 1, &value);
     }
     skip_blanks(t);
@@ -141,7 +147,8 @@ static int read_row(struct text *t, const struct ply_property *properties, uint3
     return PATINA_OK;
 }
 
-static int read_element(struct text *t, const struct ply_element *element, const struct ply_target *targets)
+static int read_element(struct text *t, const struct ply_element *element, const struct ply_target *targets,
+                        struct ply_lists *lists)
 {
     int code = PATINA_OK;
     for (uint64_t i = 0; i < element->count && !code; i++) {
@@ -151,16 +158,17 @@ static int read_element(struct text *t, const struct ply_element *element, const
             code = start_row(t, element, i);
         if (code)
             break;
-        if (targets)
-            code = read_row(t, t->cursor->header->properties + element->first, element->properties, targets, i);
-        while (!targets && !line_ends(t))
+        if (targets || lists)
+            code = read_row(t, t->cursor->header->properties + element->first, element->properties, targets, lists, i);
+        while (!targets && !lists && !line_ends(t))
             t->at++;
         next_line(t);
     }
     return code;
 }
 
-int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets)
+int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                   struct ply_lists *lists)
 {
     int code = element->properties ? ply_check_count(at, element) : PATINA_OK;
     if (code || element->properties == 0)
@@ -173,7 +181,7 @@ int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, con
                       .c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0) };
     if (!t.c_locale)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", at->input->name);
-    code = read_element(&t, element, targets);
+    code = read_element(&t, element, targets, lists);
     at->offset = (uint64_t)(t.at - at->input->data);
     at->line = t.line;
     freelocale(t.c_locale);

@@ -127,33 +127,50 @@ static int ends_early(const struct bytes *b, const struct ply_element *element, 
                      (unsigned long long)element->count, element->name, (unsigned long long)b->at->offset);
 }
 
-// One row with lists; targets NULL: passed over.
-static int read_loose_row(struct bytes *b, const struct ply_property *properties, const struct ply_element *element,
-                          const struct ply_target *targets, uint64_t i)
+// The items of a list, handed on or passed over.
+static int read_items(struct bytes *b, const struct ply_property *property, const struct ply_element *element,
+                      struct ply_lists *lists, uint64_t i, double count)
 {
-    const uint8_t *data = b->at->input->data;
+    struct ply_cursor *at = b->at;
+    if (count < 0)
+        return ply_fault(at, "%s: byte %llu: list %s of row %llu has the count %.0f", at->input->name,
+                         (unsigned long long)(at->offset - pt_type_size(property->count_type)), property->name,
+                         (unsigned long long)i, count);
+    size_t item = pt_type_size(property->type);
+    uint64_t size = (uint64_t)count * item; // below 2^35
+    if (at->input->size - at->offset < size)
+        return ends_early(b, element, i);
+    int code = lists ? ply_make_room(at, lists, (size_t)count) : PATINA_OK;
+    if (lists && !code) {
+        load(lists->items, at->input->data + at->offset, item, (size_t)count, property->type, b->swap);
+        lists->take(lists->context, i, lists->items, (size_t)count);
+    }
+    at->offset += size;
+    return code;
+}
+
+static int read_loose_row(struct bytes *b, const struct ply_property *properties, const struct ply_element *element,
+                          const struct ply_target *targets, struct ply_lists *lists, uint64_t i)
+{
     double value;
-    for (uint32_t k = 0; k < element->properties; k++) {
+    int code = PATINA_OK;
+    for (uint32_t k = 0; k < element->properties && !code; k++) {
         bool list = properties[k].count_type != PATINA_NONE;
         uint32_t type = list ? properties[k].count_type : properties[k].type;
         if (b->at->input->size - b->at->offset < pt_type_size(type))
             return ends_early(b, element, i);
-        load(&value, data + b->at->offset, 0, 1, type, b->swap);
-        if (list && value < 0)
-            return ply_fault(b->at, "%s: byte %llu: list %s of row %llu has the count %.0f", b->at->input->name,
-                             (unsigned long long)b->at->offset, properties[k].name, (unsigned long long)i, value);
+        load(&value, b->at->input->data + b->at->offset, 0, 1, type, b->swap);
         b->at->offset += pt_type_size(type);
-        uint64_t items = list ? (uint64_t)value * pt_type_size(properties[k].type) : 0; // below 2^35
-        if (b->at->input->size - b->at->offset < items)
-            return ends_early(b, element, i);
-        b->at->offset += items;
-        if (targets && targets[k].data)
+        if (list)
+            code = read_items(b, &properties[k], element, lists && lists->property == k ? lists : NULL, i, value);
+        else if (targets && targets[k].data)
             ply_store(&targets[k], i, 1, &value);
     }
-    return PATINA_OK;
+    return code;
 }
 
-int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets)
+int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                    struct ply_lists *lists)
 {
     const struct ply_property *properties = at->header->properties + element->first;
     bool big_machine = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
@@ -174,7 +191,7 @@ int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, co
         if (i % POLL_ROWS == 0)
             code = ply_poll(at->input, at->offset);
         if (!code)
-            code = read_loose_row(&b, properties, element, targets, i);
+            code = read_loose_row(&b, properties, element, targets, lists, i);
     }
     return code;
 }

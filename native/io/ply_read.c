@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // From header to columns: which property is what, room for the columns, then the rows of either kind.
 //
-// Elements behind the points are not needed: where the file ends in one of them, that is told and the points stay.
+// Elements behind the points are not needed: where the file ends in one of them, that is told and the points stay. Faces
+// give normals where there are no others.
 // Integer colours of type char, short, int and uint are taken as 0..255 (their writers meant bytes), uchar is 0..255,
 // ushort 0..65535, float and double are linear. A Gaussian splat without colours has the sRGB colour of its base, the
 // constant term of its spherical harmonics (Kerbl et al., 3D Gaussian Splatting, 2023). What is no position, normal or
@@ -35,6 +36,7 @@ struct plan {
     struct ply_target *targets;            // one a property
     bool *taken;                           // one a property: it is part of a position, normal or colour
     double *staged;                        // positions whose detail float32 may not hold
+    const struct ply_element *faces;       // that normals come from; NULL: none, or the points have normals
 };
 
 static int out_of_memory(const struct plan *plan)
@@ -245,18 +247,68 @@ static const struct ply_element *find_points(const struct ply_header *header)
     return NULL;
 }
 
-// Reads the points, and passes over the other elements. A fault behind the points is no loss of any: a line in the log.
-static int read_elements(const struct plan *plan, struct ply_cursor *at)
+// Reads the points, and passes over what stands before them. `before`: where the faces begin if they do.
+static int read_to_points(const struct plan *plan, struct ply_cursor *at, struct ply_cursor *before)
 {
     int code = PATINA_OK;
-    for (const struct ply_element *e = plan->header->elements; e < plan->header->elements + plan->header->element_count; e++) {
-        at->tone = e > plan->points ? PLY_WARN : PLY_REFUSE;
-        code = ply_read_rows(at, e, e == plan->points ? plan->targets : NULL);
+    for (const struct ply_element *e = plan->header->elements; e <= plan->points && !code; e++) {
+        if (e == plan->faces)
+            *before = *at;
+        code = ply_read_rows(at, e, e == plan->points ? plan->targets : NULL, NULL);
+    }
+    return code;
+}
+
+// A fault in the faces is no loss of points: a line in the log.
+static int read_faces(const struct plan *plan, struct ply_cursor *at)
+{
+    struct patina_file *file = plan->file;
+    struct ply_faces faces = { .position = file->position, .points = file->count };
+    struct ply_lists lists = { .take = ply_take_face, .context = &faces };
+    faces.strips = !strcmp(plan->faces->name, "tristrips");
+    faces.normal = file->normal = calloc(file->count + 1, 3 * sizeof *file->normal);
+    if (!file->normal)
+        return out_of_memory(plan);
+    lists.property = (uint32_t)ply_find_corners(plan->header, plan->faces);
+    at->tone = PLY_WARN;
+    int code = ply_read_rows(at, plan->faces, NULL, &lists);
+    free(lists.items);
+    ply_finish_faces(&faces);
+    if (faces.bad)
+        pt_log(PT_LOG_WARNING, "%s: %llu faces name points that are not there, and were left out; the first, %llu, names %.0f of %llu",
+               plan->input->name, (unsigned long long)faces.bad, (unsigned long long)faces.bad_row, faces.bad_point,
+               (unsigned long long)file->count);
+    if (!faces.used) {
+        free(file->normal);
+        file->normal = NULL;
+    }
+    return code;
+}
+
+// Passes over what stands behind the points. Where the file ends too early there, a line in the log says so.
+static int read_behind(const struct plan *plan, struct ply_cursor *at)
+{
+    const struct ply_element *end = plan->header->elements + plan->header->element_count;
+    at->tone = PLY_WARN;
+    for (const struct ply_element *e = plan->points + 1; e < end; e++) {
+        int code = e == plan->faces ? read_faces(plan, at) : ply_read_rows(at, e, NULL, NULL);
         if (code)
-            return code == PATINA_ERROR_FORMAT && e > plan->points ? PATINA_OK : code;
+            return code == PATINA_ERROR_FORMAT ? PATINA_OK : code;
     }
     ply_warn_of_rest(*at);
     return PATINA_OK;
+}
+
+static const struct ply_element *find_faces(const struct plan *plan)
+{
+    static const char *const names[] = { "face", "faces", "tristrips" };
+    const struct ply_header *header = plan->header;
+    for (size_t n = 0; n < sizeof names / sizeof *names && !plan->file->normal; n++)
+        for (uint32_t e = 0; e < header->element_count; e++)
+            if (!strcmp(header->elements[e].name, names[n]) && header->elements[e].count &&
+                ply_find_corners(header, &header->elements[e]) >= 0)
+                return &header->elements[e];
+    return NULL;
 }
 
 static int read_points(struct plan *plan)
@@ -281,12 +333,18 @@ static int read_points(struct plan *plan)
     if ((code = plan_positions(plan)) || (code = plan_normals(plan)) || (code = plan_colors(plan)) ||
         (code = plan_attributes(plan)))
         return code;
-    if ((code = ply_check_line_ends(plan->input, plan->header)) || (code = read_elements(plan, &at)))
+    plan->faces = find_faces(plan);
+    struct ply_cursor before = at;
+    if ((code = ply_check_line_ends(plan->input, plan->header)) || (code = read_to_points(plan, &at, &before)))
         return code;
     if (plan->staged) {
         pt_file_place(file, plan->staged);
         plan->staged = NULL;
     }
+    if (plan->faces && plan->faces < plan->points && (code = read_faces(plan, &before)) && code != PATINA_ERROR_FORMAT)
+        return code;
+    if ((code = read_behind(plan, &at)))
+        return code;
     pt_file_measure(file);
     pt_progress_set(plan->input->progress, 1);
     return PATINA_OK;

@@ -6,6 +6,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 int ply_poll(const struct pt_input *input, uint64_t offset)
@@ -109,9 +110,24 @@ int ply_fault(const struct ply_cursor *at, const char *format, ...)
     return PATINA_ERROR_FORMAT;
 }
 
-int ply_read_rows(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets)
+int ply_read_rows(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                  struct ply_lists *lists)
 {
-    return at->header->format == PLY_ASCII ? ply_read_ascii(at, element, targets) : ply_read_binary(at, element, targets);
+    return at->header->format == PLY_ASCII ? ply_read_ascii(at, element, targets, lists)
+                                           : ply_read_binary(at, element, targets, lists);
+}
+
+int ply_make_room(const struct ply_cursor *at, struct ply_lists *lists, size_t count)
+{
+    if (count <= lists->room)
+        return PATINA_OK;
+    size_t room = 2 * count;
+    double *grown = realloc(lists->items, room * sizeof *grown);
+    if (!grown)
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: no memory for a list of %zu", at->input->name, count);
+    lists->items = grown;
+    lists->room = room;
+    return PATINA_OK;
 }
 
 // A count that is too small leaves points out: that deserves a line in the log.
@@ -154,7 +170,7 @@ int ply_check_line_ends(const struct pt_input *input, const struct ply_header *h
     if (!count)
         return PATINA_OK;
     for (uint32_t e = 0; e < header->element_count && !code; e++)
-        code = ply_read_binary(&at, &header->elements[e], NULL);
+        code = ply_read_binary(&at, &header->elements[e], NULL, NULL);
     bool lists = false; // behind one that is read wrongly, anything may follow
     for (uint32_t k = 0; k < header->property_count; k++)
         lists |= header->properties[k].count_type != PATINA_NONE;

@@ -9,6 +9,8 @@
 
 #include "files.h"
 
+#include <stdlib.h>
+
 // ---- types and colours ---------------------------------------------------------------------------------------------
 
 static void test_bool(void **state)
@@ -115,6 +117,103 @@ static void test_faces_cut_short(void **state)
     patina_file_destroy(file);
 }
 
+// ---- faces ---------------------------------------------------------------------------------------------------------
+
+static void expect_normals(const patina_file *file, const float *wanted, size_t values)
+{
+    float got[64];
+    assert_int_equal(info_of(file).has_normals, 1);
+    assert_int_equal(patina_file_read_normals(file, got, sizeof got), PATINA_OK);
+    for (size_t i = 0; i < values; i++)
+        if (fabs((double)got[i] - (double)wanted[i]) > 1e-6)
+            fail_msg("value %zu is %.9g, wanted %.9g", i, (double)got[i], (double)wanted[i]);
+}
+
+#define CUBE "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
+#define CUBE_HEAD(faces) "element vertex 8\n" XYZ "element face " faces "\nproperty list uchar int vertex_indices\nend_header\n"
+
+// A cube's corners point away from its middle, whichever way its squares were cut, and whether faces stand first or not.
+static void test_normals_of_faces(void **state)
+{
+    (void)state;
+    static const char *const files[] = {
+        ASCII CUBE_HEAD("6") CUBE "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n",
+        ASCII CUBE_HEAD("12") CUBE "3 0 3 2\n3 0 2 1\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n"
+                                   "3 3 0 4\n3 3 4 7\n",
+        ASCII "element face 6\nproperty list uchar int vertex_index\nelement vertex 8\n" XYZ
+              "end_header\n4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n" CUBE,
+    };
+    const float r = sqrtf(1.0f / 3);
+    const float wanted[24] = { -r, -r, -r, r, -r, -r, r, r, -r, -r, r, -r, -r, -r, r, r, -r, r, r, r, r, -r, r, r };
+    for (int i = 0; i < 3; i++) {
+        patina_file *file = open_text(files[i]);
+        expect_normals(file, wanted, 24);
+        patina_file_destroy(file);
+    }
+}
+
+static void test_faces_of_any_size(void **state)
+{
+    (void)state;
+    static const uint8_t body[] = { 0, 0, 0, 4, 0, 0, 4, 4, 0, 1, 1, 0, 0, 4, 0, 9, 9, 9, // the fourth lies inwards
+                                    0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 0, 0, 1, 5, 0, 0, 0, 5, 0, 1, 2, 3, 4 };
+    struct blob b = blob(BIG "element vertex 6\nproperty uchar x\nproperty uchar y\nproperty uchar z\n"
+                             "element face 4\nproperty list uint uchar vertex_indices\nend_header\n",
+                         body, sizeof body);
+    empty_log();
+    patina_file *file = open_bytes(b.bytes, b.size);
+    expect_normals(file, (float[]){ 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 0 }, 18);
+    patina_file_destroy(file);
+
+    // a strip, and another behind -1: all of it faces upwards
+    file = open_text(ASCII "element vertex 5\n" XYZ "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+                           "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 2 0\n8 0 1 2 3 -1 3 1 4\n");
+    float n[15];
+    assert_int_equal(patina_file_read_normals(file, n, sizeof n), PATINA_OK);
+    for (int i = 0; i < 5; i++)
+        assert_true(n[3 * i + 2] == 1);
+    patina_file_destroy(file);
+
+    enum { MANY = 100000 }; // a disc of one face
+    char *text = malloc(MANY * 64u);
+    assert_non_null(text);
+    int at = sprintf(text, ASCII "element vertex %d\n" XYZ "element face 1\nproperty list int int vertex_indices\nend_header\n", MANY);
+    for (int i = 0; i < MANY; i++)
+        at += sprintf(text + at, "%.9g %.9g 3\n", cos(i * 2 * 3.14159265358979 / MANY), sin(i * 2 * 3.14159265358979 / MANY));
+    at += sprintf(text + at, "%d", MANY);
+    for (int i = 0; i < MANY; i++)
+        at += sprintf(text + at, " %d", i);
+    file = open_text(text);
+    float *normals = malloc(MANY * 3 * sizeof *normals);
+    assert_non_null(normals);
+    assert_int_equal(patina_file_read_normals(file, normals, MANY * 3 * sizeof *normals), PATINA_OK);
+    for (int i = 0; i < MANY; i++)
+        assert_true(normals[3 * i + 2] == 1);
+    free(normals);
+    free(text);
+    patina_file_destroy(file);
+}
+
+static void test_bad_faces(void **state)
+{
+    (void)state;
+    empty_log();
+    patina_file *file = open_text(ASCII "element vertex 3\n" XYZ "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+                                        "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 3\n3 -1 0 1\n4 0 1 2 99999\n");
+    expect_log("1 (memory): 3 faces name points that are not there, and were left out; the first, 1, names 3 of 3");
+    expect_normals(file, (float[]){ 0, 0, 1, 0, 0, 1, 0, 0, 1 }, 9);
+    patina_file_destroy(file);
+    file = open_text(ASCII "element vertex 3\n" XYZ "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+                           "0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n3 0 0 1\n");
+    assert_int_equal(info_of(file).has_normals, 0); // no face has a side
+    patina_file_destroy(file);
+    file = open_text(ASCII "element vertex 1\n" XYZ "property float nx\nproperty float ny\nproperty float nz\nelement face 1\n"
+                           "property list uchar int vertex_indices\nend_header\n0 0 0 1 0 0\n3 0 1 7\n");
+    expect_normals(file, (float[]){ 1, 0, 0 }, 3); // its own
+    patina_file_destroy(file);
+    empty_log();
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -123,6 +222,9 @@ int main(void)
         cmocka_unit_test(test_copied_as_text),
         cmocka_unit_test(test_too_many_bytes),
         cmocka_unit_test(test_faces_cut_short),
+        cmocka_unit_test(test_normals_of_faces),
+        cmocka_unit_test(test_faces_of_any_size),
+        cmocka_unit_test(test_bad_faces),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
