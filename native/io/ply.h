@@ -36,6 +36,7 @@ struct ply_header {
     struct ply_element elements[PLY_MOST_ELEMENTS];
     uint32_t property_count;
     struct ply_property properties[PLY_MOST_PROPERTIES];
+    uint32_t grid_columns, grid_rows; // from "obj_info num_cols", "num_rows"
     bool crlf;          // the header's lines end with CR LF
     uint64_t body;      // offset of the first byte behind the header
     uint64_t body_line; // its line number
@@ -105,6 +106,16 @@ struct ply_faces {
 int64_t ply_find_corners(const struct ply_header *header, const struct ply_element *element);
 void ply_take_face(void *faces, uint64_t row, const double *corners, size_t count); // ply_lists.take
 void ply_finish_faces(struct ply_faces *faces); // unit lengths; points without a face keep 0
+
+// Which point lies in which cell of a scanner's grid, row by row of at most one point.
+struct ply_grid {
+    uint32_t columns;
+    uint64_t points;
+    uint16_t *row, *column; // a point; PLY_NO_CELL
+};
+enum { PLY_NO_CELL = UINT16_MAX };
+
+void ply_take_cell(void *grid, uint64_t cell, const double *points, size_t count); // ply_lists.take
 
 // Puts n values at points first, first + 1, ... of a column; integers are clamped to what their type holds.
 void ply_store(const struct ply_target *target, uint64_t first, size_t n, const double *values);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Normals from the faces of a PLY file that has no others.
+// What lists of points mean: faces, which give normals to a PLY file that has no others, and the cells of a scanner's grid.
 #include "ply.h"
 
 #include <math.h>
@@ -117,4 +117,13 @@ void ply_finish_faces(struct ply_faces *faces)
         for (int k = 0; k < 3; k++)
             n[k] = good ? (float)unit[k] : 0;
     }
+}
+
+void ply_take_cell(void *context, uint64_t cell, const double *points, size_t count)
+{
+    struct ply_grid *grid = context;
+    if (count == 0 || !(points[0] >= 0 && points[0] < (double)grid->points))
+        return;
+    grid->row[(size_t)points[0]] = (uint16_t)(cell / grid->columns);
+    grid->column[(size_t)points[0]] = (uint16_t)(cell % grid->columns);
 }

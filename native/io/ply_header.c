@@ -253,6 +253,23 @@ static int read_comment(struct reader *r)
     return code;
 }
 
+// Sizes of a scanner's grid, as the Stanford repository's range images say them. Others mean nothing here.
+static void read_info(struct reader *r)
+{
+    uint32_t *size = r->word_count == 3 && is(r->words[1], "num_cols")   ? &r->header->grid_columns
+                     : r->word_count == 3 && is(r->words[1], "num_rows") ? &r->header->grid_rows
+                                                                          : NULL;
+    uint32_t value = 0;
+    for (size_t i = 0; size && i < r->words[2].length && value < PLY_NO_CELL; i++) {
+        uint8_t c = r->words[2].text[i];
+        if (c < '0' || c > '9')
+            return;
+        value = value * 10 + (uint32_t)(c - '0');
+    }
+    if (size)
+        *size = value;
+}
+
 // Old Blender exporters forgot the word "comment" on their own line. Before the first element an unknown line can
 // change nothing of what follows, so it is let pass there; later it might be a misspelt property.
 static int read_line(struct reader *r)
@@ -266,6 +283,8 @@ static int read_line(struct reader *r)
         return read_format(r);
     if (is(key, "comment"))
         return read_comment(r);
+    if (is(key, "obj_info"))
+        read_info(r);
     if (is(key, "obj_info") || r->header->element_count == 0)
         return PATINA_OK;
     return fail(r, "unknown keyword", key);

@@ -37,6 +37,7 @@ struct plan {
     bool *taken;                           // one a property: it is part of a position, normal or colour
     double *staged;                        // positions whose detail float32 may not hold
     const struct ply_element *faces;       // that normals come from; NULL: none, or the points have normals
+    const struct ply_element *grid;        // of a scanner; NULL: none
 };
 
 static int out_of_memory(const struct plan *plan)
@@ -285,13 +286,50 @@ static int read_faces(const struct plan *plan, struct ply_cursor *at)
     return code;
 }
 
+// Range images as the Stanford repository has them: each cell of a grid lists the point in it, if there is one. They were
+// taken along -z, row by row from below. Where the file ends in them the grid is left out.
+static int read_grid(const struct plan *plan, struct ply_cursor *at)
+{
+    struct patina_file *file = plan->file;
+    struct ply_grid grid = { .columns = plan->header->grid_columns, .points = file->count };
+    struct ply_lists lists = { .take = ply_take_cell, .context = &grid };
+    lists.property = (uint32_t)ply_find_corners(plan->header, plan->grid);
+    grid.row = column(plan, sizeof *grid.row);
+    grid.column = column(plan, sizeof *grid.column);
+    file->scans = calloc(1, sizeof *file->scans);
+    int code = grid.row && grid.column && file->scans ? PATINA_OK : out_of_memory(plan);
+    if (!code) {
+        memset(grid.row, 0xFF, file->count * sizeof *grid.row);
+        memset(grid.column, 0xFF, file->count * sizeof *grid.column);
+        at->tone = PLY_WARN;
+        code = ply_read_rows(at, plan->grid, NULL, &lists);
+        free(lists.items);
+    }
+    if (code) {
+        free(grid.row);
+        free(grid.column);
+        return code;
+    }
+    file->scans[0] = (struct pt_scan){ .count = file->count, .columns = plan->header->grid_columns,
+                                       .rows = plan->header->grid_rows, .station = { 0, 0, 1 }, .parallel = true };
+    file->scan_count = 1;
+    code = pt_file_add_attribute(file, "column", PATINA_UINT16, grid.column);
+    if (code)
+        free(grid.row);
+    else
+        code = pt_file_add_attribute(file, "row", PATINA_UINT16, grid.row);
+    return code ? out_of_memory(plan) : pt_file_grid_normals(file, plan->input);
+}
+
 // Passes over what stands behind the points. Where the file ends too early there, a line in the log says so.
 static int read_behind(const struct plan *plan, struct ply_cursor *at)
 {
     const struct ply_element *end = plan->header->elements + plan->header->element_count;
     at->tone = PLY_WARN;
     for (const struct ply_element *e = plan->points + 1; e < end; e++) {
-        int code = e == plan->faces ? read_faces(plan, at) : ply_read_rows(at, e, NULL, NULL);
+        int code = e == plan->faces  ? read_faces(plan, at)
+                   : e == plan->grid ? read_grid(plan, at)
+                                     : ply_read_rows(at, e, NULL, NULL);
         if (code)
             return code == PATINA_ERROR_FORMAT ? PATINA_OK : code;
     }
@@ -308,6 +346,18 @@ static const struct ply_element *find_faces(const struct plan *plan)
             if (!strcmp(header->elements[e].name, names[n]) && header->elements[e].count &&
                 ply_find_corners(header, &header->elements[e]) >= 0)
                 return &header->elements[e];
+    return NULL;
+}
+
+// A grid behind the points that has as many cells as it says.
+static const struct ply_element *find_grid(const struct plan *plan)
+{
+    const struct ply_header *h = plan->header;
+    for (const struct ply_element *e = plan->points + 1; e < h->elements + h->element_count; e++)
+        if (!strcmp(e->name, "range_grid") && e->count == (uint64_t)h->grid_columns * h->grid_rows && e->count &&
+            h->grid_columns < PLY_NO_CELL && h->grid_rows < PLY_NO_CELL && ply_find_corners(h, e) >= 0 &&
+            !pt_file_find_attribute(plan->file, "row") && !pt_file_find_attribute(plan->file, "column"))
+            return e;
     return NULL;
 }
 
@@ -334,6 +384,7 @@ static int read_points(struct plan *plan)
         (code = plan_attributes(plan)))
         return code;
     plan->faces = find_faces(plan);
+    plan->grid = find_grid(plan);
     struct ply_cursor before = at;
     if ((code = ply_check_line_ends(plan->input, plan->header)) || (code = read_to_points(plan, &at, &before)))
         return code;

@@ -238,6 +238,27 @@ def test_conf():
     check(np.mean(np.array(far) < 0.004) > 0.95, f"{np.mean(np.array(far) < 0.004):.0%} within 4 mm")
 
 
+def test_places_of_points():
+    """Row, column and scan of each point come as attributes, the scanners' places with the data; grids give normals."""
+    new_scene()
+    head = "3\n2\n{0} 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{0} 0 0 1\n"
+    wall = "".join(f"{u} 5 {v} 0.5\n" for u in range(3) for v in range(2))
+    obj, = import_points(text_file("two.ptx", head.format(10) + wall + head.format(20) + wall))
+    for name, wanted in (("scan", [0] * 6 + [1] * 6), ("column", [0, 0, 1, 1, 2, 2] * 2), ("row", [0, 1] * 6)):
+        check_close(attribute_of(obj, name, "value")[:, 0], wanted, 0, name)
+    check_close(attribute_of(obj, "Normal", "vector", 3), [(0, -1, 0)] * 12, 1e-6, "normals towards the scanner")
+    check_close(np.array(obj.data["patina_scanners"]), (10, 0, 0, 20, 0, 0), 1e-6, "scanners")
+
+
+def test_conf_has_grids():
+    path = shared("stanford/bunny_range/bun.conf")
+    points = importers.reader(path).read(path, importers.Filter(every=20), importers.Progress())
+    check({"scan", "row", "column"} <= points.scalars.keys(), f"{points.scalars.keys()}")
+    check(0 < points.scalars["row"].max() < 400 and 400 < points.scalars["column"].max() < 512, "512 by 400 cells")
+    good = (points.normals ** 2).sum(axis=1) > 0.99
+    check(good.mean() > 0.99, f"{good.mean():.1%} have normals")
+
+
 def test_unknown_ending():
     new_scene()
     fails(text_file("a.abc", "1 2 3\n"), "is none of .ply")

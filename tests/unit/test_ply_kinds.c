@@ -214,6 +214,41 @@ static void test_bad_faces(void **state)
     empty_log();
 }
 
+// ---- a scanner's grid ----------------------------------------------------------------------------------------------
+
+// 8 columns, 5 rows, taken along -z: on the left z = x / 2, on the right the same 10 higher; cell 9 is empty. The slope is
+// found on both sides of the step, and faces the scanner.
+static void test_range_grid(void **state)
+{
+    (void)state;
+    char text[4096];
+    int at = snprintf(text, sizeof text, ASCII "obj_info num_cols 8\nobj_info num_rows 5\nobj_info is_mesh 0\nelement vertex 39\n" XYZ
+                                               "element range_grid 40\nproperty list uchar int vertex_indices\nend_header\n");
+    for (int i = 0; i < 40; i++)
+        if (i != 9)
+            at += snprintf(text + at, sizeof text - (size_t)at, "%d %d %g\n", i % 8, i / 8, i % 8 / 2.0 + (i % 8 > 3 ? 10 : 0));
+    for (int i = 0, point = 0; i < 40; i++)
+        at += i == 9 ? snprintf(text + at, sizeof text - (size_t)at, "0\n")
+                     : snprintf(text + at, sizeof text - (size_t)at, "1 %d\n", point++);
+    patina_file *file = open_text(text);
+    patina_file_info info = info_of(file);
+    float columns[39], rows[39], n[3 * 39];
+    assert_true(info.count == 39 && info.attributes == 2 && info.has_normals && info.stations == 0);
+    assert_int_equal(patina_file_read_attribute(file, 0, columns, sizeof columns), PATINA_OK);
+    assert_int_equal(patina_file_read_attribute(file, 1, rows, sizeof rows), PATINA_OK);
+    assert_int_equal(patina_file_read_normals(file, n, sizeof n), PATINA_OK);
+    for (int i = 0; i < 39; i++) {
+        int cell = i < 9 ? i : i + 1;
+        assert_true(columns[i] == (float)(cell % 8) && rows[i] == (float)(cell / 8));
+        assert_true(fabsf(n[3 * i] + sqrtf(0.2f)) < 1e-5f && fabsf(n[3 * i + 1]) < 1e-5f && fabsf(n[3 * i + 2] - sqrtf(0.8f)) < 1e-5f);
+    }
+    patina_file_destroy(file);
+    strstr(text, "num_rows 5")[9] = '6'; // not as many cells as the grid should have
+    file = open_text(text);
+    assert_true(info_of(file).attributes == 0 && !info_of(file).has_normals);
+    patina_file_destroy(file);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -225,6 +260,7 @@ int main(void)
         cmocka_unit_test(test_normals_of_faces),
         cmocka_unit_test(test_faces_of_any_size),
         cmocka_unit_test(test_bad_faces),
+        cmocka_unit_test(test_range_grid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
