@@ -111,6 +111,95 @@ def test_las_round_trip():
     check(any("2,000 points" in line for line in las.preview(path)), f"preview {las.preview(path)}")
 
 
+def las_file(name, form, fields, rows, extras=(), behind=False):
+    """A LAS 1.4 file of records with these fields, in millimetres, and extra dimensions in VLRs, or behind the points."""
+    rows = np.array(rows, fields)
+    body = b"".join(extras)
+    # an extended record's length has eight bytes
+    record = (b"\0\0LASF_Spec" + bytes(7) + struct.pack("<HQ" if behind else "<HH", 4, len(body)) + bytes(32) + body
+              if body else b"")
+    head = bytearray(375)
+    head[:4], head[24:26] = b"LASF", b"\x01\x04"
+    offset = 375 if behind else 375 + len(record)
+    struct.pack_into("<HIIBHI", head, 94, 375, offset, int(bool(record) and not behind), form, rows.dtype.itemsize, 0)
+    struct.pack_into("<12d", head, 131, 0.001, 0.001, 0.001, 0, 0, 0, 9, 0, 9, 0, 9, 0)
+    struct.pack_into("<QI", head, 235, offset + rows.nbytes, int(bool(record) and behind))
+    struct.pack_into("<Q", head, 247, len(rows))
+    path = SCRATCH / name
+    path.write_bytes(bytes(head) + (rows.tobytes() + record if behind else record + rows.tobytes()))
+    return path
+
+
+def extra_record(name, kind, options=0, no_data=b"", scale=0.0, offset=0.0):
+    return struct.pack("<2xBB32s4x24s48x3d3d32x", kind, options, name.encode(), no_data, scale, 0, 0, offset, 0, 0)
+
+
+def read_las(path):
+    return las.read(path, importers.Filter(), importers.Progress())
+
+
+def test_las_extra_dimensions():
+    """CloudCompare's scalar fields: their types, scale and offset, no-data; in a record before the points or behind them."""
+    extras = [extra_record("Curvature", 9), extra_record("height", 3, 8 | 16, scale=0.01, offset=100.0),
+              extra_record("depth", 6, 1, struct.pack("<q", -9999)), extra_record("", 0, 3), extra_record("class", 1),
+              extra_record("pair", 14), extra_record("NormalX", 9), extra_record("NormalY", 9), extra_record("NormalZ", 9)]
+    more = [("curvature", "<f4"), ("height", "<u2"), ("depth", "<i4"), ("unknown", "V3"), ("second", "u1"), ("pair", "<i2", 2),
+            ("n", "<f4", 3)]
+    rows = [(1000 * i, 0, 0, 7, 0, 0, 2, 0, 0, 0, 5.0, 0.5 * i, 10 * i, -9999 if i == 1 else i, b"abc", 40 + i, (i, -i), (0, 0, 1))
+            for i in range(3)]
+    for behind in (False, True):
+        points = read_las(las_file("extra.las", 6, las._NEW + more, rows, extras, behind))
+        found = points.scalars
+        check_close(points.positions, [(0, 0, 0), (1, 0, 0), (2, 0, 0)], 1e-6, "positions")
+        check_close(found["Curvature"], (0, 0.5, 1), 0, "a float")
+        check_close(found["height"], (100, 100.1, 100.2), 1e-4, "scale and offset")
+        check(np.isnan(found["depth"][1]) and found["depth"][2] == 2, f"no-data: {found['depth']}")
+        check_close(found["class"], (2, 2, 2), 0, "the class is the format's own")
+        check_close(found["extra class"], (40, 41, 42), 0, "and the other stays beside it")
+        check_close(found["pair 1"], (0, -1, -2), 0, "the second of a pair")
+        check_close(points.normals, [(0, 0, 1)] * 3, 0, "normals")
+    points = read_las(las_file("plain.las", 6, las._NEW + more, rows))  # nobody says what the bytes are
+    check(not {"Curvature", "height"} & points.scalars.keys(), f"{points.scalars.keys()}")
+
+
+def test_las_infrared():
+    """Point formats 8 and 10, of which the latter has a waveform behind it."""
+    for form in (8, 10):
+        fields = las._NEW + las._RGB + [("nir", "<u2")] + [("wave", "V29")] * (form == 10)
+        row = (1, 2, 3, 0, 0, 0, 2, 0, 0, 0, 5.0, 10, 20, 30, 777) + (b"w" * 29,) * (form == 10)
+        points = read_las(las_file("nir.las", form, fields, [row] * 2))
+        check_close(points.scalars["nir"], (777, 777), 0, f"format {form}")
+        check_close(points.colors[0], (10, 20, 30, 255), 0, "colour")
+
+
+def test_las_absurd_times():
+    """A time that cannot be one is none; the others keep their range."""
+    times = (300000.5, np.nan, 300002.5, np.inf, -1e300, 1e300)
+    points = read_las(las_file("times.las", 6, las._NEW, [(1, 2, 3, 0, 0, 0, 2, 0, 0, 0, time) for time in times]))
+    check(points.notes["gps_time_start"] == 300000.5, f"{points.notes}")
+    found = points.scalars["gps_time"]
+    check_close(found[[0, 2]], (0, 2), 1e-6, "times")
+    check(np.isnan(found[[1, 3, 4, 5]]).all(), f"{found}")
+
+
+def test_real_extra_dimensions():
+    """LAS and LAZ of laspy's own tests, against laspy; format 10, too."""
+    with_laspy()
+    import laspy
+    for name in ("extrabytes.las", "extra.laz"):
+        path = shared(f"formats/las/laspy/{name}")
+        points, wanted = read_las(path), laspy.read(str(path))
+        for dimension in ("Intensity", "Time"):
+            check_close(points.scalars[dimension], np.asarray(wanted[dimension]).astype(np.float32), 0, f"{name}: {dimension}")
+        check_close(points.scalars["Flags 1"], np.asarray(wanted["Flags"])[:, 1], 0, "Flags")
+        check_close(points.scalars["Colors 1"], np.asarray(wanted["Colors"])[:, 1].astype(np.float32), 0, "Colors")
+    path = shared("formats/las/laspy/fullwave.laz")
+    points, wanted = read_las(path), laspy.read(str(path))
+    if np.asarray(wanted.nir).any():
+        check_close(points.scalars["nir"], np.asarray(wanted.nir).astype(np.float32), 0, "nir")
+    check(read_las(shared("formats/las/pdal/gps-time-nan.las")).notes["gps_time_start"] < 1e12, "times")
+
+
 def test_las_refuses():
     new_scene()
     bad = SCRATCH / "bad.las"
@@ -158,6 +247,17 @@ def test_las_that_is_larger_than_memory():
     path = SCRATCH / "huge.laz"
     path.write_bytes(bytes(head))
     fails(path, "huge.laz:")
+
+
+def test_laz_that_is_broken():
+    """Files of others' tests at which lazrs panics, are told like others."""
+    with_laspy()
+    shared("formats/laz/pdal")
+    for path in sorted((DATA / "formats").glob("la*/*/*.laz")):
+        try:
+            read_las(path)
+        except importers.PatinaError as error:
+            check(path.name in str(error), str(error))
 
 
 def test_laz_is_las():
