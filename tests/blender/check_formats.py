@@ -448,6 +448,107 @@ def test_e57_in_steps():
         e57.SMALL_PIECE = size
 
 
+def e57_file(name, *scans):
+    """Each scan: {field: (node of libe57, its limits, values)}, and perhaps "pose": (rotation, translation), "limits": {...}."""
+    try:
+        import pye57
+        from pye57 import libe57
+    except ImportError:
+        raise Skip("pye57 is not installed here") from None
+    path = SCRATCH / name
+    path.unlink(missing_ok=True)
+    file = pye57.E57(str(path), mode="w")
+    image = file.image_file
+    image.extensionsAdd("nor", "http://www.libe57.org/E57_NOR_surface_normals.txt")
+    image.extensionsAdd("las", "http://www.astm.org/COMMIT/E57/2010-las-v1.0")
+    for scan in scans:
+        node, prototype = libe57.StructureNode(image), libe57.StructureNode(image)
+        node.set("guid", libe57.StringNode(image, "{a}"))
+        if "pose" in scan:
+            pose = libe57.StructureNode(image)
+            node.set("pose", pose)
+            for part, names, values in zip(("rotation", "translation"), ("wxyz", "xyz"), scan.pop("pose"), strict=True):
+                inner = libe57.StructureNode(image)
+                pose.set(part, inner)
+                for axis, value in zip(names, values, strict=True):
+                    inner.set(axis, libe57.FloatNode(image, value))
+        if "limits" in scan:
+            limits = libe57.StructureNode(image)
+            node.set("colorLimits", limits)
+            for key, value in scan.pop("limits").items():
+                limits.set(key, libe57.IntegerNode(image, value))
+        buffers = libe57.VectorSourceDestBuffer()
+        for field, (kind, limits, values) in scan.items():
+            integer = kind == "integer"
+            prototype.set(field, libe57.IntegerNode(image, limits[0], *limits) if integer else
+                          libe57.FloatNode(image, 0.0, libe57.E57_DOUBLE, -1e9, 1e9))
+            scan[field] = np.array(values, np.float64)  # pye57 takes int64 for int32
+            buffers.append(libe57.SourceDestBuffer(image, field, scan[field], len(values), True, True))
+        points = libe57.CompressedVectorNode(image, prototype, libe57.VectorNode(image, True))
+        node.set("points", points)
+        file.data3d.append(node)
+        writer = points.writer(buffers)
+        if len(values):
+            writer.write(len(values))
+        writer.close()
+    file.close()
+    return path
+
+
+def places(*points):
+    return {f"cartesian{axis}": ("float", (), [point[k] for point in points]) for k, axis in enumerate("XYZ")}
+
+
+def test_e57_fields():
+    """All that a scan declares: normals, which turn with its pose, classes, grid; an empty scan between others."""
+    turn = ((np.sqrt(0.5), 0, 0, np.sqrt(0.5)), (100.0, 0.0, 7.0))  # x becomes y
+    normals = {"nor:normalX": ("float", (), (1, 0)), "nor:normalY": ("float", (), (0, 0)), "nor:normalZ": ("float", (), (0, 1))}
+    more = {"rowIndex": ("integer", (0, 200000), (70000, 3)), "columnIndex": ("integer", (0, 9), (4, 5)),
+            "las:classification": ("integer", (0, 255), (6, 2)), "las:odd": ("float", (), (0.5, -2.5))}
+    path = e57_file("fields.e57", places((1, 0, 0), (2, 0, 0)) | normals | more | {"pose": turn}, places(),
+                    places((9, 9, 9)))
+    points = e57.read(path, importers.Filter(), importers.Progress())
+    check_close(points.positions + np.array(points.origin), [(100, 1, 7), (100, 2, 7), (9, 9, 9)], 1e-5, "positions")
+    check_close(points.normals, [(0, 1, 0), (0, 0, 1), (0, 0, 0)], 1e-6, "normals")
+    for name, wanted in (("row", (70000, 3, 0)), ("column", (4, 5, 0)), ("class", (6, 2, 0)), ("odd", (0.5, -2.5, 0)),
+                         ("scan", (0, 0, 2))):
+        check_close(points.scalars[name], wanted, 0, name)
+    stations = np.array(points.notes["scanners"]).reshape(-1, 3)
+    check_close(stations[0] + points.origin, (100, 0, 7), 1e-6, "the first station")
+    check(np.isnan(stations[1:]).all(), f"a scan of points alone has no station: {stations}")
+
+
+def test_e57_colors():
+    """Of 8 bits, of 16, and within declared limits; side by side in one file."""
+    def colors(limits, *rgb):
+        return {f"color{name}": ("integer", limits, [color[k] for color in rgb]) for k, name in enumerate(("Red", "Green", "Blue"))}
+    limits = {f"color{name}{end}": value for name in ("Red", "Green", "Blue") for end, value in (("Minimum", 0), ("Maximum", 1023))}
+    deep = places((1, 0, 0), (2, 0, 0)) | colors((0, 65535), (65535, 256, 0), (1000, 30000, 7))
+    points = e57.read(e57_file("deep.e57", deep), importers.Filter(), importers.Progress())
+    check(points.colors.dtype == np.float32, "16 bits were cut to 8")
+    check_close(points.colors[0], (1, 256 / 65535 / 12.92, 0, 1), 1e-6, "16 bits")
+    points = e57.read(e57_file("both.e57", places((1, 0, 0)) | colors((0, 255), (255, 128, 1)),
+                               places((2, 0, 0)) | colors((0, 65535), (1023, 0, 1023)) | {"limits": limits}),
+                      importers.Filter(), importers.Progress())
+    check_close(points.colors, [(255, 128, 1, 255), (255, 0, 255, 255)], 0, "bytes")
+
+
+def test_real_e57():
+    """Others' test files: what opens, and a sentence for the rest."""
+    e57_file("any.e57", places((0, 0, 0)))
+    shared("formats/e57")
+    counts = {"ColourRepresentation.e57": 153, "A_B_different_dims.e57": 2, "testWithNormals.e57": 2, "ZeroPoints.e57": 0,
+              "ZeroPointsInvalid.e57": 0, "bunnyInt32.e57": 30571}
+    for path in sorted((DATA / "formats/e57").glob("*/*.e57")):
+        try:
+            points = e57.read(path, importers.Filter(), importers.Progress())
+        except importers.PatinaError as error:
+            check(path.name not in counts and path.name in str(error), str(error))
+            continue
+        check(len(points.positions) == counts.get(path.name, len(points.positions)), f"{path.name}: {len(points.positions)}")
+        check((points.normals is not None) == (path.name == "testWithNormals.e57"), f"{path.name}: normals")
+
+
 def test_cancel():
     path = SCRATCH / "long.las"
     head = bytearray(227)
