@@ -67,8 +67,29 @@ const struct pt_column *pt_file_find_attribute(const struct patina_file *file, c
 
 // ---- open ----------------------------------------------------------------------------------------------------------
 
+// Formats that only the add-on reads, by their first bytes; NULL for others.
+static const char *format_of_add_on(const struct pt_input *input)
+{
+    static const struct {
+        const char *start, *format;
+    } known[] = {
+        { "LASF", "LAS, LAZ or COPC" }, { "ASTM-E57", "E57" }, { "# .PCD", "PCD" }, { "VERSION .7", "PCD" }, { "VERSION 0.7", "PCD" },
+        { "camera ", "conf" },          { "bmesh ", "conf" },  { "mesh ", "conf" },
+    };
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (input->size >= strlen(known[i].start) && !memcmp(input->data, known[i].start, strlen(known[i].start)))
+            return known[i].format;
+    return NULL;
+}
+
 static int read_input(const struct pt_input *input, patina_file **out)
 {
+    const char *elsewhere = format_of_add_on(input);
+    if (elsewhere)
+        return pt_fail(NULL, PATINA_ERROR_FORMAT,
+                       "%s: a file of format %s, which Patina's add-on for Blender reads and exports as PLY; here PLY, XYZ, CSV, PTS "
+                       "and PTX are read",
+                       input->name, elsewhere);
     struct patina_file *file = calloc(1, sizeof *file);
     if (!file)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
