@@ -126,11 +126,16 @@ class _FileInfo(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32),
                 ("origin", c_double * 3), ("box_min", c_double * 3), ("box_max", c_double * 3),
-                ("invalid_positions", c_uint64)]
+                ("invalid_positions", c_uint64), ("stations", c_uint32)]
 
 
 class _FileAttribute(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("type", c_uint32)]
+
+
+class _GridDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", c_void_p), ("column", c_void_p),
+                ("row", c_void_p), ("station", c_double * 3)]
 
 
 class _CloudStyle(_Descriptor):
@@ -252,6 +257,7 @@ _CALLS = {
     "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
     "patina_scene_create": (_OUT,),
     "patina_scene_destroy": (c_void_p,),
@@ -288,6 +294,7 @@ _CALLS = {
     "patina_task_render": (c_void_p, c_void_p, c_void_p, c_uint32, _OUT),
     "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_task_set_colors": (c_void_p, POINTER(_Array), _OUT),
+    "patina_task_grid_normals": (POINTER(_GridDesc), c_void_p, c_void_p, _OUT),
     "patina_task_fingerprint": (POINTER(_CloudDesc), POINTER(c_uint64), _OUT),
     "patina_task_open_file": (c_char_p, c_void_p, _OUT),
     "patina_task_save": (c_void_p, c_char_p, _OUT),
@@ -495,6 +502,17 @@ def start_fingerprint(*arrays: np.ndarray | None) -> Task:
     return Task("fingerprint", byref(_describe(*arrays)), values, keep=(arrays, values), finish=lambda task: tuple(values))
 
 
+def start_grid_normals(positions: np.ndarray, columns: np.ndarray, rows: np.ndarray, station: Sequence[float]) -> Task:
+    """A task that gives (n, 3) normals of a scan's points, towards its scanner, out of its grid; 0 0 0 where there is none."""
+    positions = np.ascontiguousarray(positions, np.float32)
+    columns, rows = (np.ascontiguousarray(values, np.uint32) for values in (columns, rows))
+    normals = np.empty((len(positions), 3), np.float32)
+    grid = _GridDesc(count=len(positions), position=positions.ctypes.data, column=columns.ctypes.data, row=rows.ctypes.data,
+                     station=tuple(station))
+    return Task("grid_normals", byref(grid), None, normals.ctypes.data,
+                keep=(positions, columns, rows, normals), finish=lambda task: normals)
+
+
 class Cloud(_Handle):
     """Points: positions (n, 3); normals (n, 3) or None; colors (n, 3|4), integers sRGB, floats linear, or None;
     opacities (n, 1), floats 0 to 1, or None; origin is added to the positions, in float64; radii of discs (n, 1), floats,
@@ -675,6 +693,11 @@ class File(_Handle):
 
     def attribute(self, index: int) -> np.ndarray:
         return self._column("read_attribute", (self.count,), index)
+
+    def stations(self) -> np.ndarray:
+        """(n, 3) float64, where the scanner stood, in the file's coordinates: attribute "scan" tells which for a point."""
+        count = self._info.stations
+        return self._column("read_stations", (count, 3), dtype=np.float64) if count else np.empty((0, 3))
 
 
 class Scene(_Handle):

@@ -302,6 +302,7 @@ typedef struct patina_file_info {
     double origin[3];       // float64 origin that positions are relative to; 0 unless float32 would lose detail
     double box_min[3], box_max[3]; // of all finite positions, origin included
     uint64_t invalid_positions;
+    uint32_t stations;      // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
 } patina_file_info;
 
 typedef struct patina_file_attribute {
@@ -311,7 +312,8 @@ typedef struct patina_file_attribute {
 } patina_file_attribute;
 
 // Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS or PTX file whole; formats are told apart by content. Errors name
-// the byte offset (binary) or line (text).
+// the byte offset (binary) or line (text). Points of a scanner's grid (PTX, range_grid of a PLY) have the attributes "row" and
+// "column", those of a PTX "scan" too. A PLY's faces, and a scanner's grid, give normals where there are no others.
 PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
 PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
 PATINA_API void patina_file_destroy(patina_file *file);
@@ -322,7 +324,20 @@ PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, s
 PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);
 PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size);   // sRGB
 PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
+PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz, size_t size); // file coordinates: origin included
 PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
+// A scanner's grid, of one scan: which column and row each point lies in, and where the scanner stood, in the positions'
+// coordinates.
+typedef struct patina_grid_desc {
+    size_t struct_size;
+    uint64_t count;
+    const float *position; // 3 a point
+    const uint32_t *column, *row;
+    double station[3];
+} patina_grid_desc;
+// Normals as patina_file_open finds them in grids, towards the scanner, 3 a point into `normals`; 0 0 0 where a point lies in no
+// surface, and everywhere where the grid is nearly empty.
+PATINA_API int patina_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals);
 // Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
 // gives it classes.
 PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
@@ -719,6 +734,8 @@ PATINA_API int patina_task_apply(patina_task *task); // waits; PATINA_ERROR_EMPT
 // against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
 // written once the task is done. About as fast as memory is read.
 PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);
+PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals,
+                                        patina_task **out); // patina_grid_normals
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
