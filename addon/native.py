@@ -127,7 +127,7 @@ class _FileInfo(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32),
                 ("origin", c_double * 3), ("box_min", c_double * 3), ("box_max", c_double * 3),
-                ("invalid_positions", c_uint64)]
+                ("invalid_positions", c_uint64), ("stations", c_uint32)]
 
 
 class _FileAttribute(_Descriptor):
@@ -254,6 +254,7 @@ _CALLS = {
     "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
     "patina_scene_create": (_OUT,),
     "patina_scene_destroy": (c_void_p,),
@@ -684,6 +685,11 @@ class File(_Handle):
 
     def attribute(self, index: int) -> np.ndarray:
         return self._column("read_attribute", (self.count,), index)
+
+    def stations(self) -> np.ndarray:
+        """(n, 3) float64, where the scanner stood, in the file's coordinates: attribute "scan" tells which for a point."""
+        count = self._info.stations
+        return self._column("read_stations", (count, 3), dtype=np.float64) if count else np.empty((0, 3))
 
 
 class Scene(_Handle):

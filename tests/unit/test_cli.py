@@ -166,6 +166,16 @@ def test_missing_and_broken_files():
     assert not (FOLDER / "x.png").exists() and not (FOLDER / "x.ply").exists()
 
 
+def test_formats_of_the_add_on():
+    """Files that only the add-on reads are told as such, not as broken ones."""
+    for name, head, word in (("a.las", b"LASF" + bytes(300), "LAS, LAZ or COPC"), ("a.e57", b"ASTM-E57" + bytes(100), "E57"),
+                             ("a.pcd", b"# .PCD v0.7\nVERSION 0.7\n", "PCD"), ("a.conf", b"camera 0 0 0 0 0 0 1\n", "conf")):
+        (FOLDER / name).write_bytes(head)
+        for arguments in (("info", name), ("render", name, "-o", "x.png"), ("convert", name, "x.ply")):
+            error = run(*arguments, code=1).stderr
+            assert f"{name}: a file of format {word}, which Patina's add-on for Blender reads" in error, error
+
+
 def test_unwritable_output():
     ball("unwritable.ply", 100)
     assert "no/such" in run("render", "unwritable.ply", "-o", "no/such/x.png", code=1).stderr

@@ -309,6 +309,7 @@ typedef struct patina_file_info {
     double origin[3];       // float64 origin that positions are relative to; 0 unless float32 would lose detail
     double box_min[3], box_max[3]; // of all finite positions, origin included
     uint64_t invalid_positions;
+    uint32_t stations;      // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
 } patina_file_info;
 
 typedef struct patina_file_attribute {
@@ -318,7 +319,8 @@ typedef struct patina_file_attribute {
 } patina_file_attribute;
 
 // Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS or PTX file whole; formats are told apart by content. Errors name
-// the byte offset (binary) or line (text).
+// the byte offset (binary) or line (text). Points of a scanner's grid (PTX, range_grid of a PLY) have the attributes "row" and
+// "column", those of a PTX "scan" too. A PLY's faces, and a scanner's grid, give normals where there are no others.
 PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
 PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
 PATINA_API void patina_file_destroy(patina_file *file);
@@ -329,6 +331,7 @@ PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, s
 PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);
 PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size);   // sRGB
 PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
+PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz, size_t size); // file coordinates: origin included
 PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
 // Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
 // gives it classes.
