@@ -27,13 +27,15 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
 {
     const struct sift_args *args = sift->call->arguments;
     const struct clip_view *clips = (const struct clip_view *)pt_cpu_data(sift->call, 3) + chunk->clip_first;
-    const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                      vf_load(positions + 2 * (size_t)chunk->padded + i) };
     vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
-    for (uint32_t k = 0; k < chunk->clip_keeps; k++)
-        keep = vm_or(keep, inside(&clips[k], p));
-    for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
-        cut = vm_or(cut, inside(&clips[k], p));
+    if (chunk->clip_count) { // else positions need not come from memory
+        const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                          vf_load(positions + 2 * (size_t)chunk->padded + i) };
+        for (uint32_t k = 0; k < chunk->clip_keeps; k++)
+            keep = vm_or(keep, inside(&clips[k], p));
+        for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
+            cut = vm_or(cut, inside(&clips[k], p));
+    }
     if (args->by_class) {
         const vm all = vm_first(PT_LANES);
         vi slot = vi_add(vi_set(chunk->first + i), vi_lanes());
