@@ -188,6 +188,7 @@ typedef struct patina_cloud_info {
     uint32_t normals_oriented; // 1: every normal knows its side, as given or by a station; PATINA_SIDES_VOTED: some by votes
     uint64_t estimated_normals; // of points whose normal the analysis found
     uint64_t kinds[6];       // drawn points of each patina_kind
+    uint64_t seen_through;   // drawn points that some station saw through: patina_analysis_desc.free_space
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -225,6 +226,11 @@ typedef struct patina_analysis_desc {
     uint32_t station_count;  // places of the scanner, in object units: estimated normals face the one that ...
     const double *stations;  // 3 each
     patina_array station;    // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
+    uint32_t free_space;     // 1 = points that a station, not their own, saw through are marked: its samples around the
+                             // direction to the point lie farther. Needs stations and station. 4 bytes meanwhile for each of
+                             // a station's directions, 128 MiB at most
+    patina_array row, column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell free space how
+                             // far apart the directions are. Optional: else found from how dense they are
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -244,6 +250,7 @@ typedef struct patina_neighbourhoods {
     float *sigma;       // thickness: noise, and disagreement of scans; 0 = unknown
     uint8_t *kind;      // patina_kind
     float *certainty;   // 0..1: how well that explains the neighbours
+    uint8_t *seen_through; // 1: by some station, see patina_analysis_desc.free_space
     // From the `neighbours` nearest, walked anew for any cloud.
     uint32_t neighbours; // 1..64
     uint32_t threads;    // 0 = one per core
@@ -366,6 +373,9 @@ enum patina_color_source {
 // A ramp by name: grey, viridis, heat, spectrum, relief, diverging; classes: of LAS classes, for a range of 0 to 255.
 PATINA_API int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3]);
 
+// SHOW: magenta in place of their own colour (with color_source OWN). USE: they are not drawn and cast no shadow.
+enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, PATINA_FREE_SPACE_USE = 2 };
+
 // What a cloud leaves out of shadows [D 6].
 enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2, PATINA_SHADOW_NO_SELF = 4 };
 
@@ -396,6 +406,10 @@ typedef struct patina_cloud_style {
     float contrast;               // 0..16: slope in stops around mid grey (0.18), after exposure; 0 = 1
     uint32_t hidden_classes[8];   // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
     uint32_t clip_off;            // 1 = clips leave this cloud whole
+    // Of clouds that were analysed; nothing for others:
+    uint32_t free_space;          // patina_free_space: what becomes of points that a station saw through
+    uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
+    float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
 } patina_cloud_style;
 
 typedef struct patina_mesh_style {
