@@ -108,7 +108,8 @@ def markdown(result: dict[str, Any]) -> str:
                          ("styles", "Styles, one row each"),
                          ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
                          ("shadows", "A ball's shadow on a plane"), ("patterns", "Patterns and noise"),
-                         ("steady", "Steadiness under a slow turn")):
+                         ("steady", "Steadiness under a slow turn"),
+                         ("independent", "Shapes that no rule was made on")):
         rows = joined(result, group)
         if rows:
             text += [f"## {title}", "", errors_table(rows), ""]
