@@ -190,7 +190,8 @@ class Astroid(Traced):
 
 def _slits() -> tuple[Surface, ...]:
     """Boards 0.2 wide with gaps of 0.005 to 0.08 between them, before a wall."""
-    gaps, x, found = (0.005, 0.01, 0.02, 0.04, 0.08), -0.68, [Rectangle(width=2.4, height=2.0).placed(rotation("x", 50.0), translation(0.0, 0.0, -0.4))]
+    gaps, x = (0.005, 0.01, 0.02, 0.04, 0.08), -0.68
+    found = [Rectangle(width=2.4, height=2.0).placed(rotation("x", 50.0), translation(0.0, 0.0, -0.4))]
     for gap in (*gaps, 0.0):
         found.append(Rectangle(width=0.2, height=1.6).placed(rotation("x", 50.0), translation(x + 0.1, 0.0, 0.0)))
         x += 0.2 + gap
@@ -203,7 +204,8 @@ SHAPES: dict[str, Callable[[], tuple[Surface, ...]]] = {
     "astroid": lambda: (Astroid().placed(rotation("z", 20.0), rotation("x", 25.0)),),
     "plates": lambda: tuple(Box(half=(0.7, 0.5 * thick, 0.45)).placed(rotation("z", 25.0), translation(0.0, y, 0.0))
                             for y, thick in ((-0.6, 0.004), (-0.2, 0.008), (0.2, 0.016), (0.6, 0.032))),
-    "kissing": lambda: (Sphere(radius=0.5).placed(translation(-0.5, 0.0, 0.0)), Sphere(radius=0.5).placed(translation(0.5, 0.0, 0.0)),
+    "kissing": lambda: (Sphere(radius=0.5).placed(translation(-0.5, 0.0, 0.0)),
+                        Sphere(radius=0.5).placed(translation(0.5, 0.0, 0.0)),
                         Sphere(radius=0.3).placed(translation(0.0, 0.0, float(np.sqrt(0.8**2 - 0.5**2))))),
     "slits": _slits,
     "shells": lambda: (Sphere(radius=0.9), Sphere(radius=0.89)),
