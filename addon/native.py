@@ -41,6 +41,13 @@ def split_plane(plane: str) -> tuple[str, int]:
     return name, int(layer or 0)
 
 
+KINDS = ("UNKNOWN", "SURFACE", "BORDER", "LINE", "VOLUME", "STRAY")  # patina_kind
+
+# Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
+NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),
+                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "certainty": (np.float32, 0), "seen_through": (np.uint8, 0), "numbers": (np.uint32, -1),
+                  "distances": (np.float64, -1), "soft_radius": (np.float32, 0), "uncertainty": (np.float32, 0)}
+
 # patina_type by numpy type
 _TYPES = {"float32": 1, "float64": 2, "uint8": 3, "uint16": 4, "uint32": 5, "int8": 6, "int16": 7, "int32": 8}
 
@@ -99,18 +106,37 @@ class _CloudInfo(_Descriptor):
                 ("has_colors", c_uint32), ("has_opacities", c_uint32), ("origin", c_double * 3),
                 ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float),
                 ("has_scalars", c_uint32), ("has_classes", c_uint32), ("scalar_range", c_float * 2),
-                ("class_bits", c_uint32 * 8)]
+                ("class_bits", c_uint32 * 8), ("has_shapes", c_uint32), ("normals_oriented", c_uint32),
+                ("estimated_normals", c_uint64), ("kinds", c_uint64 * 6), ("seen_through", c_uint64)]
+
+
+class _AnalysisDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("neighbours", c_uint32), ("threads", c_uint32), ("keep_normals", c_uint32),
+                ("station_count", c_uint32), ("stations", c_void_p), ("station", _Array), ("free_space", c_uint32),
+                ("row", _Array), ("column", _Array)]
+
+
+class _Neighbourhoods(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("normal", c_void_p), ("axis", c_void_p), ("spacing", c_void_p),
+                ("half_axes", c_void_p), ("sigma", c_void_p), ("kind", c_void_p), ("certainty", c_void_p),
+                ("seen_through", c_void_p), ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p), ("distances", c_void_p),
+                ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
 
 
 class _FileInfo(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32),
                 ("origin", c_double * 3), ("box_min", c_double * 3), ("box_max", c_double * 3),
-                ("invalid_positions", c_uint64)]
+                ("invalid_positions", c_uint64), ("stations", c_uint32)]
 
 
 class _FileAttribute(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("type", c_uint32)]
+
+
+class _GridDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", c_void_p), ("column", c_void_p),
+                ("row", c_void_p), ("station", c_double * 3)]
 
 
 class _CloudStyle(_Descriptor):
@@ -119,7 +145,8 @@ class _CloudStyle(_Descriptor):
                 ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float),
                 ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p), ("ramp_count", c_uint32),
                 ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
-                ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32)]
+                ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
+                ("hidden_kinds", c_uint32), ("least_certainty", c_float)]
 
 
 class _Clip(_Descriptor):
@@ -232,6 +259,7 @@ _CALLS = {
     "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
     "patina_scene_create": (_OUT,),
     "patina_scene_destroy": (c_void_p,),
@@ -241,6 +269,8 @@ _CALLS = {
     "patina_scene_add_clip": (c_void_p, POINTER(_Clip)),
     "patina_ramp": (c_char_p, c_void_p),
     "patina_cloud_set_scalars": (c_void_p, POINTER(_Array)),
+    "patina_cloud_analyse": (c_void_p, POINTER(_AnalysisDesc), c_void_p),
+    "patina_cloud_neighbourhoods": (c_void_p, POINTER(_Neighbourhoods), c_void_p),
     "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
     "patina_scene_set_lines": (c_void_p, POINTER(_Lines)),
@@ -266,11 +296,14 @@ _CALLS = {
     "patina_task_render": (c_void_p, c_void_p, c_void_p, c_uint32, _OUT),
     "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_task_set_colors": (c_void_p, POINTER(_Array), _OUT),
+    "patina_task_grid_normals": (POINTER(_GridDesc), c_void_p, c_void_p, _OUT),
     "patina_task_fingerprint": (POINTER(_CloudDesc), POINTER(c_uint64), _OUT),
     "patina_task_open_file": (c_char_p, c_void_p, _OUT),
     "patina_task_save": (c_void_p, c_char_p, _OUT),
     "patina_task_take_file": (c_void_p, _OUT),
     "patina_task_done": (c_void_p,),
+    "patina_task_analyse": (c_void_p, POINTER(_AnalysisDesc), c_void_p, _OUT),
+    "patina_task_apply": (c_void_p,),
     "patina_task_wait": (c_void_p,),
     "patina_task_take_cloud": (c_void_p, _OUT),
     "patina_task_destroy": (c_void_p,),
@@ -436,6 +469,7 @@ class Device(_Handle):
         self._call("get_info", byref(info))
         self.name = info.name.decode()
         self.description = info.description.decode("utf-8", "replace")
+        self.hardware = bool(info.hardware)
 
 
 def _view(array: np.ndarray | None, count: int) -> _Array:
@@ -468,6 +502,17 @@ def start_fingerprint(*arrays: np.ndarray | None) -> Task:
     positions, normals, colors, opacities, radii, scalars, classes."""
     values = (c_uint64 * 2)()
     return Task("fingerprint", byref(_describe(*arrays)), values, keep=(arrays, values), finish=lambda task: tuple(values))
+
+
+def start_grid_normals(positions: np.ndarray, columns: np.ndarray, rows: np.ndarray, station: Sequence[float]) -> Task:
+    """A task that gives (n, 3) normals of a scan's points, towards its scanner, out of its grid; 0 0 0 where there is none."""
+    positions = np.ascontiguousarray(positions, np.float32)
+    columns, rows = (np.ascontiguousarray(values, np.uint32) for values in (columns, rows))
+    normals = np.empty((len(positions), 3), np.float32)
+    grid = _GridDesc(count=len(positions), position=positions.ctypes.data, column=columns.ctypes.data, row=rows.ctypes.data,
+                     station=tuple(station))
+    return Task("grid_normals", byref(grid), None, normals.ctypes.data,
+                keep=(positions, columns, rows, normals), finish=lambda task: normals)
 
 
 class Cloud(_Handle):
@@ -521,6 +566,10 @@ class Cloud(_Handle):
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
         self.has_scalars = bool(info.has_scalars)
+        self.has_shapes = bool(info.has_shapes)  # analysed
+        self.normals_oriented = bool(info.normals_oriented)
+        self.kinds = tuple(info.kinds)  # points of each of KINDS
+        self.seen_through = info.seen_through  # points that a station saw through
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))
 
@@ -528,6 +577,50 @@ class Cloud(_Handle):
         """Other colours for the same points; no picture of them may be drawn meanwhile."""
         return Task("set_colors", self._handle, byref(_view(colors, self.count)), keep=(self, colors))
 
+    def _describe_analysis(self, neighbours: int, stations: np.ndarray | None, station: np.ndarray | None,
+                           keep_normals: bool, threads: int, free_space: bool, grid: tuple[np.ndarray, np.ndarray] | None
+                           ) -> _AnalysisDesc:
+        count = 0 if stations is None else len(stations)
+        row, column = grid or (None, None)
+        return _AnalysisDesc(neighbours=neighbours, threads=threads, keep_normals=keep_normals, station_count=count,
+                             stations=stations.ctypes.data if count else None, station=_view(station, self.count),
+                             free_space=free_space, row=_view(row, self.count), column=_view(column, self.count))
+
+    def analyse(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
+                keep_normals: bool = True, progress: Progress | None = None, threads: int = 0, free_space: bool = False,
+                grid: tuple[np.ndarray, np.ndarray] | None = None) -> None:
+        """Gives points normals, spacings and footprints of their own; as start_colors. stations: (n, 3) places of the
+        scanner that normals face, station: (count, 1) uint8 or uint16, which of them saw the point. free_space: marks points
+        that another station saw through; grid: row and column of each point, (count, 1) uint16, uint32 or int32."""
+        stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
+        self._call("analyse", byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads, free_space,
+                                                            grid)), _handle_of(progress))
+        self._learn()
+
+    def start_analysis(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
+                       keep_normals: bool = True, progress: Progress | None = None, free_space: bool = False,
+                       grid: tuple[np.ndarray, np.ndarray] | None = None) -> Task:
+        """analyse, beside pictures: its result() changes the cloud, and no picture of it may be drawn then."""
+        def apply(task: Task) -> None:
+            task._call("apply")
+            self._learn()
+
+        stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
+        return Task("analyse", self._handle,
+                    byref(self._describe_analysis(neighbours, stations, station, keep_normals, 0, free_space, grid)),
+                    _handle_of(progress), keep=(self, stations, station, grid, progress), finish=apply)
+
+    def neighbourhoods(self, *names: str, neighbours: int = 16, progress: Progress | None = None,
+                       threads: int = 0) -> dict[str, np.ndarray]:
+        """Arrays by name: those of NEIGHBOURHOODS that are named, else all that need no walk to neighbours."""
+        arrays = {}
+        for name in names or list(NEIGHBOURHOODS)[:8]:
+            kind, width = NEIGHBOURHOODS[name]
+            arrays[name] = np.empty((self.count, neighbours if width < 0 else width) if width else self.count, kind)
+        self._call("neighbourhoods", byref(_Neighbourhoods(neighbours=neighbours, threads=threads,
+                                                           **{name: a.ctypes.data for name, a in arrays.items()})),
+                   _handle_of(progress))
+        return arrays
 
     def set_scalars(self, scalars: np.ndarray | None) -> None:
         """Other scalars for the same points; as start_colors."""
@@ -610,6 +703,11 @@ class File(_Handle):
 
     def attribute(self, index: int) -> np.ndarray:
         return self._column("read_attribute", (self.count,), index)
+
+    def stations(self) -> np.ndarray:
+        """(n, 3) float64, where the scanner stood, in the file's coordinates: attribute "scan" tells which for a point."""
+        count = self._info.stations
+        return self._column("read_stations", (count, 3), dtype=np.float64) if count else np.empty((0, 3))
 
 
 class Scene(_Handle):

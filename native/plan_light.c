@@ -375,7 +375,8 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
     out->has_camera = 1;
     out->settings = (patina_settings){ .struct_size = sizeof out->settings,
                                        .quality = scene->settings.quality,
-                                       .fill = scene->settings.fill };
+                                       .fill = scene->settings.fill,
+                                       .surface = PATINA_SURFACE_FILL };
     patina_camera *camera = &out->camera;
     uint32_t most = scene->settings.shadow_resolution;
     out->settings.width = fit(&camera->left, &camera->right, light->texel, most);
@@ -436,7 +437,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
         patina_camera *camera = &survey.camera;
         double texel = fmax(camera->right - camera->left, camera->top - camera->bottom) / SURVEY_TEXELS;
         texel = texel > 0.0 ? texel : 1e-6;
-        survey.settings = (patina_settings){ .struct_size = sizeof survey.settings };
+        survey.settings = (patina_settings){ .struct_size = sizeof survey.settings, .surface = PATINA_SURFACE_FILL };
         survey.settings.width = fit(&camera->left, &camera->right, texel, SURVEY_TEXELS + 2);
         survey.settings.height = fit(&camera->bottom, &camera->top, texel, SURVEY_TEXELS + 2);
         survey.settings.region[2] = survey.settings.width;
@@ -518,7 +519,7 @@ static void put_word(struct key *key, uint64_t word)
     put(key, (double)(word & 0xFFFFFFFFu));
 }
 
-// What is cut out of the instance: clips in its own frame, and hidden classes.
+// What is cut out of the instance: clips in its own frame, hidden classes and hidden shapes.
 static void put_cuts(struct key *key, const struct patina_scene *scene, const struct pt_instance *instance)
 {
     const uint32_t clips = instance->style.clip_off || scene->settings.shadow_uncut ? 0 : scene->clip_count;
@@ -530,6 +531,10 @@ static void put_cuts(struct key *key, const struct patina_scene *scene, const st
         put(key, (double)instance->style.hidden_classes[k]);
     if (hiding)
         put_word(key, instance->cloud->class_hash);
+    uint32_t shapes[8]; // the words themselves are in the cloud's fingerprint
+    hiding = pt_hidden_shapes(instance, shapes);
+    for (int k = 0; k < 8 && hiding; k++)
+        put(key, (double)shapes[k]);
     for (uint32_t i = 0; i < clips; i++) {
         const patina_clip *clip = &scene->clips[i];
         double turned[9], across[9], from[3], product[9];

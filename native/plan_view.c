@@ -17,6 +17,10 @@
 
 enum { DEFAULT_LAYERS = 8 };
 
+// Half an axis of a footprint, pixels, from which on points are discs: narrower ones are closed by filling as well, in a third of
+// the time. A spacing of 1.4 pixels.
+#define WIDE_FOOTPRINT 1.9
+
 struct camera {
     double axes[9], position[3];
     double xs, ys;         // window units a pixel
@@ -39,6 +43,7 @@ struct seen {
     uint32_t cull, away; // test each point's normal; every point faces away
     struct extent extent;  // on screen in pixels of the picture without its padding
     double spacing_px, area_px;
+    uint32_t wide; // its points are discs
 };
 
 struct object {
@@ -119,6 +124,17 @@ static void normal_matrix(const struct camera *camera, const struct object *obje
         out[i] = object->singular || !(largest > 0.0) ? 0.0f : (float)(sign * product[i] / largest);
 }
 
+// What makes the normal matrix the inverse transposed, times the largest stretch.
+static float axis_scale(const struct camera *camera, const struct object *object)
+{
+    double cofactors[9], product[9], largest = 0.0;
+    pt_cofactors(object->linear, cofactors);
+    pt_multiply(camera->axes, cofactors, product);
+    for (int i = 0; i < 9; i++)
+        largest = fmax(largest, fabs(product[i]));
+    return object->singular ? 1.0f : (float)(largest * object->scale / fabs(pt_dot(object->linear, cofactors)));
+}
+
 // The product's rows, the same for every chunk of an object: screen X, Y (perspective: times z) and z.
 static void product_rows(const struct camera *camera, const struct object *object, double rows[9])
 {
@@ -154,16 +170,26 @@ static void chunk_translation(const struct camera *camera, const struct object *
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
 
-// The largest radius of the chunk's discs, world units; 0 where points stay pixels.
-static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
-                         const struct pt_chunk *chunk, double thinned)
+// Whether points may be discs.
+static int knows_discs(const struct patina_scene *scene, const struct pt_instance *instance)
 {
-    if (scene->settings.surface != PATINA_SURFACE_SPLATS)
+    return scene->settings.surface == PATINA_SURFACE_SPLATS ||
+           (scene->settings.surface == PATINA_SURFACE_AUTO && scene->settings.fill == PATINA_FILL_CLOSED &&
+            instance->cloud->shapes && pt_disc_ids(scene));
+}
+
+// Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
+static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
+                         const struct pt_chunk *chunk, double thinned, int most)
+{
+    if (!knows_discs(scene, instance))
         return 0.0;
     if (instance->style.radius > 0.0f)
         return (double)instance->style.radius * thinned;
     if (instance->cloud->info.has_radii)
         return (double)instance->cloud->info.radius_most * object->scale * thinned;
+    if (instance->cloud->shapes)
+        return (double)(most ? chunk->reach : chunk->footprint) * object->scale * thinned;
     return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
 }
 
@@ -311,6 +337,7 @@ struct survey {
     struct object *objects;
     struct seen **seen; // per instance
     uint32_t *seen_count;
+    int points, discs; // some chunk's points are drawn as such
 };
 
 // How many of a chunk's points the settings ask for: whole vectors, for the processor draws no part of one.
@@ -346,7 +373,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     struct object *object = &survey->objects[i];
     int transparent = is_transparent(instance), layered = transparent || scene->settings.layer_passes;
     set_object(camera, instance->style.world_from_object, object);
-    int cull = instance->style.cull_back && cloud->info.has_normals && !object->singular && !transparent;
+    int cull = instance->style.cull_back && cloud->info.normals_oriented && !object->singular && !transparent;
     struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
     struct pt_inverse_clip *clips = pt_arena_take(&plan->arena, (scene->clip_count + 1) * sizeof *clips);
     if (!list || !clips)
@@ -370,7 +397,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (cull && facing == FACES_AWAY)
             continue;
         chunk_translation(camera, object, chunk, translation);
-        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart), &seen.extent))
+        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), &seen.extent))
             continue;
         for (int k = 0; k < 4; k++)
             seen.extent.rect[k] -= AROUND;
@@ -383,6 +410,10 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
                           sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
+        seen.wide = scene->settings.surface == PATINA_SURFACE_SPLATS ||
+                    disc_reach(scene, instance, object, chunk, apart, 0) > WIDE_FOOTPRINT * footprint;
+        survey->points |= !seen.wide;
+        survey->discs |= seen.wide;
         list[survey->seen_count[i]++] = seen;
     }
     plan->transparent |= transparent && survey->seen_count[i] > 0;
@@ -449,19 +480,18 @@ static void choose_filling(const patina_settings *settings, struct pt_plan *plan
 {
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
-    plan->surface = settings->surface;
     plan->quality = settings->quality;
     plan->fill = settings->fill;
-    if (plan->surface == PATINA_SURFACE_SPLATS) {
-        plan->expected = pt_expected_error(PT_MEANS_SPLATS, s);
-        plan->levels = plan->iterations = 0;
+    plan->levels = plan->iterations = 0;
+    if (settings->surface == PATINA_SURFACE_SPLATS) {
+        plan->means = PT_MEANS_SPLATS;
+        plan->expected = pt_expected_error(plan->means, s);
         return;
     }
     if (settings->error_target > 0.0f)
         pt_means_settings(pt_means_for((double)settings->error_target, s), &plan->quality, &plan->fill);
-    plan->expected = pt_expected_error(pt_means_of(plan->quality, plan->fill), s);
-    plan->levels = 0;
-    plan->iterations = 0;
+    plan->means = pt_means_of(plan->quality, plan->fill);
+    plan->expected = pt_expected_error(plan->means, s);
     if (plan->fill == PATINA_FILL_PAPER)
         plan->iterations = asked ? asked : 1;
     if (plan->fill != PATINA_FILL_CLOSED)
@@ -565,7 +595,7 @@ static void set_instance(const struct camera *camera, const struct object *objec
     args->id_base = instance->id_base;
     args->id_count = (uint32_t)cloud->slots;
     args->has_normals = cloud->info.has_normals;
-    args->color_format = cloud->color_format;
+    args->color_format = cloud->color_format ? cloud->color_format : pt_is_marked(instance) ? PT_COLOR_FLOAT : PT_COLOR_NONE;
     args->lit = style->lighting == PATINA_LIGHTING_LIT;
     args->shininess = style->shininess;
     args->opacity = 1.0f - style->transparency;
@@ -577,6 +607,7 @@ static void set_instance(const struct camera *camera, const struct object *objec
     // finite with all that they are multiplied by: within an infinite layer distance empty pixels would be neighbours
     args->d_min = fminf(style->d_min, LARGEST_LAYER);
     normal_matrix(camera, object, args->normal_matrix);
+    args->axis_scale = axis_scale(camera, object);
     for (uint32_t k = 0; k < PT_SPACINGS; k++)
         args->spacing[k] = (float)fmin(thinned * cloud->spacing_base * pt_spacing_of_class(k) * object->scale,
                                        LARGEST_LAYER);
@@ -610,15 +641,19 @@ static int rect_in_window(const struct view_args *view, const double bounds[4], 
     return rect[0] < rect[2] && rect[1] < rect[3];
 }
 
-static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey,
-                          uint32_t i)
+// Instance i of the scene, its wide chunks or the others. Ids are moved by id_base.
+static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i,
+                        uint32_t wide, uint32_t id_base, struct pt_plan_instance *out)
 {
     const struct pt_instance *instance = &scene->instances[i];
-    struct pt_plan_instance *out = &plan->instances[i];
     out->instance = instance;
+    out->of = i;
+    out->discs = wide;
+    out->marked = pt_is_marked(instance);
     out->radius = (float)fmin((double)instance->style.radius * thinning(scene), (double)PT_DISC_MOST);
     out->radius_scale = (float)fmin(survey->objects[i].scale * thinning(scene), (double)PT_DISC_MOST);
     set_instance(&survey->camera, &survey->objects[i], instance, thinning(scene), &out->args);
+    out->args.id_base += id_base;
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
     if (!out->chunks || !out->bounds)
@@ -629,12 +664,13 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         const struct seen *seen = &survey->seen[i][k];
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
         uint32_t *rect = out->bounds[out->chunk_count].rect;
-        if (!rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
+        if (seen->wide != wide || !rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
             continue;
         uint32_t count = drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
         set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
                   &out->chunks[out->chunk_count]);
+        out->chunks[out->chunk_count].id_base += id_base;
         out->chunks[out->chunk_count].row_first = rect[1];
         out->chunks[out->chunk_count].row_end = rect[3];
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
@@ -643,10 +679,24 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         plan->points_scattered += count;
     }
     join_rect(plan->view.rect, out->rect);
-    plan->chunks += instance->cloud->chunk_count;
-    plan->chunks_culled += instance->cloud->chunk_count - out->chunk_count;
-    plan->points += instance->cloud->info.count;
+    plan->chunks_culled -= out->chunk_count;
     return PATINA_OK;
+}
+
+static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i)
+{
+    const struct patina_cloud *cloud = scene->instances[i].cloud;
+    const uint32_t all = scene->settings.surface == PATINA_SURFACE_SPLATS;
+    uint32_t wide = 0;
+    plan->chunks += cloud->chunk_count;
+    plan->chunks_culled += cloud->chunk_count;
+    plan->points += cloud->info.count;
+    int error = place_chunks(scene, plan, survey, i, all, 0, &plan->instances[i]);
+    for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
+        wide |= survey->seen[i][k].wide;
+    if (!error && wide)
+        error = place_chunks(scene, plan, survey, i, 1, plan->discs_first, &plan->instances[plan->instance_count++]);
+    return error;
 }
 
 static void place_mesh(struct pt_plan *plan, const struct camera *camera, const struct pt_mesh_instance *instance,
@@ -704,7 +754,7 @@ int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = { 0 };
-    plan->instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *plan->instances);
+    plan->instances = pt_arena_take(&plan->arena, (2 * (size_t)scene->instance_count + 1) * sizeof *plan->instances);
     plan->mesh_count = scene->mesh_count;
     plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
     if (!plan->instances || !plan->meshes)
@@ -728,6 +778,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
                        plan->view.width, plan->view.height);
+    plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
+    plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
     uint64_t id_base = scene->points;

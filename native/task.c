@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Long calls on threads of their own, for hosts that must go on meanwhile and start no threads themselves.
 #include "error.h"
+#include "scene/analysis.h"
 #include "scene/fingerprint.h"
 
 #include <signal.h>
@@ -28,6 +29,10 @@ struct patina_task {
     char *path;            // its own copy
     const patina_cloud *saved;
     patina_file *file; // opened, until it is taken
+    patina_analysis_desc analyse;
+    struct pt_analysis analysis; // computed, until it is applied
+    patina_grid_desc grid;
+    float *normals;
 };
 
 static void *thread_main(void *argument)
@@ -80,7 +85,14 @@ static int open_file(struct patina_task *task) { return patina_file_open(task->p
 
 static int save(struct patina_task *task) { return patina_cloud_save(task->saved, task->path); }
 
+static int analyse(struct patina_task *task)
+{
+    return pt_analysis_compute(task->painted, &task->analyse, task->progress, &task->analysis);
+}
+
 static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }
+
+static int grid_normals(struct patina_task *task) { return patina_grid_normals(&task->grid, task->progress, task->normals); }
 
 int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
                        patina_task **out)
@@ -105,11 +117,39 @@ int patina_task_set_colors(patina_cloud *cloud, const patina_array *color, patin
     return start(&(struct patina_task){ .work = paint, .painted = cloud, .color = *color }, out);
 }
 
+int patina_task_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress, patina_task **out)
+{
+    const patina_analysis_desc automatic = { .struct_size = sizeof automatic };
+    struct patina_task task = { .work = analyse, .painted = cloud, .analyse = desc ? *desc : automatic, .progress = progress };
+    const int error = pt_analysis_check(cloud, &task.analyse);
+    return error ? error : start(&task, out);
+}
+
+int patina_task_apply(patina_task *task)
+{
+    if (!task)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_apply: task is NULL");
+    int error = patina_task_wait(task);
+    if (error)
+        return error;
+    if (!task->analysis.shapes)
+        return pt_fail(&task->handle, PATINA_ERROR_EMPTY, "patina_task_apply: nothing was analysed, or it was applied");
+    error = pt_analysis_apply(task->painted, &task->analysis);
+    return error ? pt_fail_again(&task->handle, error) : PATINA_OK;
+}
+
 int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out)
 {
     if (!desc || desc->struct_size != sizeof *desc || !values)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: bad arguments");
     return start(&(struct patina_task){ .work = fingerprint, .desc = *desc, .fingerprint = values }, out);
+}
+
+int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals, patina_task **out)
+{
+    if (!grid || grid->struct_size != sizeof *grid)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_grid_normals: grid->struct_size is not %zu", sizeof *grid);
+    return start(&(struct patina_task){ .work = grid_normals, .grid = *grid, .progress = progress, .normals = normals }, out);
 }
 
 // Starts a task that has a path.
@@ -179,6 +219,7 @@ void patina_task_destroy(patina_task *task)
     patina_task_wait(task);
     patina_cloud_destroy(task->cloud);
     patina_file_destroy(task->file);
+    pt_analysis_free(&task->analysis);
     free(task->path);
     pt_handle_destroy(&task->handle);
     free(task);

@@ -352,32 +352,19 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 // ---- normals -------------------------------------------------------------------------------------------------------
 
-// Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
-static void surface_chunk(struct build *build, uint32_t index)
+void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface)
 {
-    struct patina_cloud *cloud = build->cloud;
-    struct pt_chunk *chunk = &cloud->chunks[index];
-    const uint32_t *order = cloud->order + chunk->first;
-    uint32_t *surface = cloud->surface + chunk->first;
-    uint32_t class = pt_class_of_spacing((double)chunk->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
-    double axis[3] = { 0.0, 0.0, 0.0 }, n[3];
-    for (uint32_t i = 0; i < chunk->count; i++) {
-        uint32_t bits = PT_NORMAL_NONE;
-        if (build->desc.normal.data && read_normal(&build->desc.normal, order[i], n)) {
-            bits = pt_encode_normal(n);
-            pt_decode_normal(bits, n);
-            for (int k = 0; k < 3; k++)
-                axis[k] += n[k];
-        } else {
-            build->tallies[index].invalid_normals++;
-        }
-        surface[i] = bits | class;
-    }
-    for (uint32_t i = chunk->count; i < chunk->padded; i++)
-        surface[i] = surface[chunk->count - 1];
-    double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]), cosine = 1.0;
+    double axis[3] = { 0.0, 0.0, 0.0 }, n[3], cosine = 1.0;
     chunk->cone_cosine = -2.0f;
-    if (build->tallies[index].invalid_normals || !(length > 0.0))
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        if ((surface[i] & PT_NORMAL_BITS) == PT_NORMAL_NONE)
+            return;
+        pt_decode_normal(surface[i] & PT_NORMAL_BITS, n);
+        for (int k = 0; k < 3; k++)
+            axis[k] += n[k];
+    }
+    double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+    if (!(length > 0.0))
         return;
     for (int k = 0; k < 3; k++) {
         axis[k] /= length;
@@ -388,6 +375,28 @@ static void surface_chunk(struct build *build, uint32_t index)
         cosine = fmin(cosine, n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2]);
     }
     chunk->cone_cosine = (float)(cosine - 1e-6);
+}
+
+// Rounds every valid normal of the chunk's points into surface words; the cone is that of the rounded normals.
+static void surface_chunk(struct build *build, uint32_t index)
+{
+    struct patina_cloud *cloud = build->cloud;
+    struct pt_chunk *chunk = &cloud->chunks[index];
+    const uint32_t *order = cloud->order + chunk->first;
+    uint32_t *surface = cloud->surface + chunk->first;
+    uint32_t class = pt_class_of_spacing((double)chunk->spacing, cloud->spacing_base) << PT_SPACING_SHIFT;
+    double n[3];
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        uint32_t bits = PT_NORMAL_NONE;
+        if (build->desc.normal.data && read_normal(&build->desc.normal, order[i], n))
+            bits = pt_encode_normal(n);
+        else
+            build->tallies[index].invalid_normals++;
+        surface[i] = bits | class;
+    }
+    for (uint32_t i = chunk->count; i < chunk->padded; i++)
+        surface[i] = surface[chunk->count - 1];
+    pt_chunk_cone(chunk, surface);
 }
 
 static void surface_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -653,6 +662,7 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
         cloud->info = (patina_cloud_info){ .struct_size = sizeof cloud->info,
                                            .count = desc->count,
                                            .has_normals = desc->normal.data != NULL,
+                                           .normals_oriented = desc->normal.data != NULL,
                                            .has_colors = desc->color.data != NULL,
                                            .has_opacities = desc->opacity.data != NULL,
                                            .has_radii = desc->radius.data != NULL };
@@ -746,6 +756,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_pages_free(cloud->colors, color_bytes(cloud));
     pt_pages_free(cloud->opacities, opacity_bytes(cloud));
     pt_pages_free(cloud->radii, cloud->slots * 4);
+    pt_pages_free(cloud->shapes, cloud->slots * 4);
     pt_pages_free(cloud->scalars, pt_scalar_bytes(cloud));
     pt_pages_free(cloud->classes, pt_class_bytes(cloud));
     free(cloud->chunks);

@@ -21,12 +21,15 @@ struct pt_chunk {
     uint32_t first;                  // slot of the first point
     uint32_t count, padded;          // padded slots repeat the last point
     uint32_t classes[8];             // of its points: bits as in patina_cloud_info.class_bits
+    uint32_t shapes[8];              // of its points, drawn or not: bit c % 32 of word c / 32: the byte c from PT_SHAPE_SIGHT_SHIFT on
+    float reach, footprint;          // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
 };
 
 // Whether a cloud still lives, shared with the devices that hold its buffers.
 struct pt_alive {
     atomic_int references, alive;
     atomic_uint colors; // counts how often they and the scalars were set
+    atomic_uint shapes; // counts how often surface words and shapes were
     _Atomic uint64_t fingerprint; // 0: nobody has asked for it yet
 };
 
@@ -47,6 +50,7 @@ struct patina_cloud {
     float *positions;  // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
     uint32_t *order;   // slots: index in the caller's arrays
     uint32_t *surface; // slots: octahedral normal and spacing class (kernel_args.h)
+    uint32_t *shapes;  // slots: footprint, thickness, kind (kernel_args.h), or NULL where the cloud was not analysed
     void *colors;      // slots x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // slots, or NULL where every point is opaque
     float *radii;       // slots, object units, or NULL
@@ -65,6 +69,9 @@ double pt_spacing_of_class(uint32_t index);
 uint32_t pt_class_of_spacing(double spacing, double base);
 // Sums the chunks' spacings up: the cloud's, and the base of its classes. 0 or PATINA_ERROR_MEMORY.
 int pt_cloud_settle_spacing(struct patina_cloud *cloud);
+
+// The cone of the normals in these surface words.
+void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface);
 
 // Octahedral encoding of any non-zero finite vector: 26 bits, nearest of the four roundings.
 uint32_t pt_encode_normal(const double n[3]);

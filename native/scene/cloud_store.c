@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTION = 1 << 16, VERSION = 5, SECTIONS = 9 };
+enum { SECTION = 1 << 16, VERSION = 6, SECTIONS = 10 };
 static const char magic[8] = "patina\n\x1a";
 
 struct header {
@@ -59,6 +59,7 @@ static void list_sections(struct patina_cloud *cloud, struct section sections[SE
         {(void **)&cloud->radii, cloud->info.has_radii ? slots * 4 : 0},
         {(void **)&cloud->scalars, cloud->info.has_scalars ? pt_scalar_bytes(cloud) : 0},
         {(void **)&cloud->classes, cloud->info.has_classes ? pt_class_bytes(cloud) : 0},
+        {(void **)&cloud->shapes, cloud->info.has_shapes ? slots * 4 : 0},
     };
     memcpy(sections, list, sizeof list);
 }
@@ -146,7 +147,7 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
     uint64_t next = 0, drawn = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
-        double sum = (double)chunk->spacing;
+        double sum = (double)chunk->spacing + (double)chunk->reach + (double)chunk->footprint;
         for (int k = 0; k < 3; k++)
             sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] +
                    (double)chunk->cone_axis[k];
@@ -179,7 +180,7 @@ static int check_header(const char *path, const struct header *header, uint64_t 
         header->chunk_count > header->info.count || header->info.drawn > header->info.count ||
         header->info.has_colors != (header->color_format != PT_COLOR_NONE) || header->info.has_opacities > 1 ||
         header->info.has_normals > 1 || header->info.has_radii > 1 || !isfinite(header->info.radius_most) ||
-        header->info.has_scalars > 1 || header->info.has_classes > 1 || !isfinite(header->spacing_base))
+        header->info.has_scalars > 1 || header->info.has_shapes > 1 || header->info.has_classes > 1 || !isfinite(header->spacing_base))
         return refuse(path, "its header is damaged");
     return PATINA_OK;
 }

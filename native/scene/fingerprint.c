@@ -37,6 +37,8 @@ static uint64_t fingerprint_of(const struct patina_cloud *cloud)
 {
     uint64_t hash = pt_fingerprint(cloud->info.count, cloud->positions, cloud->slots * 12);
     hash = pt_fingerprint(hash, cloud->surface, cloud->slots * 4);
+    if (cloud->shapes)
+        hash = pt_fingerprint(hash, cloud->shapes, cloud->slots * 4);
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         hash = pt_fingerprint(hash, chunk->origin, sizeof chunk->origin);

@@ -91,6 +91,12 @@ static int check_color(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: exposure must be between -32 and 32 stops, contrast between 0 and 16");
     if (style->clip_off > 1)
         return fail(scene, "cloud style: clip_off is 0 or 1");
+    if (style->free_space > PATINA_FREE_SPACE_USE)
+        return fail(scene, "cloud style: no such free_space");
+    if (style->hidden_kinds >> 6)
+        return fail(scene, "cloud style: hidden_kinds has unknown bits");
+    if (!(style->least_certainty >= 0.0f && style->least_certainty <= 1.0f))
+        return fail(scene, "cloud style: least_certainty must be within 0 and 1");
     style->contrast = style->contrast == 0.0f ? 1.0f : style->contrast;
     return PATINA_OK;
 }
@@ -333,7 +339,7 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
     if (s.quality > PATINA_QUALITY_PAPER || s.fill > PATINA_FILL_OFF || s.smooth > PATINA_SMOOTH_OFF ||
         s.antialias > PATINA_ANTIALIAS_OFF || s.fill_iterations > 64)
         return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
-    if (s.surface > PATINA_SURFACE_SPLATS)
+    if (s.surface > PATINA_SURFACE_FILL)
         return fail(scene, "settings: no such surface");
     if (!(s.error_target >= 0.0f) || !isfinite(s.error_target))
         return fail(scene, "settings: error_target is negative or not finite");

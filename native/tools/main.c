@@ -13,6 +13,8 @@
 static const char usage[] =
     "patina info FILE                     what a file of points holds\n"
     "patina convert IN.ply OUT.ply        writes a binary PLY\n"
+    "patina analyse FILE -o OUT.ply       normal, spacing, radii, thickness, kind and certainty of every point, as columns\n"
+    "  --neighbours K                     3 to 64 (16, and 48 where 16 leave doubts)\n"
     "patina render FILE... -o OUT.png     draws clouds as surfaces\n"
     "  --size WxH                         of the picture (1024x1024)\n"
     "  --region X0,Y0,X1,Y1               only these pixels, from the bottom left\n"
@@ -23,7 +25,8 @@ static const char usage[] =
     "  --ortho WIDTH                      parallel projection, WIDTH world units wide\n"
     "  --quality refined|paper            depth of filled pixels: tangent plane, or as in the paper\n"
     "  --fill closed|paper|off            hole filling; --iterations N (0: automatic)\n"
-    "  --surface fill|splats              filling in the picture, or points as discs\n"
+    "  --surface auto|splats|fill         discs where points lie wide and filling elsewhere, all discs, all filled\n"
+    "  --analysis on|off                  points' own spacings and footprints, and normals where a file has none (on)\n"
     "  --radius R                         of the discs, world units (default: the points' own, else 1.75 spacings)\n"
     "  --smooth alleviated|gaussian|box|off\n"
     "  --antialias layers|background|off\n"
@@ -36,6 +39,10 @@ static const char usage[] =
     "  --ramp-colors NAME                 viridis, grey, heat, spectrum, relief, diverging, classes\n"
     "  --exposure STOPS, --contrast C     of the points' colours, before light\n"
     "  --hide-classes N[,N...]            points of these classes are left out\n"
+    "  --hide-kinds KIND[,KIND...]        points of these kinds are left out: unknown, surface, border, line, volume, stray\n"
+    "  --least-certainty C                0 to 1; points less certain of their kind are left out\n"
+    "  --free-space off|show|use          points that another of the scanner's stations saw through: as they are, in magenta,\n"
+    "                                     or left out; for files that know their stations\n"
     "  --clip-box X,Y,Z,X,Y,Z             only what lies in it, or in another; --cut-box: only what does not\n"
     "  --clip-tint R,G,B,WIDTH            colours the surface that near to a cut, world units\n"
     "  --mesh FILE.obj                    triangles among the points, in grey; may be repeated\n"
@@ -209,5 +216,7 @@ int main(int count, char **arguments)
         return tool_info(count - 2, arguments + 2);
     if (!strcmp(command, "convert"))
         return tool_convert(count - 2, arguments + 2);
+    if (!strcmp(command, "analyse"))
+        return tool_analyse(count - 2, arguments + 2);
     return tool_misuse("there is no command '%s'", command);
 }

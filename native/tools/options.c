@@ -260,7 +260,9 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     else if (!strcmp(name, "--fill"))
         bad = parse_word(value, "closed|paper|off", &s->fill);
     else if (!strcmp(name, "--surface"))
-        bad = parse_word(value, "fill|splats", &s->surface);
+        bad = parse_word(value, "auto|splats|fill", &s->surface);
+    else if (!strcmp(name, "--analysis"))
+        bad = parse_word(value, "on|off", &o->analysis);
     else if (!strcmp(name, "--radius"))
         bad = parse_width(value, &o->radius);
     else if (!strcmp(name, "--iterations"))
@@ -348,6 +350,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("--save-shadows and --load-shadows need --shadows");
     if (options->line_options && !options->has_lines)
         return tool_misuse("--line-... options need --lines");
+    if (options->analysis && (options->color.free_space || options->color.hidden_kinds || options->color.least_certainty > 0))
+        return tool_misuse("--free-space, --hide-kinds and --least-certainty need the analysis");
     if (!options->file_count && !options->mesh_count)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)

@@ -172,7 +172,7 @@ static void print_string(const char *text)
     putchar('"');
 }
 
-void tool_times_print(struct tool_times *times, const char *device, const patina_frame_stats *stats)
+void tool_times_print(struct tool_times *times, const char *device, const patina_frame_stats *stats, double analysis_ms)
 {
     double least = times->frames ? times->ms[0] : 0, most = least;
     for (int i = 1; i < times->frames; i++) {
@@ -198,5 +198,6 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     printf(", \"spacing_px\": %.4f, \"expected_error\": {\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f}",
            (double)stats->spacing_px, (double)stats->expected.color, (double)stats->expected.coverage,
            (double)stats->expected.depth, (double)stats->expected.normal);
+    printf(", \"analysis_ms\": %.1f", analysis_ms);
     printf(", \"shadow_samples\": %u, \"shadow_error\": %.6f}\n", stats->shadow_samples, (double)stats->shadow_error);
 }

@@ -93,26 +93,65 @@ void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color
     add(at + 14u, weight, PT_SUM_SCALE);
 }
 
+// What the point's disc adds at weight 1, but for its normal.
+vec4 color_of(uint id)
+{
+    vec3 rgb = albedo_of(id);
+    precise float opacity = opacity_of(id) * PT_SUM_SCALE;
+    precise vec4 color = vec4(pt_max(pt_min(rgb.x, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
+                              pt_max(pt_min(rgb.y, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
+                              pt_max(pt_min(rgb.z, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity, opacity);
+    return color;
+}
+
+// Its box in the band.
+ivec4 box_of(disc d) { return ivec4(d.box.x, max(d.box.y, band_first), d.box.z, min(d.box.w, band_end - 1)); }
+
+#if LARGE == 0
+
 void main()
 {
-    chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
+    uint at = first_chunk + gl_WorkGroupID.x;
+    chunk_view chunk = chunks[at];
     view_args view = args.view;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         disc d;
         if (!disc_of(view, chunk, i, d))
             continue;
-        vec3 rgb = albedo_of(d.id);
-        precise float opacity = opacity_of(d.id) * PT_SUM_SCALE;
-        precise vec4 color = vec4(pt_max(pt_min(rgb.x, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
-                                  pt_max(pt_min(rgb.y, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
-                                  pt_max(pt_min(rgb.z, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity, opacity);
+        ivec4 box = box_of(d);
+        if (disc_listed(box, at, i))
+            continue;
+        vec4 color = color_of(d.id);
         precise vec3 n = d.n * PT_SUM_SCALE;
-        for (int y = max(d.box.y, band_first); y <= min(d.box.w, band_end - 1); y++)
-            for (int x = d.box.x; x <= d.box.z; x++)
+        for (int y = box.y; y <= box.w; y++)
+            for (int x = box.x; x <= box.z; x++)
                 add_pixel(view, d, chunk.id_base + d.id, x, y, color, n);
     }
 }
+
+#else
+
+void main()
+{
+    uint at, part;
+    if (!disc_large(at, part))
+        return;
+    chunk_view chunk = chunks[large[2u * at]];
+    view_args view = args.view;
+    disc d;
+    if (!disc_of(view, chunk, large[2u * at + 1u], d))
+        return;
+    ivec4 box = box_of(d);
+    vec4 color = color_of(d.id);
+    precise vec3 n = d.n * PT_SUM_SCALE;
+    ivec2 own = ivec2(gl_LocalInvocationID.x & 7u, 8u * part + (gl_LocalInvocationID.x >> 3));
+    for (int y = box.y + own.y; y <= box.w; y += 8 * int(parts))
+        for (int x = box.x + own.x; x <= box.z; x += 8)
+            add_pixel(view, d, chunk.id_base + d.id, x, y, color, n);
+}
+
+#endif
 
 #else
 
@@ -129,12 +168,13 @@ float sum_of(uint at)
     return negative ? -value : value;
 }
 
-bool has_normals(uint id)
+// The instance that a point is a disc of, or args.instances. No return from within the loop: llvmpipe loses lanes that do not.
+uint instance_of(uint id)
 {
+    uint at = args.instances;
     for (uint i = 0u; i < args.instances; i++)
-        if (id - discs[i].instance.id_base < discs[i].instance.id_count && discs[i].instance.has_normals != 0u)
-            return true;
-    return false;
+        at = id - discs[i].instance.id_base < discs[i].instance.id_count ? i : at;
+    return at;
 }
 
 // The mean normal, on the side that the nearest disc's lies on.
@@ -160,9 +200,12 @@ void main()
         return;
     uint pixel = uint(y) * view.width + uint(x), at = 2u * SUMS * (pixel - uint(band_first) * view.width);
     uvec2 key = read_key(pixel);
-    if (key.y == PT_KEY_EMPTY_Z)
+    uint of = instance_of(key.x);
+    if (key.y == PT_KEY_EMPTY_Z || of == args.instances)
         return;
-    float opacity = sum_of(at + 6u), weight = pt_max(sum_of(at + 14u), 1.0);
+    float opacity = sum_of(at + 6u), weight = sum_of(at + 14u);
+    if (weight < 1.0)
+        return; // what was filled shows no disc: it takes its source's
     vec3 color = vec3(0.0);
     if (1.0 <= opacity) {
         precise vec3 mean = vec3(sum_of(at), sum_of(at + 2u), sum_of(at + 4u)) * pt_rcp(opacity);
@@ -170,7 +213,7 @@ void main()
     }
     precise float share = opacity * pt_rcp(weight);
     albedo[pixel] = vec4(color, opacity < weight ? pt_min(share, 1.0) : 1.0); // opaque: 1 exactly
-    if (has_normals(key.x))
+    if (discs[of].instance.has_normals != 0u)
         normal[pixel].xyz = mean_normal(view, vec3(sum_of(at + 8u), sum_of(at + 10u), sum_of(at + 12u)), x, y, normal[pixel].xyz);
 }
 

@@ -15,7 +15,10 @@ of them, in the same order; "absent" what could not be measured, and why.
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
-scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session (ten minutes of work in Blender). With --quick they take a million points, and one minute.
+scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
+(ten minutes of work in Blender), analysis (what every point knows, 10 million). With --quick they take a million points, and one
+minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
+and scaling (threads up to all cores).
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import analysis
 import case as cases
 import imports
 import meshes
@@ -52,7 +56,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session")
+          "leaves", "scans", "independent", "session", "analysis", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -123,13 +127,17 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
     found += papers.cases(main, quick)
     if full or options.readme or "independent" in options.only:
         found += independent(main, quick)
+    for group, make in (("graphics", on_graphics), ("scaling", over_threads)):
+        if group in options.only:
+            found += make(quick)
     return [one for one in found if not options.only or one["group"] in options.only]
 
 
 def independent(device: str, quick: bool) -> list[dict[str, Any]]:
-    """The shapes that no rule was made on: by density, as filling and as discs; then noise, strays and scan rows of 1 : 10."""
+    """The shapes that no rule was made on: by density, analysed, as filling and as discs; then noise, strays and scan rows of
+    1 : 10."""
     cases = []
-    for quality in ("refined", "splats"):
+    for quality in ("analysed", "refined", "splats"):
         for surface in list(stage.scenes.SHAPES)[: 2 if quick else None]:
             cases += [case_of("independent", surface, device, 512, density=density, quality=quality, frames=5)
                       for density in ([1.0] if quick else [0.2, 1.0, 4.0] + [16.0] * (surface == "knot"))]
@@ -138,6 +146,26 @@ def independent(device: str, quick: bool) -> list[dict[str, Any]]:
                 cases += [case_of("independent", surface, device, 512, density=density, quality=quality, frames=5, **more)
                           for more in ({"noise": 1.0}, {"strays": 0.001}, {"pattern": "rows"})]
     return cases
+
+
+def on_graphics(quick: bool) -> list[dict[str, Any]]:
+    """The torus on a graphics processor, and on the processor with all its threads. Held against the truth where there is one
+    that takes no minutes."""
+    large = [] if quick else [{"points": 10_000_000}, {"points": 100_000_000}, {"size": 4096, "unheld": 1}]
+    asked = [{}, {"quality": "paper"}, {"quality": "unfilled"}, {"quality": "splats"}, *large,
+             *({"mode": mode} for mode in ("shadows kept", "shadows 1")),
+             *({"mode": mode, "unheld": 1} for mode in ("shadows 10", "6 layers", "lines 2", "eye-dome lighting",
+                                                        "ambient obscurance", "depth of field"))]
+    return [case_of("graphics", device=device, **{"points": 1_000_000, **one}, graphics=int(device == "gl-egl"))
+            for one in asked for device in ("gl-egl", "cpu")]
+
+
+def over_threads(quick: bool) -> list[dict[str, Any]]:
+    """The processor with 1, 2, 4, ... and all threads."""
+    cores = machine.cores()
+    asked = [{}] if quick else [{}, {"points": 10_000_000}, {"size": 4096, "unheld": 1}]
+    return [case_of("scaling", threads=threads, **{"points": 1_000_000, **one})
+            for one in asked for threads in sorted({*(2**k for k in range(8) if 2**k <= cores), cores})]
 
 
 def too_large(case: dict[str, Any]) -> str:
@@ -183,6 +211,8 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
     "viewport": ("viewport", "Viewport",
                  lambda options: window.measure(1_000_000 if options.quick else 10_000_000, options.library)),
     "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
+    "analysis": ("analysis", "What every point knows",
+                 lambda options: analysis.measure(1_000_000 if options.quick else 10_000_000, options.library)),
     "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
 }
 

@@ -184,6 +184,11 @@ typedef struct patina_cloud_info {
     uint32_t has_scalars, has_classes;
     float scalar_range[2];   // least and greatest finite scalar; 0, 0 without one
     uint32_t class_bits[8];  // classes that drawn points have: class c is bit c % 32 of word c / 32
+    uint32_t has_shapes;     // the cloud was analysed: patina_cloud_analyse
+    uint32_t normals_oriented; // 1: every normal knows its side, as given or by a station; PATINA_SIDES_VOTED: some by votes
+    uint64_t estimated_normals; // of points whose normal the analysis found
+    uint64_t kinds[6];       // drawn points of each patina_kind
+    uint64_t seen_through;   // drawn points that some station saw through: patina_analysis_desc.free_space
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -192,13 +197,72 @@ typedef struct patina_cloud_info {
 PATINA_API int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out);
 PATINA_API void patina_cloud_destroy(patina_cloud *cloud);
 // Gives a cloud other colours (as in the descriptor, count elements; NULL data: none) and leaves all else as it is, so
-// that painting uploads colours alone. The one change a cloud allows: no frame may be rendering it meanwhile.
+// that painting uploads colours alone. No frame may be rendering it meanwhile.
 PATINA_API int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color);
 // The same for scalars.
 PATINA_API int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar);
 // The scalars that `share` of the points lie below and above, 0 <= share < 0.5; 0: the least and the greatest. What is not
 // finite does not count. PATINA_ERROR_EMPTY without a finite scalar.
 PATINA_API int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2]);
+// What every point knows (SPEC 11), from its nearest neighbours among all points: normal, spacing, footprint, thickness, kind.
+enum patina_kind {
+    PATINA_KIND_UNKNOWN = 0, // not analysed, alone, or all neighbours at its own place
+    PATINA_KIND_SURFACE = 1,
+    PATINA_KIND_BORDER = 2,  // of a surface: neighbours on one side only
+    PATINA_KIND_LINE = 3,    // a wire, a railing's bar
+    PATINA_KIND_VOLUME = 4,  // foliage
+    PATINA_KIND_STRAY = 5,   // far from what its neighbours are part of
+};
+
+// Where nothing tells the side of a surface, 64 views from outside vote for the one that is seen; sheets face up.
+#define PATINA_SIDES_VOTED 2
+
+typedef struct patina_analysis_desc {
+    size_t struct_size;
+    uint32_t neighbours;     // 3..64; 0 = 16, and 48 where 16 leave doubts
+    uint32_t threads;        // 0 = one per core
+    uint32_t keep_normals;   // 1 = normals that the cloud has stay, and only missing ones are estimated. 0 = all are
+                             // estimated, on the side of those that it has
+    uint32_t station_count;  // places of the scanner, in object units: estimated normals face the one that ...
+    const double *stations;  // 3 each
+    patina_array station;    // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
+    uint32_t free_space;     // 1 = points that a station, not their own, saw through are marked: its samples around the
+                             // direction to the point lie farther. Needs stations and station. 4 bytes meanwhile for each of
+                             // a station's directions, 128 MiB at most
+    patina_array row, column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell free space how
+                             // far apart the directions are. Optional: else found from how dense they are
+} patina_analysis_desc;
+
+// The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
+// a picture follows from them (8 bytes a point, 4 of them new, 20 more meanwhile). No frame may be rendering it meanwhile. desc may be
+// NULL. On failure or cancel the cloud stays as it was. Any number of threads gives the same bytes.
+PATINA_API int patina_cloud_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress);
+
+// Arrays of the caller's, patina_cloud_info.count elements in the given order; NULL = not wanted. Points that are not drawn
+// read 0. Those of the first group are as the analysis left them, in steps of what 8 bytes hold; without one, 0 but for what
+// the cloud was given.
+typedef struct patina_neighbourhoods {
+    size_t struct_size;
+    float *normal;      // 3 each; 0 = none
+    float *axis;        // 3 each: direction of the greater half axis; 0 without a normal
+    float *spacing;     // about 1 / sqrt(points per area) where the point lies
+    float *half_axes;   // 2 each, of its footprint, the greater first
+    float *sigma;       // thickness: noise, and disagreement of scans; 0 = unknown
+    uint8_t *kind;      // patina_kind
+    float *certainty;   // 0..1: how well that explains the neighbours
+    uint8_t *seen_through; // 1: by some station, see patina_analysis_desc.free_space
+    // From the `neighbours` nearest, walked anew for any cloud.
+    uint32_t neighbours; // 1..64
+    uint32_t threads;    // 0 = one per core
+    uint32_t *numbers;   // `neighbours` each: of the points, nearest first, equal distances by number; 2^32 - 1 = there is none
+    double *distances;   // likewise; +inf
+    float *soft_radius;  // [S Eq. 20], with the farthest distance outside the root
+    float *uncertainty;  // [S Eq. 21], in parts of its 99th percentile, at most 1. From the cloud's normals
+} patina_neighbourhoods;
+
+PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbourhoods *wanted,
+                                           patina_progress *progress);
+
 // Writes the built cloud to a file, and opens it again by mapping: nothing is read but what is drawn, and the memory stays
 // the file's. A file of another version or machine, or a damaged one, is PATINA_ERROR_FORMAT: build the cloud anew. While a
 // cloud is open its file may be replaced (patina_cloud_save does), not written into.
@@ -245,6 +309,7 @@ typedef struct patina_file_info {
     double origin[3];       // float64 origin that positions are relative to; 0 unless float32 would lose detail
     double box_min[3], box_max[3]; // of all finite positions, origin included
     uint64_t invalid_positions;
+    uint32_t stations;      // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
 } patina_file_info;
 
 typedef struct patina_file_attribute {
@@ -254,7 +319,8 @@ typedef struct patina_file_attribute {
 } patina_file_attribute;
 
 // Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS or PTX file whole; formats are told apart by content. Errors name
-// the byte offset (binary) or line (text).
+// the byte offset (binary) or line (text). Points of a scanner's grid (PTX, range_grid of a PLY) have the attributes "row" and
+// "column", those of a PTX "scan" too. A PLY's faces, and a scanner's grid, give normals where there are no others.
 PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
 PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
 PATINA_API void patina_file_destroy(patina_file *file);
@@ -265,7 +331,20 @@ PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, s
 PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);
 PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size);   // sRGB
 PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
+PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz, size_t size); // file coordinates: origin included
 PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
+// A scanner's grid, of one scan: which column and row each point lies in, and where the scanner stood, in the positions'
+// coordinates.
+typedef struct patina_grid_desc {
+    size_t struct_size;
+    uint64_t count;
+    const float *position; // 3 a point
+    const uint32_t *column, *row;
+    double station[3];
+} patina_grid_desc;
+// Normals as patina_file_open finds them in grids, towards the scanner, 3 a point into `normals`; 0 0 0 where a point lies in no
+// surface, and everywhere where the grid is nearly empty.
+PATINA_API int patina_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals);
 // Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
 // gives it classes.
 PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
@@ -293,6 +372,9 @@ enum patina_color_source {
 #define PATINA_MAX_RAMP 256
 // A ramp by name: grey, viridis, heat, spectrum, relief, diverging; classes: of LAS classes, for a range of 0 to 255.
 PATINA_API int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3]);
+
+// SHOW: magenta in place of their own colour (with color_source OWN). USE: they are not drawn and cast no shadow.
+enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, PATINA_FREE_SPACE_USE = 2 };
 
 // What a cloud leaves out of shadows [D 6].
 enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2, PATINA_SHADOW_NO_SELF = 4 };
@@ -324,6 +406,10 @@ typedef struct patina_cloud_style {
     float contrast;               // 0..16: slope in stops around mid grey (0.18), after exposure; 0 = 1
     uint32_t hidden_classes[8];   // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
     uint32_t clip_off;            // 1 = clips leave this cloud whole
+    // Of clouds that were analysed; nothing for others:
+    uint32_t free_space;          // patina_free_space: what becomes of points that a station saw through
+    uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
+    float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
 } patina_cloud_style;
 
 typedef struct patina_mesh_style {
@@ -378,10 +464,11 @@ typedef struct patina_camera {
 
 enum patina_quality { PATINA_QUALITY_REFINED = 0, PATINA_QUALITY_PAPER = 1 }; // filled depth: tangent plane | source's
 enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OFF = 2 };
-// How points become a surface. FILL: image-space filling, as quality and fill say. SPLATS: each point is a flat disc across its
+// How points become a surface. AUTO: of clouds that were analysed, points whose footprint is wider than a pixel or two are discs,
+// as wide as it, the others are filled; where fill is not CLOSED, and of clouds that were not, all are filled. FILL: image-space filling, as quality and fill say. SPLATS: each point is a flat disc across its
 // normal (without one: across the view), discs within a layer distance of the nearest one are blended; quality, fill, their
 // iterations and error_target say nothing then. Light maps of shadows are filled either way.
-enum patina_surface { PATINA_SURFACE_FILL = 0, PATINA_SURFACE_SPLATS = 1 };
+enum patina_surface { PATINA_SURFACE_AUTO = 0, PATINA_SURFACE_SPLATS = 1, PATINA_SURFACE_FILL = 2 };
 enum patina_smooth { PATINA_SMOOTH_ALLEVIATED = 0, PATINA_SMOOTH_GAUSSIAN = 1, PATINA_SMOOTH_BOX = 2, PATINA_SMOOTH_OFF = 3 };
 enum patina_antialias { PATINA_ANTIALIAS_LAYERS = 0, PATINA_ANTIALIAS_BACKGROUND = 1, PATINA_ANTIALIAS_OFF = 2 };
 
@@ -651,11 +738,18 @@ PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress 
                                  patina_task **out); // patina_cloud_create
 PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
                                       patina_task **out); // patina_cloud_set_colors
+// patina_cloud_analyse beside frames: the cloud stays as it is, and may be drawn, until patina_task_apply takes what was found;
+// no frame may be rendering it then. stations and station must live until the task is done.
+PATINA_API int patina_task_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
+                                   patina_task **out);
+PATINA_API int patina_task_apply(patina_task *task); // waits; PATINA_ERROR_EMPTY the second time or for other tasks
 // Two numbers that tell whether points changed: of count, positions, normals, opacities, radii and classes; of count, colours
 // and scalars. Not
 // against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
 // written once the task is done. About as fast as memory is read.
 PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);
+PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals,
+                                        patina_task **out); // patina_grid_normals
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block

@@ -1,0 +1,445 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "analysis.h"
+#include "beams.h"
+#include "free_space.h"
+#include "kernel_args.h"
+#include "memory.h"
+#include "orient.h"
+#include "progress.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Where 16 neighbours leave doubts, three times as many are asked: rows 1 : 10 apart fill three of them, and noise of half a
+// spacing is flat then. What is a volume to them is looked at once more among every eighth point.
+enum { NEIGHBOURS = 16, WIDER = 3, FAR_STRATA = 3, FAR_THINNING = 8 };
+
+struct walk {
+    const patina_cloud *cloud;
+    const patina_analysis_desc *desc;
+    struct pt_analysis *out;
+    struct pt_neighbours tree, coarse;
+    struct pt_beams beams;
+    patina_progress *progress;
+    uint32_t k;
+    int given; // normals that the cloud has know their side
+    struct tally {
+        uint32_t kinds[6], estimated, unoriented;
+    } *tallies; // a chunk
+    atomic_uint done;
+};
+
+// ---- a leaf ----------------------------------------------------------------------------------------------------------------
+
+static void sample_of(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t place,
+                      const struct pt_found *found, struct pt_sample *sample)
+{
+    const uint32_t lane = place % PT_LEAF;
+    sample->count = found->count[lane];
+    for (uint32_t i = 0; i < sample->count; i++) {
+        pt_neighbours_offset(tree, from, place, found->place[lane][i], sample->offset[i]);
+        sample->square[i] = found->square[lane][i];
+    }
+}
+
+static uint64_t all_of(const struct pt_sample *sample) { return sample->count >= 64 ? ~0ull : (1ull << sample->count) - 1ull; }
+
+static void look_from_afar(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf,
+                           struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
+{
+    struct pt_sample sample;
+    struct pt_plane plane;
+    uint32_t volume = 0;
+    for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(left);
+        volume |= (uint32_t)(hoods[lane].kind == PT_KIND_VOLUME) << lane;
+    }
+    if (!volume)
+        return;
+    pt_neighbours_find(coarse, tree, leaf, volume, PT_NEIGHBOURS_MOST, found);
+    for (; volume; volume &= volume - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(volume);
+        sample_of(coarse, tree, leaf * PT_LEAF + lane, found, &sample);
+        pt_plane_fit(&sample, all_of(&sample), &plane);
+        if (sample.count == PT_NEIGHBOURS_MOST)
+            pt_neighbourhood_from_afar(&sample, &plane, FAR_THINNING, &hoods[lane]);
+        if (limit)
+            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
+    }
+}
+
+void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k,
+                      struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
+{
+    const uint32_t lanes = pt_leaf_lanes(tree, leaf), wider = WIDER * k < PT_NEIGHBOURS_MOST ? WIDER * k : PT_NEIGHBOURS_MOST;
+    struct pt_plane planes[PT_LEAF], wide;
+    struct pt_sample sample, narrow;
+    uint32_t doubtful = 0;
+    pt_neighbours_find(tree, tree, leaf, lanes, k, found);
+    for (uint32_t left = lanes; left; left &= left - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(left);
+        sample_of(tree, tree, leaf * PT_LEAF + lane, found, &sample);
+        pt_plane_fit(&sample, all_of(&sample), &planes[lane]);
+        const int more = wider > k && sample.count == k;
+        if (!more || !pt_plane_is_doubtful(&planes[lane]))
+            pt_neighbourhood_of(&sample, &planes[lane], &hoods[lane]);
+        const int doubts = more && (pt_plane_is_doubtful(&planes[lane]) || pt_neighbourhood_is_doubtful(&hoods[lane]));
+        if (limit && !doubts)
+            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
+        if (more && (pt_plane_is_doubtful(&planes[lane]) || pt_neighbourhood_is_doubtful(&hoods[lane])))
+            doubtful |= 1u << lane;
+    }
+    if (doubtful)
+        pt_neighbours_find(tree, tree, leaf, doubtful, wider, found);
+    for (; doubtful; doubtful &= doubtful - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(doubtful);
+        sample_of(tree, tree, leaf * PT_LEAF + lane, found, &sample);
+        pt_plane_fit(&sample, all_of(&sample), &wide);
+        const int flat = !pt_plane_is_doubtful(&planes[lane]); // and came here for its rows, or its border
+        if (flat ? !pt_plane_is_doubtful(&wide) : pt_plane_prefers_wide(&planes[lane], &wide)) {
+            struct pt_neighbourhood known = hoods[lane];
+            pt_neighbourhood_of(&sample, &wide, &hoods[lane]);
+            if (flat && known.kind == PT_KIND_BORDER && hoods[lane].kind == PT_KIND_BORDER)
+                hoods[lane] = known; // a border to both: the nearer neighbours tell its spacing better
+        } else {
+            narrow = sample; // the nearest k of them
+            narrow.count = k;
+            pt_neighbourhood_of(&narrow, &planes[lane], &hoods[lane]);
+        }
+        if (limit)
+            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
+    }
+    look_from_afar(tree, coarse, leaf, found, hoods, limit, context);
+}
+
+// ---- a chunk ---------------------------------------------------------------------------------------------------------------
+
+// Turns the normal as what is known says; returns whether anything is.
+static int orient(const struct pt_beam *beam, const double p[3], uint32_t given, double n[3])
+{
+    double towards[3];
+    if (given != PT_NORMAL_NONE) {
+        pt_decode_normal(given, towards);
+    } else if (beam) {
+        for (int k = 0; k < 3; k++)
+            towards[k] = beam->place[k] - p[k];
+    } else {
+        return 0;
+    }
+    const double facing = n[0] * towards[0] + n[1] * towards[1] + n[2] * towards[2];
+    for (int k = 0; k < 3 && facing < 0.0; k++)
+        n[k] = -n[k];
+    return 1;
+}
+
+// The beam that took a point, and where that lies; NULL where no station is known.
+static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_chunk *chunk, uint32_t slot, double p[3])
+{
+    for (uint32_t k = 0; k < 3; k++)
+        p[k] = chunk->origin[k] + (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + slot - chunk->first];
+    return walk->beams.count ? &walk->beams.each[pt_beam_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
+}
+
+struct limited { // by a chunk's beams
+    const struct walk *walk;
+    uint32_t chunk;
+};
+
+static void limit_point(void *context, uint32_t place, const struct pt_sample *sample, struct pt_neighbourhood *hood)
+{
+    const struct limited *limited = context;
+    double p[3];
+    const struct pt_beam *beam =
+        beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], limited->walk->tree.slots[place], p);
+    if (beam)
+        pt_beam_limit(beam, p, sample, hood);
+}
+
+static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, struct pt_neighbourhood *hood)
+{
+    const struct pt_chunk *chunk = &walk->cloud->chunks[chunk_index];
+    struct tally *tally = &walk->tallies[chunk_index];
+    const uint32_t given = walk->given ? walk->cloud->surface[slot] & PT_NORMAL_BITS : PT_NORMAL_NONE;
+    uint32_t bits = given;
+    double p[3];
+    const struct pt_beam *beam = beam_of(walk, chunk, slot, p);
+    tally->kinds[hood->kind]++;
+    if (hood->has_normal && !(walk->desc->keep_normals && given != PT_NORMAL_NONE)) {
+        tally->unoriented += !orient(beam, p, given, hood->normal);
+        tally->estimated++;
+        bits = pt_encode_normal(hood->normal);
+    }
+    const double spacing = hood->spacing > 0.0 ? hood->spacing : (double)chunk->spacing;
+    walk->out->surface[slot] = bits | pt_class_of_spacing(spacing, walk->out->spacing_base) << PT_SPACING_SHIFT;
+    walk->out->shapes[slot] = pt_pack_shape(hood, bits, walk->out->spacing_base);
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+static void finish_chunk(struct walk *walk, struct pt_chunk *chunk, float *spacings, uint32_t known)
+{
+    uint32_t *surface = walk->out->surface + chunk->first, *shapes = walk->out->shapes + chunk->first;
+    uint32_t histogram[64] = { 0 }, most = 0, below = 0, at = 0;
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        histogram[shapes[i] & 63u]++;
+        most = (shapes[i] & 63u) > most ? shapes[i] & 63u : most;
+    }
+    for (; at < 63 && (below += histogram[at]) < chunk->count * 9u / 10u; at++)
+        ;
+    chunk->reach = (float)(walk->out->spacing_base * pt_spacing_of_class(most));
+    chunk->footprint = (float)(walk->out->spacing_base * pt_spacing_of_class(at));
+    qsort(spacings, known, sizeof *spacings, compare_floats);
+    chunk->spacing = known ? spacings[known / 2] : chunk->spacing;
+    for (uint32_t i = chunk->count; i < chunk->padded; i++) {
+        surface[i] = surface[chunk->count - 1];
+        shapes[i] = shapes[chunk->count - 1];
+    }
+}
+
+static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+{
+    struct walk *walk = context;
+    struct pt_found found;
+    struct pt_neighbourhood hoods[PT_LEAF];
+    float spacings[PT_CHUNK_POINTS];
+    (void)thread;
+    for (uint32_t c = begin; c < end; c++) {
+        struct limited limited = { walk, c };
+        uint32_t known = 0;
+        for (uint32_t leaf = walk->tree.chunk_leaf[c]; leaf < walk->tree.chunk_leaf[c + 1]; leaf++) {
+            if (pt_progress_cancelled(walk->progress))
+                return;
+            pt_describe_leaf(&walk->tree, &walk->coarse, leaf, walk->k, &found, hoods, limit_point, &limited);
+            for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
+                const uint32_t lane = (uint32_t)__builtin_ctz(left);
+                write_point(walk, c, walk->tree.slots[leaf * PT_LEAF + lane], &hoods[lane]);
+                if (hoods[lane].spacing > 0.0)
+                    spacings[known++] = (float)hoods[lane].spacing;
+            }
+        }
+        finish_chunk(walk, &walk->out->chunks[c], spacings, known);
+        uint32_t done = atomic_fetch_add_explicit(&walk->done, 1, memory_order_relaxed) + 1;
+        pt_progress_raise(walk->progress, 0.05 + 0.8 * done / walk->cloud->chunk_count);
+    }
+}
+
+// ---- the cloud -------------------------------------------------------------------------------------------------------------
+
+// Classes span 15 octaves and three quarters: two below the finest chunk, unless the coarsest needs them above.
+static double base_of(const patina_cloud *cloud)
+{
+    double least = INFINITY, most = 0.0, box = 0.0;
+    if (cloud->shapes) // a second time: the same words
+        return cloud->spacing_base;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        const double spacing = (double)cloud->chunks[c].spacing;
+        least = spacing > 0.0 ? fmin(least, spacing) : least;
+        most = fmax(most, spacing);
+    }
+    for (int k = 0; k < 3 && cloud->chunk_count; k++)
+        box = fmax(box, cloud->info.box_max[k] - cloud->info.box_min[k]);
+    return most > 0.0 ? fmax(least / 4.0, most / 4096.0) : box / 32768.0;
+}
+
+// Makes strides explicit.
+static int check_arrays(patina_analysis_desc *desc)
+{
+    const uint32_t lines = 1u << PATINA_UINT16 | 1u << PATINA_UINT32 | 1u << PATINA_INT32;
+    int error = pt_check_array(&desc->station, "station", 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1);
+    error = error ? error : pt_check_array(&desc->row, "row", lines, 1, 1);
+    return error ? error : pt_check_array(&desc->column, "column", lines, 1, 1);
+}
+
+int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *desc)
+{
+    if (!cloud || !desc || desc->struct_size != sizeof *desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: no cloud, or desc->struct_size is not %zu", sizeof *desc);
+    if (desc->neighbours > PT_NEIGHBOURS_MOST || (desc->neighbours && desc->neighbours < 3))
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: neighbours: 3 to %d, not %u", PT_NEIGHBOURS_MOST,
+                       desc->neighbours);
+    if (desc->station_count && !desc->stations)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: no places of %u stations", desc->station_count);
+    for (uint32_t i = 0; i < 3 * desc->station_count; i++)
+        if (!isfinite(desc->stations[i]))
+            return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: station %u is nowhere", i / 3);
+    patina_analysis_desc checked = *desc;
+    const int error = check_arrays(&checked);
+    return error ? error : pt_free_space_check(desc);
+}
+
+static void gather_shapes(struct pt_chunk *chunk, const uint32_t *shapes)
+{
+    memset(chunk->shapes, 0, sizeof chunk->shapes);
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        const uint32_t sight = shapes[i] >> PT_SHAPE_SIGHT_SHIFT & 255u;
+        chunk->shapes[sight / 32] |= 1u << sight % 32;
+    }
+}
+
+static int mark_free_space(struct walk *walk, struct pt_pool *pool)
+{
+    struct pt_free_space job = { .cloud = walk->cloud,
+                                 .desc = walk->desc,
+                                 .spacing_base = walk->out->spacing_base,
+                                 .progress = walk->progress,
+                                 .begin = 0.8,
+                                 .end = 1.0,
+                                 .shapes = walk->out->shapes };
+    const int error = pt_free_space_mark(&job, pool);
+    walk->out->seen_through = job.marked;
+    return error;
+}
+
+// Sides that neither the caller nor a station told.
+static int vote_sides(struct walk *walk, struct pt_pool *pool)
+{
+    const patina_cloud *cloud = walk->cloud;
+    uint64_t unoriented = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        unoriented += walk->tallies[c].unoriented;
+    walk->out->oriented = 1;
+    if (!unoriented)
+        return PATINA_OK;
+    const size_t size = (cloud->slots / 32 + 1) * sizeof(uint32_t);
+    uint32_t *told = walk->given ? pt_pages_alloc(size) : NULL;
+    if (walk->given && !told)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t slot = 0; told && slot < cloud->slots; slot++)
+        told[slot / 32] |= (uint32_t)((cloud->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << slot % 32;
+    walk->out->oriented = PATINA_SIDES_VOTED;
+    const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surface, walk->out->shapes, pool, walk->progress, 0.85, 1.0);
+    pt_pages_free(told, size);
+    return error;
+}
+
+static int compute(struct walk *walk, struct pt_pool *pool)
+{
+    const patina_cloud *cloud = walk->cloud;
+    struct pt_analysis *out = walk->out;
+    walk->tallies = calloc(cloud->chunk_count + 1, sizeof *walk->tallies);
+    out->chunks = malloc((cloud->chunk_count + 1) * sizeof *out->chunks);
+    out->surface = pt_pages_alloc(out->slots * 4);
+    out->shapes = pt_pages_alloc(out->slots * 4);
+    if (!walk->tallies || !out->chunks || !out->surface || !out->shapes)
+        return PATINA_ERROR_MEMORY;
+    if (cloud->chunk_count)
+        memcpy(out->chunks, cloud->chunks, cloud->chunk_count * sizeof *out->chunks);
+    out->spacing_base = base_of(cloud);
+    int error = pt_beams_create(cloud, walk->desc, &walk->beams);
+    if (!error)
+        error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, pool, walk->progress, 0.0, 0.04);
+    if (!error)
+        error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, pool, walk->progress, 0.04, 0.05);
+    if (error) {
+        pt_neighbours_destroy(&walk->tree);
+        return error;
+    }
+    pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
+    pt_neighbours_destroy(&walk->coarse);
+    error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : vote_sides(walk, pool);
+    pt_neighbours_destroy(&walk->tree);
+    if (error)
+        return error;
+    if (walk->desc->free_space && (error = mark_free_space(walk, pool)))
+        return error;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        for (int kind = 0; kind < 6; kind++)
+            out->kinds[kind] += walk->tallies[c].kinds[kind];
+        out->estimated += walk->tallies[c].estimated;
+    }
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        gather_shapes(&out->chunks[c], out->shapes + out->chunks[c].first);
+        out->chunks[c].cone_cosine = -2.0f;
+        if (out->oriented)
+            pt_chunk_cone(&out->chunks[c], out->surface + out->chunks[c].first);
+    }
+    pt_progress_set(walk->progress, 1.0);
+    return PATINA_OK;
+}
+
+int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
+                        struct pt_analysis *out)
+{
+    patina_analysis_desc checked = *desc;
+    check_arrays(&checked); // checked already
+    struct walk walk = { .cloud = cloud,
+                         .desc = &checked,
+                         .out = out,
+                         .progress = progress,
+                         .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
+                         .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED };
+    *out = (struct pt_analysis){ .slots = cloud->slots };
+    struct pt_pool *pool = pt_pool_create(desc->threads, 0);
+    int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
+    pt_pool_destroy(pool);
+    pt_beams_destroy(&walk.beams);
+    free(walk.tallies);
+    if (error)
+        pt_analysis_free(out);
+    return !error                              ? PATINA_OK
+           : error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "analysing the cloud was cancelled")
+                                             : pt_fail(NULL, error, "analysing %llu points: out of memory",
+                                                       (unsigned long long)cloud->info.drawn);
+}
+
+void pt_analysis_free(struct pt_analysis *analysis)
+{
+    pt_pages_free(analysis->surface, analysis->slots * 4);
+    pt_pages_free(analysis->shapes, analysis->slots * 4);
+    free(analysis->chunks);
+    *analysis = (struct pt_analysis){ 0 };
+}
+
+// What cannot fail comes last: a cloud is analysed or as it was.
+int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
+{
+    struct patina_cloud next = *cloud;
+    next.chunks = analysis->chunks;
+    next.spacing_base = analysis->spacing_base;
+    if (pt_cloud_settle_spacing(&next))
+        return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "taking an analysis: out of memory");
+    cloud->info.bytes += cloud->shapes ? 0 : cloud->slots * 4;
+    cloud->info.spacing = next.info.spacing;
+    cloud->info.spacing_min = next.info.spacing_min;
+    cloud->info.spacing_max = next.info.spacing_max;
+    cloud->info.layer_distance = next.info.layer_distance;
+    cloud->info.has_shapes = 1;
+    cloud->info.has_normals |= analysis->estimated > 0;
+    cloud->info.normals_oriented = cloud->info.has_normals ? (uint32_t)analysis->oriented : 0;
+    cloud->info.estimated_normals = analysis->estimated;
+    for (int kind = 0; kind < 6; kind++)
+        cloud->info.kinds[kind] = analysis->kinds[kind];
+    cloud->info.seen_through = analysis->seen_through;
+    pt_pages_free(cloud->surface, cloud->slots * 4);
+    pt_pages_free(cloud->shapes, cloud->slots * 4);
+    free(cloud->chunks);
+    cloud->surface = analysis->surface;
+    cloud->shapes = analysis->shapes;
+    cloud->chunks = analysis->chunks;
+    cloud->spacing_base = analysis->spacing_base;
+    *analysis = (struct pt_analysis){ 0 };
+    atomic_store(&cloud->alive->fingerprint, 0);
+    atomic_fetch_add(&cloud->alive->shapes, 1);
+    return PATINA_OK;
+}
+
+int patina_cloud_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress)
+{
+    const patina_analysis_desc automatic = { .struct_size = sizeof automatic };
+    struct pt_analysis analysis;
+    desc = desc ? desc : &automatic;
+    int error = pt_analysis_check(cloud, desc);
+    if (!error)
+        error = pt_analysis_compute(cloud, desc, progress, &analysis);
+    if (!error) {
+        error = pt_analysis_apply(cloud, &analysis);
+        pt_analysis_free(&analysis);
+        return error;
+    }
+    return cloud ? pt_fail_again(&cloud->handle, error) : error;
+}

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The walk over all points that gives each its surface and shape words. Computing leaves the cloud as it is, so that it may
+// be drawn meanwhile; applying swaps arrays.
+#ifndef PT_ANALYSIS_H
+#define PT_ANALYSIS_H
+
+#include "neighbourhood.h"
+
+struct pt_analysis {
+    uint32_t *surface, *shapes; // slots
+    struct pt_chunk *chunks;
+    uint64_t slots;
+    double spacing_base;
+    uint64_t estimated, kinds[6], seen_through;
+    int oriented;
+};
+
+int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *desc);
+// 0 or an error with its message at the thread. Arrays of the descriptor are read.
+int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
+                        struct pt_analysis *out);
+int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis); // takes its arrays
+void pt_analysis_free(struct pt_analysis *analysis);
+
+// Shape words. base: the cloud's spacing_base.
+uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base);
+// Half axes, sigma and certainty of a word; out->axis where normal_bits are a normal.
+void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct pt_neighbourhood *out);
+
+// What else is known of the point in a place of the tree may shrink its footprint.
+typedef void pt_limit(void *context, uint32_t place, const struct pt_sample *sample, struct pt_neighbourhood *hood);
+
+// The leaf's lanes described: neighbours, plane, kind. found is room to work in.
+void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k,
+                      struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context);
+
+#endif

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a point's neighbours say about it (SPEC 11): a plane, its kind, its footprint. No cloud here: offsets in, numbers out.
+#ifndef PT_NEIGHBOURHOOD_H
+#define PT_NEIGHBOURHOOD_H
+
+#include "neighbours.h"
+
+struct pt_sample { // offsets from the point to its neighbours, nearest first
+    uint32_t count;
+    double offset[PT_NEIGHBOURS_MOST][3], square[PT_NEIGHBOURS_MOST];
+};
+
+struct pt_plane { // of the point and those of its neighbours that `inside` marks, about their mean
+    uint64_t inside;
+    uint32_t count;    // of them, the point included
+    double mean[3];    // relative to the point
+    double value[3];   // variances along the axes, least first
+    double axis[3][3]; // orthonormal; axis[0] is the normal
+};
+
+struct pt_neighbourhood {
+    uint32_t kind; // PT_KIND_*
+    int has_normal;
+    double normal[3], axis[3]; // axis: of the greater half axis, on the plane
+    double major, minor;       // half axes of the footprint; 0: none
+    double spacing, sigma;     // 0: unknown
+    double certainty;          // 0..1
+    double uneven;             // spacing along the greater axis in those across, as measured; 1: not told
+};
+
+// The plane through the marked neighbours and the point.
+void pt_plane_fit(const struct pt_sample *sample, uint64_t inside, struct pt_plane *plane);
+// Does this plane say all, or would more neighbours say more? Of a neighbourhood likewise.
+int pt_plane_is_doubtful(const struct pt_plane *plane);
+int pt_neighbourhood_is_doubtful(const struct pt_neighbourhood *hood);
+// The better of two planes, through few and through more neighbours.
+int pt_plane_prefers_wide(const struct pt_plane *narrow, const struct pt_plane *wide);
+// A plane through the point that more of its neighbours lie on than on `plane`: on one side of a crease, of a thin wall.
+// 0 where there is none.
+int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane *plane, double within, struct pt_plane *out);
+// RMS distance of the marked neighbours from the plane, or from the quadric where that explains more.
+double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane);
+
+// From a sample of every `thinning`-th point, where the point's nearest make it a volume: noise that is wider than they reach
+// apart is flat from farther off. 1: out is a surface now.
+int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_plane *plane, double thinning,
+                               struct pt_neighbourhood *out);
+
+void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *plane, struct pt_neighbourhood *out);
+
+#endif

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Shape words (kernel_args.h).
+#include "analysis.h"
+#include "kernel_args.h"
+
+#include <math.h>
+
+#define PI 3.14159265358979323846
+
+static void frame_of(const double n[3], double t1[3], double t2[3])
+{
+    const double s = n[2] >= (double)PT_SHAPE_UP ? 1.0 : -1.0, q = -1.0 / (s + n[2]), b = n[0] * n[1] * q;
+    t1[0] = 1.0 + s * n[0] * n[0] * q;
+    t1[1] = s * b;
+    t1[2] = -s * n[0];
+    t2[0] = b;
+    t2[1] = s + n[1] * n[1] * q;
+    t2[2] = -n[1];
+}
+
+// The nearest of the classes; 0: none.
+static uint32_t class_of(double length, double base)
+{
+    if (!(length > 0.0) || !(base > 0.0) || !isfinite(length / base))
+        return 0;
+    const double steps = floor(4.0 * log2(length / base) + 0.5);
+    return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
+}
+
+uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base)
+{
+    uint32_t word = class_of(hood->major, base) | class_of(hood->sigma, base / 16.0) << PT_SHAPE_SIGMA_SHIFT;
+    word |= hood->kind << PT_SHAPE_KIND_SHIFT;
+    word |= (uint32_t)(15.0 * fmin(fmax(hood->certainty, 0.0), 1.0) + 0.5) << PT_SHAPE_CERTAINTY_SHIFT;
+    if (!(hood->major > 0.0) || !(hood->minor > 0.0))
+        return word;
+    const double steps = 4.0 * log2(hood->major / hood->minor);
+    word |= (steps > 15.0 ? 15u : (uint32_t)(steps + 0.5)) << PT_SHAPE_RATIO_SHIFT;
+    if (normal_bits == PT_NORMAL_NONE)
+        return word;
+    double n[3], t1[3], t2[3], x = 0.0, y = 0.0;
+    pt_decode_normal(normal_bits, n);
+    frame_of(n, t1, t2);
+    for (int k = 0; k < 3; k++) {
+        x += hood->axis[k] * t1[k];
+        y += hood->axis[k] * t2[k];
+    }
+    if (x == 0.0 && y == 0.0)
+        return word;
+    const double turn = floor(atan2(y, x) * 64.0 / PI + 0.5);
+    return word | ((uint32_t)(int32_t)turn & 63u) << PT_SHAPE_ANGLE_SHIFT; // an axis is the same half a turn on
+}
+
+void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct pt_neighbourhood *out)
+{
+    *out = (struct pt_neighbourhood){ .kind = shape >> PT_SHAPE_KIND_SHIFT & 7u };
+    out->major = base * pt_spacing_of_class(shape & 63u);
+    out->minor = out->major * exp2(-(double)(shape >> PT_SHAPE_RATIO_SHIFT & 15u) / 4.0);
+    out->sigma = base / 16.0 * pt_spacing_of_class(shape >> PT_SHAPE_SIGMA_SHIFT & 63u);
+    out->certainty = (shape >> PT_SHAPE_CERTAINTY_SHIFT & 15u) / 15.0;
+    if (normal_bits == PT_NORMAL_NONE)
+        return;
+    double t1[3], t2[3];
+    const double angle = (shape >> PT_SHAPE_ANGLE_SHIFT & 63u) * PI / 64.0;
+    out->has_normal = 1;
+    pt_decode_normal(normal_bits, out->normal);
+    frame_of(out->normal, t1, t2);
+    for (int k = 0; k < 3; k++)
+        out->axis[k] = cos(angle) * t1[k] + sin(angle) * t2[k];
+}

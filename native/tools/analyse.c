@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// patina analyse FILE -o OUT.ply: what every point knows, as columns of a binary PLY.
+#include "tool.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct columns {
+    uint64_t count;
+    float *position, *normal, *spacing, *half_axes, *sigma, *certainty;
+    uint8_t *kind, *seen_through;
+};
+
+enum { ROW = 24 + 12 + 4 + 8 + 4 + 4 + 2, ROWS = 4096 }; // with positions in float64
+
+static int allocate(struct columns *c, uint64_t count)
+{
+    c->count = count;
+    float **floats[] = {&c->position, &c->normal, &c->half_axes, &c->spacing, &c->sigma, &c->certainty};
+    static const size_t widths[] = {3, 3, 2, 1, 1, 1};
+    for (int i = 0; i < 6; i++)
+        if (!(*floats[i] = malloc(count * widths[i] * sizeof(float) + 1)))
+            return PATINA_ERROR_MEMORY;
+    c->kind = malloc(count + 1);
+    c->seen_through = malloc(count + 1);
+    return c->kind && c->seen_through ? PATINA_OK : PATINA_ERROR_MEMORY;
+}
+
+static void release(struct columns *c)
+{
+    free(c->position);
+    free(c->normal);
+    free(c->half_axes);
+    free(c->spacing);
+    free(c->sigma);
+    free(c->certainty);
+    free(c->kind);
+    free(c->seen_through);
+}
+
+static char *put(char *at, const void *bytes, size_t size)
+{
+    memcpy(at, bytes, size);
+    return at + size;
+}
+
+static int write_rows(FILE *file, const struct columns *c, const double origin[3], int wide)
+{
+    char *block = malloc((size_t)ROW * ROWS);
+    int good = block != NULL;
+    for (uint64_t first = 0; first < c->count && good; first += ROWS) {
+        char *at = block;
+        for (uint64_t i = first; i < c->count && i < first + ROWS; i++) {
+            for (int k = 0; k < 3; k++) {
+                const double place = origin[k] + (double)c->position[3 * i + (uint64_t)k];
+                at = wide ? put(at, &place, 8) : put(at, &c->position[3 * i + (uint64_t)k], 4);
+            }
+            at = put(at, &c->normal[3 * i], 12);
+            at = put(at, &c->spacing[i], 4);
+            at = put(at, &c->half_axes[2 * i], 8);
+            at = put(at, &c->sigma[i], 4);
+            at = put(at, &c->certainty[i], 4);
+            at = put(at, &c->kind[i], 1);
+            at = put(at, &c->seen_through[i], 1);
+        }
+        good = fwrite(block, (size_t)(at - block), 1, file) == 1;
+    }
+    free(block);
+    return good;
+}
+
+// Beside the target first, then in its place: a file that is there is lost only to a whole one.
+static int write_ply(const char *path, const struct columns *c, const double origin[3])
+{
+    const int wide = origin[0] != 0 || origin[1] != 0 || origin[2] != 0;
+    const char *type = wide ? "double" : "float";
+    char *part = malloc(strlen(path) + sizeof ".part");
+    if (!part)
+        return -1;
+    sprintf(part, "%s.part", path);
+    FILE *file = fopen(part, "wb");
+    int good = file != NULL;
+    if (good) {
+        fprintf(file,
+                "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
+                "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
+                "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nproperty "
+                "uchar seen_through\nend_header\n",
+                __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
+                type, type);
+        good = write_rows(file, c, origin, wide) && !ferror(file);
+        good = !fclose(file) && good && !rename(part, path);
+        if (!good)
+            remove(part);
+    }
+    free(part);
+    return good ? 0 : -1;
+}
+
+static int analyse(const char *in, const char *out, uint32_t neighbours, patina_progress *progress, struct columns *columns)
+{
+    patina_file *file = NULL;
+    patina_cloud *cloud = NULL;
+    patina_file_info info = {.struct_size = sizeof info};
+    patina_cloud_info built = {.struct_size = sizeof built};
+    patina_analysis_desc desc = {.struct_size = sizeof desc, .neighbours = neighbours, .keep_normals = 1};
+    struct tool_stations stations = {0};
+    int code = patina_file_open(in, progress, &file);
+    if (!code)
+        code = patina_file_get_info(file, &info);
+    if (!code)
+        code = allocate(columns, info.count);
+    if (!code && info.count)
+        code = patina_file_read_positions(file, columns->position, info.count * 3 * sizeof(float));
+    if (!code)
+        code = patina_file_cloud(file, 0, progress, &cloud);
+    if (!code)
+        code = tool_take_stations(file, &stations);
+    tool_describe_stations(&stations, &desc);
+    desc.free_space = desc.station_count > 1; // one alone sees through nothing
+    if (!code)
+        code = patina_cloud_analyse(cloud, &desc, progress);
+    tool_free_stations(&stations);
+    if (!code)
+        code = patina_cloud_get_info(cloud, &built);
+    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .normal = columns->normal, .spacing = columns->spacing,
+                                          .half_axes = columns->half_axes, .sigma = columns->sigma, .kind = columns->kind,
+                                          .certainty = columns->certainty, .seen_through = columns->seen_through};
+    if (!code)
+        code = patina_cloud_neighbourhoods(cloud, &wanted, NULL);
+    int result = code ? tool_failed(in, NULL, code) : TOOL_OK;
+    tool_cancellable(NULL, NULL);
+    if (!code && write_ply(out, columns, info.origin)) {
+        tool_say("%s: cannot be written: %s", out, strerror(errno));
+        result = TOOL_FAILED;
+    } else if (!code) {
+        for (int i = 0; i < 6; i++)
+            printf("%-12s %llu\n", tool_kinds[i], (unsigned long long)built.kinds[i]);
+        if (desc.free_space)
+            printf("seen_through %llu\n", (unsigned long long)built.seen_through);
+    }
+    patina_cloud_destroy(cloud);
+    patina_file_destroy(file);
+    return result;
+}
+
+int tool_analyse(int count, char **arguments)
+{
+    const char *in = NULL, *out = NULL;
+    double neighbours = 0;
+    for (int i = 0; i < count; i++) {
+        const char *value = i + 1 < count ? arguments[i + 1] : NULL;
+        if (arguments[i][0] != '-') {
+            if (in)
+                return tool_misuse("analyse: one file, please");
+            in = arguments[i];
+        } else if (!strcmp(arguments[i], "-o") && value) {
+            out = value;
+            i++;
+        } else if (!strcmp(arguments[i], "--neighbours") && value) {
+            if (parse_numbers(value, &neighbours, 1, 1) < 0 || neighbours < 3 || neighbours > 64)
+                return tool_misuse("'%s' is no value for option '--neighbours': 3 to 64", value);
+            i++;
+        } else {
+            return tool_misuse("analyse: '%s' is no option, or lacks its value", arguments[i]);
+        }
+    }
+    if (!in || !out || !*out)
+        return tool_misuse("analyse: a file to read, and -o OUT.ply, please");
+    patina_progress *progress = NULL;
+    struct columns columns = {0};
+    const int code = patina_progress_create(&progress);
+    tool_cancellable(progress, NULL);
+    const int result = code ? tool_failed(in, NULL, code) : analyse(in, out, (uint32_t)neighbours, progress, &columns);
+    tool_cancellable(NULL, NULL);
+    tool_drain_log(1);
+    patina_progress_destroy(progress);
+    release(&columns);
+    return result;
+}
