@@ -36,7 +36,7 @@ from truth.scans.solids import linear  # noqa: E402
 PYTHON = "/usr/bin/python3"  # Debian's, for its VTK
 OURS = {"default": ("on", []), "stations": ("stations", []), "filling": ("off", []), "discs": ("off", ["surface=1"])}
 CYCLES = ("cycles 0.01", "cycles 0.02", "cycles 0.04")
-VTK = ("vtk 1", "vtk 2", "vtk 3", "vtk 4", "vtk 5", "vtk 7", "vtk 3 EDL", "vtk 5 EDL")
+VTK = ("vtk 1", "vtk 3", "vtk 5", "vtk 7", "vtk 5 EDL")
 NEAR, FAR = 0.05, 500.0
 
 

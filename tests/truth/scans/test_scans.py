@@ -169,6 +169,26 @@ class Seen(unittest.TestCase):
         self.assertFalse(shown.scanned[on_board & (cone < blind - 0.05)].any())
         self.assertTrue(shown.scanned[on_board & (cone > blind + 0.01)].all())
 
+    def test_what_was_scanned_from_the_air(self) -> None:
+        """Two strips look 20 degrees to either side: beneath a board all but its borders stays dark; so do borders of the area."""
+        survey = Survey("airborne", (), 0.05, 0.0, 0.0, 0.0, 0.0, area=(-4.0, -4.0, 4.0, 4.0))
+        scene = replace(self.SCENE, survey=survey, views=(View((0.0, -5.0, 0.4), (0.0, 0.0, 0.1)),))
+        world = scene.make().world()
+        seen = exact.camera(scene.views[0], width=120, height=80)
+        shown = exact.picture(world, scanner.scan(world, survey), scene, seen, width=120, height=80)
+        y, x = np.mgrid[0:80, 0:120]
+        origin, way = seen.rays(x.ravel() + 0.5, y.ravel() + 0.5, 120, 80)
+        place = (origin + shown.middle.ravel()[:, None] * way).reshape(80, 120, 3)
+        floor_ = shown.surface == 0
+        reach = np.max(np.abs(place[..., :2]), axis=2)
+        lit = 1.0 - 0.5 * np.tan(np.radians(20.0))
+        self.assertTrue(shown.scanned[floor_ & (reach > 1.1) & (reach < 3.9)].all())
+        dark = floor_ & (np.abs(place[..., 0]) < lit - 0.2) & (np.abs(place[..., 1]) < 0.7)
+        self.assertGreater(dark.sum(), 20)
+        self.assertFalse(shown.scanned[dark].any())
+        self.assertFalse(shown.scanned[floor_ & (reach > 4.2)].any())
+        self.assertLess(np.abs(shown.ceiling[shown.scanned].astype(int) - 128).max(), 10)
+
     def test_metrics_of_pictures_by_hand(self) -> None:
         shape = 100, 200
         depth = np.full(shape, 4.0, np.float32)
