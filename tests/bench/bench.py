@@ -15,10 +15,10 @@ of them, in the same order; "absent" what could not be measured, and why.
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
-scans against exact views; half an hour more where these are not kept yet), session (ten minutes of work in Blender), analysis (what
-every point knows, 10 million). With --quick they take a million points, and one minute.
-Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor) and
-scaling (threads up to all cores).
+scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
+(ten minutes of work in Blender), analysis (what every point knows, 10 million). With --quick they take a million points, and one
+minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
+and scaling (threads up to all cores).
 """
 
 from __future__ import annotations
@@ -56,13 +56,14 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-           "leaves", "scans", "session", "analysis", "graphics", "scaling")
+          "leaves", "scans", "independent", "session", "analysis", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
             density: float = 0, quality: str = "refined", threads: int = 0, frames: int = 24, pattern: str = "random",
             noise: float = 0.0, **more: Any) -> dict[str, Any]:
     label = surface + (f" {pattern}" if pattern != "random" else "") + (f" noise {noise:g}" if noise else "")
+    label += f" strays {more['strays']:g}" if more.get("strays") else ""
     return {"group": group, "scene": label, "surface": surface, "mode": "surface", "device": device, "width": size,
             "height": size, "points": points or stage.density_count(surface, density, size), "density": density,
             "quality": quality, "threads": threads, "frames": frames, "pattern": pattern, "noise": noise, **more}
@@ -124,10 +125,27 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
     else:
         found.append(case_of("steady", "sphere", main, 256, density=1.0, frames=frames, steady=1))
     found += papers.cases(main, quick)
+    if full or options.readme or "independent" in options.only:
+        found += independent(main, quick)
     for group, make in (("graphics", on_graphics), ("scaling", over_threads)):
         if group in options.only:
             found += make(quick)
     return [one for one in found if not options.only or one["group"] in options.only]
+
+
+def independent(device: str, quick: bool) -> list[dict[str, Any]]:
+    """The shapes that no rule was made on: by density, analysed, as filling and as discs; then noise, strays and scan rows of
+    1 : 10."""
+    cases = []
+    for quality in ("analysed", "refined", "splats"):
+        for surface in list(stage.scenes.SHAPES)[: 2 if quick else None]:
+            cases += [case_of("independent", surface, device, 512, density=density, quality=quality, frames=5)
+                      for density in ([1.0] if quick else [0.2, 1.0, 4.0] + [16.0] * (surface == "knot"))]
+        for surface in ("knot",) if quick else ("knot", "sphere"):
+            for density in (1.0, 4.0):
+                cases += [case_of("independent", surface, device, 512, density=density, quality=quality, frames=5, **more)
+                          for more in ({"noise": 1.0}, {"strays": 0.001}, {"pattern": "rows"})]
+    return cases
 
 
 def on_graphics(quick: bool) -> list[dict[str, Any]]:

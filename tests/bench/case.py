@@ -26,7 +26,8 @@ import stage as stages  # noqa: E402
 WARM_UP = 4
 PATIENCE = 6.0  # seconds of frames, after which a slow case stops at five
 QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill": 1, "fill_iterations": 1},
-             "unfilled": {"quality": 1, "fill": 2}, "splats": {"surface": 1}}
+             "unfilled": {"quality": 1, "fill": 2}, "splats": {"surface": 1},
+             "analysed": {}}  # the default once the library knows what every point is
 LAYERS = 8  # rays through the nested tori meet up to eight surfaces
 COLOR_AND_DEPTH, ALL_PASSES = 3, 0  # patina_settings.passes
 STEADY_FRAMES, STEADY_STEP = 8, 0.05  # pictures and degrees between them: a third of a pixel at 1024
@@ -165,6 +166,10 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
         start = time.perf_counter()
         cloud = native.Cloud(shown.position, shown.normal, shown.color, opacities=shown.opacity)
         upload_ms.append(1e3 * (time.perf_counter() - start))
+    start = time.perf_counter()
+    if case["quality"] == "analysed":
+        cloud.analyse()
+    analysis_ms = 1e3 * (time.perf_counter() - start)
     spacing, count, scene_known = shown.spacing, len(shown.position), shown.scene is not None
     shown = stages.Stage(**{**vars(shown), "position": None, "normal": None, "color": None,
                             "opacity": None})  # the cloud has its own
@@ -194,7 +199,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
             error |= steadiness(frame, lambda turn: make(turn, ALL_PASSES), shown, case["width"], case["height"])
     return {**case, "points": count, **timing, "peak_mb": peak, "error": error, "device_name": device.name,
             "device_description": device.description, "read_ms": read_ms, "upload_ms": median(upload_ms),
-            "plane_bytes": stats["plane_bytes"], "cloud_bytes": cloud.bytes,
+            "analysis_ms": analysis_ms, "plane_bytes": stats["plane_bytes"], "cloud_bytes": cloud.bytes,
             "points_scattered": stats["points_scattered"]}
 
 

@@ -23,6 +23,7 @@ MEANING = {  # name -> unit and what it says; the order of tables
     "outer_growth": "of them, a pixel or more off the outline",
     "alpha_rms": "alpha against exact coverage, pixels that an outline crosses",
     "depth_rms_spacings": "depth, root mean square, in spacings of the points",
+    "depth_bias_spacings": "depth, mean, spacings: less than 0 is in front",
     "depth_p999_spacings": "depth, 99.9th percentile, spacings",
     "normal_mean_degrees": "normals, mean angle",
     "normal_p99_degrees": "normals, 99th percentile",
@@ -85,8 +86,9 @@ def errors(exact: Picture, shown: Shown, spacing: float) -> dict[str, float]:
     result["alpha_rms"] = _rms((alpha - exact_alpha)[(near > 0) & (near < 9)])
     if inner.any():
         if shown.depth is not None:
-            off = np.abs(shown.depth[inner].astype(np.float64) - exact.depth[inner]) / spacing
-            result |= {"depth_rms_spacings": _rms(off), "depth_p999_spacings": float(np.quantile(off, 0.999))}
+            off = (shown.depth[inner].astype(np.float64) - exact.depth[inner]) / spacing
+            result |= {"depth_rms_spacings": _rms(off), "depth_bias_spacings": float(off.mean()),
+                       "depth_p999_spacings": float(np.quantile(np.abs(off), 0.999))}
         if shown.normal is not None:
             dots = np.sum(shown.normal[inner].astype(np.float64) * exact.normal[inner], axis=1)
             view = np.degrees(np.arccos(np.clip(dots, -1.0, 1.0)))

@@ -13,7 +13,8 @@ from report import Row, count, joined, name_of, table
 
 NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2",
          "cpu-scalar": "processor, plain", "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
-QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs"}
+QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs",
+             "analysed": "analysed"}
 
 
 def _line(row: Row) -> list[str]:
@@ -184,6 +185,16 @@ def memory(result: dict[str, Any]) -> str:
             f"{row['upload_ms'] / 1e3:.2f} s.")
 
 
+def independent(result: dict[str, Any]) -> str:
+    """Shapes that no rule was made on, by filling and by discs."""
+    body = [[row["scene"], f"{row['density']:g}", QUALITIES.get(row["quality"], row["quality"]), f"{row['ms_median']:.1f}",
+             f"{row['error']['color_psnr']:.1f}", f"{100.0 * row['error']['inner_holes']:.2f}",
+             f"{100.0 * row['error']['outer_growth']:.2f}", f"{row['error']['depth_rms_spacings']:.2f}",
+             f"{row['error']['depth_bias_spacings']:+.2f}"] for row in joined(result, "independent")]
+    return table(["shape", "points a pixel", "quality", "ms", "PSNR, dB", "open inside, %", "grown off the outline, %", "depth rms, spacings",
+                  "depth bias, spacings"], body)
+
+
 def update(result: dict[str, Any], root: Path) -> str:
     """Writes what the run holds and the README has marks for; returns what, in a sentence."""
     against = [row for row in joined(result, "headline", "peers") if row["points"] == 1_000_000 and row["error"]]
@@ -196,7 +207,8 @@ def update(result: dict[str, Any], root: Path) -> str:
             parts["others"] = others(result)
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
             parts["effects"] = effects(result)
-    for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("cues", cues), ("styles", styles)):
+    for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("cues", cues), ("styles", styles),
+                       ("independent", independent)):
         if joined(result, name):
             parts[name] = part(result)
     if result.get("scans"):

@@ -109,6 +109,7 @@ def markdown(result: dict[str, Any]) -> str:
                          ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
                          ("shadows", "A ball's shadow on a plane"), ("patterns", "Patterns and noise"),
                          ("steady", "Steadiness under a slow turn"),
+                         ("independent", "Shapes that no rule was made on"),
                          ("graphics", "On a graphics processor, and on the processor"), ("scaling", "Over threads")):
         rows = joined(result, group)
         if rows:

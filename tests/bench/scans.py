@@ -4,8 +4,9 @@
     build/out/venv/bin/python tests/bench/scans.py [--scenes tuning|held|all|NAMES] [--cameras 0,1,…] [--modes MODE,…]
         [--json FILE] [--quick]
 
-MODE: default, stations (normals face the scanners), filling, discs (ours); vtk 1, vtk 3 EDL, … (VTK); the default is all but
-stations."""
+MODE: default, stations (normals face the scanners), filling, discs (ours); vtk 1, vtk 3 EDL, … (points of so many
+pixels); cycles 0.02, eevee 0.02, … (spheres of a radius in metres; EEVEE takes minutes a picture on llvmpipe). The default
+is all but stations and eevee."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ from truth.scans.solids import linear  # noqa: E402
 
 PYTHON = "/usr/bin/python3"  # Debian's, for its VTK
 OURS = {"default": ("on", []), "stations": ("stations", []), "filling": ("off", []), "discs": ("off", ["surface=1"])}
-VTK = ("vtk 1", "vtk 2", "vtk 3", "vtk 4", "vtk 5", "vtk 7", "vtk 3 EDL", "vtk 5 EDL")
+CYCLES = ("cycles 0.01", "cycles 0.02", "cycles 0.04")
+VTK = ("vtk 1", "vtk 3", "vtk 5", "vtk 7", "vtk 5 EDL")
 NEAR, FAR = 0.05, 500.0
 
 
@@ -47,16 +49,27 @@ def _screen() -> list[str]:
 def vtk_version() -> str:
     """Of Debian's Python, or "" where there is none."""
     try:
-        done = subprocess.run([PYTHON, "-c", "import vtk; print(vtk.vtkVersion().GetVTKVersion())"], capture_output=True, text=True)
+        done = subprocess.run([PYTHON, "-c", "import vtk; print(vtk.vtkVersion().GetVTKVersion())"],
+                              capture_output=True, text=True)
     except OSError:
         return ""
     return done.stdout.strip() if done.returncode == 0 else ""
 
 
-def vtk_rows(scenes: list[Scene], cameras: list[int], modes: list[str]) -> Iterator[dict[str, Any]]:
-    """Rows as run.measure gives them, with "mode"."""
-    sizes = [mode.removeprefix("vtk ") for mode in modes]
-    for scene in scenes:
+def _command(program: str) -> list[str]:
+    """What draws with VTK's points, Cycles' or EEVEE's spheres: [] where it is not there."""
+    if program == "vtk":
+        return [*_screen(), PYTHON, str(HERE / "peer_scans.py")] if vtk_version() else []
+    python = ROOT / "build/out/bpy45/bin/python"
+    if not python.is_file():
+        return []
+    return [*(_screen() if program == "eevee" else []), str(python), str(HERE / "peer_scans_blender.py")]
+
+
+def peer_rows(scenes: list[Scene], cameras: list[int], program: str, sizes: list[str]) -> Iterator[dict[str, Any]]:
+    """Rows as run.measure gives them, with "mode". sizes: pixels of VTK's points, metres of Blender's radii."""
+    command = _command(program)
+    for scene in scenes if command else ():
         stage = Stage(scene)
         views = [(index, 0.0) for index in cameras] + [(index, STEP) for index in cameras if scene.views[index].motion]
         with tempfile.TemporaryDirectory() as folder:
@@ -64,19 +77,22 @@ def vtk_rows(scenes: list[Scene], cameras: list[int], modes: list[str]) -> Itera
             np.savez(source, position=stage.scan.position.astype(np.float32), color=stage.scan.color,
                      matrix=np.stack([camera(scene.views[index], step).matrix for index, step in views]), fov=FOV, width=WIDTH,
                      height=HEIGHT, near=NEAR, far=FAR, sky=np.array(SKY))
-            done = subprocess.run([*_screen(), PYTHON, str(HERE / "peer_scans.py"), str(source), folder, *sizes],
+            done = subprocess.run([*command, str(source), folder, *([] if program == "vtk" else [program]), *sizes],
                                   capture_output=True, text=True)
-            if done.returncode:
-                raise OSError(f"VTK: {done.stderr.strip().splitlines()[-1:]}")
-            times = json.loads(done.stdout.splitlines()[-1])
+            said = [line for line in done.stdout.splitlines() if line.startswith("{")]
+            if not said:
+                raise OSError(f"{program}: {(done.stderr + done.stdout).strip().splitlines()[-1:]}")
+            times = json.loads(said[-1])
             for size in sizes:
                 pictures = []
                 for number in range(len(views)):
                     with np.load(Path(folder) / f"{size.replace(' ', '_')}-{number}.npz") as arrays:
-                        pictures.append((linear(arrays["rgb"] / 255.0).astype(np.float32), arrays["depth"]))
+                        rgb = arrays["rgb"]
+                        rgb = linear(rgb / 255.0).astype(np.float32) if rgb.dtype == np.uint8 else rgb
+                        pictures.append((rgb, arrays["depth"]))
                 for number, index in enumerate(cameras):
                     row = {"scene": scene.name, "held_out": scene.held_out, "camera": index, "points": len(stage.scan),
-                           "mode": f"vtk {size}", **metrics.measure(stage.view(index), *pictures[number]),
+                           "mode": f"{program} {size}", **metrics.measure(stage.view(index), *pictures[number]),
                            "ms": times[size][number]}
                     if scene.views[index].motion:
                         moved = pictures[views.index((index, STEP))][0]
@@ -106,13 +122,19 @@ def markdown(rows: list[dict[str, Any]]) -> str:
         for mode in dict.fromkeys(row["mode"] for row in rows):
             some = [row for row in rows if row["mode"] == mode]
             if any(row["held_out"] == held_out for row in some):
-                body.append([f"{title}: {NAMES.get(mode, mode.replace('vtk', 'VTK, pixels:'))}", *run.cells(means(some, held_out))])
+                body.append([f"{title}: {name_of(mode)}", *run.cells(means(some, held_out))])
     return table(head, body)
 
 
 NAMES = {"default": "Patina", "stations": "Patina, scanners known", "filling": "Patina, filling alone",
          "discs": "Patina, discs of 1.75 spacings"}
-SHOWN = ("default", "filling", "discs", *VTK)  # of the bench
+SHOWN = ("default", "filling", "discs", *VTK, *CYCLES)  # of the bench
+
+
+def name_of(mode: str) -> str:
+    program, _, size = mode.partition(" ")
+    told = {"vtk": f"VTK's points, {size} px", "cycles": f"Cycles' spheres, {size} m", "eevee": f"EEVEE's spheres, {size} m"}
+    return NAMES.get(mode) or told[program].replace(" EDL px", " px + EDL")
 
 
 def all_rows(scenes: list[Scene], cameras: list[int], modes: list[str]) -> list[dict[str, Any]]:
@@ -120,9 +142,9 @@ def all_rows(scenes: list[Scene], cameras: list[int], modes: list[str]) -> list[
     for mode in modes:
         if mode in OURS:
             rows += our_rows(scenes, cameras, mode)
-    wanted = [mode for mode in modes if mode.startswith("vtk")]
-    if wanted and vtk_version():
-        rows += vtk_rows(scenes, cameras, wanted)
+    for program in ("vtk", "cycles", "eevee"):
+        sizes = [mode.removeprefix(program + " ") for mode in modes if mode.startswith(program)]
+        rows += peer_rows(scenes, cameras, program, sizes) if sizes else []
     return rows
 
 

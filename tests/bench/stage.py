@@ -104,6 +104,17 @@ def points_of(name: str, scene: Scene, count: int, pattern: str, noise: float) -
     return Points(**{**arrays, "spacing": float(arrays["spacing"])})
 
 
+def with_strays(points: Points, share: float) -> Points:
+    """And so many more, uniform in a box of 1.3 times the points' own, with the normals and colours of others."""
+    random = np.random.default_rng(5)
+    count = int(round(share * len(points)))
+    low, high = points.position.min(axis=0), points.position.max(axis=0)
+    place = 0.5 * (low + high) + 0.65 * (high - low) * random.uniform(-1.0, 1.0, (count, 3))
+    like = random.integers(0, len(points), count)
+    more = {name: np.concatenate([getattr(points, name), getattr(points, name)[like]]) for name in ("normal", "color", "surface")}
+    return replace(points, position=np.concatenate([points.position, place.astype(np.float32)]), **more)
+
+
 def density_count(name: str, density: float, height: int) -> int:
     """Points of a scene that make so many a pixel where it faces the camera."""
     area = kept(f"{name}-area", lambda: {"area": np.array(scenes.build(name).area)})["area"]
@@ -116,6 +127,7 @@ def analytic(case: dict[str, Any]) -> Stage:
     scene = scenes.build(name)
     points = points_of(name, scene, case["points"], case.get("pattern", "random"), case.get("noise", 0.0))
     opacity = scene.opacities.astype(np.float32)[points.surface][:, None] if clear else None
+    points = with_strays(points, case.get("strays", 0.0))
     if not clear:
         scene = Scene(tuple(replace(one, opacity=1.0) for one in scene.surfaces), scene.lights)
     return Stage(points.position, None if case.get("bare") else points.normal, points.color, points.spacing,

@@ -10,7 +10,8 @@ import numpy as np
 
 from .scene import Scene, srgb_bytes
 
-PATTERNS = ("random", "blue", "scan")
+ROWS = 10.0  # how many times as far apart as their samples the lines of the pattern "rows" lie
+PATTERNS = ("random", "blue", "scan", "rows")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ def sample(scene: Scene, count: int, pattern: str = "random", noise: float = 0.0
         position, normal, surface = _blue(scene, count, random)
     elif pattern == "scan":
         position, normal, surface = _scan(scene, count)
+    elif pattern == "rows":
+        position, normal, surface = _scan(scene, count, ROWS)
     else:
         raise ValueError(f"no pattern '{pattern}': there are {', '.join(PATTERNS)}")
     color = np.rint(srgb_bytes(position)).astype(np.uint8)
@@ -94,11 +97,13 @@ def _blue(scene: Scene, count: int, random: np.random.Generator) -> tuple[np.nda
     return position[chosen], normal[chosen], surface[chosen]
 
 
-def _scan(scene: Scene, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Seven registered range scans in parallel light, lines four times as far apart as the samples in them; a sample
-    counts where it meets the surface at less than 75 degrees. Uneven on purpose: scans overlap, slopes are sparse."""
+def _scan(scene: Scene, count: int, ratio: float = 4.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Seven registered range scans in parallel light, lines `ratio` times as far apart as the samples in them; a sample
+    counts where it meets the surface at less than 75 degrees. Uneven on purpose: scans overlap, slopes are sparse. With
+    rows of 1 : 10 two scans, which do not overlap much."""
     ways = np.array([[0.31, -0.76, 0.57], [-0.82, -0.39, 0.42], [0.77, 0.48, 0.43], [-0.36, 0.80, 0.48],
                      [0.05, 0.11, 0.99], [0.54, -0.37, -0.76], [-0.61, 0.33, -0.72]])
+    ways = ways[: 2 if ratio == ROWS else None]
     reach = max(float(np.linalg.norm(surface.place[:3, 3])) + surface.radius for surface in scene.surfaces)
 
     def scans(step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -106,7 +111,7 @@ def _scan(scene: Scene, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         for way in ways / np.linalg.norm(ways, axis=1)[:, None]:
             u = np.cross(way, [0.0, 0.0, 1.0])
             u /= np.linalg.norm(u)
-            along, across = np.arange(-reach, reach, 0.5 * step), np.arange(-reach, reach, 2.0 * step)
+            along, across = np.arange(-reach, reach, step / np.sqrt(ratio)), np.arange(-reach, reach, step * np.sqrt(ratio))
             a, b = np.meshgrid(along, across)
             origin = 2.0 * reach * way + a.reshape(-1, 1) * u + b.reshape(-1, 1) * np.cross(way, u)
             for begin in range(0, len(origin), 1 << 17):

@@ -9,6 +9,7 @@ import numpy as np
 
 from .light import Light
 from .scene import Scene
+from .shapes import SHAPES
 from .surfaces import Box, Gyroid, Rectangle, Saddle, Sphere, Surface, Torus, rotation, translation
 
 SUN = Light(power=np.pi, towards=np.array([0.36, -0.48, 0.8]))  # a white Lambert surface that faces it shows 1
@@ -41,6 +42,7 @@ SURFACES: dict[str, Callable[[], tuple[Surface, ...]]] = {
 
 def build(name: str) -> Scene:
     """A scene by name, under one sun."""
-    if name not in SURFACES:
-        raise ValueError(f"no scene '{name}': there are {', '.join(SURFACES)}")
-    return Scene(SURFACES[name](), (SUN,))
+    made = (SURFACES | SHAPES).get(name)
+    if not made:
+        raise ValueError(f"no scene '{name}': there are {', '.join(SURFACES | SHAPES)}")
+    return Scene(made(), (SUN,))

@@ -12,6 +12,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from truth import Light, Material, Scene, count_for, look, orbit, parallel, sample, scenes, visibility  # noqa: E402
+from truth.shapes import Astroid, Knot  # noqa: E402
 from truth.surfaces import Box, Gyroid, Rectangle, Saddle, Sphere, Torus, rotation, translation  # noqa: E402
 
 
@@ -95,6 +96,65 @@ class Surfaces(unittest.TestCase):
         t = moved.crossings(np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]]))
         np.testing.assert_allclose(t, [[0.9, 1.1]], atol=1e-12)
         np.testing.assert_allclose(moved.normal(np.array([[0.9, 0.0, 0.0]])), [[-1.0, 0.0, 0.0]], atol=1e-12)
+
+
+class Shapes(unittest.TestCase):
+    """Those that rays through triangles find."""
+
+    def test_knot(self) -> None:
+        """A walk along each line in small steps, by the distance to 20,000 places of the curve."""
+        knot, random = Knot(), np.random.default_rng(6)
+        s = np.linspace(0.0, 2.0 * np.pi, 20_001)
+        x, y, z = np.sin(s) + 2 * np.sin(2 * s), np.cos(s) - 2 * np.cos(2 * s), -np.sin(3 * s)
+        from scipy.spatial import cKDTree
+        curve = cKDTree(0.4 * np.column_stack([x, y, z]))
+        direction = random.normal(size=(60, 3))
+        direction /= np.linalg.norm(direction, axis=1)[:, None]
+        origin = 0.6 * random.normal(size=(60, 3)) - 3.0 * direction
+        step = np.linspace(0.0, 6.0, 6001)
+        for o, d, t in zip(origin, direction, knot.crossings(origin, direction)):
+            value = curve.query(o + step[:, None] * d)[0] - 0.19
+            change = step[:-1][value[:-1] * value[1:] < 0.0]
+            t = t[~np.isnan(t)]
+            np.testing.assert_allclose(curve.query(o + t[:, None] * d)[0], 0.19, atol=4e-7)
+            for one in change:
+                self.assertLess(np.abs(t - one).min(), 1.1e-3)
+            self.assertIn(len(t) - len(change), (0, 2))  # a pair may lie within a step
+        position, normal = knot.sample(3000, random)
+        np.testing.assert_allclose(curve.query(position)[0], 0.19, atol=4e-7)
+        np.testing.assert_allclose(curve.query(position + 0.01 * normal)[0], 0.2, atol=4e-7)
+
+    def test_astroid(self) -> None:
+        column, random = Astroid(), np.random.default_rng(7)
+        position, normal = column.sample(20_000, random)
+        within = np.sum(np.abs(position[:, :2] / 1.1) ** (2.0 / 3.0), axis=1)
+        side = np.abs(position[:, 2]) < 0.6 - 1e-9
+        np.testing.assert_allclose(within[side], 1.0, atol=1e-9)
+        self.assertTrue((within[~side] < 1.0).all())
+        area, caps = 12.0 * 1.1 * 0.6, 0.75 * np.pi * 1.1**2
+        self.assertLess(abs(side.mean() - area / (area + caps)), 0.01)
+        np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-12)
+        away = np.sum(np.abs((position + 1e-4 * normal)[side, :2] / 1.1) ** (2.0 / 3.0), axis=1)
+        self.assertTrue((away > 1.0).mean() > 0.99)
+        # from above: where the line's place lies within the curve, it passes both caps, else nothing
+        flat = random.uniform(-1.1, 1.1, (4000, 2))
+        inside = np.sum(np.abs(flat / 1.1) ** (2.0 / 3.0), axis=1) - 1.0
+        t = column.crossings(np.column_stack([flat, np.full(4000, 2.0)]), np.broadcast_to([0.0, 0.0, -1.0], (4000, 3)))
+        clear = np.abs(inside) > 1e-4
+        np.testing.assert_array_equal((~np.isnan(t)).sum(axis=1)[clear], np.where(inside < 0.0, 2, 0)[clear])
+
+    def test_area(self) -> None:
+        for shape in (Knot(), Astroid()):
+            _, area = shape._crofton(100_000, np.random.default_rng(8))
+            self.assertLess(abs(area / shape.area - 1.0), 0.015, type(shape).__name__)
+
+    def test_rows(self) -> None:
+        """Neighbours in a row lie a tenth as far apart as rows do."""
+        from scipy.spatial import cKDTree
+        points = sample(Scene((Rectangle(width=2.0, height=2.0),)), 20_000, "rows")
+        self.assertLess(abs(len(points) / 20_000 - 1.0), 0.1)
+        near = cKDTree(points.position).query(points.position, k=2)[0][:, 1]
+        self.assertLess(np.median(near), 0.5 * points.spacing)
 
 
 class Pictures(unittest.TestCase):

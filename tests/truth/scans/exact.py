@@ -4,8 +4,10 @@ whatever makes them."""
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -144,12 +146,16 @@ def picture(world: World, scan: Scan, scene: Scene, seen: Camera, tree: cKDTree 
 # ---- what is kept ------------------------------------------------------------------------------------------------
 
 
+def meaning(path: Path) -> str:
+    """A source without its comments and layout, which make no difference."""
+    return "".join(re.sub(r"//[^\n]*" if path.suffix != ".py" else r"#[^\n]*", "", path.read_text()).split())
+
+
+@functools.cache
 def _sources() -> str:
     here = Path(__file__).resolve().parent
-    digest = hashlib.sha256()
-    for path in (*SOURCES, *(here / f"{name}.py" for name in ("solids", "places", "scanner", "exact"))):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+    paths = (*SOURCES, *(here / f"{name}.py" for name in ("solids", "places", "scanner", "exact")))
+    return hashlib.sha256("\n".join(meaning(path) for path in paths).encode()).hexdigest()
 
 
 def _kept(kind: type, name: str, key: str, make: Callable[[], object]) -> object:
@@ -159,8 +165,8 @@ def _kept(kind: type, name: str, key: str, make: Callable[[], object]) -> object
             return kind(**{one.name: arrays[one.name] for one in fields(kind)})
     made = make()
     CACHE.mkdir(parents=True, exist_ok=True)
-    for old in CACHE.glob(f"{name}-????????????.npz"):
-        old.unlink(missing_ok=True)
+    for old in CACHE.glob(f"{name}-????????????.npz") if "PATINA_TRUTH_CACHE" not in os.environ else ():
+        old.unlink(missing_ok=True)  # in a folder of one's own
     partial = path.with_suffix(f".{os.getpid()}.npz")
     np.savez(partial, **{one.name: getattr(made, one.name) for one in fields(kind)})
     partial.replace(path)

@@ -341,10 +341,12 @@ def _house(s: Solids, m: dict[str, int], x: float, y: float, turn: float, size: 
     s.box((-w / 2, -d / 2, 0), (w / 2, d / 2, h), m["plaster"])
     s.part()
     e, top = 0.4, h + 0.45 * d
-    s.quads([(-w / 2 - e, -d / 2 - e, h - 0.2), (-w / 2 - e, d / 2 + e, h - 0.2)], [(w / 2 + e, -d / 2 - e, h - 0.2), (w / 2 + e, d / 2 + e, h - 0.2)],
+    s.quads([(-w / 2 - e, -d / 2 - e, h - 0.2), (-w / 2 - e, d / 2 + e, h - 0.2)],
+            [(w / 2 + e, -d / 2 - e, h - 0.2), (w / 2 + e, d / 2 + e, h - 0.2)],
             [(w / 2 + e, 0, top), (w / 2 + e, 0, top)], [(-w / 2 - e, 0, top), (-w / 2 - e, 0, top)], m["roof"])
     s.part()
-    s.triangles([[(-w / 2, -d / 2, h), (-w / 2, d / 2, h), (-w / 2, 0, top - 0.1)], [(w / 2, -d / 2, h), (w / 2, d / 2, h), (w / 2, 0, top - 0.1)]],
+    s.triangles([[(-w / 2, -d / 2, h), (-w / 2, d / 2, h), (-w / 2, 0, top - 0.1)],
+                 [(w / 2, -d / 2, h), (w / 2, d / 2, h), (w / 2, 0, top - 0.1)]],
                 m["plaster"])
     s.part()
     s.box((w / 4, 0.3, h), (w / 4 + 0.6, 0.9, top + 0.8), m["bricks"])
@@ -352,7 +354,8 @@ def _house(s: Solids, m: dict[str, int], x: float, y: float, turn: float, size: 
 
 
 def _hills(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return 1.5 * np.sin(0.06 * x) * np.cos(0.05 * y) + 0.4 * np.sin(0.31 * x + 0.2 * y) + 2.0 * (y > 25) * np.clip((y - 25) / 4, 0, 1)
+    return 1.5 * np.sin(0.06 * x) * np.cos(0.05 * y) + 0.4 * np.sin(
+        0.31 * x + 0.2 * y) + 2.0 * (y > 25) * np.clip((y - 25) / 4, 0, 1)
 
 
 def terrain() -> Solids:
@@ -474,7 +477,8 @@ def court() -> Solids:
     for k in range(6):
         s.part()
         x = -3.0 + 1.6 * k
-        s.quads([(x, 4.78 - 0.12 * k, 2.9)], [(x + 0.7, 4.73 - 0.12 * k, 2.9)], [(x + 0.7, 4.7 - 0.12 * k, 2.1)], [(x, 4.8 - 0.12 * k, 2.1)],
+        s.quads([(x, 4.78 - 0.12 * k, 2.9)], [(x + 0.7, 4.73 - 0.12 * k, 2.9)],
+                [(x + 0.7, 4.7 - 0.12 * k, 2.1)], [(x, 4.8 - 0.12 * k, 2.1)],
                 m[("poster", "white", "red")[k % 3]])
     s.railing((2.0, -8, 0), (2.0, -4, 0), m["iron"])
     s.railing((2.0, -4, 0), (8.0, -4, 0), m["iron"])
@@ -487,8 +491,10 @@ def village() -> Solids:
     m = _materials(s)
     s.part()
     s.ground((-45, 45), (-45, 45), 1.0, m["earth"], lambda x, y: 0.8 * np.sin(0.05 * x + 0.04 * y))
-    for x, y, turn, size in ((-20, -15, 10, (10, 8, 5)), (-5, -18, -5, (9, 7, 4.5)), (12, -14, 15, (12, 8, 6)), (-16, 8, 80, (11, 7, 5)),
-                             (3, 10, 25, (8, 8, 4)), (20, 12, 60, (14, 9, 5.5)), (-30, 25, 0, (10, 7, 4)), (5, 30, 5, (10, 8, 5))):
+    for x, y, turn, size in ((-20, -15, 10, (10, 8, 5)), (-5, -18, -5, (9, 7, 4.5)), (12, -14, 15, (12, 8, 6)),
+                             (-16, 8, 80, (11, 7, 5)),
+                             (3, 10, 25, (8, 8, 4)), (20, 12, 60, (14, 9, 5.5)),
+                             (-30, 25, 0, (10, 7, 4)), (5, 30, 5, (10, 8, 5))):
         _house(s, m, x, y, turn, size)
     for x, y, tall in ((-8, -4, 8), (10, 2, 9), (28, -8, 10), (-28, -2, 7), (14, 25, 8), (-10, 22, 9)):
         s.tree((x, y, 0), tall, 0.32 * tall, m["bark"], m["leaf"], 4500, 0.22)

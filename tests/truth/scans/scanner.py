@@ -26,8 +26,8 @@ CHUNK = 1 << 18
 class Scan:
     """position float64 (n, 3) as told; color uint8 sRGB (n, 3); scan, row, column int32 (n,); stations (k, 3). What only the
     truth knows: true_position (n, 3), surface (n,) of the nearest part in the beam, -1 for a place between two; interval
-    (n,): metres between samples across the beam, cosine (n,) at the surface, normal float32 (n, 3) toward the scanner, beam (n, 3)
-    float32: the way of the light. shape: rows and columns of each scan's grid."""
+    (n,): metres between samples across the beam, cosine (n,) at the surface, normal float32 (n, 3) toward the scanner, beam
+    (n, 3) float32: the way of the light. shape: rows and columns of each scan's grid."""
 
     position: np.ndarray
     color: np.ndarray
@@ -114,7 +114,8 @@ def _small_turn(random: np.random.Generator, angle: float) -> np.ndarray:
 
 def _finish(parts: list[dict[str, np.ndarray]], stations: np.ndarray, shape: np.ndarray, random: np.random.Generator) -> Scan:
     whole = {name: np.concatenate([one[name] for one in parts]) for name in parts[0]}
-    color = srgb_bytes(whole["color"]).astype(np.int16) + np.rint(random.normal(scale=1.5, size=whole["color"].shape)).astype(np.int16)
+    color = srgb_bytes(whole["color"]).astype(np.int16) + np.rint(
+        random.normal(scale=1.5, size=whole["color"].shape)).astype(np.int16)
     return Scan(whole["position"], np.clip(color, 0, 255).astype(np.uint8), whole["scan"].astype(np.int32),
                 whole["row"].astype(np.int32), whole["column"].astype(np.int32), stations, whole["true_position"],
                 whole["surface"].astype(np.int32), whole["interval"], whole["cosine"], whole["normal"], whole["beam"], shape)

@@ -124,7 +124,8 @@ class Solids:
         """An ellipsoid, its radius waved by `bumps`."""
         turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, segments + 1), np.linspace(-np.pi / 2, np.pi / 2, segments // 2 + 1))
         u = np.stack([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)], axis=2)
-        wave = 1.0 + bumps * np.sin(waves * np.pi * u[..., 0]) * np.sin(waves * np.pi * u[..., 1] + 1.0) * np.cos(waves * u[..., 2])
+        wave = 1.0 + bumps * np.sin(waves * np.pi * u[..., 0]) * np.sin(
+            waves * np.pi * u[..., 1] + 1.0) * np.cos(waves * u[..., 2])
         self.sheet(np.asarray(place) + u * np.asarray(radii) * wave[..., None], material)
 
     def ring(self, place: Place, ring: float, tube: float, axis: str, material: int, segments: int = 48) -> None:
