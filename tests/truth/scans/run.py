@@ -2,7 +2,7 @@
 """Draws the virtual scans with the library and holds the pictures against the exact ones.
 
     build/out/venv/bin/python tests/truth/scans/run.py [--scenes a,b | tuning | held | all] [--cameras 0,3]
-        [--analysis off|on|stations] [--set surface=1]... [--style radius=0.02]... [--effect ...]... [--hook FILE.py]
+        [--analysis off|on|stations|free] [--set surface=1]... [--style radius=0.02]... [--effect ...]... [--hook FILE.py]
         [--pictures FOLDER] [--json FILE]
 
 The library is $PATINA_LIBRARY, else build/out/release/libpatina.so. A hook is a Python file with any of
@@ -57,9 +57,12 @@ class Drawer:
         made = make(self.native, scan, stage.scene) if make else \
             self.native.Cloud(np.ascontiguousarray(scan.position, np.float32), None, np.ascontiguousarray(scan.color))
         if self.analysis != "off" and hasattr(made, "analyse") and not make:
-            known = self.analysis == "stations" and len(scan.stations)
+            known = self.analysis in ("stations", "free") and len(scan.stations) > 0
             made.analyse(stations=scan.stations if known else None,
-                         station=scan.scan.astype(np.uint8)[:, None] if known else None)
+                         station=scan.scan.astype(np.uint8)[:, None] if known else None,
+                         free_space=known and self.analysis == "free")
+            if self.analysis == "free":
+                self.style.setdefault("free_space", 2)
         getattr(self.hook, "after", lambda *_: None)(self.native, made, stage.scene)
         return made
 
@@ -191,8 +194,8 @@ def main() -> int:
     parser.add_argument("--hook", help="a Python file, see above")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("--analysis", choices=("off", "on", "stations"), default="on",
-                        help="what every point knows, where the library finds it out; with the scanners' places")
+    parser.add_argument("--analysis", choices=("off", "on", "stations", "free"), default="on",
+                        help="what every point knows, where the library finds it out; with the scanners' places; and without what they saw through")
     parser.add_argument("--times", type=int, default=1, help="timed frames a camera; the least counts")
     parser.add_argument("--still", action="store_true", help="no flicker")
     parser.add_argument("--pictures", type=Path, help="truth, picture, errors and ceiling of each camera go here as PNG")
