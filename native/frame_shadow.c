@@ -264,13 +264,31 @@ static void set_window(const struct pt_plan *map, const double window[4], float 
     }
 }
 
-// Of all chunks those that the picture drew: points of the others have no mark. Returns how many.
-static uint32_t keep_seen(const struct pt_plan_instance *seen, struct chunk_view *chunks, uint32_t count)
+static int is_drawn(const struct pt_plan_instance *seen, uint32_t first)
+{
+    uint32_t low = 0, high = seen->chunk_count;
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (seen->chunks[middle].first < first)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < seen->chunk_count && seen->chunks[low].first == first;
+}
+
+// Of all chunks of instance i those that the picture drew, as points or as discs: points of the others have no mark. Returns
+// how many.
+static uint32_t keep_seen(const struct pt_plan *plan, uint32_t i, struct chunk_view *chunks, uint32_t count)
 {
     uint32_t kept = 0;
-    for (uint32_t c = 0; c < count && kept < seen->chunk_count; c++) // both in the cloud's order
-        if (chunks[c].first == seen->chunks[kept].first)
-            chunks[kept++] = chunks[c];
+    for (uint32_t c = 0, begin = 0; c < count; c++, begin = kept) { // all in the cloud's order
+        for (uint32_t k = 0; k < plan->instance_count && kept == begin; k++) {
+            const struct pt_plan_instance *seen = &plan->instances[k];
+            if (seen->of == i && is_drawn(seen, chunks[c].first))
+                chunks[kept++] = chunks[c];
+        }
+    }
     return kept;
 }
 
@@ -288,7 +306,7 @@ static int test_instance(struct update *update, const struct patina_scene *view,
     uint32_t light = args->base, count = instance->cloud->chunk_count;
     int error = pt_plan_chunks(view, map, instance, &args->instance, &chunks);
     if (!error && args->marked)
-        count = keep_seen(&update->plan->instances[i], chunks, count);
+        count = keep_seen(update->plan, i, chunks, count);
     if (!error && !count)
         return PATINA_OK;
     if (!error)

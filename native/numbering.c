@@ -27,6 +27,7 @@ int pt_numbering_take(struct pt_numbering *numbering, const struct patina_scene 
         taken.slots += (uint32_t)cloud->slots;
         taken.points += (uint32_t)cloud->info.count;
     }
+    taken.discs = taken.slots + scene->triangles;
     pt_numbering_release(numbering);
     *numbering = taken;
     return PATINA_OK;
@@ -60,6 +61,8 @@ int pt_numbering_keys(const struct pt_numbering *numbering, uint64_t *keys, size
         uint32_t id = (uint32_t)keys[i];
         if (keys[i] >> 32 == PT_KEY_EMPTY_Z)
             continue;
+        if (id >= numbering->discs) // where there are none, no id is as great
+            id -= (uint32_t)numbering->discs;
         if (id >= numbering->slots) { // a triangle's
             keys[i] = (keys[i] >> 32 << 32) | (id - numbering->slots + numbering->points);
             continue;

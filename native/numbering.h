@@ -17,6 +17,7 @@ struct pt_numbering {
     struct pt_numbered *clouds;
     uint32_t count;
     uint32_t slots, points; // of all: where triangles begin
+    uint64_t discs;         // first of the ids that points have as discs (plan.h)
 };
 
 // Replaces what was there. 0 or PATINA_ERROR_MEMORY (then it is as it was).

@@ -32,6 +32,7 @@ static void plan_scatter(struct pt_builder *builder)
     struct pt_plan *plan = builder->plan;
     struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1 || builder->behind, .sifted = plan->drawn_words > 0};
     struct pt_ref *refs = pt_arena_take(&plan->arena, (3 + 3 * (size_t)plan->instance_count) * sizeof *refs);
+    uint64_t points = 0, chunks = 0;
     uint32_t count = 0;
     if (!refs) {
         builder->failed = 1;
@@ -39,12 +40,15 @@ static void plan_scatter(struct pt_builder *builder)
     }
     refs[count++] = pt_keys_of(builder, 0);
     for (uint32_t i = 0; i < plan->instance_count; i++) {
-        if (!plan->instances[i].chunk_count)
+        if (!plan->instances[i].chunk_count || plan->instances[i].discs)
             continue;
         refs[count++] = pt_buffer_of(PT_CHUNKS, i);
         refs[count++] = pt_buffer_of(PT_POSITIONS, i);
         refs[count++] = pt_buffer_of(PT_SURFACE, i);
         args.instances++;
+        chunks += plan->instances[i].chunk_count;
+        for (uint32_t c = 0; c < plan->instances[i].chunk_count; c++)
+            points += plan->instances[i].chunks[c].count;
     }
     if (args.behind)
         refs[count++] = pt_plane_at(PT_PLANE_LIMIT, 0);
@@ -54,9 +58,8 @@ static void plan_scatter(struct pt_builder *builder)
     if (builder->layer > 1)
         PT_REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
     else
-        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view",
-                  (unsigned long long)plan->points_scattered, (unsigned long long)(plan->chunks - plan->chunks_culled),
-                  args.instances);
+        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view", (unsigned long long)points,
+                  (unsigned long long)chunks, args.instances);
 }
 
 void pt_plan_surface(struct pt_builder *builder, uint32_t i)
@@ -149,8 +152,9 @@ static void plan_filling(struct pt_builder *builder)
     struct pt_plan *plan = builder->plan;
     if (!plan->iterations) {
         pt_skip(builder, "fill",
-                builder->scene->settings.error_target > 0.0f ? "the error target is met without"
-                                                             : "switched off in the settings");
+                builder->scene->settings.surface == PATINA_SURFACE_SPLATS ? "the settings ask for discs"
+                : builder->scene->settings.error_target > 0.0f            ? "the error target is met without"
+                                                                          : "switched off in the settings");
         pt_skip(builder, "pull", "no filling");
         pt_skip(builder, "push", "no filling");
         return;
@@ -244,7 +248,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     double blend = floor(0.5 * plan->spacing_px + 0.5);
     uint32_t wants_normals = args.instance.lit | (builder->scene->settings.passes >> PATINA_PASS_NORMAL & 1u) |
                              (uint32_t)pt_effects_want_normals(builder->scene);
-    const int discs = plan->surface == PATINA_SURFACE_SPLATS; // blended already
+    const int discs = instance->discs != 0; // blended already
     if (discs && shown) {
         args.instance.color_format = PT_COLOR_OF_PLANE;
         args.instance.has_opacities = plan->transparent != 0;
@@ -260,7 +264,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0),
                       of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i), pt_shading_of(builder),
-                      pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, i),
+                      pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, instance->of),
                       pt_plane_at(PT_PLANE_ARRIVED, 0)}),
               "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
               args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");
@@ -343,7 +347,8 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .normal = passes >> PATINA_PASS_NORMAL & 1u,
                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
                                 .shadow = plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
-                                .discs = plan->surface == PATINA_SURFACE_SPLATS ? (uint32_t)builder->scene->points : 0};
+                                .discs_first = plan->discs_first,
+                                .discs_count = plan->discs_count};
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
@@ -405,7 +410,7 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
                      {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_SHADING, 0),
                       pt_plane_at(PT_PLANE_DEPTH, 0), pt_plane_at(PT_PLANE_NORMALS, 0), pt_plane_at(PT_PLANE_SOURCE, 0),
                       pt_plane_at(PT_PLANE_ARRIVED, 0), pt_plane_at(PT_PLANE_SHADOW, 0),
-                      pt_plane_at(extract.discs ? PT_PLANE_NORMAL : PT_PLANE_SHADING, 0)}),
+                      pt_plane_at(extract.discs_count ? PT_PLANE_NORMAL : PT_PLANE_SHADING, 0)}),
               "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
               extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
@@ -450,7 +455,7 @@ static void plan_marks(struct pt_builder *builder)
         struct mark_args args = {.view = pt_view_filled(plan, instance),
                                  .id_base = instance->args.id_base,
                                  .id_count = instance->args.id_count};
-        PT_REASON(PT_ADD(builder, mark, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_MARKS, i)}),
+        PT_REASON(PT_ADD(builder, mark, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_MARKS, instance->of)}),
                   "only points of instance %u that the picture shows need shadows", i);
     }
 }
@@ -467,19 +472,30 @@ static void skip_all(struct pt_builder *builder, const char *reason, const char 
 static void plan_surfaces(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    int estimate = 0, discs = plan->surface == PATINA_SURFACE_SPLATS;
+    int estimate = 0, points = 0, discs = 0;
     if (!plan->points_scattered) {
         skip_all(builder, "no cloud is in view", of_points, sizeof of_points / sizeof *of_points);
         return;
     }
     pt_plan_sift(builder);
-    if (discs)
-        pt_plan_splat(builder);
-    else
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        points |= plan->instances[i].chunk_count && !plan->instances[i].discs;
+        discs |= plan->instances[i].chunk_count && plan->instances[i].discs;
+    }
+    if (points)
         plan_scatter(builder);
-    if (!discs) {
-        pt_skip(builder, "splat", "the settings ask for filling");
-        pt_skip(builder, "blend", "the settings ask for filling");
+    else
+        pt_skip(builder, "scatter", builder->scene->settings.surface == PATINA_SURFACE_SPLATS
+                                        ? "the settings ask for discs"
+                                        : "all footprints in view are wide enough for discs");
+    if (discs) {
+        pt_plan_splat(builder);
+    } else {
+        const char *reason = builder->scene->settings.surface == PATINA_SURFACE_FILL ? "the settings ask for filling"
+                             : plan->discs_count ? "no footprint in view is wide enough for a disc"
+                                                 : "no cloud in view was analysed";
+        pt_skip(builder, "splat", reason);
+        pt_skip(builder, "blend", reason);
     }
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count) {
@@ -490,8 +506,7 @@ static void plan_surfaces(struct pt_builder *builder)
         pt_skip(builder, "normals", "every cloud in view has normals");
     if (discs)
         pt_plan_blend(builder);
-    else
-        plan_filling(builder);
+    plan_filling(builder);
 }
 
 // Returns the plane that holds the layer's colour.
@@ -650,7 +665,7 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
     LINE("expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)\n",
          (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
          (double)plan->expected.normal,
-         pt_means_name(plan->surface == PATINA_SURFACE_SPLATS ? PT_MEANS_SPLATS : pt_means_of(plan->quality, plan->fill)));
+         pt_means_name(plan->means));
     LINE("points %llu, scattered %llu, chunks %llu, culled %llu\n", (unsigned long long)plan->points,
          (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
          (unsigned long long)plan->chunks_culled);

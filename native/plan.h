@@ -5,6 +5,7 @@
 #define PT_PLAN_H
 
 #include "device.h"
+#include "expected.h"
 #include "scene/scene.h"
 
 enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
@@ -112,8 +113,12 @@ struct pt_plan_light {
     char reason[128];
 };
 
+// What is drawn of an instance in one way. An instance in view whose points have footprints is two of these: its fine chunks as
+// points, and behind all others its wide ones as discs, with ids of their own (pt_disc_ids).
 struct pt_plan_instance {
     const struct pt_instance *instance;
+    uint32_t of;    // its place in the scene: shadows are kept by it
+    uint32_t discs; // 1: its points are discs
     struct instance_args args;
     float radius, radius_scale; // of discs, as disc_args has them
     struct chunk_view *chunks; // those in view
@@ -138,6 +143,7 @@ struct pt_plan {
     uint32_t guard;           // pixels by which the padded picture is wider on each side
     struct pt_plan_instance *instances;
     uint32_t instance_count;
+    uint32_t discs_first, discs_count; // ids whose points are discs
     struct pt_plan_mesh *meshes;
     uint32_t mesh_count;
     uint64_t triangles; // of meshes in view; 0: none is
@@ -154,14 +160,22 @@ struct pt_plan {
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
-    uint32_t surface;       // as set
     uint32_t quality, fill; // as set, or as the error target chose them
+    enum pt_means means;    // that `expected` is of
     patina_expected_error expected;
     uint32_t layers;        // at most so many are peeled; 1: no peeling
     int transparent;        // something in view lets light through
     float line_radius;      // of the widest line, pixels; 0: none
     struct pt_arena *arena;
 };
+
+// The first of the ids that points have as discs beside others that are not; an instance's lie as its own do. 0 where 32 bits
+// hold no more: everything is filled then.
+static inline uint32_t pt_disc_ids(const struct patina_scene *scene)
+{
+    const uint64_t first = scene->points + scene->triangles;
+    return first + scene->points < 0xFFFFFFFFu ? (uint32_t)first : 0;
+}
 
 // Is there anything in view?
 static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->triangles; }

@@ -375,7 +375,8 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
     out->has_camera = 1;
     out->settings = (patina_settings){ .struct_size = sizeof out->settings,
                                        .quality = scene->settings.quality,
-                                       .fill = scene->settings.fill };
+                                       .fill = scene->settings.fill,
+                                       .surface = PATINA_SURFACE_FILL };
     patina_camera *camera = &out->camera;
     uint32_t most = scene->settings.shadow_resolution;
     out->settings.width = fit(&camera->left, &camera->right, light->texel, most);
@@ -436,7 +437,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
         patina_camera *camera = &survey.camera;
         double texel = fmax(camera->right - camera->left, camera->top - camera->bottom) / SURVEY_TEXELS;
         texel = texel > 0.0 ? texel : 1e-6;
-        survey.settings = (patina_settings){ .struct_size = sizeof survey.settings };
+        survey.settings = (patina_settings){ .struct_size = sizeof survey.settings, .surface = PATINA_SURFACE_FILL };
         survey.settings.width = fit(&camera->left, &camera->right, texel, SURVEY_TEXELS + 2);
         survey.settings.height = fit(&camera->bottom, &camera->top, texel, SURVEY_TEXELS + 2);
         survey.settings.region[2] = survey.settings.width;

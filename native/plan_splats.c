@@ -27,16 +27,20 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
         return;
     }
     struct disc_args *discs = (struct disc_args *)(void *)(args + head);
+    uint64_t points = 0, chunks = 0;
     uint32_t instances = 0, count = plane_count;
     memcpy(refs, planes, plane_count * sizeof *planes);
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
-        if (!instance->chunk_count)
+        if (!instance->chunk_count || !instance->discs)
             continue;
         discs[instances++] = (struct disc_args){.instance = instance->args,
                                                 .has_radii = instance->instance->cloud->info.has_radii,
                                                 .radius = instance->radius,
                                                 .radius_scale = instance->radius_scale};
+        chunks += instance->chunk_count;
+        for (uint32_t c = 0; c < instance->chunk_count; c++)
+            points += instance->chunks[c].count;
         count += bind_instance(refs + count, i, blend);
     }
     if (last)
@@ -53,17 +57,13 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
     else if (last)
         PT_REASON(pass, "layer %u: discs behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
     else
-        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view, as discs",
-                  (unsigned long long)plan->points_scattered, (unsigned long long)(plan->chunks - plan->chunks_culled),
-                  instances);
+        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view, as discs", (unsigned long long)points,
+                  (unsigned long long)chunks, instances);
 }
 
 void pt_plan_splat(struct pt_builder *builder)
 {
-    static const char *const left_out[] = {"scatter", "pull", "fill", "push"};
     const struct pt_ref keys = pt_keys_of(builder, 0), limit = pt_plane_at(PT_PLANE_LIMIT, 0);
-    for (size_t i = 0; i < sizeof left_out / sizeof *left_out; i++)
-        pt_skip(builder, left_out[i], "the settings ask for discs");
     add_discs(builder, 0, &keys, 1, builder->layer > 1 ? &limit : NULL);
 }
 

@@ -17,6 +17,12 @@
 
 enum { DEFAULT_LAYERS = 8 };
 
+// Half an axis of a footprint, pixels, from which on points are discs: narrower ones are closed by filling as well, in a third of
+// the time. A spacing of 1.4 pixels.
+#define WIDE_FOOTPRINT 1.9
+// Fills of what discs leave open: at most one pixel in 300, where points lie at random.
+enum { PINHOLES = 2 };
+
 struct camera {
     double axes[9], position[3];
     double xs, ys;         // window units a pixel
@@ -39,6 +45,7 @@ struct seen {
     uint32_t cull, away; // test each point's normal; every point faces away
     struct extent extent;  // on screen in pixels of the picture without its padding
     double spacing_px, area_px;
+    uint32_t wide; // its points are discs
 };
 
 struct object {
@@ -154,16 +161,26 @@ static void chunk_translation(const struct camera *camera, const struct object *
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
 
-// The largest radius of the chunk's discs, world units; 0 where points stay pixels.
-static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
-                         const struct pt_chunk *chunk, double thinned)
+// Whether points may be discs.
+static int knows_discs(const struct patina_scene *scene, const struct pt_instance *instance)
 {
-    if (scene->settings.surface != PATINA_SURFACE_SPLATS)
+    return scene->settings.surface == PATINA_SURFACE_SPLATS ||
+           (scene->settings.surface == PATINA_SURFACE_AUTO && scene->settings.fill == PATINA_FILL_CLOSED &&
+            instance->cloud->shapes && pt_disc_ids(scene));
+}
+
+// Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
+static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
+                         const struct pt_chunk *chunk, double thinned, int most)
+{
+    if (!knows_discs(scene, instance))
         return 0.0;
     if (instance->style.radius > 0.0f)
         return (double)instance->style.radius * thinned;
     if (instance->cloud->info.has_radii)
         return (double)instance->cloud->info.radius_most * object->scale * thinned;
+    if (instance->cloud->shapes)
+        return (double)(most ? chunk->reach : chunk->footprint) * object->scale * thinned;
     return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
 }
 
@@ -311,6 +328,7 @@ struct survey {
     struct object *objects;
     struct seen **seen; // per instance
     uint32_t *seen_count;
+    int points, discs; // some chunk's points are drawn as such
 };
 
 // How many of a chunk's points the settings ask for: whole vectors, for the processor draws no part of one.
@@ -370,7 +388,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (cull && facing == FACES_AWAY)
             continue;
         chunk_translation(camera, object, chunk, translation);
-        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart), &seen.extent))
+        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), &seen.extent))
             continue;
         for (int k = 0; k < 4; k++)
             seen.extent.rect[k] -= AROUND;
@@ -383,6 +401,10 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
                           sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
+        seen.wide = scene->settings.surface == PATINA_SURFACE_SPLATS ||
+                    disc_reach(scene, instance, object, chunk, apart, 0) > WIDE_FOOTPRINT * footprint;
+        survey->points |= !seen.wide;
+        survey->discs |= seen.wide;
         list[survey->seen_count[i]++] = seen;
     }
     plan->transparent |= transparent && survey->seen_count[i] > 0;
@@ -399,7 +421,8 @@ static int compare_weighted(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// The chunks' spacings with the area that they cover; those that face away only when asked for.
+// The chunks' spacings with the area that they cover; those that face away only when asked for. Where some are points, what is
+// drawn as discs does not count.
 static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *survey, int away, struct weighted *list,
                              double *area)
 {
@@ -407,7 +430,7 @@ static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *su
     for (uint32_t i = 0; i < plan->instance_count; i++)
         for (uint32_t c = 0; c < survey->seen_count[i]; c++) {
             const struct seen *seen = &survey->seen[i][c];
-            if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away))
+            if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away) || (seen->wide && survey->points))
                 continue;
             list[count++] = (struct weighted){ seen->spacing_px, seen->area_px };
             *area += seen->area_px;
@@ -445,23 +468,24 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
 // exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.65 (0.37 points a pixel) n alone leaves holes open
 // (2.7% of a disc at 0.3 points a pixel), so coarser levels halve s down to 1 first: 0.14% open. Starting them earlier,
 // at 1.35, closes 0.5 points a pixel better (0.04% for 0.32%) but lets steep planes grow by up to 0.5% at 1 point a pixel.
-static void choose_filling(const patina_settings *settings, struct pt_plan *plan)
+static void choose_filling(const patina_settings *settings, const struct survey *survey, struct pt_plan *plan)
 {
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
-    plan->surface = settings->surface;
     plan->quality = settings->quality;
     plan->fill = settings->fill;
-    if (plan->surface == PATINA_SURFACE_SPLATS) {
-        plan->expected = pt_expected_error(PT_MEANS_SPLATS, s);
-        plan->levels = plan->iterations = 0;
+    plan->levels = plan->iterations = 0;
+    if (survey->discs && !survey->points) {
+        plan->means = PT_MEANS_SPLATS;
+        plan->expected = pt_expected_error(plan->means, s);
+        if (settings->surface != PATINA_SURFACE_SPLATS && plan->fill == PATINA_FILL_CLOSED)
+            plan->iterations = asked ? asked : PINHOLES;
         return;
     }
     if (settings->error_target > 0.0f)
         pt_means_settings(pt_means_for((double)settings->error_target, s), &plan->quality, &plan->fill);
-    plan->expected = pt_expected_error(pt_means_of(plan->quality, plan->fill), s);
-    plan->levels = 0;
-    plan->iterations = 0;
+    plan->means = pt_means_of(plan->quality, plan->fill);
+    plan->expected = pt_expected_error(plan->means, s);
     if (plan->fill == PATINA_FILL_PAPER)
         plan->iterations = asked ? asked : 1;
     if (plan->fill != PATINA_FILL_CLOSED)
@@ -610,15 +634,18 @@ static int rect_in_window(const struct view_args *view, const double bounds[4], 
     return rect[0] < rect[2] && rect[1] < rect[3];
 }
 
-static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey,
-                          uint32_t i)
+// Instance i of the scene, its wide chunks or the others. Ids are moved by id_base.
+static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i,
+                        uint32_t wide, uint32_t id_base, struct pt_plan_instance *out)
 {
     const struct pt_instance *instance = &scene->instances[i];
-    struct pt_plan_instance *out = &plan->instances[i];
     out->instance = instance;
+    out->of = i;
+    out->discs = wide;
     out->radius = (float)fmin((double)instance->style.radius * thinning(scene), (double)PT_DISC_MOST);
     out->radius_scale = (float)fmin(survey->objects[i].scale * thinning(scene), (double)PT_DISC_MOST);
     set_instance(&survey->camera, &survey->objects[i], instance, thinning(scene), &out->args);
+    out->args.id_base += id_base;
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
     if (!out->chunks || !out->bounds)
@@ -629,12 +656,13 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         const struct seen *seen = &survey->seen[i][k];
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
         uint32_t *rect = out->bounds[out->chunk_count].rect;
-        if (!rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
+        if (seen->wide != wide || !rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
             continue;
         uint32_t count = drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
         set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
                   &out->chunks[out->chunk_count]);
+        out->chunks[out->chunk_count].id_base += id_base;
         out->chunks[out->chunk_count].row_first = rect[1];
         out->chunks[out->chunk_count].row_end = rect[3];
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
@@ -643,10 +671,24 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
         plan->points_scattered += count;
     }
     join_rect(plan->view.rect, out->rect);
-    plan->chunks += instance->cloud->chunk_count;
-    plan->chunks_culled += instance->cloud->chunk_count - out->chunk_count;
-    plan->points += instance->cloud->info.count;
+    plan->chunks_culled -= out->chunk_count;
     return PATINA_OK;
+}
+
+static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i)
+{
+    const struct patina_cloud *cloud = scene->instances[i].cloud;
+    const uint32_t all = scene->settings.surface == PATINA_SURFACE_SPLATS;
+    uint32_t wide = 0;
+    plan->chunks += cloud->chunk_count;
+    plan->chunks_culled += cloud->chunk_count;
+    plan->points += cloud->info.count;
+    int error = place_chunks(scene, plan, survey, i, all, 0, &plan->instances[i]);
+    for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
+        wide |= survey->seen[i][k].wide;
+    if (!error && wide)
+        error = place_chunks(scene, plan, survey, i, 1, plan->discs_first, &plan->instances[plan->instance_count++]);
+    return error;
 }
 
 static void place_mesh(struct pt_plan *plan, const struct camera *camera, const struct pt_mesh_instance *instance,
@@ -704,7 +746,7 @@ int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = { 0 };
-    plan->instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *plan->instances);
+    plan->instances = pt_arena_take(&plan->arena, (2 * (size_t)scene->instance_count + 1) * sizeof *plan->instances);
     plan->mesh_count = scene->mesh_count;
     plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
     if (!plan->instances || !plan->meshes)
@@ -713,7 +755,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     int error = look_around(scene, plan, &survey);
     if (error)
         return error;
-    choose_filling(&scene->settings, plan);
+    choose_filling(&scene->settings, &survey, plan);
     choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;
@@ -728,6 +770,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
                        plan->view.width, plan->view.height);
+    plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
+    plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
     uint64_t id_base = scene->points;

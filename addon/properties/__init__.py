@@ -37,10 +37,12 @@ class PatinaSceneProperties(PropertyGroup):
     effects: PointerProperty(type=PatinaEffectsProperties, override=_OVERRIDE)
     lines: PointerProperty(type=PatinaLinesProperties, override=_OVERRIDE)
     surface: EnumProperty(
-        name="Surface", override=_OVERRIDE, default='FILL',
+        name="Surface", override=_OVERRIDE, default='AUTO',
         description="How points become a surface",
         items=(
-            ('FILL', "Filled", "Gaps between the points are filled in the picture: fast, whatever the spacing", 0),
+            ('AUTO', "Automatic", "Points that lie wide apart on screen are discs as wide as their neighbourhood says, the others "
+                                  "are filled", 0),
+            ('FILL', "Filled", "Gaps between the points are filled in the picture: fast, whatever the spacing", 2),
             ('SPLATS', "Discs", "Every point is a small disc across its normal, discs that overlap are blended: smoother, "
                                 "slower, gaps wider than the discs stay open", 1)))
     error_target: FloatProperty(

@@ -51,7 +51,7 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         layout.use_property_decorate = False
         patina = context.scene.patina
         layout.prop(patina, "surface")
-        filled = patina.surface == 'FILL'
+        filled = patina.surface != 'SPLATS'
         row = layout.row()
         row.active = filled
         row.prop(patina, "error_target")
@@ -182,7 +182,7 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
             row.alignment = 'RIGHT'
             row.label(text=f"automatic: {_length(context.scene, estimate)}")
         row = layout.row()
-        row.active = context.scene.patina.surface == 'SPLATS'
+        row.active = context.scene.patina.surface != 'FILL'
         row.prop(patina, "radius")
         layout.prop(patina, "opacity")
         column = layout.column()

@@ -21,7 +21,8 @@ struct pt_chunk {
     uint32_t first;                  // slot of the first point
     uint32_t count, padded;          // padded slots repeat the last point
     uint32_t classes[8];             // of its points: bits as in patina_cloud_info.class_bits
-    float reach, footprint;          // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
+    float reach, footprint;          // of its points' footprints, half axes, object units: the greatest; what nine of ten stay
+                                     // below. 0 without shapes
 };
 
 // Whether a cloud still lives, shared with the devices that hold its buffers.
@@ -49,6 +50,7 @@ struct patina_cloud {
     float *positions;  // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
     uint32_t *order;   // slots: index in the caller's arrays
     uint32_t *surface; // slots: octahedral normal and spacing class (kernel_args.h)
+    uint32_t *shapes;  // slots: footprint, thickness, kind (kernel_args.h), or NULL where the cloud was not analysed
     void *colors;      // slots x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // slots, or NULL where every point is opaque
     float *radii;       // slots, object units, or NULL

@@ -333,7 +333,7 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
     if (s.quality > PATINA_QUALITY_PAPER || s.fill > PATINA_FILL_OFF || s.smooth > PATINA_SMOOTH_OFF ||
         s.antialias > PATINA_ANTIALIAS_OFF || s.fill_iterations > 64)
         return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
-    if (s.surface > PATINA_SURFACE_SPLATS)
+    if (s.surface > PATINA_SURFACE_FILL)
         return fail(scene, "settings: no such surface");
     if (!(s.error_target >= 0.0f) || !isfinite(s.error_target))
         return fail(scene, "settings: error_target is negative or not finite");

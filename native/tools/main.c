@@ -25,7 +25,7 @@ static const char usage[] =
     "  --ortho WIDTH                      parallel projection, WIDTH world units wide\n"
     "  --quality refined|paper            depth of filled pixels: tangent plane, or as in the paper\n"
     "  --fill closed|paper|off            hole filling; --iterations N (0: automatic)\n"
-    "  --surface fill|splats              filling in the picture, or points as discs\n"
+    "  --surface auto|splats|fill         discs where points lie wide and filling elsewhere, all discs, all filled\n"
     "  --analysis on|off                  points' own spacings and footprints, and normals where a file has none (on)\n"
     "  --radius R                         of the discs, world units (default: the points' own, else 1.75 spacings)\n"
     "  --smooth alleviated|gaussian|box|off\n"

@@ -260,7 +260,7 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     else if (!strcmp(name, "--fill"))
         bad = parse_word(value, "closed|paper|off", &s->fill);
     else if (!strcmp(name, "--surface"))
-        bad = parse_word(value, "fill|splats", &s->surface);
+        bad = parse_word(value, "auto|splats|fill", &s->surface);
     else if (!strcmp(name, "--analysis"))
         bad = parse_word(value, "on|off", &o->analysis);
     else if (!strcmp(name, "--radius"))

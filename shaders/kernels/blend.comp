@@ -129,12 +129,13 @@ float sum_of(uint at)
     return negative ? -value : value;
 }
 
-bool has_normals(uint id)
+// The instance that a point is a disc of, or args.instances. No return from within the loop: llvmpipe loses lanes that do not.
+uint instance_of(uint id)
 {
+    uint at = args.instances;
     for (uint i = 0u; i < args.instances; i++)
-        if (id - discs[i].instance.id_base < discs[i].instance.id_count && discs[i].instance.has_normals != 0u)
-            return true;
-    return false;
+        at = id - discs[i].instance.id_base < discs[i].instance.id_count ? i : at;
+    return at;
 }
 
 // The mean normal, on the side that the nearest disc's lies on.
@@ -160,7 +161,8 @@ void main()
         return;
     uint pixel = uint(y) * view.width + uint(x), at = 2u * SUMS * (pixel - uint(band_first) * view.width);
     uvec2 key = read_key(pixel);
-    if (key.y == PT_KEY_EMPTY_Z)
+    uint of = instance_of(key.x);
+    if (key.y == PT_KEY_EMPTY_Z || of == args.instances)
         return;
     float opacity = sum_of(at + 6u), weight = pt_max(sum_of(at + 14u), 1.0);
     vec3 color = vec3(0.0);
@@ -170,7 +172,7 @@ void main()
     }
     precise float share = opacity * pt_rcp(weight);
     albedo[pixel] = vec4(color, opacity < weight ? pt_min(share, 1.0) : 1.0); // opaque: 1 exactly
-    if (has_normals(key.x))
+    if (discs[of].instance.has_normals != 0u)
         normal[pixel].xyz = mean_normal(view, vec3(sum_of(at + 8u), sum_of(at + 10u), sum_of(at + 12u)), x, y, normal[pixel].xyz);
 }
 

@@ -52,7 +52,10 @@ void main()
     shadow[to] = some ? arrived[at] : 1.0;
 #else
     uint word = texelFetch(from_plane, int(at)).x;
-    float value = args.discs != 0u ? 1.0 + (read_key(at).x < args.discs ? disc_normals[at].w : 0.0) : source_value(width, word & ~PT_FROM_MIXED, crop_x + x, crop_y + y);
+    uint origin = word & ~PT_FROM_MIXED;
+    float value = source_value(width, origin, crop_x + x, crop_y + y);
+    if (origin == at && read_key(at).x - args.discs_first < args.discs_count)
+        value = 1.0 + disc_normals[at].w;
     source[to] = some ? ((word & PT_FROM_MIXED) != 0u ? -value : value) : 0.0;
 #endif
 }

@@ -302,9 +302,9 @@ void main()
 #endif
         if (id < id_count && own.key.y != PT_KEY_EMPTY_Z) {
             // 2. colour and opacity
-            float opacity = opacity_of(instance_opacity, id, at);
+            float opacity = opacity_of(instance_opacity, id, own.source);
             p.ray = pt_ray(view, x, y);
-            p.albedo = pt_gather_albedo(style, id, at);
+            p.albedo = pt_gather_albedo(style, id, own.source);
 #if RECOLOR
             p.albedo = recolor(view, eye_z, p.ray, p.z, style, p.albedo);
 #endif

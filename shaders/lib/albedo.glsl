@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A point's own colour, before light, by COLOR_FORMAT. Include it behind POINT_COLOR(i), a word of them, four bytes, and
-// lib/srgb.glsl. at: of the pixel.
+// lib/srgb.glsl. at: the pixel where it was measured.
 #ifndef PT_ALBEDO_GLSL
 #define PT_ALBEDO_GLSL
 

@@ -561,7 +561,7 @@ struct extract_args {
     struct view_args view;
     uint32_t crop_x, crop_y, crop_width, crop_height;
     uint32_t depth, normal, source, shadow;
-    uint32_t discs; // how far a pixel lies from its point is in the normal plane's w where the id is below this
+    uint32_t discs_first, discs_count; // of ids: how far a measured pixel lies from such a point is in the normal plane's w
     float world_from_view[9];
 };
 

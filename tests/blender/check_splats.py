@@ -11,7 +11,7 @@ COLOR = (200, 60, 40)
 def discs(radius=0.0, attribute=None):
     """A grid of points as discs: (scene, points, object). attribute: values of a point attribute "size"."""
     scene = new_scene()
-    check(scene.patina.surface == 'FILL', "discs are a choice")
+    check(scene.patina.surface == 'AUTO', "discs are a choice")
     points = grid()
     normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     obj = add_points(points, np.tile(np.array((*COLOR, 255), np.uint8), (len(points), 1)), normals)

@@ -12,7 +12,7 @@ static void compare(struct harness *h, const char *label, int x, int y, double g
 }
 
 static void check(struct harness *h, const struct picture *picture, const float *shading, const uint32_t crop[4],
-                  uint32_t wanted, const float matrix[9])
+                  uint32_t wanted, const float matrix[9], const uint32_t discs[2])
 {
     struct extract_args args = {.view = picture->view,
                                 .crop_x = crop[0],
@@ -22,7 +22,9 @@ static void check(struct harness *h, const struct picture *picture, const float 
                                 .depth = wanted & 1,
                                 .normal = wanted >> 1 & 1,
                                 .source = wanted >> 2 & 1,
-                                .shadow = wanted >> 3 & 1};
+                                .shadow = wanted >> 3 & 1,
+                                .discs_first = discs[0],
+                                .discs_count = discs[1]};
     memcpy(args.world_from_view, matrix, 9 * sizeof *matrix);
     size_t count = picture->count, inside = (size_t)crop[2] * crop[3];
     float *unset = harness_alloc(h, inside * 12);
@@ -38,7 +40,8 @@ static void check(struct harness *h, const struct picture *picture, const float 
         shares[i] = (float)(i % 97) / 96.0f;
     struct pt_buffer *arrived = harness_buffer(h, shares, count * 4);
     struct pt_buffer *shadow = harness_buffer(h, unset, inside * 4);
-    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source, arrived, shadow);
+    struct pt_buffer *surfaces = harness_buffer(h, picture->normal, count * 16);
+    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source, arrived, shadow, surfaces);
     const float *got_depth = harness_read(h, depth), *got_normal = harness_read(h, normal);
     const float *got_source = harness_read(h, source), *got_shadow = harness_read(h, shadow);
     struct ref_planes planes = picture_planes(picture);
@@ -63,6 +66,7 @@ static void check(struct harness *h, const struct picture *picture, const float 
 static void passes(struct harness *h)
 {
     static const uint32_t crops[][4] = {{0, 0, 67, 45}, {5, 3, 40, 30}, {66, 44, 1, 1}};
+    static const uint32_t discs[][2] = {{0, 0}, {0, 0xFFFFFFFFu}, {0xFFFFFFFEu - 67 * 45 + 700, 900}};
     for (int kind = 0; kind < PICTURE_KINDS; kind++)
         for (uint32_t wanted = 1; wanted < 16; wanted++) {
             struct rng rng = {(uint64_t)kind};
@@ -81,7 +85,7 @@ static void passes(struct harness *h)
                 if (rng_below(&rng, 3) == 0)
                     picture.from[i] |= PT_FROM_MIXED;
             }
-            check(h, &picture, shading, crops[wanted % 3], wanted, matrix);
+            check(h, &picture, shading, crops[wanted % 3], wanted, matrix, discs[(wanted / 4 + (uint32_t)kind) % 3]);
         }
 }
 
@@ -89,13 +93,14 @@ static void shapes(struct harness *h)
 {
     static const uint32_t sizes[][2] = {{1, 1}, {16384, 1}, {1, 70}};
     static const float identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    static const uint32_t no_discs[2] = {0, 0};
     for (size_t s = 0; s < 3; s++) {
         struct rng rng = {s};
         struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_FLAT, 0.5);
         for (size_t i = 0; i < picture.count; i++) // as far away as the plane allows
             picture.from[i] = rng_below(&rng, (uint32_t)picture.count);
         const uint32_t crop[4] = {0, 0, sizes[s][0], sizes[s][1]};
-        check(h, &picture, picture.normal, crop, 15, identity);
+        check(h, &picture, picture.normal, crop, 15, identity, no_discs);
     }
 }
 

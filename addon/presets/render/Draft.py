@@ -3,7 +3,7 @@ import bpy
 # What a quick look needs: filling as in the paper, one sample.
 patina = bpy.context.scene.patina
 
-patina.surface = 'FILL'
+patina.surface = 'AUTO'
 patina.error_target = 0.0
 patina.quality = 'PAPER'
 patina.fill = 'PAPER'

@@ -3,7 +3,7 @@ import bpy
 # Sixteen samples a pixel, for smooth edges.
 patina = bpy.context.scene.patina
 
-patina.surface = 'FILL'
+patina.surface = 'AUTO'
 patina.error_target = 0.0
 patina.quality = 'REFINED'
 patina.fill = 'CLOSED'

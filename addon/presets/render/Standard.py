@@ -3,7 +3,7 @@ import bpy
 # What a new scene has.
 patina = bpy.context.scene.patina
 
-patina.surface = 'FILL'
+patina.surface = 'AUTO'
 patina.error_target = 0.0
 patina.quality = 'REFINED'
 patina.fill = 'CLOSED'

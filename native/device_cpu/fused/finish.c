@@ -125,11 +125,13 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
     }
     if (args->source) {
         vf value = vf_zero();
-        if (vm_bits(some) && args->discs)
-            value = pt_source_of_discs(finish->planes.keys + (size_t)py * width + px,
-                                       finish->planes.normals + 4 * ((size_t)py * width + px), args->discs, mixed, some);
+        const size_t at = (size_t)py * width + px;
+        const vi source = vm_bits(some) ? pt_source(&finish->planes, at) : vi_set(0);
+        if (vm_bits(some) && args->discs_count)
+            value = pt_source_among_discs(args, finish->planes.keys + at, finish->planes.normals + 4 * at, source, mixed, some, px,
+                                          py);
         else if (vm_bits(some))
-            value = pt_source_value(width, pt_source(&finish->planes, (size_t)py * width + px), mixed, some, px, py);
+            value = pt_source_value(width, source, mixed, some, px, py);
         vf_put(finish->source + out, value, count);
     }
     if (args->shadow) {

@@ -65,7 +65,8 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
         vm ours = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
         if (!vm_bits(ours))
             continue;
-        vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 4), pt_cpu_data(call, 7), id, (size_t)y * width + x, ours);
+        const vi source = pt_source(&finish->planes, (size_t)y * width + x);
+        vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 4), pt_cpu_data(call, 7), id, source, ours);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
         vf_store_where(row->color[3] + x, opacity, ours);
@@ -158,7 +159,7 @@ static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *
         vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, width), &id);
         if (!vm_bits(ours))
             continue;
-        pt_albedo(&args->instance, pt_cpu_data(call, 4), id, at, ours, albedo);
+        pt_albedo(&args->instance, pt_cpu_data(call, 4), id, pt_source(&finish->planes, at), ours, albedo);
         if (pt_recolors(args))
             pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
         for (uint32_t k = 0; k < 3; k++)

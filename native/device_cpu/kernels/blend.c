@@ -47,8 +47,8 @@ static inline void set_terms(const struct pt_bins *bins, uint32_t instance, cons
     const void *colors = pt_cpu_data(bins->call, at + 4);
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     vf color[4], normal[4], largest = scale;
-    pt_albedo(args, colors, discs->id, 0, discs->drawn, color);
-    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 5), discs->id, 0, discs->drawn) * scale;
+    pt_albedo(args, colors, discs->id, vi_set(0), discs->drawn, color);
+    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 5), discs->id, vi_set(0), discs->drawn) * scale;
     for (int k = 0; k < 3; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
         largest = vf_max(largest, vf_abs(color[k]));
@@ -198,13 +198,13 @@ static void sums_of(const struct tile *tile, uint32_t pixel, vm some, vf sums[SU
     }
 }
 
-// Those of `some` whose points have normals.
-static vm with_normals(const struct pt_bins *bins, vi id, vm some)
+// Those of `some` whose points are discs; or discs of instances with normals.
+static vm of_discs(const struct pt_bins *bins, vi id, vm some, int normals)
 {
     vm with = vm_of_bits(0);
     for (uint32_t i = 0; i < bins->instances; i++) {
         const struct instance_args *args = &bins->discs[i].instance;
-        if (args->has_normals)
+        if (args->has_normals || !normals)
             with = vm_or(with, vi_lt_unsigned(vi_sub(id, vi_set(args->id_base)), vi_set(args->id_count)));
     }
     return vm_and(with, some);
@@ -239,6 +239,7 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
             const uint32_t pixel = (uint32_t)y * PT_DISC_TILE + x;
             const uint32_t count = pt_lanes_left(x, (uint32_t)tile->patches.tile.width);
             vm some = vm_and(vm_first(count), vf_lt(vf_load(tile->nearest + pixel), vf_set(pt_float(PT_KEY_EMPTY_Z))));
+            some = of_discs(bins, vi_load_id(keys + at), some, 0);
             if (!vm_bits(some))
                 continue;
             vf sums[SUMS], color[4], n[4];
@@ -250,7 +251,7 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
             vf weight = vf_max(sums[7], one);
             color[3] = vf_select(vf_lt(sums[3], weight), vf_min(sums[3] * vf_rcp(weight), one), one); // opaque: 1 exactly
             vf_load4(normals + 4 * at, n);
-            mean_normal(bins->view, sums, px, py, with_normals(bins, vi_load_id(keys + at), some), n);
+            mean_normal(bins->view, sums, px, py, of_discs(bins, vi_load_id(keys + at), some, 1), n);
             const uint32_t *own = (const uint32_t *)(const void *)(tile->own + pixel);
             const vi pair = vi_load(own), other = vi_load(own + PT_LANES);
             vf dx = vi_convert(vi_sub(vi_add(vi_set(px), vi_lanes()), vi_evens(pair, other)));

@@ -17,8 +17,9 @@ static void extract_source(const struct extract_args *args, const uint64_t *keys
         }
         vi word = vi_load(from + x), source = vi_and(word, vi_set(~PT_FROM_MIXED));
         vm mixed = vm_not(vi_eq(word, source));
-        vf value = args->discs ? pt_source_of_discs(keys + x, normals + 4 * (size_t)x, args->discs, mixed, some)
-                               : pt_source_value(view->width, source, mixed, some, args->crop_x + x, args->crop_y + y);
+        const uint32_t px = args->crop_x + x, py = args->crop_y + y;
+        vf value = normals ? pt_source_among_discs(args, keys + x, normals + 4 * (size_t)x, source, mixed, some, px, py)
+                           : pt_source_value(view->width, source, mixed, some, px, py);
         vf_store_where(out + x, value, lanes);
     }
 }
@@ -63,7 +64,7 @@ static void extract_row(void *context, uint32_t y)
                        (float *)pt_cpu_data(call, 4) + 3 * out);
     if (args->source)
         extract_source(args, keys, (const uint32_t *)pt_cpu_data(call, 1) + row,
-                       args->discs ? (const float *)pt_cpu_data(call, 8) + 4 * row : NULL, y,
+                       args->discs_count ? (const float *)pt_cpu_data(call, 8) + 4 * row : NULL, y,
                        (float *)pt_cpu_data(call, 5) + out);
     if (args->shadow)
         extract_shadow(args, keys, (const float *)pt_cpu_data(call, 6) + row, (float *)pt_cpu_data(call, 7) + out);

@@ -36,14 +36,17 @@ static inline vf pt_source_value(uint32_t width, vi source, vm mixed, vm some, u
     return vf_select(some, value, vf_zero());
 }
 
-// The same of discs; normals: of the pixels, w how far off their points fell. Ids from `discs` on are no points.
-static inline vf pt_source_of_discs(const uint64_t *keys, const float *normals, uint32_t discs, vm mixed, vm some)
+// The same where some are discs; normals: of the pixels, w how far off a disc's point fell.
+static inline vf pt_source_among_discs(const struct extract_args *args, const uint64_t *keys, const float *normals, vi source,
+                                       vm mixed, vm some, uint32_t x, uint32_t y)
 {
-    vf pixels[4], value = vf_set(1.0f);
+    vf pixels[4], value = pt_source_value(args->view.width, source, mixed, some, x, y);
+    const vm filled = pt_filled(source, (size_t)y * args->view.width + x, some);
+    const vi number = vi_sub(vi_load_id(keys), vi_set(args->discs_first));
+    const vm disc = vm_and(vm_and(some, vm_not(filled)), vi_lt_unsigned(number, vi_set(args->discs_count)));
     vf_load4(normals, pixels);
-    value = vf_select(vi_lt_unsigned(vi_load_id(keys), vi_set(discs)), value + pixels[3], value);
-    value = vf_select(mixed, vf_zero() - value, value);
-    return vf_select(some, value, vf_zero());
+    pixels[3] = vf_set(1.0f) + pixels[3];
+    return vf_select(disc, vf_select(mixed, vf_zero() - pixels[3], pixels[3]), value);
 }
 
 // View-space normals in world space, 0 where nothing is.

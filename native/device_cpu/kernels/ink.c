@@ -27,7 +27,7 @@ static void line_color(const struct ink *ink, vi id, vf z, vm ours, vf color[3])
         color[k] = vf_set(args->color[k]);
     if (args->source == PATINA_LINE_POINT) {
         vf own[3];
-        pt_albedo(&args->instance, ink->colors, id, 0, ours, own);
+        pt_albedo(&args->instance, ink->colors, id, vi_set(0), ours, own);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * own[k];
     } else if (args->source == PATINA_LINE_DEPTH) {

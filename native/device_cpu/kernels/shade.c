@@ -40,12 +40,13 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         vm ours = pt_of_instance(shade->planes.keys + at, &args->instance, pt_lanes_left(x, rect[2]), &id);
         if (!vm_bits(ours))
             continue;
-        pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, at, ours, color);
+        const vi source = pt_source(&shade->planes, at);
+        pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, source, ours, color);
         if (pt_recolors(args))
             pt_recolor(args, x, y, vf_load(around[args->blend]->z + x), ours, color);
         vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, pt_cpu_data(shade->call, 8), x, y, id,
                                    ours, 0, color, normal);
-        normal[3] = color[3] = pt_opacity(&args->instance, pt_cpu_data(shade->call, 4), pt_cpu_data(shade->call, 7), id, at, ours);
+        normal[3] = color[3] = pt_opacity(&args->instance, pt_cpu_data(shade->call, 4), pt_cpu_data(shade->call, 7), id, source, ours);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * color[3];
         vf_store4(shading + 4 * at, normal, vm_bits(ours));

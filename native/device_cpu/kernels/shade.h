@@ -25,12 +25,12 @@ static inline void pt_decode_srgb(vi rgb, vf linear[3])
         linear[k] = vf_look_up(pt_srgb_table, 256, vi_and(vi_shr(rgb, 8 * k), vi_set(255)));
 }
 
-// The points' own colours, before light; at: the first pixel in the plane, where they were blended.
-static inline void pt_albedo(const struct instance_args *instance, const void *colors, vi id, size_t at, vm ours, vf albedo[3])
+// The points' own colours, before light; source: the pixels in the plane where they were blended.
+static inline void pt_albedo(const struct instance_args *instance, const void *colors, vi id, vi source, vm ours, vf albedo[3])
 {
     if (instance->color_format == PT_COLOR_OF_PLANE) {
         vf pixels[4];
-        vf_load4((const float *)colors + 4 * at, pixels);
+        vf_gather4(colors, source, ours, pixels);
         for (int k = 0; k < 3; k++)
             albedo[k] = pixels[k];
         return;
@@ -60,7 +60,7 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
 }
 
 // The points' opacity, times the instance's.
-static inline vf pt_opacity(const struct instance_args *instance, const void *colors, const uint8_t *opacities, vi id, size_t at,
+static inline vf pt_opacity(const struct instance_args *instance, const void *colors, const uint8_t *opacities, vi id, vi source,
                             vm ours)
 {
     vf opacity = vf_set(instance->opacity);
@@ -68,7 +68,7 @@ static inline vf pt_opacity(const struct instance_args *instance, const void *co
         return opacity;
     if (instance->color_format == PT_COLOR_OF_PLANE) {
         vf pixels[4];
-        vf_load4((const float *)colors + 4 * at, pixels);
+        vf_gather4(colors, source, ours, pixels);
         return pixels[3];
     }
     vi byte = vi_and(vi_gather_bytes(opacities, id, ours), vi_set(255));

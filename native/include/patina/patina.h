@@ -432,10 +432,11 @@ typedef struct patina_camera {
 
 enum patina_quality { PATINA_QUALITY_REFINED = 0, PATINA_QUALITY_PAPER = 1 }; // filled depth: tangent plane | source's
 enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OFF = 2 };
-// How points become a surface. FILL: image-space filling, as quality and fill say. SPLATS: each point is a flat disc across its
+// How points become a surface. AUTO: of clouds that were analysed, points whose footprint is wider than a pixel or two are discs,
+// as wide as it, the others are filled; where fill is not CLOSED, and of clouds that were not, all are filled. FILL: image-space filling, as quality and fill say. SPLATS: each point is a flat disc across its
 // normal (without one: across the view), discs within a layer distance of the nearest one are blended; quality, fill, their
 // iterations and error_target say nothing then. Light maps of shadows are filled either way.
-enum patina_surface { PATINA_SURFACE_FILL = 0, PATINA_SURFACE_SPLATS = 1 };
+enum patina_surface { PATINA_SURFACE_AUTO = 0, PATINA_SURFACE_SPLATS = 1, PATINA_SURFACE_FILL = 2 };
 enum patina_smooth { PATINA_SMOOTH_ALLEVIATED = 0, PATINA_SMOOTH_GAUSSIAN = 1, PATINA_SMOOTH_BOX = 2, PATINA_SMOOTH_OFF = 3 };
 enum patina_antialias { PATINA_ANTIALIAS_LAYERS = 0, PATINA_ANTIALIAS_BACKGROUND = 1, PATINA_ANTIALIAS_OFF = 2 };
 
