@@ -54,7 +54,6 @@ struct patina_cloud {
     void *colors;      // slots x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // slots, or NULL where every point is opaque
     float *radii;       // slots, object units, or NULL
-    uint32_t *shapes;   // slots (kernel_args.h), or NULL: not analysed
     float *scalars;     // slots, or NULL
     uint8_t *classes;   // slots, or NULL
     uint64_t class_hash;
