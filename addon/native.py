@@ -264,6 +264,7 @@ _CALLS = {
     "patina_cloud_analyse": (c_void_p, POINTER(_AnalysisDesc), c_void_p),
     "patina_cloud_neighbourhoods": (c_void_p, POINTER(_Neighbourhoods), c_void_p),
     "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
+    "patina_cloud_dense_box": (c_void_p, c_void_p, c_void_p),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
     "patina_scene_set_lines": (c_void_p, POINTER(_Lines)),
     "patina_scene_set_settings": (c_void_p, POINTER(_Settings)),
@@ -436,7 +437,7 @@ class Task(_Handle):
         self._finish = finish
 
     def done(self) -> bool:
-        return bool(library().patina_task_done(self._handle))
+        return not self._finalizer.alive or bool(library().patina_task_done(self._handle))
 
     def result(self) -> Any:
         """Waits; raises what the call would have raised, else gives its result. Once: then the task is closed."""
@@ -571,14 +572,14 @@ class Cloud(_Handle):
         self._learn()
 
     def start_analysis(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
-                       keep_normals: bool = True, progress: Progress | None = None) -> Task:
+                       keep_normals: bool = True, progress: Progress | None = None, threads: int = 0) -> Task:
         """analyse, beside pictures: its result() changes the cloud, and no picture of it may be drawn then."""
         def apply(task: Task) -> None:
             task._call("apply")
             self._learn()
 
         stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
-        return Task("analyse", self._handle, byref(self._describe_analysis(neighbours, stations, station, keep_normals, 0)),
+        return Task("analyse", self._handle, byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads)),
                     _handle_of(progress), keep=(self, stations, station, progress), finish=apply)
 
     def neighbourhoods(self, *names: str, neighbours: int = 16, progress: Progress | None = None,
@@ -597,6 +598,12 @@ class Cloud(_Handle):
         """Other scalars for the same points; as start_colors."""
         self._call("set_scalars", byref(_view(scalars, self.count)))
         self.has_scalars = scalars is not None
+
+    def dense_box(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Of the points without strays."""
+        lower, upper = (c_double * 3)(), (c_double * 3)()
+        self._call("dense_box", lower, upper)
+        return tuple(lower), tuple(upper)
 
     def scalar_range(self, share: float) -> tuple[float, float]:
         """The scalars that this share of the points lies below and above."""

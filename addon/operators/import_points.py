@@ -14,7 +14,7 @@ from bpy_extras.io_utils import ImportHelper
 from .. import importers, jobs, native, styles
 from ..importers import PointFile, origin
 from ..sync import linked, sequence
-from . import scanner
+from ..sync.analysis import SCANNERS
 
 TICK = 0.01  # seconds from one look at a user's import to the next
 SHARE = 0.03  # seconds that a look reads, and a step beyond
@@ -107,7 +107,7 @@ class PATINA_OT_import_points(Operator, ImportHelper):
                     time.sleep(0.001)
         except StopIteration as end:
             done = end.value
-        text = f"Reading points: {100.0 * self._progress.value():.0f} %, Esc ends it"
+        text = f"{self._progress.doing}: {100.0 * self._progress.value():.0f} %, Esc ends it"
         context.workspace.status_text_set(None if done else text)
         if not done:
             return {'RUNNING_MODAL'}
@@ -168,7 +168,7 @@ class PATINA_OT_import_points(Operator, ImportHelper):
             if name in found:
                 continue
             try:
-                source = linked.source(first)
+                source = linked.source(first, analyzed=name == first)  # of a sequence none is
                 if source is None:
                     raise native.PatinaError("there is no such file")
                 importers.reader(first)
@@ -182,7 +182,7 @@ class PATINA_OT_import_points(Operator, ImportHelper):
             name = path.stem.replace("#", "").rstrip("_-. ") or path.stem if self.sequence else path.stem
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
             if item.scanners:
-                obj.data[scanner.PROPERTY] = item.scanners
+                obj.data[SCANNERS] = item.scanners
             obj.patina.linked_file = str(path)
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, shared)

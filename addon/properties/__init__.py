@@ -161,6 +161,14 @@ class PatinaObjectProperties(PropertyGroup):
     cull_back: BoolProperty(
         name="Backface Culling", override=_OVERRIDE, default=False,
         description="Leave out points that face away; only where the points have normals")
+    analysis: EnumProperty(
+        name="Analysis", override=_OVERRIDE, default='AUTO',
+        description="Whether Patina finds out from each point's neighbors how wide, how thick and which way the surface is there",
+        items=(
+            ('AUTO', "Automatic", "In the background, once; not for sequences and points that move, which would be analyzed in "
+                                  "every frame", 0),
+            ('ALWAYS', "Always", "Sequences and points that move too, in every frame", 1),
+            ('OFF', "Off", "Nothing is computed ahead: one spacing holds for many points", 2)))
     d_min: FloatProperty(
         name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
         unit='LENGTH', precision=4,

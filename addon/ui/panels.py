@@ -174,6 +174,7 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         patina, data = context.object.patina, context.object.data
         layout.prop(patina, "lighting")
         layout.prop(patina, "cull_back")
+        layout.prop(patina, "analysis")
         column = layout.column(align=True)
         column.prop(patina, "d_min")
         estimate = estimates.layer_distance(context.object.name_full)

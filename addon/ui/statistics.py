@@ -8,6 +8,7 @@ from bpy.types import Context, Panel, UILayout
 
 from .. import pace, viewport
 from ..engine import PatinaRenderEngine
+from ..sync.analyzing import ANALYSES
 
 
 class SidebarPanel:
@@ -41,6 +42,9 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
                 ("Picture", f"{stats['width']} x {stats['height']}"), ("Time", f"{stats['ms']:.1f} ms"),
                 ("Planes", f"{stats['plane_bytes'] / 1e6:,.0f} MB"),
                 ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]
+        shares = [share for item in shown.clouds if (share := ANALYSES.progress(item.cloud)) is not None]
+        if shares:
+            rows.append(("Analysis", f"{shares[0]:.0%}"))
         if level != pace.FULL:
             rows.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
         if stats["shadow_samples"]:
