@@ -2,6 +2,7 @@
 #include "analysis.h"
 #include "kernel_args.h"
 #include "memory.h"
+#include "orient.h"
 #include "progress.h"
 
 #include <math.h>
@@ -9,14 +10,14 @@
 #include <string.h>
 
 // Where 16 neighbours leave doubts, three times as many are asked: rows 1 : 10 apart fill three of them, and noise of half a
-// spacing is flat then.
-enum { NEIGHBOURS = 16, WIDER = 3 };
+// spacing is flat then. What is a volume to them is looked at once more among every eighth point.
+enum { NEIGHBOURS = 16, WIDER = 3, FAR_STRATA = 3, FAR_THINNING = 8 };
 
 struct walk {
     const patina_cloud *cloud;
     const patina_analysis_desc *desc;
     struct pt_analysis *out;
-    struct pt_neighbours tree;
+    struct pt_neighbours tree, coarse;
     patina_progress *progress;
     uint32_t k;
     int given; // normals that the cloud has know their side
@@ -28,29 +29,52 @@ struct walk {
 
 // ---- a leaf ----------------------------------------------------------------------------------------------------------------
 
-static void sample_of(const struct pt_neighbours *tree, uint32_t place, const struct pt_found *found, struct pt_sample *sample)
+static void sample_of(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t place,
+                      const struct pt_found *found, struct pt_sample *sample)
 {
     const uint32_t lane = place % PT_LEAF;
     sample->count = found->count[lane];
     for (uint32_t i = 0; i < sample->count; i++) {
-        pt_neighbours_offset(tree, place, found->place[lane][i], sample->offset[i]);
+        pt_neighbours_offset(tree, from, place, found->place[lane][i], sample->offset[i]);
         sample->square[i] = found->square[lane][i];
     }
 }
 
 static uint64_t all_of(const struct pt_sample *sample) { return sample->count >= 64 ? ~0ull : (1ull << sample->count) - 1ull; }
 
-void pt_describe_leaf(const struct pt_neighbours *tree, uint32_t leaf, uint32_t k, struct pt_found *found,
-                      struct pt_neighbourhood hoods[PT_LEAF])
+static void look_from_afar(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf,
+                           struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF])
+{
+    struct pt_sample sample;
+    struct pt_plane plane;
+    uint32_t volume = 0;
+    for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(left);
+        volume |= (uint32_t)(hoods[lane].kind == PT_KIND_VOLUME) << lane;
+    }
+    if (!volume)
+        return;
+    pt_neighbours_find(coarse, tree, leaf, volume, PT_NEIGHBOURS_MOST, found);
+    for (; volume; volume &= volume - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(volume);
+        sample_of(coarse, tree, leaf * PT_LEAF + lane, found, &sample);
+        pt_plane_fit(&sample, all_of(&sample), &plane);
+        if (sample.count == PT_NEIGHBOURS_MOST)
+            pt_neighbourhood_from_afar(&sample, &plane, FAR_THINNING, &hoods[lane]);
+    }
+}
+
+void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k,
+                      struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF])
 {
     const uint32_t lanes = pt_leaf_lanes(tree, leaf), wider = WIDER * k < PT_NEIGHBOURS_MOST ? WIDER * k : PT_NEIGHBOURS_MOST;
     struct pt_plane planes[PT_LEAF], wide;
     struct pt_sample sample, narrow;
     uint32_t doubtful = 0;
-    pt_neighbours_find(tree, leaf, lanes, k, found);
+    pt_neighbours_find(tree, tree, leaf, lanes, k, found);
     for (uint32_t left = lanes; left; left &= left - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(left);
-        sample_of(tree, leaf * PT_LEAF + lane, found, &sample);
+        sample_of(tree, tree, leaf * PT_LEAF + lane, found, &sample);
         pt_plane_fit(&sample, all_of(&sample), &planes[lane]);
         const int more = wider > k && sample.count == k;
         if (!more || !pt_plane_is_doubtful(&planes[lane]))
@@ -58,12 +82,11 @@ void pt_describe_leaf(const struct pt_neighbours *tree, uint32_t leaf, uint32_t 
         if (more && (pt_plane_is_doubtful(&planes[lane]) || pt_neighbourhood_is_doubtful(&hoods[lane])))
             doubtful |= 1u << lane;
     }
-    if (!doubtful)
-        return;
-    pt_neighbours_find(tree, leaf, doubtful, wider, found);
+    if (doubtful)
+        pt_neighbours_find(tree, tree, leaf, doubtful, wider, found);
     for (; doubtful; doubtful &= doubtful - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(doubtful);
-        sample_of(tree, leaf * PT_LEAF + lane, found, &sample);
+        sample_of(tree, tree, leaf * PT_LEAF + lane, found, &sample);
         pt_plane_fit(&sample, all_of(&sample), &wide);
         const int flat = !pt_plane_is_doubtful(&planes[lane]); // and came here for its rows
         if (flat ? !pt_plane_is_doubtful(&wide) : pt_plane_prefers_wide(&planes[lane], &wide)) {
@@ -74,6 +97,7 @@ void pt_describe_leaf(const struct pt_neighbours *tree, uint32_t leaf, uint32_t 
             pt_neighbourhood_of(&narrow, &planes[lane], &hoods[lane]);
         }
     }
+    look_from_afar(tree, coarse, leaf, found, hoods);
 }
 
 // ---- a chunk ---------------------------------------------------------------------------------------------------------------
@@ -178,7 +202,7 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         for (uint32_t leaf = walk->tree.chunk_leaf[c]; leaf < walk->tree.chunk_leaf[c + 1]; leaf++) {
             if (pt_progress_cancelled(walk->progress))
                 return;
-            pt_describe_leaf(&walk->tree, leaf, walk->k, &found, hoods);
+            pt_describe_leaf(&walk->tree, &walk->coarse, leaf, walk->k, &found, hoods);
             for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
                 const uint32_t lane = (uint32_t)__builtin_ctz(left);
                 write_point(walk, c, walk->tree.slots[leaf * PT_LEAF + lane], &hoods[lane]);
@@ -188,7 +212,7 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         }
         finish_chunk(walk, &walk->out->chunks[c], spacings, known);
         uint32_t done = atomic_fetch_add_explicit(&walk->done, 1, memory_order_relaxed) + 1;
-        pt_progress_raise(walk->progress, 0.05 + 0.95 * done / walk->cloud->chunk_count);
+        pt_progress_raise(walk->progress, 0.05 + 0.8 * done / walk->cloud->chunk_count);
     }
 }
 
@@ -226,6 +250,28 @@ int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *des
     return pt_check_array(&station, "station", 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1);
 }
 
+// Sides that neither the caller nor a station told.
+static int vote_sides(struct walk *walk, struct pt_pool *pool)
+{
+    const patina_cloud *cloud = walk->cloud;
+    uint64_t unoriented = 0;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        unoriented += walk->tallies[c].unoriented;
+    walk->out->oriented = 1;
+    if (!unoriented)
+        return PATINA_OK;
+    const size_t size = (cloud->slots / 32 + 1) * sizeof(uint32_t);
+    uint32_t *told = walk->given ? pt_pages_alloc(size) : NULL;
+    if (walk->given && !told)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t slot = 0; told && slot < cloud->slots; slot++)
+        told[slot / 32] |= (uint32_t)((cloud->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << slot % 32;
+    walk->out->oriented = PATINA_SIDES_VOTED;
+    const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surface, walk->out->shapes, pool, walk->progress, 0.85, 1.0);
+    pt_pages_free(told, size);
+    return error;
+}
+
 static int compute(struct walk *walk, struct pt_pool *pool)
 {
     const patina_cloud *cloud = walk->cloud;
@@ -239,19 +285,23 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     if (cloud->chunk_count)
         memcpy(out->chunks, cloud->chunks, cloud->chunk_count * sizeof *out->chunks);
     out->spacing_base = base_of(cloud);
-    int error = pt_neighbours_create(&walk->tree, cloud, pool, walk->progress, 0.0, 0.05);
+    int error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, pool, walk->progress, 0.0, 0.04);
+    if (!error)
+        error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, pool, walk->progress, 0.04, 0.05);
+    if (error) {
+        pt_neighbours_destroy(&walk->tree);
+        return error;
+    }
+    pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
+    pt_neighbours_destroy(&walk->coarse);
+    error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : vote_sides(walk, pool);
+    pt_neighbours_destroy(&walk->tree);
     if (error)
         return error;
-    pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
-    pt_neighbours_destroy(&walk->tree);
-    if (pt_progress_cancelled(walk->progress))
-        return PATINA_ERROR_CANCELLED;
-    out->oriented = walk->given || walk->desc->station_count;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         for (int kind = 0; kind < 6; kind++)
             out->kinds[kind] += walk->tallies[c].kinds[kind];
         out->estimated += walk->tallies[c].estimated;
-        out->oriented &= !walk->tallies[c].unoriented;
     }
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         out->chunks[c].cone_cosine = -2.0f;
@@ -273,7 +323,7 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
                          .out = out,
                          .progress = progress,
                          .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
-                         .given = cloud->info.has_normals && (cloud->info.normals_oriented || !cloud->info.estimated_normals) };
+                         .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED };
     *out = (struct pt_analysis){ .slots = cloud->slots };
     struct pt_pool *pool = pt_pool_create(desc->threads, 0);
     int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
@@ -310,7 +360,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->info.layer_distance = next.info.layer_distance;
     cloud->info.has_shapes = 1;
     cloud->info.has_normals |= analysis->estimated > 0;
-    cloud->info.normals_oriented = cloud->info.has_normals && analysis->oriented;
+    cloud->info.normals_oriented = cloud->info.has_normals ? (uint32_t)analysis->oriented : 0;
     cloud->info.estimated_normals = analysis->estimated;
     for (int kind = 0; kind < 6; kind++)
         cloud->info.kinds[kind] = analysis->kinds[kind];

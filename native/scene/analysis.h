@@ -28,7 +28,7 @@ uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits
 void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct pt_neighbourhood *out);
 
 // The leaf's lanes described: neighbours, plane, kind. found is room to work in.
-void pt_describe_leaf(const struct pt_neighbours *tree, uint32_t leaf, uint32_t k, struct pt_found *found,
+void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k, struct pt_found *found,
                       struct pt_neighbourhood hoods[PT_LEAF]);
 
 #endif

@@ -90,7 +90,7 @@ static void read_leaves(void *context, uint32_t begin, uint32_t end, uint32_t th
     struct pt_found found;
     (void)thread;
     for (uint32_t leaf = begin; leaf < end && !pt_progress_cancelled(reading->progress); leaf++) {
-        pt_neighbours_find(tree, leaf, pt_leaf_lanes(tree, leaf), k, &found);
+        pt_neighbours_find(tree, tree, leaf, pt_leaf_lanes(tree, leaf), k, &found);
         for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
             const uint32_t lane = (uint32_t)__builtin_ctz(left), place = leaf * PT_LEAF + lane;
             const size_t at = reading->cloud->order[tree->slots[place]];
@@ -155,7 +155,7 @@ static int read_all(struct reading *reading, struct pt_pool *pool)
     pt_parallel(pool, reading->cloud->chunk_count, 1, read_chunks, reading);
     if (!to->numbers && !to->distances && !to->soft_radius && !to->uncertainty)
         return PATINA_OK;
-    int error = pt_neighbours_create(&reading->tree, reading->cloud, pool, reading->progress, 0.0, 0.1);
+    int error = pt_neighbours_create(&reading->tree, reading->cloud, PT_STRATA, pool, reading->progress, 0.0, 0.1);
     if (error)
         return error;
     reading->uncertainty = to->uncertainty;

@@ -18,6 +18,9 @@
 #define UNEVEN_MOST 13.0    // what a shape word holds
 
 #define FLATTEST 0.1        // thickness over width, squared: what still is a surface
+#define FLATTEST_AFAR 0.2    // from afar: noise of two spacings has 0.1
+#define FACING 0.35          // from afar: a volume's dots lie on its plane
+#define THICKEST 3.0         // spacings: what is thicker is a volume, however flat from afar
 #define SLIMMEST 0.03       // narrowness squared of a line
 #define BORDER_GAP -0.8660254 // cosine of 150 degrees without a neighbour: 16 random ones leave them by chance at 0.5 %
 #define BORDER_OFFSET 0.2   // of their mean from the point, in distances of the farthest, where gaps are looked for
@@ -258,6 +261,30 @@ static void be_volume(const struct pt_sample *sample, const struct pt_plane *pla
     const double thick = sqrt(plane->value[0] / plane->value[1]);
     be_dot(PT_KIND_VOLUME, COVER_DOT * nearest, fmin(spacing, 2.0 * nearest), fmin(thick, 1.0), out);
     out->sigma = sqrt(plane->value[0]);
+}
+
+int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_plane *plane, double thinning,
+                               struct pt_neighbourhood *out)
+{
+    struct pt_neighbourhood surface = { .kind = 0 };
+    if (plane->value[0] >= FACING * plane->value[1] || plane->value[1] <= SLIMMEST * plane->value[2])
+        return 0;
+    out->has_normal = 1;
+    for (int k = 0; k < 3; k++) {
+        out->normal[k] = plane->axis[0][k];
+        out->axis[k] = plane->axis[2][k];
+    }
+    if (plane->value[0] >= FLATTEST_AFAR * plane->value[1])
+        return 0;
+    be_surface(sample, plane, &surface);
+    const double scale = 1.0 / sqrt(thinning);
+    surface.spacing *= scale;
+    surface.major *= scale;
+    surface.minor *= scale;
+    if (surface.sigma > THICKEST * surface.spacing)
+        return 0;
+    *out = surface;
+    return 1;
 }
 
 int pt_neighbourhood_is_doubtful(const struct pt_neighbourhood *hood)

@@ -41,6 +41,11 @@ int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane 
 // RMS distance of the marked neighbours from the plane, or from the quadric where that explains more.
 double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane);
 
+// From a sample of every `thinning`-th point, where the point's nearest make it a volume: noise that is wider than they reach
+// apart is flat from farther off. 1: out is a surface now.
+int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_plane *plane, double thinning,
+                               struct pt_neighbourhood *out);
+
 void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *plane, struct pt_neighbourhood *out);
 
 #endif

@@ -93,10 +93,10 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     for (uint32_t c = begin; c < end && !pt_progress_cancelled(fill->progress); c++) {
         const struct pt_chunk *chunk = &tree->cloud->chunks[c];
         const float *xyz = tree->cloud->positions + 3 * (size_t)chunk->first;
-        const uint32_t first = tree->chunk_leaf[c];
-        for (uint32_t i = 0; i < chunk->count; i++)
+        const uint32_t first = tree->chunk_leaf[c], count = pt_neighbours_of_chunk(tree, c);
+        for (uint32_t i = 0; i < count; i++)
             places[i] = (struct place){ { xyz[i], xyz[chunk->padded + i], xyz[2 * chunk->padded + i] }, chunk->first + i };
-        split(tree, places, chunk->count, first, tree->nodes + 2 * (size_t)first);
+        split(tree, places, count, first, tree->nodes + 2 * (size_t)first);
         for (uint32_t leaf = first; leaf < tree->chunk_leaf[c + 1]; leaf++)
             tree->leaf_chunk[leaf] = c;
         uint32_t done = atomic_fetch_add_explicit(&fill->done, 1, memory_order_relaxed);
@@ -189,17 +189,22 @@ static int best_level(void)
     return 0;
 }
 
-int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, struct pt_pool *pool,
+uint32_t pt_neighbours_of_chunk(const struct pt_neighbours *tree, uint32_t chunk)
+{
+    return pt_chunk_prefix(&tree->cloud->chunks[chunk], tree->strata);
+}
+
+int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, uint32_t strata, struct pt_pool *pool,
                          struct patina_progress *progress, double begin, double end)
 {
-    *tree = (struct pt_neighbours){ .cloud = cloud, .chunk_count = cloud->chunk_count, .level = best_level() };
+    *tree = (struct pt_neighbours){ .cloud = cloud, .chunk_count = cloud->chunk_count, .strata = strata, .level = best_level() };
     int error = PATINA_ERROR_MEMORY;
     tree->chunk_leaf = malloc((cloud->chunk_count + 1) * sizeof *tree->chunk_leaf);
     if (!tree->chunk_leaf)
         return error;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         tree->chunk_leaf[c] = tree->leaf_count;
-        tree->leaf_count += (cloud->chunks[c].count + PT_LEAF - 1) / PT_LEAF;
+        tree->leaf_count += (pt_neighbours_of_chunk(tree, c) + PT_LEAF - 1) / PT_LEAF;
     }
     tree->chunk_leaf[cloud->chunk_count] = tree->leaf_count;
     for (int k = 0; k < 3 && cloud->chunk_count; k++)

@@ -20,7 +20,7 @@ struct pt_chunk_node { // over chunks, in the cloud's frame; widened by what its
 
 struct pt_neighbours {
     const struct patina_cloud *cloud;
-    uint32_t leaf_count, chunk_count;
+    uint32_t leaf_count, chunk_count, strata; // strata: PT_STRATA, or fewer: of each chunk's first alone
     float *places;         // a leaf: x[16], y[16], z[16], relative to the chunk's origin; +inf where there is no point
     uint32_t *slots;       // of leaf * 16 + lane
     uint32_t *leaf_chunk;  // chunk of each leaf
@@ -42,15 +42,20 @@ struct pt_found {
 
 // progress runs from `begin` to `end` of it. 0, PATINA_ERROR_MEMORY or PATINA_ERROR_CANCELLED; on failure nothing is left.
 // About 20 bytes a point, and the cloud must outlive it.
-int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, struct pt_pool *pool,
+int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, uint32_t strata, struct pt_pool *pool,
                          struct patina_progress *progress, double begin, double end);
 void pt_neighbours_destroy(struct pt_neighbours *tree);
 
+// Points of the chunk in this tree: its first.
+uint32_t pt_neighbours_of_chunk(const struct pt_neighbours *tree, uint32_t chunk);
 // Lanes of the leaf that hold points.
 uint32_t pt_leaf_lanes(const struct pt_neighbours *tree, uint32_t leaf);
-// The k nearest (1..PT_NEIGHBOURS_MOST) of the lanes in the mask. Any thread.
-void pt_neighbours_find(const struct pt_neighbours *tree, uint32_t leaf, uint32_t lanes, uint32_t k, struct pt_found *found);
-// From the point at place `from` to that at `to`.
-void pt_neighbours_offset(const struct pt_neighbours *tree, uint32_t from, uint32_t to, double offset[3]);
+// The k nearest (1..PT_NEIGHBOURS_MOST) in `tree` of the lanes in the mask, which are of `from`: that tree, or one of the same
+// cloud with other strata (then the point itself may be among them). Any thread.
+void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
+                        uint32_t k, struct pt_found *found);
+// From the point at place `at` of `from` to that at `to` of `tree`.
+void pt_neighbours_offset(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t at, uint32_t to,
+                          double offset[3]);
 
 #endif

@@ -15,7 +15,7 @@ struct walk {
     _Alignas(64) double place[3][PT_LEAF]; // of the lanes, in the frame that is walked
     _Alignas(64) double worst[PT_LEAF];    // square of the distance to the k-th found; negative: a lane that does not look
     double middle[3];                      // of them: what is nearest to it is walked first
-    const struct pt_neighbours *tree;
+    const struct pt_neighbours *tree, *from; // that is walked, that the lanes are of
     struct pt_found *found;
     uint32_t leaf, k, frame; // frame: a chunk, or one of these two
 };
@@ -26,7 +26,7 @@ struct walk {
 uint32_t pt_leaf_lanes(const struct pt_neighbours *tree, uint32_t leaf)
 {
     const uint32_t c = tree->leaf_chunk[leaf];
-    const uint32_t before = (leaf - tree->chunk_leaf[c]) * PT_LEAF, left = tree->cloud->chunks[c].count - before;
+    const uint32_t before = (leaf - tree->chunk_leaf[c]) * PT_LEAF, left = pt_neighbours_of_chunk(tree, c) - before;
     return left >= PT_LEAF ? 0xFFFFu : (1u << left) - 1u;
 }
 
@@ -39,7 +39,7 @@ static double outside(double p, double low, double high)
 // Places of the lanes relative to `origin`.
 static void set_frame(struct walk *walk, const double origin[3], uint32_t frame)
 {
-    const struct pt_neighbours *tree = walk->tree;
+    const struct pt_neighbours *tree = walk->from;
     const float *xyz = tree->places + (size_t)walk->leaf * 3 * PT_LEAF;
     const double *own = tree->cloud->chunks[tree->leaf_chunk[walk->leaf]].origin;
     const uint32_t count = (uint32_t)__builtin_popcount(pt_leaf_lanes(tree, walk->leaf));
@@ -207,9 +207,10 @@ TARGET static inline uint32_t near_points_avx512(const float *xyz, const double 
 
 // ----------------------------------------------------------------------------------------------------------------------------
 
-void pt_neighbours_find(const struct pt_neighbours *tree, uint32_t leaf, uint32_t lanes, uint32_t k, struct pt_found *found)
+void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
+                        uint32_t k, struct pt_found *found)
 {
-    struct walk walk = { .tree = tree, .found = found, .leaf = leaf, .k = k, .frame = NO_FRAME };
+    struct walk walk = { .tree = tree, .from = from, .found = found, .leaf = leaf, .k = k, .frame = NO_FRAME };
     for (int i = 0; i < PT_LEAF; i++)
         walk.worst[i] = lanes >> i & 1u ? INFINITY : -1.0;
     for (uint32_t left = lanes; left; left &= left - 1)
@@ -229,11 +230,12 @@ void pt_neighbours_find(const struct pt_neighbours *tree, uint32_t leaf, uint32_
     walk_cloud_plain(&walk);
 }
 
-void pt_neighbours_offset(const struct pt_neighbours *tree, uint32_t from, uint32_t to, double offset[3])
+void pt_neighbours_offset(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t at, uint32_t to,
+                          double offset[3])
 {
-    const float *a = tree->places + (size_t)(from / PT_LEAF) * 3 * PT_LEAF + from % PT_LEAF;
+    const float *a = from->places + (size_t)(at / PT_LEAF) * 3 * PT_LEAF + at % PT_LEAF;
     const float *b = tree->places + (size_t)(to / PT_LEAF) * 3 * PT_LEAF + to % PT_LEAF;
-    const uint32_t chunk_a = tree->leaf_chunk[from / PT_LEAF], chunk_b = tree->leaf_chunk[to / PT_LEAF];
+    const uint32_t chunk_a = from->leaf_chunk[at / PT_LEAF], chunk_b = tree->leaf_chunk[to / PT_LEAF];
     const double *origin_a = tree->cloud->chunks[chunk_a].origin, *origin_b = tree->cloud->chunks[chunk_b].origin;
     for (int k = 0; k < 3; k++) // the shift first, as the walk has it
         offset[k] = (double)b[k * PT_LEAF] - ((double)a[k * PT_LEAF] + (origin_a[k] - origin_b[k]));

@@ -16,7 +16,7 @@ TARGET static void LEVEL(walk_leaf)(struct walk *walk, uint32_t leaf, uint32_t l
         const uint32_t lane = (uint32_t)__builtin_ctz(lanes);
         const double place[3] = { walk->place[0][lane], walk->place[1][lane], walk->place[2][lane] };
         uint32_t near = LEVEL(near_points)(xyz, place, walk->worst[lane], square);
-        if (leaf == walk->leaf)
+        if (leaf == walk->leaf && tree == walk->from)
             near &= ~(1u << lane);
         for (near &= pt_leaf_lanes(tree, leaf); near; near &= near - 1) {
             const uint32_t other = (uint32_t)__builtin_ctz(near);
@@ -80,7 +80,7 @@ TARGET static void LEVEL(walk_cloud)(struct walk *walk)
     } stack[48], at = { 0, 0, walk->tree->chunk_count };
     const struct pt_chunk_node *nodes = walk->tree->chunk_nodes;
     uint32_t depth = 0;
-    LEVEL(walk_chunk)(walk, walk->tree->leaf_chunk[walk->leaf]); // its own first: most lanes then need no other
+    LEVEL(walk_chunk)(walk, walk->from->leaf_chunk[walk->leaf]); // its own first: most lanes then need no other
     for (;; at = stack[--depth]) {
         for (;;) {
             const struct pt_chunk_node *node = &nodes[at.node];
@@ -89,7 +89,7 @@ TARGET static void LEVEL(walk_cloud)(struct walk *walk)
                 break;
             if (at.chunks == 1) {
                 const uint32_t chunk = walk->tree->chunk_order[at.chunk];
-                if (chunk != walk->tree->leaf_chunk[walk->leaf])
+                if (chunk != walk->from->leaf_chunk[walk->leaf])
                     LEVEL(walk_chunk)(walk, chunk);
                 break;
             }

@@ -9,6 +9,7 @@
 #define FLAT 0.03
 #define FLAT_BEST 0.6 // more neighbours are better when they bring it below this part: noise falls to a third, creases stay
 #define BENT 7e-4     // a quadric may explain it: at less, sigma is below a thirtieth of the spacing
+#define TIGHT 0.4     // RMS in parts of a slab's half thickness; of points spread over it, 0.58
 #define LINEAR 0.1    // narrowness squared: 16 neighbours on one row of a scan
 
 static void rotate(double a[3][3], double v[3][3], int p, int q)
@@ -39,7 +40,7 @@ static void solve_symmetric(double a[3][3], double value[3], double v[3][3])
         for (int k = 0; k < 3; k++)
             v[i][k] = i == k;
     const double size = fabs(a[0][0]) + fabs(a[1][1]) + fabs(a[2][2]);
-    for (int sweep = 0; sweep < 12 && fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]) > 1e-15 * size; sweep++) {
+    for (int sweep = 0; sweep < 12 && fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]) > 1e-13 * size; sweep++) {
         rotate(a, v, 0, 1);
         rotate(a, v, 0, 2);
         rotate(a, v, 1, 2);
@@ -138,6 +139,8 @@ int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane 
     if (2 * found < (int)sample->count || 5 * found < 7 * known || found < 5)
         return 0;
     pt_plane_fit(sample, best, out);
+    if (out->value[0] > TIGHT * TIGHT * within * within)
+        return 0; // they fill the slab, as any would: no plane
     const double place = along(out->axis[0], out->mean);
     const uint64_t again = within_of(sample, out->axis[0], place, within);
     if (__builtin_popcountll(again) >= found)

@@ -15,7 +15,7 @@ of them, in the same order; "absent" what could not be measured, and why.
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), session (ten
-minutes of work in Blender). With --quick they take a million points, and one minute.
+minutes of work in Blender), analysis (what every point knows, 10 million). With --quick they take a million points, and one minute.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import analysis
 import case as cases
 import imports
 import meshes
@@ -51,7 +52,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "session")
+          "leaves", "session", "analysis")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -165,6 +166,8 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
     "viewport": ("viewport", "Viewport",
                  lambda options: window.measure(1_000_000 if options.quick else 10_000_000, options.library)),
     "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
+    "analysis": ("analysis", "What every point knows",
+                 lambda options: analysis.measure(1_000_000 if options.quick else 10_000_000, options.library)),
     "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
 }
 

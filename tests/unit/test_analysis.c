@@ -37,7 +37,7 @@ static void compare_with_all(patina_cloud *cloud, uint32_t k, uint32_t looked_at
 {
     struct pt_neighbours tree;
     static struct pt_found found;
-    assert_int_equal(pt_neighbours_create(&tree, cloud, NULL, NULL, 0, 1), 0);
+    assert_int_equal(pt_neighbours_create(&tree, cloud, PT_STRATA, NULL, NULL, 0, 1), 0);
     const int best = tree.level;
     struct pcg random = pcg_seed(k);
     for (uint32_t q = 0; q < looked_at && tree.leaf_count; q++) {
@@ -49,7 +49,7 @@ static void compare_with_all(patina_cloud *cloud, uint32_t k, uint32_t looked_at
             double o[3];
             if (!(pt_leaf_lanes(&tree, place / PT_LEAF) >> place % PT_LEAF & 1u) || place == from)
                 continue;
-            pt_neighbours_offset(&tree, from, place, o);
+            pt_neighbours_offset(&tree, &tree, from, place, o);
             const double d = o[0] * o[0] + o[1] * o[1] + o[2] * o[2];
             const uint32_t n = cloud->order[tree.slots[place]];
             uint32_t at = count;
@@ -62,7 +62,7 @@ static void compare_with_all(patina_cloud *cloud, uint32_t k, uint32_t looked_at
             count += count < k;
         }
         for (tree.level = best; tree.level >= 0; tree.level--) {
-            pt_neighbours_find(&tree, leaf, lanes, k, &found);
+            pt_neighbours_find(&tree, &tree, leaf, lanes, k, &found);
             assert_int_equal(found.count[lane], count);
             for (uint32_t i = 0; i < count; i++) {
                 assert_true(found.square[lane][i] == square[i]);
@@ -337,15 +337,19 @@ static void test_threads(void **state)
     struct points points = points_torus(60000, 1.0, 0.4, POINTS_NORMALS, 5);
     for (uint64_t i = 0; i < 3 * points.count; i++)
         points.position[i] += 0.004f * (float)(i * 2654435761u % 1000u) / 1000.0f;
-    patina_cloud *one = points_upload(&points), *other = points_upload(&points);
-    analyse(one, 1);
-    analyse(other, 3);
-    assert_memory_equal(one->shapes, other->shapes, one->slots * 4);
-    assert_memory_equal(one->surface, other->surface, one->slots * 4);
-    assert_memory_equal(one->chunks, other->chunks, one->chunk_count * sizeof *one->chunks);
-    assert_true(one->info.normals_oriented && one->info.estimated_normals > 50000);
-    patina_cloud_destroy(one);
-    patina_cloud_destroy(other);
+    patina_cloud_desc plain = points_desc(&points);
+    plain.normal.data = NULL;
+    for (int voted = 1; voted >= 0; voted--) {
+        patina_cloud *one = voted ? build(&plain) : points_upload(&points), *other = voted ? build(&plain) : points_upload(&points);
+        analyse(one, 1);
+        analyse(other, 3);
+        assert_memory_equal(one->shapes, other->shapes, one->slots * 4);
+        assert_memory_equal(one->surface, other->surface, one->slots * 4);
+        assert_memory_equal(one->chunks, other->chunks, one->chunk_count * sizeof *one->chunks);
+        assert_true(one->info.normals_oriented == (voted ? PATINA_SIDES_VOTED : 1u) && one->info.estimated_normals > 50000);
+        patina_cloud_destroy(one);
+        patina_cloud_destroy(other);
+    }
     points_free(&points);
 }
 
@@ -379,6 +383,44 @@ static void test_orientation(void **state)
         patina_cloud_destroy(cloud);
     }
     points_free(&points);
+}
+
+// Votes of views from outside find the side of closed shapes; an open sheet faces up. Strays far off change nothing.
+static void test_votes(void **state)
+{
+    (void)state;
+    const double half[3] = {1.0, 0.6, 0.3};
+    for (int shape = 0; shape < 4; shape++) {
+        const uint64_t count = 30000;
+        struct points points = shape == 0   ? points_torus(count, 1.0, 0.4, POINTS_NORMALS, 5)
+                               : shape == 1 ? points_box(count, half, POINTS_NORMALS, 5)
+                               : shape == 2 ? points_sphere(count, 1.0, POINTS_NORMALS, 5)
+                                            : points_rectangle(count, 2.0, 1.0, POINTS_NORMALS, 5);
+        for (uint64_t i = 0; i < 3; i++)
+            for (uint64_t k = 0; k < 3; k++)
+                points.position[3 * i + k] *= 100.0f;
+        patina_cloud_desc desc = points_desc(&points);
+        desc.normal.data = NULL;
+        patina_cloud *cloud = build(&desc);
+        analyse(cloud, 0);
+        assert_int_equal(cloud->info.normals_oriented, PATINA_SIDES_VOTED);
+        struct read r = read_cloud(cloud);
+        uint64_t right = 0, known = 0;
+        for (uint64_t i = 3; i < count; i++) {
+            double dot = 0.0, square = 0.0;
+            for (uint64_t k = 0; k < 3; k++) {
+                dot += (double)r.normal[3 * i + k] * (double)points.normal[3 * i + k];
+                square += (double)r.normal[3 * i + k] * (double)r.normal[3 * i + k];
+            }
+            known += square > 0.5;
+            right += square > 0.5 && dot > 0.0;
+        }
+        printf("  shape %d: %.3f %% of normals on the right side\n", shape, 100.0 * (double)right / (double)known);
+        assert_true(known > count * 95 / 100 && 1000 * right >= 999 * known);
+        read_free(&r);
+        patina_cloud_destroy(cloud);
+        points_free(&points);
+    }
 }
 
 // Saved and opened it is the same; so is what a task computes beside.
@@ -466,7 +508,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_neighbours), cmocka_unit_test(test_torus),       cmocka_unit_test(test_kinds),
         cmocka_unit_test(test_far_away),   cmocka_unit_test(test_hard),        cmocka_unit_test(test_words),
-        cmocka_unit_test(test_threads),    cmocka_unit_test(test_orientation), cmocka_unit_test(test_saved_and_task),
+        cmocka_unit_test(test_threads),    cmocka_unit_test(test_orientation), cmocka_unit_test(test_votes), cmocka_unit_test(test_saved_and_task),
         cmocka_unit_test(test_cancel_and_refusals), cmocka_unit_test(test_soft),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -185,7 +185,7 @@ typedef struct patina_cloud_info {
     float scalar_range[2];   // least and greatest finite scalar; 0, 0 without one
     uint32_t class_bits[8];  // classes that drawn points have: class c is bit c % 32 of word c / 32
     uint32_t has_shapes;     // the cloud was analysed: patina_cloud_analyse
-    uint32_t normals_oriented; // every normal knows its side, as given or by a station
+    uint32_t normals_oriented; // 1: every normal knows its side, as given or by a station; PATINA_SIDES_VOTED: some by votes
     uint64_t estimated_normals; // of points whose normal the analysis found
     uint64_t kinds[6];       // drawn points of each patina_kind
 } patina_cloud_info;
@@ -215,6 +215,9 @@ enum patina_kind {
     PATINA_KIND_VOLUME = 4,  // foliage
     PATINA_KIND_STRAY = 5,   // far from what its neighbours are part of
 };
+
+// Where nothing tells the side of a surface, 64 views from outside vote for the one that is seen; sheets face up.
+#define PATINA_SIDES_VOTED 2
 
 typedef struct patina_analysis_desc {
     size_t struct_size;
