@@ -32,10 +32,13 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
     memcpy(refs, planes, plane_count * sizeof *planes);
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
+        const struct patina_cloud *cloud = instance->instance->cloud;
         if (!instance->chunk_count || !instance->discs)
             continue;
         discs[instances++] = (struct disc_args){.instance = instance->args,
-                                                .has_radii = instance->instance->cloud->info.has_radii,
+                                                .has_radii = cloud->info.has_radii ? PT_RADII_FLOATS
+                                                             : cloud->shapes       ? PT_RADII_SHAPES
+                                                                                   : PT_RADII_NONE,
                                                 .radius = instance->radius,
                                                 .radius_scale = instance->radius_scale};
         chunks += instance->chunk_count;

@@ -126,6 +126,17 @@ static void normal_matrix(const struct camera *camera, const struct object *obje
         out[i] = object->singular || !(largest > 0.0) ? 0.0f : (float)(sign * product[i] / largest);
 }
 
+// What makes the normal matrix the inverse transposed, times the largest stretch.
+static float axis_scale(const struct camera *camera, const struct object *object)
+{
+    double cofactors[9], product[9], largest = 0.0;
+    pt_cofactors(object->linear, cofactors);
+    pt_multiply(camera->axes, cofactors, product);
+    for (int i = 0; i < 9; i++)
+        largest = fmax(largest, fabs(product[i]));
+    return object->singular ? 1.0f : (float)(largest * object->scale / fabs(pt_dot(object->linear, cofactors)));
+}
+
 // The product's rows, the same for every chunk of an object: screen X, Y (perspective: times z) and z.
 static void product_rows(const struct camera *camera, const struct object *object, double rows[9])
 {
@@ -601,6 +612,7 @@ static void set_instance(const struct camera *camera, const struct object *objec
     // finite with all that they are multiplied by: within an infinite layer distance empty pixels would be neighbours
     args->d_min = fminf(style->d_min, LARGEST_LAYER);
     normal_matrix(camera, object, args->normal_matrix);
+    args->axis_scale = axis_scale(camera, object);
     for (uint32_t k = 0; k < PT_SPACINGS; k++)
         args->spacing[k] = (float)fmin(thinned * cloud->spacing_base * pt_spacing_of_class(k) * object->scale,
                                        LARGEST_LAYER);

@@ -32,6 +32,7 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
     PT_GL_SCRATCH_WOKEN,  // fill: tiles that the next step has to look at
     PT_GL_SCRATCH_SUMS,   // blend: of the pixels of a band
+    PT_GL_SCRATCH_LARGE,  // discs: how many are large, and which
     PT_GL_SCRATCH_TILES,  // what each tile holds
     PT_GL_SCRATCH_TILE_LISTS,
     PT_GL_SCRATCH_TILE_COUNTS,

@@ -10,12 +10,16 @@
 enum {
     SLICES = 16,     // workgroups that share a chunk on a GPU: 4096 points are too many for one where cores abound
     LONG_RUN = 4096, // chunks between two looks at cancel
+    DISC_RUN = 256,  // chunks, with discs: a list holds the large ones of a run
+    CHUNK_MOST = 4096, // points of a chunk
+    DISC_STEPS = 8192, // through the loops of an invocation for a large disc: see lib/disc.glsl
 };
 
 struct instance_buffers {
     enum pt_kernel kernel;
     uint32_t binding; // of chunks; positions and surface follow
     const struct pt_buffer *chunks, *positions, *surface; // surface: NULL where none is read
+    uint32_t large, parts; // discs: the program of large ones, and workgroups for each; 0: no discs
 };
 
 struct batch {
@@ -42,18 +46,50 @@ static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, 
     return result;
 }
 
+// The discs that a run listed as large: its own program draws them.
+static int run_large(struct pt_gl_device *d, const struct instance_buffers *b, const struct batch *batch)
+{
+    const GLuint program = d->programs[b->kernel][b->large];
+    uint32_t count = 0, x, y;
+    d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_LARGE].name);
+    d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof count, &count);
+    pt_gl_grid(count * b->parts, &x, &y);
+    d->gl.ProgramUniform1ui(program, 1, (GLuint)batch->first_slot);
+    d->gl.ProgramUniform1ui(program, 5, b->parts);
+    return pt_gl_dispatch(d, b->kernel, b->large, x, y);
+}
+
+// Makes room for the large discs of a run.
+static int begin_large(struct pt_gl_device *d, const struct instance_buffers *b)
+{
+    const uint32_t none = 0;
+    const uint64_t slots = b->positions->size / 12, most = (uint64_t)DISC_RUN * CHUNK_MOST;
+    const size_t size = 4 + 8 * (size_t)(slots < most ? slots : most);
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_LARGE, size, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 10, d->scratch[PT_GL_SCRATCH_LARGE].name, 0, size, pt_kernel_names[b->kernel]);
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_LARGE].name);
+    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, &none);
+    return result;
+}
+
 static int run_batch(struct pt_gl_device *d, const struct instance_buffers *b, const struct batch *batch, uint32_t pass,
                      const atomic_int *cancel)
 {
     int result = bind_batch(d, b, batch);
-    for (uint32_t done = 0; done < batch->chunk_count && result == PATINA_OK; done += LONG_RUN) {
-        uint32_t groups = batch->chunk_count - done < LONG_RUN ? batch->chunk_count - done : LONG_RUN;
+    const uint32_t run = b->parts ? DISC_RUN : LONG_RUN;
+    for (uint32_t done = 0; done < batch->chunk_count && result == PATINA_OK; done += run) {
+        uint32_t groups = batch->chunk_count - done < run ? batch->chunk_count - done : run;
         if (cancel && atomic_load(cancel))
             return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
+        if (b->parts && (result = begin_large(d, b)) != PATINA_OK)
+            break;
         d->gl.ProgramUniform1ui(d->programs[b->kernel][pass], 0, batch->first_chunk + done);
         d->gl.ProgramUniform1ui(d->programs[b->kernel][pass], 1, (GLuint)batch->first_slot);
         // llvmpipe: 1M points in 21 ms with one, 27 ms with 4: setting a chunk up costs more than idle lanes.
         result = pt_gl_dispatch(d, b->kernel, pass, groups, d->base.info.hardware ? SLICES : 1);
+        if (b->parts && result == PATINA_OK)
+            result = run_large(d, b, batch);
     }
     return result;
 }
@@ -136,7 +172,7 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
                  args->sifted);
         result = pt_gl_kernel_program(d, PT_KERNEL_scatter, variant, definitions);
         for (uint32_t i = 0; i < args->instances && 3 * i + 3 < count && result == PATINA_OK; i++) {
-            struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[3 * i + 1], buffers[3 * i + 2], buffers[3 * i + 3]};
+            struct instance_buffers b = {PT_KERNEL_scatter, 2, buffers[3 * i + 1], buffers[3 * i + 2], buffers[3 * i + 3], 0, 0};
             result = run_instance(d, &b, variant, cancel);
         }
     }
@@ -145,12 +181,29 @@ int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struc
 
 // ---- discs ---------------------------------------------------------------------------------------------------------------
 
-// All points of instance i, whose buffers start at buffers[0]: chunks, positions, surface, radii and the rest up to `count`,
-// from binding 2 on.
-static int run_discs(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t pass, uint32_t i, struct pt_buffer *const *buffers,
-                     uint32_t count, const atomic_int *cancel)
+// Programs of discs: those of large ones follow.
+enum { LARGE = 3 };
+
+static int disc_programs(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t pass, const char *definition)
 {
-    struct instance_buffers b = {kernel, 2, buffers[0], buffers[1], buffers[2]};
+    int result = PATINA_OK;
+    for (uint32_t large = 0; large < 2 && result == PATINA_OK; large++) {
+        char definitions[64];
+        snprintf(definitions, sizeof definitions, "%s#define LARGE %u\n", definition, large);
+        result = pt_gl_kernel_program(d, kernel, pass + LARGE * large, definitions);
+    }
+    return result;
+}
+
+// All points of instance i, whose buffers start at buffers[0]: chunks, positions, surface, radii and the rest up to `count`,
+// from binding 2 on. At most so many pixels each.
+static int run_discs(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t pass, uint32_t i, struct pt_buffer *const *buffers,
+                     uint32_t count, uint32_t width, uint32_t height, const atomic_int *cancel)
+{
+    const uint64_t steps = (uint64_t)(width / 8 + 2) * (height / 8 + 1), fewest = d->base.info.hardware ? 8 : 1;
+    const uint64_t parts = (steps + DISC_STEPS - 1) / DISC_STEPS;
+    struct instance_buffers b = {kernel, 2, buffers[0], buffers[1], buffers[2], pass + LARGE,
+                                 (uint32_t)(parts < fewest ? fewest : parts)};
     int result = PATINA_OK;
     for (uint32_t k = 3; k < count && result == PATINA_OK; k++) {
         int missing = !buffers[k] || !buffers[k]->name; // any stands in
@@ -158,6 +211,7 @@ static int run_discs(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t pas
                             missing ? sizeof(struct splat_args) : buffers[k]->size, pt_kernel_names[kernel]);
     }
     d->gl.ProgramUniform1ui(d->programs[kernel][pass], 2, i);
+    d->gl.ProgramUniform1ui(d->programs[kernel][pass + LARGE], 2, i);
     return result == PATINA_OK ? run_instance(d, &b, pass, cancel) : result;
 }
 
@@ -172,9 +226,9 @@ int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt
     if (result == PATINA_OK && args->sifted)
         result = pt_gl_bind_texture(d, 5, buffers[1 + 4 * args->instances + args->behind]);
     for (uint32_t pass = first; pass <= last && result == PATINA_OK; pass++) {
-        result = pt_gl_kernel_program(d, PT_KERNEL_splat, pass, passes[pass]);
+        result = disc_programs(d, PT_KERNEL_splat, pass, passes[pass]);
         for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
-            result = run_discs(d, PT_KERNEL_splat, pass, i, buffers + 1 + 4 * i, 4, cancel);
+            result = run_discs(d, PT_KERNEL_splat, pass, i, buffers + 1 + 4 * i, 4, args->view.width, args->view.height, cancel);
     }
     return result;
 }
@@ -191,12 +245,13 @@ static int blend_band(struct pt_gl_device *d, const struct blend_args *args, str
     d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)((size_t)(end - first) * width * SUM_BYTES),
                              GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
     d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
-    for (uint32_t step = ADD; step <= MEAN; step++) {
-        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_blend][step], 3, (GLint)first);
-        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_blend][step], 4, (GLint)end);
+    for (uint32_t step = 0; step < 3; step++) {
+        const GLuint program = d->programs[PT_KERNEL_blend][step == 2 ? ADD + LARGE : step];
+        d->gl.ProgramUniform1i(program, 3, (GLint)first);
+        d->gl.ProgramUniform1i(program, 4, (GLint)end);
     }
     for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
-        result = run_discs(d, PT_KERNEL_blend, ADD, i, buffers + 4 + 6 * i, 6, cancel);
+        result = run_discs(d, PT_KERNEL_blend, ADD, i, buffers + 4 + 6 * i, 6, width, end - first, cancel);
     return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_blend, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
 }
 
@@ -207,9 +262,9 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
     const uint32_t width = args->view.width, height = args->view.height;
     uint32_t rows = (uint32_t)(most / SUM_BYTES / width);
     rows = rows < 1 ? 1 : rows < height ? rows : height;
-    int result = pt_gl_kernel_program(d, PT_KERNEL_blend, ADD, "#define STEP 0\n");
+    int result = disc_programs(d, PT_KERNEL_blend, ADD, "#define STEP 0\n");
     if (result == PATINA_OK)
-        result = pt_gl_kernel_program(d, PT_KERNEL_blend, MEAN, "#define STEP 1\n");
+        result = pt_gl_kernel_program(d, PT_KERNEL_blend, MEAN, "#define STEP 1\n#define LARGE 1\n");
     if (result == PATINA_OK)
         result = pt_gl_scratch(d, PT_GL_SCRATCH_SUMS, (size_t)rows * width * SUM_BYTES, 0);
     if (result == PATINA_OK)
@@ -240,7 +295,7 @@ int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *co
     int result = pt_gl_kernel_program(d, PT_KERNEL_lit, 0, "");
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, PT_KERNEL_lit, argument_size, rest, count);
-    struct instance_buffers b = {PT_KERNEL_lit, 4, buffers[3], buffers[4], buffers[5]};
+    struct instance_buffers b = {PT_KERNEL_lit, 4, buffers[3], buffers[4], buffers[5], 0, 0};
     return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
 }
 
@@ -252,6 +307,6 @@ int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *c
     int result = pt_gl_kernel_program(d, PT_KERNEL_sift, 0, "");
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, PT_KERNEL_sift, argument_size, rest, count);
-    struct instance_buffers b = {PT_KERNEL_sift, 1, buffers[0], buffers[1], NULL};
+    struct instance_buffers b = {PT_KERNEL_sift, 1, buffers[0], buffers[1], NULL, 0, 0};
     return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
 }

@@ -93,26 +93,65 @@ void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color
     add(at + 14u, weight, PT_SUM_SCALE);
 }
 
+// What the point's disc adds at weight 1, but for its normal.
+vec4 color_of(uint id)
+{
+    vec3 rgb = albedo_of(id);
+    precise float opacity = opacity_of(id) * PT_SUM_SCALE;
+    precise vec4 color = vec4(pt_max(pt_min(rgb.x, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
+                              pt_max(pt_min(rgb.y, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
+                              pt_max(pt_min(rgb.z, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity, opacity);
+    return color;
+}
+
+// Its box in the band.
+ivec4 box_of(disc d) { return ivec4(d.box.x, max(d.box.y, band_first), d.box.z, min(d.box.w, band_end - 1)); }
+
+#if LARGE == 0
+
 void main()
 {
-    chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
+    uint at = first_chunk + gl_WorkGroupID.x;
+    chunk_view chunk = chunks[at];
     view_args view = args.view;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         disc d;
         if (!disc_of(view, chunk, i, d))
             continue;
-        vec3 rgb = albedo_of(d.id);
-        precise float opacity = opacity_of(d.id) * PT_SUM_SCALE;
-        precise vec4 color = vec4(pt_max(pt_min(rgb.x, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
-                                  pt_max(pt_min(rgb.y, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
-                                  pt_max(pt_min(rgb.z, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity, opacity);
+        ivec4 box = box_of(d);
+        if (disc_listed(box, at, i))
+            continue;
+        vec4 color = color_of(d.id);
         precise vec3 n = d.n * PT_SUM_SCALE;
-        for (int y = max(d.box.y, band_first); y <= min(d.box.w, band_end - 1); y++)
-            for (int x = d.box.x; x <= d.box.z; x++)
+        for (int y = box.y; y <= box.w; y++)
+            for (int x = box.x; x <= box.z; x++)
                 add_pixel(view, d, chunk.id_base + d.id, x, y, color, n);
     }
 }
+
+#else
+
+void main()
+{
+    uint at, part;
+    if (!disc_large(at, part))
+        return;
+    chunk_view chunk = chunks[large[2u * at]];
+    view_args view = args.view;
+    disc d;
+    if (!disc_of(view, chunk, large[2u * at + 1u], d))
+        return;
+    ivec4 box = box_of(d);
+    vec4 color = color_of(d.id);
+    precise vec3 n = d.n * PT_SUM_SCALE;
+    ivec2 own = ivec2(gl_LocalInvocationID.x & 7u, 8u * part + (gl_LocalInvocationID.x >> 3));
+    for (int y = box.y + own.y; y <= box.w; y += 8 * int(parts))
+        for (int x = box.x + own.x; x <= box.z; x += 8)
+            add_pixel(view, d, chunk.id_base + d.id, x, y, color, n);
+}
+
+#endif
 
 #else
 

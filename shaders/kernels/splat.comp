@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // splat: points -> least key of every pixel that their discs cover. SPEC 5, solid; twin of native/device_cpu/kernels/splat.c
 //
-// A workgroup takes a chunk; passes as in scatter.comp.
+// A workgroup takes a chunk, or one large disc; passes as in scatter.comp.
 #version 430 core
 #if PASS == 2
 #extension GL_ARB_gpu_shader_int64 : require
@@ -34,25 +34,51 @@ void take(uint pixel, uint z_bits, uint id)
 #endif
 }
 
+void draw_pixel(view_args view, disc d, uint id, int x, int y)
+{
+    float z, square;
+    bool beside;
+    if (!disc_pixel(view, d, x, y, z, square, beside))
+        return;
+    uint pixel = uint(y) * view.width + uint(x);
+    if (args.behind == 0u || limit[pixel] < z)
+        take(pixel, pt_bits(z) & 0x7FFFFFFFu, id); // the sign bit of -0 is dropped
+}
+
+#if LARGE == 0
+
 void main()
 {
-    chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
+    uint at = first_chunk + gl_WorkGroupID.x;
+    chunk_view chunk = chunks[at];
     view_args view = args.view;
-    bool behind = args.behind != 0u;
     uint stride = gl_WorkGroupSize.x * gl_NumWorkGroups.y;
     for (uint i = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x; i < chunk.count; i += stride) {
         disc d;
-        if (!disc_of(view, chunk, i, d))
+        if (!disc_of(view, chunk, i, d) || disc_listed(d.box, at, i))
             continue;
         for (int y = d.box.y; y <= d.box.w; y++)
-            for (int x = d.box.x; x <= d.box.z; x++) {
-                float z, square;
-                bool beside;
-                if (!disc_pixel(view, d, x, y, z, square, beside))
-                    continue;
-                uint pixel = uint(y) * view.width + uint(x);
-                if (!behind || limit[pixel] < z)
-                    take(pixel, pt_bits(z) & 0x7FFFFFFFu, chunk.id_base + d.id); // the sign bit of -0 is dropped
-            }
+            for (int x = d.box.x; x <= d.box.z; x++)
+                draw_pixel(view, d, chunk.id_base + d.id, x, y);
     }
 }
+
+#else
+
+void main()
+{
+    uint at, part;
+    if (!disc_large(at, part))
+        return;
+    chunk_view chunk = chunks[large[2u * at]];
+    view_args view = args.view;
+    disc d;
+    if (!disc_of(view, chunk, large[2u * at + 1u], d))
+        return;
+    ivec2 own = ivec2(gl_LocalInvocationID.x & 7u, 8u * part + (gl_LocalInvocationID.x >> 3));
+    for (int y = d.box.y + own.y; y <= d.box.w; y += 8 * int(parts))
+        for (int x = d.box.x + own.x; x <= d.box.z; x += 8)
+            draw_pixel(view, d, chunk.id_base + d.id, x, y);
+}
+
+#endif

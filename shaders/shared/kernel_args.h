@@ -20,21 +20,54 @@
 #define PT_NORMAL_NONE 0x03FFFFFFu // these 26 bits all ones: the point has no normal
 #define PT_NORMAL_BITS 0x03FFFFFFu
 #define PT_SPACING_SHIFT 26
-// The shape word of a point that was analysed. Bits 0-5: major half axis of its footprint, radius = spacing_base *
-// 2^((c - 1) / 4), 0: none, a pixel. Minor half axis = major * 2^(-k / 4). The major axis is cos(a pi / 64) t1 + sin(a pi / 64) t2,
-// t1, t2 the frame of the decoded normal n (Duff et al. 2017): s = n.z >= 0 ? 1 : -1, q = -1 / (s + n.z), b = n.x n.y q,
-// t1 = (1 + s n.x^2 q, s b, -s n.x), t2 = (b, s + n.y^2 q, -n.y). Sigma = spacing_base / 16 * 2^((c - 1) / 4), 0: unknown.
+
+// The shape word of a point, where its cloud was analysed: the footprint, an ellipse on the tangent plane, and what kind of
+// point it is. Bits 0-5: class of the major half axis, as of spacings; 0: none, the point is a pixel. 6-9: k, the minor half axis
+// is 2^(-k / 4) of it. 10-15: a, the major axis is cos(a pi / 64) t1 + sin(a pi / 64) t2 in the frame of the point's normal n in
+// its object: s = n.z >= -1e-4 ? 1 : -1 (below 0 n.z is -1 / 4095 at most), q = -1 / (s + n.z), b = n.x n.y q, t1 = (1 + s n.x^2 q, s b, -s n.x), t2 = (b, s + n.y^2 q, -n.y)
+// (Duff et al. 2017). 16-21: class of the thickness sigma, in sixteenths of the spacings' unit; 0: not known. 22-24: kind.
+// 25-28: certainty, of 15.
+#define PT_SHAPE_CLASS_BITS 63u // of each class
 #define PT_SHAPE_RATIO_SHIFT 6
 #define PT_SHAPE_ANGLE_SHIFT 10
 #define PT_SHAPE_SIGMA_SHIFT 16
 #define PT_SHAPE_KIND_SHIFT 22
-#define PT_SHAPE_CERTAINTY_SHIFT 25 // of 15
-#define PT_SHAPE_SEEN_THROUGH (1u << 29)
+#define PT_SHAPE_CERTAINTY_SHIFT 25
+#define PT_SHAPE_SEEN_THROUGH (1u << 29) // a scanner looked through where it lies
+#define PT_SHAPE_UP -1e-4f // n.z of which s is 1
+#define PT_KIND_UNKNOWN 0u
 #define PT_KIND_SURFACE 1u
 #define PT_KIND_BORDER 2u
 #define PT_KIND_LINE 3u
 #define PT_KIND_VOLUME 4u // foliage
 #define PT_KIND_STRAY 5u
+#define PT_RADII_NONE 0u   // what disc_args.has_radii says of the radii buffer: it is not read
+#define PT_RADII_FLOATS 1u // radii, object units
+#define PT_RADII_SHAPES 2u // shape words
+// cos(a pi / 64), sin(a pi / 64) for a < 64; 2^(k / 4) for k < 16, as many again that fill a vector.
+#define PT_SHAPE_COSINES \
+    1.0f, 0.99879545f, 0.99518472f, 0.989176512f, 0.980785251f, 0.970031261f, 0.956940353f, 0.941544056f, \
+    0.923879504f, 0.903989315f, 0.881921291f, 0.857728601f, 0.831469595f, 0.803207517f, 0.773010433f, 0.740951121f, \
+    0.707106769f, 0.671558976f, 0.634393275f, 0.59569931f, 0.555570245f, 0.514102757f, 0.471396744f, 0.427555084f, \
+    0.382683426f, 0.336889863f, 0.290284663f, 0.242980182f, 0.195090324f, 0.146730468f, 0.0980171412f, 0.0490676761f, \
+    0.0f, -0.0490676761f, -0.0980171412f, -0.146730468f, -0.195090324f, -0.242980182f, -0.290284663f, -0.336889863f, \
+    -0.382683426f, -0.427555084f, -0.471396744f, -0.514102757f, -0.555570245f, -0.59569931f, -0.634393275f, -0.671558976f, \
+    -0.707106769f, -0.740951121f, -0.773010433f, -0.803207517f, -0.831469595f, -0.857728601f, -0.881921291f, -0.903989315f, \
+    -0.923879504f, -0.941544056f, -0.956940353f, -0.970031261f, -0.980785251f, -0.989176512f, -0.99518472f, -0.99879545f
+#define PT_SHAPE_SINES \
+    0.0f, 0.0490676761f, 0.0980171412f, 0.146730468f, 0.195090324f, 0.242980182f, 0.290284663f, 0.336889863f, \
+    0.382683426f, 0.427555084f, 0.471396744f, 0.514102757f, 0.555570245f, 0.59569931f, 0.634393275f, 0.671558976f, \
+    0.707106769f, 0.740951121f, 0.773010433f, 0.803207517f, 0.831469595f, 0.857728601f, 0.881921291f, 0.903989315f, \
+    0.923879504f, 0.941544056f, 0.956940353f, 0.970031261f, 0.980785251f, 0.989176512f, 0.99518472f, 0.99879545f, \
+    1.0f, 0.99879545f, 0.99518472f, 0.989176512f, 0.980785251f, 0.970031261f, 0.956940353f, 0.941544056f, \
+    0.923879504f, 0.903989315f, 0.881921291f, 0.857728601f, 0.831469595f, 0.803207517f, 0.773010433f, 0.740951121f, \
+    0.707106769f, 0.671558976f, 0.634393275f, 0.59569931f, 0.555570245f, 0.514102757f, 0.471396744f, 0.427555084f, \
+    0.382683426f, 0.336889863f, 0.290284663f, 0.242980182f, 0.195090324f, 0.146730468f, 0.0980171412f, 0.0490676761f
+#define PT_SHAPE_RATIOS \
+    1.0f, 1.18920708f, 1.41421354f, 1.68179286f, 2.0f, 2.37841415f, 2.82842708f, 3.36358571f, \
+    4.0f, 4.75682831f, 5.65685415f, 6.72717142f, 8.0f, 9.51365662f, 11.3137083f, 13.4543428f, \
+    1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, \
+    1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f
 
 #define PT_KEY_EMPTY_Z 0x7F800000u // float bits of +inf
 #define PT_KEY_EMPTY_ID 0xFFFFFFFFu
@@ -205,6 +238,7 @@ struct instance_args {
     float opacity;              // of the instance; times that of the point
     uint32_t has_opacities;     // 1: points have their own, a byte each
     float normal_matrix[9];     // object normal -> view space, not yet unit
+    float axis_scale;           // times the matrix: a unit tangent -> view space, a length along it as a share of the stretch
     float d_min;                // world units
     float spacing[PT_SPACINGS]; // local spacing by class, world units
 };
@@ -212,9 +246,10 @@ struct instance_args {
 // A cloud's discs, one of these an instance behind the arguments of splat and blend.
 struct disc_args {
     struct instance_args instance;
-    uint32_t has_radii; // points have their own, object units
-    float radius;       // world units, of every point; 0: its own, else PT_DISC_SPACINGS times its spacing
+    uint32_t has_radii; // PT_RADII_*: what the radii buffer holds
+    float radius;       // world units, of every point; 0: its own, or its shape's, else PT_DISC_SPACINGS times its spacing
     float radius_scale; // object units -> world, times what strata leave out
+    float radius_most;  // world units: no half axis is longer; 0: as long as it is
 };
 
 // splat: points -> least key of every pixel that their discs cover. SPEC 5, solid; the visibility pass. A disc is flat, has the

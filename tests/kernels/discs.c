@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "discs.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,9 +21,37 @@ void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene
         discs->instance.normal_matrix[k] = (float)camera->rotation[k];
     for (int k = 0; k < PT_SPACINGS; k++)
         discs->instance.spacing[k] = (float)(largest * k / PT_SPACINGS);
-    scene->radii[instance] = harness_alloc(h, 4 * (size_t)cloud->slots);
+    discs->instance.axis_scale = 1.0f;
+    float *radii = harness_alloc(h, 4 * (size_t)cloud->slots);
+    scene->radii[instance] = radii;
     for (uint32_t i = 0; i < cloud->slots; i++)
-        scene->radii[instance][i] = rng_below(rng, 8) ? (float)rng_range(rng, 0.0, largest) : 0.0f;
+        radii[i] = rng_below(rng, 8) ? (float)rng_range(rng, 0.0, largest) : 0.0f;
+}
+
+void discs_shape(struct harness *h, struct rng *rng, struct disc_scene *scene, uint32_t instance, const struct camera *camera,
+                 const double stretch[3])
+{
+    static const double as_it_is[3] = {1.0, 1.0, 1.0};
+    struct disc_args *discs = &scene->discs[instance];
+    const struct cloud *cloud = &scene->points.clouds[instance];
+    const double *by = stretch ? stretch : as_it_is;
+    double most = 0.0, largest = 0.0; // stretch, of the inverse transposed
+    for (int k = 0; k < 3; k++)
+        most = by[k] > most ? by[k] : most;
+    double inverse[9];
+    for (int k = 0; k < 9; k++) {
+        inverse[k] = camera->rotation[k] / by[k % 3];
+        largest = inverse[k] > largest ? inverse[k] : -inverse[k] > largest ? -inverse[k] : largest;
+    }
+    for (int k = 0; k < 9; k++)
+        discs->instance.normal_matrix[k] = (float)(inverse[k] / largest);
+    discs->instance.axis_scale = (float)(largest * most);
+    discs->has_radii = PT_RADII_SHAPES;
+    discs->radius = 0.0f;
+    uint32_t *words = harness_alloc(h, 4 * (size_t)cloud->slots);
+    scene->radii[instance] = words;
+    for (uint32_t i = 0; i < cloud->slots; i++) // ratios up to 4 are the most
+        words[i] = ((uint32_t)rng_next(rng) & ~(15u << PT_SHAPE_RATIO_SHIFT)) | rng_below(rng, i % 4 ? 9 : 16) << PT_SHAPE_RATIO_SHIFT;
 }
 
 struct view_args discs_window(uint32_t width, uint32_t height, int perspective, double focal)
@@ -45,6 +74,43 @@ struct disc_scene discs_in_window(struct harness *h, struct rng *rng, uint32_t w
     points_scatter_about(rng, points_add_cloud(h, rng, &scene.points, &camera, few, 3, 0, 0), 1.5);
     discs_describe(h, rng, &scene, 0, &turned, 0.0f, largest, 1);
     return scene;
+}
+
+static uint32_t surface_word(struct ref_vec n)
+{
+    const double size = fabs(n.x) + fabs(n.y) + fabs(n.z);
+    double x = n.x / size, y = n.y / size;
+    if (n.z < 0.0) {
+        const double folded = (1.0 - fabs(y)) * (x < 0.0 ? -1.0 : 1.0);
+        y = (1.0 - fabs(x)) * (y < 0.0 ? -1.0 : 1.0);
+        x = folded;
+    }
+    return (uint32_t)(4095.5 + 4095.0 * x) | (uint32_t)(4095.5 + 4095.0 * y) << 13;
+}
+
+void discs_beside(struct harness *h, struct rng *rng, struct disc_scene *scene, double focal, float radius)
+{
+    static const uint32_t many[] = {400};
+    struct view_args *view = &scene->points.view;
+    struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = focal};
+    const uint32_t instance = scene->points.count;
+    view->z_near = 0.01f;
+    camera.center_x = view->origin_x + 0.5 * view->width;
+    camera.center_y = view->origin_y + 0.5 * view->height;
+    struct cloud *cloud = points_add_cloud(h, rng, &scene->points, &camera, many, 1, 0, instance * 5000);
+    for (uint32_t i = 0; i < many[0]; i++) {
+        const double turn = rng_range(rng, 0.0, 6.2831853), far = rng_range(rng, 5.0, 30.0), z = rng_range(rng, 0.1, 0.6);
+        const struct ref_vec at = {far * cos(turn), far * sin(turn), -z}, towards = ref_unit(at);
+        float direction[3];
+        rng_direction(rng, direction);
+        struct ref_vec n = ref_vec_of(direction);
+        n = ref_unit(ref_add(n, ref_scale(towards, -ref_dot(n, towards) + rng_range(rng, -1e-3, 1e-3))));
+        *points_coordinate(cloud, 0, i, 0) = (float)at.x;
+        *points_coordinate(cloud, 0, i, 1) = (float)at.y;
+        *points_coordinate(cloud, 0, i, 2) = (float)at.z;
+        cloud->surface[i] = surface_word(n);
+    }
+    discs_describe(h, rng, scene, instance, &camera, radius, 0.25, 1);
 }
 
 struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)

@@ -77,6 +77,51 @@ static void orthographic(struct harness *h)
     random_discs(h, 0, 2, 0.3, 0.1f);
 }
 
+// Ellipses: as they are, mirrored and cut off, of an object that is stretched.
+static void ellipses(struct harness *h)
+{
+    static const double stretch[3] = {0.3, 1.0, 2.5};
+    for (int p = 0; p < 2; p++)
+        for (uint32_t seed = 0; seed < 3; seed++) {
+            struct rng rng = {13 + seed};
+            const double focal = p ? 60.0 : 20.0;
+            struct disc_scene scene = {.points = {.view = discs_window(67, 45, p, focal)}};
+            for (uint32_t i = 0; i < 3; i++) {
+                struct camera camera = points_look(&rng, &scene.points.view, focal, 4.0), seen;
+                for (int k = 0; k < 9; k++)
+                    camera.rotation[k] *= i == 1 ? -1.0 : 1.0;
+                seen = camera;
+                for (int k = 0; k < 9 && i == 2; k++)
+                    seen.rotation[k] *= stretch[k % 3];
+                points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &seen, sizes, SIZES, 0, i * 5000),
+                                     i == 0 ? 1.0 : 2.0);
+                discs_describe(h, &rng, &scene, i, &camera, 0.0f, seed == 2 ? 3.0 : 0.5, 1);
+                discs_shape(h, &rng, &scene, i, &camera, i == 2 ? stretch : NULL);
+                scene.discs[i].radius_most = i == 1 ? 0.15f : 0.0f;
+            }
+            check_scene(h, &scene);
+        }
+}
+
+// Words without a class, without normals, beside a radius that all points have; and clouds whose normals are not known.
+static void shapes_of_none(struct harness *h)
+{
+    for (uint32_t way = 0; way < 3; way++) {
+        struct rng rng = {16 + way};
+        struct disc_scene scene = {.points = {.view = discs_window(67, 45, 1, 60.0)}};
+        struct camera camera = points_look(&rng, &scene.points.view, 60.0, 4.0);
+        struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, 0);
+        points_scatter_about(&rng, cloud, 1.0);
+        discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.3, way != 1);
+        discs_shape(h, &rng, &scene, 0, &camera, NULL);
+        uint32_t *words = scene.radii[0];
+        for (uint32_t i = 0; i < cloud->slots && way == 0; i++)
+            words[i] &= ~PT_SHAPE_CLASS_BITS;
+        scene.discs[0].radius = way == 2 ? 0.1f : 0.0f;
+        check_scene(h, &scene);
+    }
+}
+
 static void small_and_huge(struct harness *h)
 {
     static const double largest[] = {1e-3, 5.0, 1e20};
@@ -151,6 +196,64 @@ static void camera_plane(struct harness *h)
     points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, 0), 1.0);
     discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.6, 1);
     check_scene(h, &scene);
+}
+
+// Nothing of them is seen.
+static void beside_the_camera(struct harness *h)
+{
+    struct rng rng = {18};
+    for (int own = 0; own < 2; own++) {
+        struct disc_scene scene = {.points = {.view = discs_window(160, 120, 1, 130.0)}};
+        discs_beside(h, &rng, &scene, 130.0, own ? 0.0f : 0.25f);
+        const uint64_t *keys = check_scene(h, &scene);
+        for (size_t i = 0; i < (size_t)160 * 120; i++)
+            if (keys[i] != REF_EMPTY_KEY)
+                harness_fail(h, "keys", (int)(i % 160), (int)(i / 160), "shows a disc that lies beside the view");
+    }
+}
+
+// Discs of 1 to 3000 pixels, as wide as no loop of a driver is long: the same keys everywhere, and of each its very middle and
+// pixels at its rim.
+static void large(struct harness *h)
+{
+    enum { WIDTH = 1500, HEIGHT = 1100, DISCS = 24 };
+    static const uint32_t many[] = {DISCS};
+    for (int p = 0; p < 2; p++) {
+        struct rng rng = {19};
+        struct disc_scene scene = {.points = {.view = discs_window(WIDTH, HEIGHT, p, 1000.0)}};
+        struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .focal = 1000.0};
+        camera.center_x = scene.points.view.origin_x + 0.5 * WIDTH;
+        camera.center_y = scene.points.view.origin_y + 0.5 * HEIGHT;
+        struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 1, 0, 0);
+        for (uint32_t i = 0; i < DISCS; i++) {
+            *points_coordinate(cloud, 0, i, 0) = (float)rng_range(&rng, -0.8, 0.8);
+            *points_coordinate(cloud, 0, i, 1) = (float)rng_range(&rng, -0.5, 0.5);
+            *points_coordinate(cloud, 0, i, 2) = -1.0f - (float)i;
+            cloud->surface[i] = (4095u + rng_below(&rng, 1500)) | (4095u - rng_below(&rng, 1500)) << 13;
+        }
+        discs_describe(h, &rng, &scene, 0, &camera, 0.0f, 0.0, 1);
+        for (uint32_t i = 0; i < DISCS; i++) // the nearer, the smaller
+            ((float *)scene.radii[0])[i] = (float)(5e-4 * pow(3000.0, i / (DISCS - 1.0)) * (p ? 1.0 + i : 1.0));
+        const uint64_t *keys = harness_read(h, discs_splat(h, &scene));
+        harness_same(h, "keys", keys, (size_t)WIDTH * HEIGHT, 8, 1, WIDTH);
+        uint32_t count;
+        const struct ref_disc *discs = discs_reference(h, &scene, &count);
+        for (uint32_t k = 0; k < 20000; k++) {
+            const int x = (int)rng_below(&rng, WIDTH), y = (int)rng_below(&rng, HEIGHT);
+            const uint64_t key = keys[(size_t)y * WIDTH + (size_t)x];
+            double farthest = INFINITY;
+            for (uint32_t i = 0; i < count; i++) {
+                const struct ref_met cover = ref_disc_at(&scene.points.view, &discs[i], x, y);
+                if (cover.covered == REF_YES)
+                    farthest = fmin(farthest, cover.z.hi);
+            }
+            if (ref_key_z(key) > farthest)
+                harness_fail(h, "keys", x, y, "got z %.9g, expected at most %.9g", ref_key_z(key), farthest);
+            const struct ref_disc *disc = discs_find(discs, count, ref_key_id(key));
+            if (key != REF_EMPTY_KEY && (!disc || ref_disc_at(&scene.points.view, disc, x, y).covered == REF_NO))
+                harness_fail(h, "keys", x, y, "got id %u, whose disc is not there", ref_key_id(key));
+        }
+    }
 }
 
 // One place, many discs: the least id wins where all have one normal, whichever thread, tile or lane.
@@ -285,11 +388,15 @@ int main(int argc, char **argv)
         {"sanity", sanity, 1},
         {"random discs, perspective", perspective, 0},
         {"random discs, orthographic", orthographic, 0},
+        {"ellipses", ellipses, 0},
+        {"shapes of points that are none", shapes_of_none, 0},
         {"discs under a pixel and over the whole view", small_and_huge, 0},
         {"no radius: as scatter", points, 0},
         {"plane sizes", plane_sizes, 0},
         {"NaN, Inf and huge positions", not_numbers, 0},
         {"discs through the camera plane", camera_plane, 0},
+        {"discs beside the camera, before its plane", beside_the_camera, 0},
+        {"discs of 1 to 3000 pixels", large, 0},
         {"coincident discs, ids near 2^32 - 2", coincident, 0},
         {"seen from their edge", edge_on, 0},
         {"behind a layer", limits, 0},

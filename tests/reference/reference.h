@@ -117,10 +117,12 @@ struct ref_disc {
     struct ref_vec n;       // unit, towards the viewer; without a normal: of the picture
     int has_normal, has_normals; // of the point; of its cloud
     int edge_on;            // so much that float32 may draw its pixel alone
-    double normal_error, radius;
+    double normal_error, radius; // radius: of the major half axis
+    struct ref_vec axes[2];      // of a shape: what an offset in the plane times them is in half axes, times the radius
+    int shaped;
 };
 struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
-                         const float *positions, const uint32_t *surface, const float *radii,
+                         const float *positions, const uint32_t *surface, const void *radii,
                          uint32_t slot);
 // Whether it covers a pixel of the plane, how deep, and at which squared share of its radius from its middle.
 struct ref_met {

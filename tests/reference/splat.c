@@ -17,17 +17,43 @@ static struct ref_vec ray_of(const struct view_args *view, double x, double y)
     return ray;
 }
 
-static double radius_of(const struct disc_args *args, const float *radii, uint32_t id, uint32_t word)
+static int is_shaped(const struct disc_args *args) { return args->has_radii == PT_RADII_SHAPES && !(args->radius > 0.0f); }
+
+// The major half axis, before it is cut off.
+static double radius_of(const struct disc_args *args, const void *radii, uint32_t id, uint32_t word)
 {
     if (args->radius > 0.0f)
         return args->radius;
+    if (is_shaped(args))
+        return args->instance.spacing[((const uint32_t *)radii)[id] & PT_SHAPE_CLASS_BITS];
     if (args->has_radii)
-        return fmin((double)radii[id] * args->radius_scale, PT_DISC_MOST);
+        return fmin((double)((const float *)radii)[id] * args->radius_scale, PT_DISC_MOST);
     return args->instance.spacing[word >> PT_SPACING_SHIFT] * (double)PT_DISC_SPACINGS;
 }
 
+// n: of the object, unit.
+static void set_axes(const struct disc_args *args, uint32_t shape, double radius, struct ref_vec n, struct ref_disc *disc)
+{
+    const double s = n.z >= (double)PT_SHAPE_UP ? 1.0 : -1.0, q = -1.0 / (s + n.z), b = n.x * n.y * q;
+    const struct ref_vec t1 = {1.0 + s * n.x * n.x * q, s * b, -s * n.x}, t2 = {b, s + n.y * n.y * q, -n.y};
+    const double angle = (shape >> PT_SHAPE_ANGLE_SHIFT & 63u) * 3.14159265358979323846 / 64.0;
+    const double minor = radius * pow(2.0, -0.25 * (shape >> PT_SHAPE_RATIO_SHIFT & 15u));
+    const float *m = args->instance.normal_matrix;
+    struct ref_vec object[2] = {ref_add(ref_scale(t1, cos(angle)), ref_scale(t2, sin(angle))),
+                                ref_add(ref_scale(t2, cos(angle)), ref_scale(t1, -sin(angle)))};
+    disc->shaped = 1;
+    for (int k = 0; k < 2; k++) {
+        const struct ref_vec t = object[k];
+        // minor is cut off where the major is
+        const double share = k ? disc->radius / (args->radius_most > 0.0f ? fmin(minor, args->radius_most) : minor) : 1.0;
+        disc->axes[k] = ref_scale(ref_vec(m[0] * t.x + m[1] * t.y + m[2] * t.z, m[3] * t.x + m[4] * t.y + m[5] * t.z,
+                                          m[6] * t.x + m[7] * t.y + m[8] * t.z),
+                                  args->instance.axis_scale * share);
+    }
+}
+
 struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
-                         const float *positions, const uint32_t *surface, const float *radii,
+                         const float *positions, const uint32_t *surface, const void *radii,
                          uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
@@ -42,7 +68,8 @@ struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *a
     enum ref_truth culled = ref_culled(chunk, p, word);
     disc.possible = culled != REF_YES;
     disc.definite = culled == REF_NO && at->z.lo >= view->z_near && at->z.hi <= view->z_far;
-    disc.radius = radius_of(args, radii, id, word);
+    const double uncut = radius_of(args, radii, id, word);
+    disc.radius = args->radius_most > 0.0f ? fmin(uncut, args->radius_most) : uncut;
     if (!(disc.radius >= PT_DISC_LEAST) || disc.radius * PT_DISC_FINE < (view->perspective ? middle(at->z) : 1.0))
         disc.radius = 0.0;
     disc.normal_error = TOL_NORMAL;
@@ -58,6 +85,8 @@ struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *a
         if (disc.has_normal) {
             disc.normal_error *= terms / ref_length(n);
             disc.n = ref_unit(n);
+            if (is_shaped(args) && disc.radius > 0.0)
+                set_axes(args, ((const uint32_t *)radii)[id], uncut, ref_unit(own), &disc);
         }
     }
     struct ref_vec ray = ray_of(view, middle(at->x), middle(at->y));
@@ -122,9 +151,16 @@ static struct ref_met meet(const struct view_args *view, const struct ref_disc *
     }
     if (depth <= 0.0 && view->perspective)
         return out;
-    out.covered = distance + error <= disc->radius ? REF_YES : distance - error > disc->radius ? REF_NO : REF_UNSURE;
     out.z = (struct ref_range){depth - error - TOL_QUOTIENT * fabs(depth), depth + error + TOL_QUOTIENT * fabs(depth)};
-    double lo = fmax(distance - error, 0.0) / disc->radius, hi = (distance + error) / disc->radius;
+    double share = distance / disc->radius, share_error = error / disc->radius;
+    if (disc->shaped) { // what moves a place moves its share by the axes' lengths; they are rounded as normals are
+        const double major = ref_dot(offset, disc->axes[0]), minor = ref_dot(offset, disc->axes[1]);
+        const double longest = fmax(ref_length(disc->axes[0]), ref_length(disc->axes[1]));
+        share = hypot(major, minor) / disc->radius;
+        share_error = longest * (error + 2.0 * TOL_NORMAL * distance / cosine) / disc->radius;
+    }
+    out.covered = share + share_error <= 1.0 ? REF_YES : share - share_error > 1.0 ? REF_NO : REF_UNSURE;
+    double lo = fmax(share - share_error, 0.0), hi = share + share_error;
     out.square = (struct ref_range){lo * lo, hi * hi};
     return out;
 }

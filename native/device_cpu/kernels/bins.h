@@ -150,9 +150,9 @@ static void pt_bin_chunk(struct pt_bins *bins, uint32_t thread, const struct pt_
         discs.id = vi_add(vi_set(chunk->first + i), vi_lanes());
         vi word = vi_load(source->surface + i);
         pt_disc_cull(source, p, word, &discs);
-        discs.radius = pt_disc_radius(source->args, source->radii, discs.id, word, discs.drawn);
+        pt_disc_size(source->args, source->radii, discs.id, word, discs.drawn, &discs);
         pt_disc_reach(source->view, &discs);
-        pt_disc_box(source->view, discs.reach, &discs);
+        pt_disc_box(source->view, discs.low, discs.high, &discs);
         uint32_t drawn = vm_bits(discs.drawn);
         if (chunk->sifted)
             drawn &= bins->drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD;
@@ -266,7 +266,7 @@ static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct p
 {
     *instance = pt_bin_instance(bins, pt_bin_id(block, i), *instance);
     const struct disc_args *args = &bins->discs[*instance];
-    const float *radii = pt_cpu_data(bins->call, bins->first + *instance * bins->stride + 3);
+    const void *radii = pt_cpu_data(bins->call, bins->first + *instance * bins->stride + 3);
     const uint32_t count = pt_lanes_left(i, end);
     const vi word = vi_load(block->word + i);
     struct pt_discs discs;
@@ -279,7 +279,7 @@ static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct p
     const uint32_t others = vm_bits(vm_and(vm_first(count), vm_not(vi_lt_unsigned(discs.id, vi_set(args->instance.id_count)))));
     const uint32_t taken = others ? (uint32_t)__builtin_ctz(others) : count;
     discs.drawn = vm_first(taken);
-    discs.radius = pt_disc_radius(args, radii, discs.id, word, discs.drawn);
+    pt_disc_size(args, radii, discs.id, word, discs.drawn, &discs);
     pt_disc_reach(bins->view, &discs);
     pt_disc_shape(bins->view, args, word, &discs);
     pt_disc_tight_box(bins->view, &discs);

@@ -3,7 +3,8 @@
 // shaders/lib/disc.glsl
 //
 // About the disc's middle (x, y), z: a pixel (dx, dy) away sees the disc's plane at z / q, q = 1 + gx dx + gy dy (orthographic:
-// z + gx dx + gy dy), at (e dx + f dy) dx + g dy^2 over q^2 squared radii from the middle.
+// z + gx dx + gy dy), at e w^2 + m dy^2 over q^2 squared radii from the middle, w = dx + h dy. Neither term is negative, so
+// that nothing cancels however flat the disc is seen.
 #ifndef PT_DISC_H
 #define PT_DISC_H
 
@@ -13,8 +14,13 @@
 
 // PT_LANES of them.
 struct pt_discs {
-    vf x, y, z, radius, reach[2]; // reach: of the ball around, pixels
-    vf gx, gy, e, f, g;
+    vf x, y, z, radius; // radius: of the major half axis
+    vi shape;           // word, with PT_RADII_SHAPES
+    vf ratio;           // with PT_RADII_SHAPES: of the half axes, 1 at least
+    vf reach[2];        // no farther does the ball around, pixels
+    vf low[2], high[2]; // nor beyond these
+    vf widest;          // q at most, within the disc
+    vf gx, gy, e, h, m;
     vm gentle;      // the slope within reach is at most PT_DISC_GENTLE
     vi box[4];      // x0, y0, x1, y1: pixels of the window that they may cover, both ends included
     vi column, row; // that they fall into; not always in the window
@@ -32,20 +38,67 @@ struct pt_disc_source {
     const struct chunk_view *chunk;
     const float *positions;  // of the chunk
     const uint32_t *surface; // of the chunk
-    const float *radii;
+    const void *radii; // floats or shape words
 };
 
 static inline vf pt_clamp_far(vf x) { return vf_min(vf_max(x, vf_set(-PT_DISC_FAR)), vf_set(PT_DISC_FAR)); }
 
-// Radii, world units; below PT_DISC_LEAST: none.
-static inline vf pt_disc_radius(const struct disc_args *args, const float *radii, vi id, vi word, vm lanes)
+static const float pt_shape_cosines[64] = { PT_SHAPE_COSINES }, pt_shape_sines[64] = { PT_SHAPE_SINES },
+                   pt_shape_ratios[32] = { PT_SHAPE_RATIOS };
+
+// Whether discs have the half axes of their points' shapes.
+static inline int pt_disc_shaped(const struct disc_args *args)
 {
+    return args->has_radii == PT_RADII_SHAPES && !(args->radius > 0.0f);
+}
+
+// Radii, world units; below PT_DISC_LEAST: none.
+static inline void pt_disc_size(const struct disc_args *args, const void *radii, vi id, vi word, vm lanes, struct pt_discs *d)
+{
+    const float *spacing = args->instance.spacing;
     vf radius = vf_set(args->radius);
-    if (!(args->radius > 0.0f) && args->has_radii)
+    if (pt_disc_shaped(args)) {
+        d->shape = vi_gather(radii, id, lanes);
+        radius = vf_look_up(spacing, PT_SPACINGS, vi_and(d->shape, vi_set(PT_SHAPE_CLASS_BITS)));
+        d->ratio = vf_look_up(pt_shape_ratios, 32, vi_and(vi_shr(d->shape, PT_SHAPE_RATIO_SHIFT), vi_set(15)));
+    } else if (!(args->radius > 0.0f) && args->has_radii) {
         radius = vf_min(vf_gather(radii, id, lanes) * vf_set(args->radius_scale), vf_set(PT_DISC_MOST));
-    else if (!(args->radius > 0.0f))
-        radius = vf_look_up(args->instance.spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT)) * vf_set(PT_DISC_SPACINGS);
-    return vf_select(vf_le(vf_set(PT_DISC_LEAST), radius), radius, vf_zero());
+    } else if (!(args->radius > 0.0f)) {
+        radius = vf_look_up(spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT)) * vf_set(PT_DISC_SPACINGS);
+    }
+    if (args->radius_most > 0.0f) { // the minor half axis is shortened last
+        const vf one = vf_set(1.0f), most = vf_set(args->radius_most);
+        const vm beyond = vf_lt(most, radius);
+        if (pt_disc_shaped(args))
+            d->ratio = vf_max(d->ratio * vf_select(beyond, most * vf_rcp(vf_select(beyond, radius, one)), one), one);
+        radius = vf_select(beyond, most, radius);
+    }
+    d->radius = vf_select(vf_le(vf_set(PT_DISC_LEAST), radius), radius, vf_zero());
+}
+
+// Balls wider than a 32nd of their depth: where exactly they are seen. One whose rim the camera's plane cuts has an end all
+// the same, towards the view's axis: what passes the eye closely far outside the view is not drawn across it.
+static inline void pt_disc_near(const struct view_args *view, vm wide, struct pt_discs *d)
+{
+    const vf zero = vf_zero(), one = vf_set(1.0f), at[2] = { d->x, d->y }, far = vf_set(PT_DISC_FAR);
+    const float start[2] = { view->ray_x0, view->ray_y0 }, step[2] = { view->ray_xs, view->ray_ys };
+    const vf k = (d->radius * vf_set(1.001f)) * vf_rcp(d->z), left = one - k * k;
+    const vm before = vf_le(vf_set(0.015625f), left); // the camera's plane
+    const vf inverse = vf_rcp(vf_select(before, left, one));
+    for (int i = 0; i < 2; i++) {
+        const vf slope = vf_set(start[i]) + vf_set(step[i]) * at[i], u = vf_abs(slope), square = u * u + one;
+        const vf room = square - k * k; // the eye lies outside the ball, seen along the other axis
+        const vm outside = vf_le(square * vf_set(0.0009765625f), room);
+        const vf safe = vf_select(outside, room, one), root = safe * vf_rsqrt(safe);
+        const vf pixels = vf_set(1.001f * pt_rcp(step[i]));
+        const vf towards = (((k * (u * root + k)) * vf_rcp(vf_select(wide, u + k * root, one)))) * pixels; // the axis
+        const vf beyond = ((k * (root + u * k)) * inverse) * pixels;
+        const vf inner = vf_select(outside, towards, far), outer = vf_select(vm_and(outside, before), beyond, far);
+        const vm right = vf_le(zero, slope);
+        const vf low = at[i] - vf_select(right, inner, outer), high = at[i] + vf_select(right, outer, inner);
+        d->low[i] = vf_select(wide, vf_max(low, d->low[i]), d->low[i]);
+        d->high[i] = vf_select(wide, vf_min(high, d->high[i]), d->high[i]);
+    }
 }
 
 // 2. The ball around the disc: how many pixels it reaches to the sides.
@@ -55,10 +108,12 @@ static inline void pt_disc_reach(const struct view_args *view, struct pt_discs *
     const float start[2] = { view->ray_x0, view->ray_y0 }, step[2] = { view->ray_xs, view->ray_ys };
     vf before = one; // of the ball's nearest point: the camera's plane lies beyond it
     vm around = vm_of_bits(0);
+    d->widest = one;
     if (view->perspective) {
         vf nearest = d->z - d->radius;
-        around = vm_not(vf_lt(d->z * vf_set(0x1p-10f), nearest));
+        around = vm_not(vf_lt(d->z * vf_set(0.03125f), nearest));
         before = vf_rcp(vf_select(around, one, nearest));
+        d->widest = vf_select(around, vf_set(PT_DISC_FAR), (d->z * before) * vf_set(1.05f));
     }
     for (int k = 0; k < 2; k++) {
         vf reach = d->radius;
@@ -67,18 +122,22 @@ static inline void pt_disc_reach(const struct view_args *view, struct pt_discs *
             reach = (reach * (square * vf_rsqrt(square))) * before;
         }
         d->reach[k] = vf_select(around, vf_set(PT_DISC_FAR), reach * vf_set(1.001f * pt_rcp(step[k])));
+        d->low[k] = at[k] - d->reach[k];
+        d->high[k] = at[k] + d->reach[k];
     }
+    const vm wide = vf_lt(d->z * vf_set(0.03125f), d->radius);
+    if (view->perspective && vm_bits(vm_and(wide, d->drawn)))
+        pt_disc_near(view, wide, d);
 }
 
-// The box of what reaches so far, not beyond the window. Lanes without one are taken out of drawn.
-static inline void pt_disc_box(const struct view_args *view, const vf reach[2], struct pt_discs *d)
+// The box of what lies between low and high, not beyond the window. Lanes without one are taken out of drawn.
+static inline void pt_disc_box(const struct view_args *view, const vf low[2], const vf high[2], struct pt_discs *d)
 {
     const vf half = vf_set(0.5f), at[2] = { d->x, d->y };
     const int32_t origin[2] = { view->origin_x, view->origin_y };
     const uint32_t size[2] = { view->width, view->height };
     for (int k = 0; k < 2; k++) {
-        vf own = vf_floor(at[k]), first = vf_floor(pt_clamp_far((at[k] - reach[k]) + half)),
-           last = vf_floor(pt_clamp_far((at[k] + reach[k]) - half));
+        vf own = vf_floor(at[k]), first = vf_floor(pt_clamp_far(low[k] + half)), last = vf_floor(pt_clamp_far(high[k] - half));
         first = vf_max(vf_min(first, own), vf_set((float)origin[k]));
         last = vf_min(vf_max(last, own), vf_set((float)(origin[k] + (int32_t)size[k] - 1)));
         d->drawn = vm_and(d->drawn, vf_le(first, last));
@@ -120,11 +179,39 @@ static inline void pt_disc_cull(const struct pt_disc_source *s, const vf p[3], v
     d->drawn = vm_and(d->drawn, vm_not(vm_and(away, vm_not(none))));
 }
 
+// The half axes of shapes in view space: as covectors, of which offsets in the plane get their share of each half axis when
+// they are divided by the radius. normal: in the object, not yet unit. SPEC 11.
+static inline void pt_disc_axes(const struct disc_args *args, const struct pt_discs *d, const vf normal[3], vf axes[2][3])
+{
+    const vf one = vf_set(1.0f), zero = vf_zero();
+    const vf scale = vf_rsqrt((normal[0] * normal[0] + normal[1] * normal[1]) + normal[2] * normal[2]);
+    const vf x = normal[0] * scale, y = normal[1] * scale, z = normal[2] * scale;
+    const vm up = vf_le(vf_set(PT_SHAPE_UP), z);
+    const vf a = vf_rcp(one + vf_abs(z)), b = (x * y) * a;
+    const vf c = one - (y * y) * a;
+    const vf t1[3] = { one - (x * x) * a, zero - b, vf_select(up, zero - x, x) };
+    const vf t2[3] = { vf_select(up, zero - b, b), vf_select(up, c, zero - c), zero - y };
+    const vi angle = vi_and(vi_shr(d->shape, PT_SHAPE_ANGLE_SHIFT), vi_set(63));
+    const vf cosine = vf_look_up(pt_shape_cosines, 64, angle), sine = vf_look_up(pt_shape_sines, 64, angle);
+    const vf short_scale = d->ratio * vf_set(args->instance.axis_scale), long_scale = vf_set(args->instance.axis_scale);
+    const float *m = args->instance.normal_matrix;
+    vf along[3], across[3];
+    for (int k = 0; k < 3; k++) {
+        along[k] = cosine * t1[k] + sine * t2[k];
+        across[k] = cosine * t2[k] - sine * t1[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        axes[0][k] = ((vf_set(m[3 * k]) * along[0] + vf_set(m[3 * k + 1]) * along[1]) + vf_set(m[3 * k + 2]) * along[2]) * long_scale;
+        axes[1][k] =
+            ((vf_set(m[3 * k]) * across[0] + vf_set(m[3 * k + 1]) * across[1]) + vf_set(m[3 * k + 2]) * across[2]) * short_scale;
+    }
+}
+
 // 3. plane and ellipse
 static inline void pt_disc_shape(const struct view_args *view, const struct disc_args *args, vi word, struct pt_discs *d)
 {
     const vf zero = vf_zero(), one = vf_set(1.0f), xs = vf_set(view->ray_xs), ys = vf_set(view->ray_ys);
-    vf u = zero, v = zero, n[3] = { zero, zero, one };
+    vf u = zero, v = zero, n[3] = { zero, zero, one }, object[3];
     vm none = vm_first(PT_LANES);
     if (view->perspective) {
         u = vf_set(view->ray_x0) + xs * d->x;
@@ -132,8 +219,11 @@ static inline void pt_disc_shape(const struct view_args *view, const struct disc
     }
     // the normal; without one: that of the picture
     if (args->instance.has_normals) {
+        const float *m = args->instance.normal_matrix;
         vf own[3];
-        vf_view_normal(&args->instance, word, own);
+        vf_decode_normal(word, object);
+        for (int k = 0; k < 3; k++)
+            own[k] = (vf_set(m[3 * k]) * object[0] + vf_set(m[3 * k + 1]) * object[1]) + vf_set(m[3 * k + 2]) * object[2];
         vf square = (own[0] * own[0] + own[1] * own[1]) + own[2] * own[2];
         none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
         none = vm_or(none, vm_not(vf_le(vf_set(1e-30f), square)));
@@ -160,36 +250,56 @@ static inline void pt_disc_shape(const struct view_args *view, const struct disc
         fine = d->z * fine;
     }
     flat = vm_and(flat, vf_le(fine, vf_set(PT_DISC_FINE)));
-    // a step of a pixel along x, y: (xs - gx u, -gx v, gx), (-gy u, ys - gy v, gy) times z / q
-    vf a[2] = { xs - d->gx * u, d->gx * v }, b[2] = { d->gy * u, ys - d->gy * v };
-    d->e = ((a[0] * a[0] + a[1] * a[1]) + d->gx * d->gx) * fine * fine;
-    d->f = ((d->gx * d->gy - a[0] * b[0]) - a[1] * b[1]) * (fine + fine) * fine;
-    d->g = ((b[0] * b[0] + b[1] * b[1]) + d->gy * d->gy) * fine * fine;
-    // its pixel alone
+    // a step of a pixel along x, y: (xs - gx u, -gx v, gx), (-gy u, ys - gy v, gy) times z / q, in radii (orthographic: depth is
+    // -z); their squares and product, and the area that they span
+    const vf sign = vf_set(view->perspective ? 1.0f : -1.0f);
+    const vf a[3] = { (xs - d->gx * u) * fine, (d->gx * v) * fine, (sign * d->gx) * fine };
+    const vf b[3] = { (d->gy * u) * fine, (ys - d->gy * v) * fine, (sign * d->gy) * fine };
+    vf e = (a[0] * a[0] + a[1] * a[1]) + a[2] * a[2], f = (a[2] * b[2] - a[0] * b[0]) - a[1] * b[1];
+    vf area = ((xs * fine) * (ys * fine)) * inverse;
+    if (args->instance.has_normals && pt_disc_shaped(args)) {
+        vf axes[2][3], p[2], q[2];
+        pt_disc_axes(args, d, object, axes);
+        for (int k = 0; k < 2; k++) {
+            p[k] = (a[0] * axes[k][0] - a[1] * axes[k][1]) + a[2] * axes[k][2];
+            q[k] = (b[1] * axes[k][1] - b[0] * axes[k][0]) + b[2] * axes[k][2];
+        }
+        const vf turn = (n[0] * (axes[0][1] * axes[1][2] - axes[0][2] * axes[1][1]) +
+                         n[1] * (axes[0][2] * axes[1][0] - axes[0][0] * axes[1][2])) +
+                        n[2] * (axes[0][0] * axes[1][1] - axes[0][1] * axes[1][0]);
+        e = vf_select(none, e, p[0] * p[0] + p[1] * p[1]);
+        f = vf_select(none, f, p[0] * q[0] + p[1] * q[1]);
+        area = vf_select(none, area, area * vf_abs(turn));
+    }
+    const vf part = vf_rcp(vf_max(e, vf_set(PT_DISC_LEAST)));
+    // or its pixel alone
     d->gx = vf_select(flat, d->gx, zero);
     d->gy = vf_select(flat, d->gy, zero);
-    d->e = vf_select(flat, d->e, vf_set(1e20f));
-    d->f = vf_select(flat, d->f, zero);
-    d->g = vf_select(flat, d->g, vf_set(1e20f));
+    d->e = vf_select(flat, e, vf_set(1e20f));
+    d->h = vf_select(flat, f * part, zero);
+    d->m = vf_select(flat, area * (area * part), vf_set(1e20f));
     d->gentle = vf_le(vf_abs(d->gx) * (d->reach[0] + one) + vf_abs(d->gy) * (d->reach[1] + one), vf_set(PT_DISC_GENTLE));
 }
 
-// 4. The ellipse's own box, which is smaller, where it is no needle: within q of e dx^2 + f dx dy + g dy^2 = q^2, for the
-// greatest q that the ball has. Leaves out no pixel that is covered.
+// 4. The ellipse's own box, which is smaller: within q of e w^2 + m dy^2 = q^2, for the greatest q that the disc has. Leaves out
+// no pixel that is covered.
 static inline void pt_disc_tight_box(const struct view_args *view, struct pt_discs *d)
 {
-    const vf one = vf_set(1.0f), size[2] = { d->g, d->e };
-    const vf determinant = d->e * d->g - (d->f * d->f) * vf_set(0.25f);
-    const vf inverse = vf_rcp(vf_max(determinant, vf_set(1e-30f)));
-    const vm round = vm_and(vf_le((d->e * d->g) * vf_set(1e-3f), determinant), vf_le(vf_set(1e-30f), determinant));
-    const vf most = (one + vf_abs(d->gx) * (d->reach[0] + one)) + vf_abs(d->gy) * (d->reach[1] + one);
-    vf reach[2];
+    const vf one = vf_set(1.0f), least = vf_set(PT_DISC_LEAST), at[2] = { d->x, d->y };
+    const vm known = vm_and(vf_le(least, d->e), vf_le(least, d->m));
+    vf most = one, low[2], high[2];
+    if (view->perspective)
+        most = vf_min((one + vf_abs(d->gx) * (d->reach[0] + one)) + vf_abs(d->gy) * (d->reach[1] + one), d->widest);
+    most = most * vf_set(1.001f);
+    const vf up = vf_rsqrt(vf_max(d->m, least)), beside = d->h * up;
+    const vf square = vf_max(beside * beside + vf_rcp(vf_max(d->e, least)), vf_set(1e-12f)); // of what it reaches to the sides
+    const vf own[2] = { square * vf_rsqrt(square), up };
     for (int k = 0; k < 2; k++) {
-        const vf square = vf_max(size[k] * inverse, vf_set(1e-12f));
-        const vf own = (square * vf_rsqrt(square)) * (most * vf_set(1.001f)) + vf_set(0.02f);
-        reach[k] = vf_select(round, vf_min(own, d->reach[k]), d->reach[k]);
+        const vf reach = own[k] * most + vf_set(0.02f);
+        low[k] = vf_select(known, vf_max(at[k] - reach, d->low[k]), d->low[k]);
+        high[k] = vf_select(known, vf_min(at[k] + reach, d->high[k]), d->high[k]);
     }
-    pt_disc_box(view, reach, d);
+    pt_disc_box(view, low, high, d);
 }
 
 // A part of the window: first column and row, and how many.
@@ -220,7 +330,8 @@ struct pt_patches {
     struct pt_disc_tile tile;
     float middle_x[PT_DISC_TILE + PT_PATCH_COLUMNS]; // of pixels: halves are exact
     _Alignas(64) float middle_y[PT_DISC_TILE + PT_PATCH_ROWS][PT_PATCH_COLUMNS];
-    float x[PT_LANES], y[PT_LANES], z[PT_LANES], gx[PT_LANES], gy[PT_LANES], e[PT_LANES], f[PT_LANES], g[PT_LANES];
+    float x[PT_LANES], y[PT_LANES], z[PT_LANES], gx[PT_LANES], gy[PT_LANES], e[PT_LANES], h[PT_LANES], m[PT_LANES];
+    float deep[PT_LANES]; // no pixel of the disc lies nearer or farther than so much from its middle
     uint32_t x0[PT_LANES], y0[PT_LANES], x1[PT_LANES], y1[PT_LANES]; // boxes in the tile
     uint32_t first[PT_LANES], columns[PT_LANES], rows[PT_LANES];     // not of wide: first pixel; columns, a bit each; rows
     uint32_t column[PT_LANES], row[PT_LANES];                        // own pixels in the tile, if they lie there
@@ -258,9 +369,10 @@ static inline void pt_patches_turn(struct pt_patches *out, const struct view_arg
 static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_discs *d, uint32_t step)
 {
     const struct view_args *view = out->view;
-    // in its own pixel, less than 0.71 from its middle, a disc with e dx^2 + f dx dy + g dy^2 <= 1.9 (dx^2 + dy^2) and q > 0.99
-    // lies over the middle, and the weight is its own
-    const vf steep = vf_max(d->e, d->g) + vf_abs(d->f) * vf_set(0.5f), slope = vf_abs(d->gx) + vf_abs(d->gy);
+    // in its own pixel, less than 0.71 from its middle, a disc with e w^2 + m dy^2 <= 1.9 (dx^2 + dy^2) and q > 0.99 lies over
+    // the middle, and the weight is its own
+    const vf mixed = vf_abs(d->e * d->h), steep = vf_max(d->e, mixed * vf_abs(d->h) + d->m) + mixed;
+    const vf slope = vf_abs(d->gx) + vf_abs(d->gy);
     const vi tile_x = vi_set((uint32_t)out->tile.x), tile_y = vi_set((uint32_t)out->tile.y), next = vi_set(1);
     const vi x0 = vi_select(vi_lt_unsigned(d->box[0], tile_x), tile_x, d->box[0]);
     const vi y0 = vi_select(vi_lt_unsigned(d->box[1], tile_y), tile_y, d->box[1]);
@@ -282,8 +394,9 @@ static inline uint32_t pt_patches_begin(struct pt_patches *out, const struct pt_
     vf_store(out->gx, d->gx);
     vf_store(out->gy, d->gy);
     vf_store(out->e, d->e);
-    vf_store(out->f, d->f);
-    vf_store(out->g, d->g);
+    vf_store(out->h, d->h);
+    vf_store(out->m, d->m);
+    vf_store(out->deep, d->radius * vf_set(1.001f));
     vi_store(out->x0, vi_sub(x0, tile_x));
     vi_store(out->y0, vi_sub(y0, tile_y));
     vi_store(out->x1, vi_sub(x1, tile_x));
@@ -372,8 +485,8 @@ static inline struct pt_shown pt_patch_show(const struct pt_patches *list, uint3
     struct pt_shown out = { .dx = pt_patch_columns(list->middle_x + at % PT_DISC_TILE) - vf_set(list->x[k]),
                             .dy = vf_load(list->middle_y[at / PT_DISC_TILE]) - vf_set(list->y[k]) };
     const vf slope = vf_set(list->gx[k]) * out.dx + vf_set(list->gy[k]) * out.dy;
-    out.square = (vf_set(list->e[k]) * out.dx + vf_set(list->f[k]) * out.dy) * out.dx +
-                 (vf_set(list->g[k]) * out.dy) * out.dy;
+    const vf w = out.dx + vf_set(list->h[k]) * out.dy;
+    out.square = (vf_set(list->e[k]) * w) * w + (vf_set(list->m[k]) * out.dy) * out.dy;
     out.covered = vm_of_bits(list->box[i]);
     if (view->perspective) {
         vf inverse = (one - slope) * (one + slope * slope);
@@ -382,6 +495,8 @@ static inline struct pt_shown pt_patch_show(const struct pt_patches *list, uint3
             inverse = vf_rcp(one + slope);
         }
         out.z = z * inverse;
+        if (!(list->gentle >> k & 1u)) // where slopes cancel, the depth shows it
+            out.covered = vm_and(out.covered, vf_le(vf_abs(out.z - z), vf_set(list->deep[k])));
         out.square = out.square * (inverse * inverse);
     } else {
         out.z = z + slope;
