@@ -175,6 +175,8 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         layout.prop(patina, "lighting")
         layout.prop(patina, "cull_back")
         layout.prop(patina, "analysis")
+        if not patina.linked_file:
+            layout.operator("object.patina_analyze", text="Analyze to Attributes")
         column = layout.column(align=True)
         column.prop(patina, "d_min")
         estimate = estimates.layer_distance(context.object.name_full)

@@ -21,6 +21,14 @@ class SidebarPanel:
         return context.engine == PatinaRenderEngine.bl_idname
 
 
+class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
+    bl_label = "Camera"
+    bl_order = 1
+
+    def draw(self, _context: Context) -> None:
+        self.layout.operator("object.patina_frame_points")
+
+
 class PATINA_PT_statistics(SidebarPanel, Panel):
     bl_label = "Statistics"
 
@@ -90,6 +98,6 @@ def sentence(layout: UILayout, text: str, icon: str, width: int = 38) -> None:
         line = f"{line} {word}".strip()
 
 
-_CLASSES = (PATINA_PT_statistics, PATINA_PT_statistics_passes)
+_CLASSES = (PATINA_PT_sidebar_camera, PATINA_PT_statistics, PATINA_PT_statistics_passes)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)
