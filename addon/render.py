@@ -221,7 +221,8 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
     scene.set_camera(**asdict(description.camera))
     if description.lines:
         scene.set_lines(**asdict(description.lines))
-    for light in description.lights:
+    headlight = [description.headlight.of(description.camera)] if description.headlight else []
+    for light in [*description.lights, *headlight]:
         scene.add_light(**asdict(light))
     for clip in description.clips:
         scene.add_clip(**asdict(clip))

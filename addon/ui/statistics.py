@@ -25,8 +25,9 @@ class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
     bl_label = "Camera"
     bl_order = 1
 
-    def draw(self, _context: Context) -> None:
+    def draw(self, context: Context) -> None:
         self.layout.operator("object.patina_frame_points")
+        self.layout.prop(context.scene.patina.studio, "use_headlight")
 
 
 class PATINA_PT_statistics(SidebarPanel, Panel):

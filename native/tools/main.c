@@ -52,6 +52,7 @@ static const char usage[] =
     "  --fog START,END[,DENSITY,R,G,B]    distances from the camera; without a colour into the background's\n"
     "  --focus DISTANCE,APERTURE          depth of field: what is sharp, diameter of the lens, world units\n"
     "  --paper GRAIN[,R,G,B]              grain 0 to 1, and a tint\n"
+    "  --headlight                        one light from the camera in place of the two, without shadows\n"
     "  --shadows                          the brighter light casts shadows\n"
     "  --sun AZIMUTH,HEIGHT[,DIAMETER]    where from and how wide, degrees (default: over the left shoulder, sharp)\n"
     "  --samples N                        of a sun with a diameter, 1 to 4096 (16)\n"

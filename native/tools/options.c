@@ -169,6 +169,8 @@ static int parse_switch(const char *name, struct tool_options *options)
         options->transparent = 1;
     else if (!strcmp(name, "--shadows"))
         options->shadows = 1;
+    else if (!strcmp(name, "--headlight"))
+        options->headlight = 1;
     else if (!strcmp(name, "--dump-plan"))
         options->dump_plan = 1;
     else if (!strcmp(name, "--verbose"))
@@ -348,6 +350,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     options->settings.shadow_lazy = 1; // a picture has no use for whole textures, and measured frames are to compute theirs
     if ((options->save_shadows || options->load_shadows) && !options->shadows)
         return tool_misuse("--save-shadows and --load-shadows need --shadows");
+    if (options->headlight && (options->shadows || options->sun || options->panorama[0]))
+        return tool_misuse("--headlight is one light from the camera: without --sun, --shadows and --panorama");
     if (options->line_options && !options->has_lines)
         return tool_misuse("--line-... options need --lines");
     if (!options->file_count && !options->mesh_count)

@@ -69,7 +69,7 @@ struct tool_options {
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;
     uint32_t analysis;              // 0: clouds are analysed, 1: not
-    int cull, transparent, shadows, sun, json, dump_plan, verbose;
+    int cull, transparent, shadows, headlight, sun, json, dump_plan, verbose;
     float ambient[3];
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
     int repeat; // measured frames; 0 = just the picture

@@ -262,6 +262,23 @@ def test_analysis_refines():
     yield lambda: settled(0)
 
 
+def test_headlight_follows_the_view():
+    """What the view looks at is lit, from every side."""
+    scene = setup()
+    scene.patina.fill = 'CLOSED'
+    scene.patina.studio.use_headlight = True
+    scene.patina.studio.headlight = 3.0
+    positions, _, normals = sphere(60000, 1.5, (0, 0, 0))
+    add_points(positions, None, normals)
+    for turn in (0.0, 1.5, 3.0):
+        view().view_rotation = Quaternion((0, 1, 0), turn)
+        area().tag_redraw()
+        yield lambda: settled(60000)
+        picture = shown().shown.color
+        height, width = picture.shape[:2]
+        check_close(picture[height // 2, width // 2, 0], 0.8 * 3.0 / np.pi, 0.02, f"the middle, turned by {turn}")
+
+
 def test_analyze_is_undone():
     """A user's Analyze goes on beside Blender; one step of undo takes the attributes back."""
     setup()
