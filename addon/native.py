@@ -45,7 +45,7 @@ KINDS = ("UNKNOWN", "SURFACE", "BORDER", "LINE", "VOLUME", "STRAY")  # patina_ki
 
 # Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
 NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),
-                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "certainty": (np.float32, 0), "numbers": (np.uint32, -1),
+                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "certainty": (np.float32, 0), "seen_through": (np.uint8, 0), "numbers": (np.uint32, -1),
                   "distances": (np.float64, -1), "soft_radius": (np.float32, 0), "uncertainty": (np.float32, 0)}
 
 # patina_type by numpy type
@@ -107,18 +107,19 @@ class _CloudInfo(_Descriptor):
                 ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float),
                 ("has_scalars", c_uint32), ("has_classes", c_uint32), ("scalar_range", c_float * 2),
                 ("class_bits", c_uint32 * 8), ("has_shapes", c_uint32), ("normals_oriented", c_uint32),
-                ("estimated_normals", c_uint64), ("kinds", c_uint64 * 6)]
+                ("estimated_normals", c_uint64), ("kinds", c_uint64 * 6), ("seen_through", c_uint64)]
 
 
 class _AnalysisDesc(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("neighbours", c_uint32), ("threads", c_uint32), ("keep_normals", c_uint32),
-                ("station_count", c_uint32), ("stations", c_void_p), ("station", _Array)]
+                ("station_count", c_uint32), ("stations", c_void_p), ("station", _Array), ("free_space", c_uint32),
+                ("row", _Array), ("column", _Array)]
 
 
 class _Neighbourhoods(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("normal", c_void_p), ("axis", c_void_p), ("spacing", c_void_p),
                 ("half_axes", c_void_p), ("sigma", c_void_p), ("kind", c_void_p), ("certainty", c_void_p),
-                ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p), ("distances", c_void_p),
+                ("seen_through", c_void_p), ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p), ("distances", c_void_p),
                 ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
 
 
@@ -126,7 +127,7 @@ class _FileInfo(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32),
                 ("origin", c_double * 3), ("box_min", c_double * 3), ("box_max", c_double * 3),
-                ("invalid_positions", c_uint64)]
+                ("invalid_positions", c_uint64), ("stations", c_uint32)]
 
 
 class _FileAttribute(_Descriptor):
@@ -139,7 +140,8 @@ class _CloudStyle(_Descriptor):
                 ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float),
                 ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p), ("ramp_count", c_uint32),
                 ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
-                ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32)]
+                ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
+                ("hidden_kinds", c_uint32), ("least_certainty", c_float)]
 
 
 class _Clip(_Descriptor):
@@ -252,6 +254,7 @@ _CALLS = {
     "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
+    "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
     "patina_scene_create": (_OUT,),
     "patina_scene_destroy": (c_void_p,),
@@ -549,6 +552,7 @@ class Cloud(_Handle):
         self.has_shapes = bool(info.has_shapes)  # analysed
         self.normals_oriented = bool(info.normals_oriented)
         self.kinds = tuple(info.kinds)  # points of each of KINDS
+        self.seen_through = info.seen_through  # points that a station saw through
         self.layer_distance = info.layer_distance  # what d_min = 0 stands for at the median spacing, object units
         self.box = (tuple(info.box_min), tuple(info.box_max))
 
@@ -557,36 +561,43 @@ class Cloud(_Handle):
         return Task("set_colors", self._handle, byref(_view(colors, self.count)), keep=(self, colors))
 
     def _describe_analysis(self, neighbours: int, stations: np.ndarray | None, station: np.ndarray | None,
-                           keep_normals: bool, threads: int) -> _AnalysisDesc:
+                           keep_normals: bool, threads: int, free_space: bool, grid: tuple[np.ndarray, np.ndarray] | None
+                           ) -> _AnalysisDesc:
         count = 0 if stations is None else len(stations)
+        row, column = grid or (None, None)
         return _AnalysisDesc(neighbours=neighbours, threads=threads, keep_normals=keep_normals, station_count=count,
-                             stations=stations.ctypes.data if count else None, station=_view(station, self.count))
+                             stations=stations.ctypes.data if count else None, station=_view(station, self.count),
+                             free_space=free_space, row=_view(row, self.count), column=_view(column, self.count))
 
     def analyse(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
-                keep_normals: bool = True, progress: Progress | None = None, threads: int = 0) -> None:
+                keep_normals: bool = True, progress: Progress | None = None, threads: int = 0, free_space: bool = False,
+                grid: tuple[np.ndarray, np.ndarray] | None = None) -> None:
         """Gives points normals, spacings and footprints of their own; as start_colors. stations: (n, 3) places of the
-        scanner that normals face, station: (count, 1) uint8 or uint16, which of them saw the point."""
+        scanner that normals face, station: (count, 1) uint8 or uint16, which of them saw the point. free_space: marks points
+        that another station saw through; grid: row and column of each point, (count, 1) uint16, uint32 or int32."""
         stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
-        self._call("analyse", byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads)),
-                   _handle_of(progress))
+        self._call("analyse", byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads, free_space,
+                                                            grid)), _handle_of(progress))
         self._learn()
 
     def start_analysis(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
-                       keep_normals: bool = True, progress: Progress | None = None, threads: int = 0) -> Task:
+                       keep_normals: bool = True, progress: Progress | None = None, free_space: bool = False,
+                       grid: tuple[np.ndarray, np.ndarray] | None = None, threads: int = 0) -> Task:
         """analyse, beside pictures: its result() changes the cloud, and no picture of it may be drawn then."""
         def apply(task: Task) -> None:
             task._call("apply")
             self._learn()
 
         stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
-        return Task("analyse", self._handle, byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads)),
-                    _handle_of(progress), keep=(self, stations, station, progress), finish=apply)
+        return Task("analyse", self._handle,
+                    byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads, free_space, grid)),
+                    _handle_of(progress), keep=(self, stations, station, grid, progress), finish=apply)
 
     def neighbourhoods(self, *names: str, neighbours: int = 16, progress: Progress | None = None,
                        threads: int = 0) -> dict[str, np.ndarray]:
         """Arrays by name: those of NEIGHBOURHOODS that are named, else all that need no walk to neighbours."""
         arrays = {}
-        for name in names or list(NEIGHBOURHOODS)[:7]:
+        for name in names or list(NEIGHBOURHOODS)[:8]:
             kind, width = NEIGHBOURHOODS[name]
             arrays[name] = np.empty((self.count, neighbours if width < 0 else width) if width else self.count, kind)
         self._call("neighbourhoods", byref(_Neighbourhoods(neighbours=neighbours, threads=threads,
@@ -681,6 +692,11 @@ class File(_Handle):
 
     def attribute(self, index: int) -> np.ndarray:
         return self._column("read_attribute", (self.count,), index)
+
+    def stations(self) -> np.ndarray:
+        """(n, 3) float64, where the scanner stood, in the file's coordinates: attribute "scan" tells which for a point."""
+        count = self._info.stations
+        return self._column("read_stations", (count, 3), dtype=np.float64) if count else np.empty((0, 3))
 
 
 class Scene(_Handle):

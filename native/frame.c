@@ -156,6 +156,8 @@ static int upload(struct render *render)
         if (!error)
             error = device->ops->buffer_create(device, instance->chunk_count * sizeof *instance->chunks,
                                                instance->chunks, 1, &render->chunks[i]);
+        if (!error && instance->marked)
+            error = pt_residency_mark(device, instance->instance->cloud, render->clouds[i]);
         if (error)
             return pt_fail_again(&render->frame->handle, error);
     }
@@ -177,6 +179,8 @@ static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *r
         return pt_shadows_buffer(render->frame, ref->which, ref->index);
     if (ref->which == PT_CLIPS || ref->which == PT_DRAWN)
         return pt_clip_buffer(&render->frame->clips, ref->which);
+    if (ref->which == PT_COLORS && render->plan->instances[ref->index].marked)
+        return &render->clouds[ref->index]->marked;
     return ref->which == PT_CHUNKS ? &render->chunks[ref->index] : &render->clouds[ref->index]->buffers[ref->which];
 }
 

@@ -64,7 +64,7 @@ _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_S
 
 // PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole.
 enum pt_instance_buffer {
-    PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES,
+    PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES, PT_SHAPES,
     PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN
 };
 
@@ -126,7 +126,8 @@ struct pt_plan_instance {
     uint32_t chunk_count;
     uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
     uint32_t chunks_cut; // of its chunks, those that are sifted
-    int by_class;        // some of them by class
+    int by_class, by_shape; // some of them by class, by shape
+    int marked;             // shown with what stations saw through in magenta
 };
 
 struct pt_plan_mesh {

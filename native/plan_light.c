@@ -519,7 +519,7 @@ static void put_word(struct key *key, uint64_t word)
     put(key, (double)(word & 0xFFFFFFFFu));
 }
 
-// What is cut out of the instance: clips in its own frame, and hidden classes.
+// What is cut out of the instance: clips in its own frame, hidden classes and hidden shapes.
 static void put_cuts(struct key *key, const struct patina_scene *scene, const struct pt_instance *instance)
 {
     const uint32_t clips = instance->style.clip_off || scene->settings.shadow_uncut ? 0 : scene->clip_count;
@@ -531,6 +531,10 @@ static void put_cuts(struct key *key, const struct patina_scene *scene, const st
         put(key, (double)instance->style.hidden_classes[k]);
     if (hiding)
         put_word(key, instance->cloud->class_hash);
+    uint32_t shapes[8]; // the words themselves are in the cloud's fingerprint
+    hiding = pt_hidden_shapes(instance, shapes);
+    for (int k = 0; k < 8 && hiding; k++)
+        put(key, (double)shapes[k]);
     for (uint32_t i = 0; i < clips; i++) {
         const patina_clip *clip = &scene->clips[i];
         double turned[9], across[9], from[3], product[9];

@@ -600,7 +600,7 @@ static void set_instance(const struct camera *camera, const struct object *objec
     args->id_base = instance->id_base;
     args->id_count = (uint32_t)cloud->slots;
     args->has_normals = cloud->info.has_normals;
-    args->color_format = cloud->color_format;
+    args->color_format = cloud->color_format ? cloud->color_format : pt_is_marked(instance) ? PT_COLOR_FLOAT : PT_COLOR_NONE;
     args->lit = style->lighting == PATINA_LIGHTING_LIT;
     args->shininess = style->shininess;
     args->opacity = 1.0f - style->transparency;
@@ -654,6 +654,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     out->instance = instance;
     out->of = i;
     out->discs = wide;
+    out->marked = pt_is_marked(instance);
     out->radius = (float)fmin((double)instance->style.radius * thinning(scene), (double)PT_DISC_MOST);
     out->radius_scale = (float)fmin(survey->objects[i].scale * thinning(scene), (double)PT_DISC_MOST);
     set_instance(&survey->camera, &survey->objects[i], instance, thinning(scene), &out->args);

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "residency.h"
 
+#include "kernel_args.h"
+
 #include <stdlib.h>
+#include <string.h>
 
 static void destroy(struct pt_resident *resident, struct patina_device *device)
 {
     for (int i = 0; i < PT_INSTANCE_BUFFERS; i++)
         device->ops->buffer_destroy(device, &resident->buffers[i]);
+    device->ops->buffer_destroy(device, &resident->marked);
     pt_alive_release(resident->alive);
     free(resident);
 }
@@ -30,8 +34,11 @@ static int upload_shapes(struct patina_device *device, const struct patina_cloud
     const void *radii = cloud->radii ? (const void *)cloud->radii : cloud->shapes;
     device->ops->buffer_destroy(device, &resident->buffers[PT_SURFACE]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_RADII]);
+    device->ops->buffer_destroy(device, &resident->buffers[PT_SHAPES]);
     resident->shapes = atomic_load(&cloud->alive->shapes);
     int error = device->ops->buffer_create(device, cloud->slots * 4, cloud->surface, 1, &resident->buffers[PT_SURFACE]);
+    if (!error && cloud->radii && cloud->shapes)
+        error = device->ops->buffer_create(device, cloud->slots * 4, cloud->shapes, 1, &resident->buffers[PT_SHAPES]);
     if (error || !radii)
         return error;
     return device->ops->buffer_create(device, cloud->slots * 4, radii, 1, &resident->buffers[PT_RADII]);
@@ -128,6 +135,32 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
         return renew(device, cloud, resident);
     resident = begin(device, cloud->alive);
     return resident ? end(residency, device, resident, upload(device, cloud, resident), out) : PATINA_ERROR_MEMORY;
+}
+
+int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    static const uint8_t magenta[3] = { 255, 0, 255 };
+    static const float linear_magenta[3] = { 1.0f, 0.0f, 1.0f }, grey[3] = { 0.8f, 0.8f, 0.8f };
+    const uint32_t colors = atomic_load(&cloud->alive->colors), shapes = atomic_load(&cloud->alive->shapes);
+    const enum pt_color_format format = cloud->color_format ? cloud->color_format : PT_COLOR_FLOAT;
+    const size_t size = pt_color_size(format);
+    const void *mark = format == PT_COLOR_FLOAT ? (const void *)linear_magenta : magenta;
+    if (resident->marked.size && resident->marked_colors == colors && resident->marked_shapes == shapes)
+        return PATINA_OK;
+    device->ops->buffer_destroy(device, &resident->marked);
+    char *words = malloc(cloud->slots * size);
+    if (!words)
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "showing free space: out of memory");
+    for (uint64_t slot = 0; slot < cloud->slots; slot++) {
+        const int marked = cloud->shapes && (cloud->shapes[slot] & PT_SHAPE_SEEN_THROUGH);
+        const void *own = cloud->colors ? (const char *)cloud->colors + slot * size : (const void *)grey;
+        memcpy(words + slot * size, marked ? mark : own, size);
+    }
+    int error = device->ops->buffer_create(device, cloud->slots * size, words, 0, &resident->marked);
+    free(words);
+    resident->marked_colors = colors;
+    resident->marked_shapes = shapes;
+    return error;
 }
 
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,

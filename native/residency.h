@@ -9,12 +9,16 @@ struct pt_resident {
     struct pt_resident *next;
     struct pt_alive *alive;
     uint32_t colors, shapes; // the states of alive->colors and alive->shapes that the buffers hold
+    struct pt_buffer marked; // colours with what stations saw through in magenta; made when first asked for
+    uint32_t marked_colors, marked_shapes; // the states that it holds
     struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh by pt_mesh_buffer; PT_CHUNKS is unused
 };
 
 // The cloud's buffers on the device, uploaded at the first call; forgets dead clouds on the way.
 int pt_residency_take(struct pt_residency *residency, struct patina_device *device, const struct patina_cloud *cloud,
                       struct pt_resident **out);
+// Makes resident->marked what it should be: in the cloud's format of colours, PT_COLOR_FLOAT where it has none.
+int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
 // Likewise of a mesh.
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
                            struct pt_resident **out);

@@ -21,9 +21,13 @@ SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-_INVALID = ("cartesianInvalidState", "sphericalInvalidState")
 _COLORS = ("colorRed", "colorGreen", "colorBlue")
-_FIELDS = (*_CARTESIAN, *_SPHERICAL, *_INVALID, "intensity", *_COLORS)
+_NORMALS = ("normalX", "normalY", "normalZ")  # of the extension "nor", as are others
+_INVALID = ("cartesianInvalidState", "sphericalInvalidState")
+
+# Names of attributes, as the other readers have them; other fields keep theirs, without an extension's prefix.
+_NAMES = {"rowIndex": "row", "columnIndex": "column", "returnIndex": "return_number", "returnCount": "number_of_returns",
+          "classification": "class", "Classification": "class", "pointSourceId": "point_source_id"}
 
 
 def _open(path: Path) -> Any:
@@ -59,15 +63,15 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     """The same with a pause after each piece."""
     file = _open(path)
     parts: list[dict[str, np.ndarray]] = []
-    scanners: list[np.ndarray] = []
+    stations: list[np.ndarray] = []
     done, read, index, crs = 0, 0, 0, ""
     try:
         crs = _crs(file)
         headers = [file.get_header(index) for index in range(file.scan_count)]
         total = max(sum(header.point_count for header in headers), 1)
         for index, header in enumerate(headers):
-            if header.has_pose():
-                scanners.append(header.translation)
+            stations.append(_station(header))
+            first = len(parts)
             for count, data in _pieces(file, header):
                 progress.step(read / total)
                 read += count
@@ -76,6 +80,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
                 part = {name: values[keep] for name, values in data.items()}
                 parts.append(part | {"scan": np.full(int(keep.sum()), index, np.float32)})
                 yield jobs.Pause()
+            _level_colors(header, parts[first:])
     except native.PatinaError:
         raise
     except Exception as error:
@@ -83,15 +88,39 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     finally:
         file.close()
     points = merge(path.stem, parts, {"crs": crs} if crs else {})
-    points.notes |= scanners_of(scanners, points.origin)
+    points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
     return points
 
 
+def _station(header: Any) -> np.ndarray:
+    """Where the scanner stood, in the file's coordinates; NaN where that is not said. Without a pose a scan that has ranges
+    or a grid was taken from zero; points alone may come from anywhere."""
+    local = {_SPHERICAL[0], "rowIndex", "columnIndex"} & set(header.point_fields)
+    return header.translation if header.has_pose() or local else np.full(3, np.nan)
+
+
+def _fields(header: Any) -> dict[str, str]:
+    """The numbers that the scan's points declare: local name → name in the file."""
+    from pye57 import libe57
+    prototype = libe57.StructureNode(header.points.prototype())
+    numbers = (libe57.IntegerNode, libe57.ScaledIntegerNode, libe57.FloatNode)
+    return {name.rpartition(":")[2]: name for name in header.point_fields if isinstance(prototype[name], numbers)}
+
+
 def _pieces(file: Any, header: Any) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-    """How many points were read, and of the valid ones "positions" in the file's coordinates, "intensity" and "rgb" where
-    there are such."""
-    data, buffers = file.make_buffers([name for name in _FIELDS if name in header.point_fields],
-                                      max(min(SMALL_PIECE, header.point_count), 1))
+    """How many points were read, and of the valid ones "positions" in the file's coordinates, "normals" and "rgb" where there
+    are such (the latter as the file has them), and all other numbers by name. pye57's own way knows a few fields of certain
+    types; float64 holds what any file declares."""
+    from pye57 import libe57
+    if not header.point_count:
+        return
+    fields, size = _fields(header), min(SMALL_PIECE, header.point_count)
+    if not any(all(name in fields for name in names) for names in (_CARTESIAN, _SPHERICAL)):
+        raise native.PatinaError("its points have no positions: " + ", ".join(header.point_fields), -4)
+    data = {name: np.empty(size, np.float64) for name in fields}
+    buffers = libe57.VectorSourceDestBuffer()
+    for name, field in fields.items():
+        buffers.append(libe57.SourceDestBuffer(file.image_file, field, data[name], size, True, True))
     reader = header.points.reader(buffers)
     try:
         while count := reader.read():
@@ -99,19 +128,50 @@ def _pieces(file: Any, header: Any) -> Iterator[tuple[int, dict[str, np.ndarray]
             valid = np.ones(count, bool)
             for name in _INVALID:
                 if name in piece:
-                    valid &= piece[name] == 0
-            piece = {name: values[valid] for name, values in piece.items()}
-            positions = _cartesian(piece)
-            if header.has_pose():
-                positions = file.to_global(positions, header.rotation, header.translation)
-            found = {"positions": positions}
-            if "intensity" in piece:
-                found["intensity"] = piece["intensity"]
-            if all(name in piece for name in _COLORS):
-                found["rgb"] = np.stack([piece[name] for name in _COLORS], 1)
-            yield count, found
+                    valid &= piece.pop(name) == 0
+            yield count, _columns({name: values[valid] for name, values in piece.items()}, header)
     finally:
         reader.close()
+
+
+def _columns(piece: dict[str, np.ndarray], header: Any) -> dict[str, np.ndarray]:
+    found = {"positions": _cartesian(piece)}
+    for name, parts in (("normals", _NORMALS), ("rgb", _COLORS)):
+        if all(part in piece for part in parts):
+            found[name] = np.stack([piece.pop(part) for part in parts], 1).astype(np.float32)
+    if header.has_pose():
+        turn = header.rotation_matrix
+        found["positions"] = found["positions"] @ turn.T + header.translation
+        if "normals" in found:
+            found["normals"] = found["normals"] @ turn.T.astype(np.float32)
+    for name, values in piece.items():
+        if name not in {*_CARTESIAN, *_SPHERICAL}:
+            found.setdefault(_NAMES.get(name, name), values.astype(np.float32))
+    return found
+
+
+def _level_colors(header: Any, parts: list[dict[str, np.ndarray]]) -> None:
+    """Brings a scan's colours to 0..65535, from the limits that it declares, else from those of its numbers."""
+    from pye57 import libe57
+    colored = [part for part in parts if "rgb" in part]
+    if not colored:
+        return
+    prototype = libe57.StructureNode(header.points.prototype())
+    for axis, name in enumerate(_COLORS):
+        low, high = (_limit(header, prototype, name, end) for end in ("Minimum", "Maximum"))
+        if not np.isfinite([low, high]).all() or high <= low:
+            most = max((float(part["rgb"][:, axis].max(initial=0.0)) for part in colored), default=0.0)
+            low, high = 0.0, 1.0 if most <= 1.0 else 255.0 if most <= 255.0 else 65535.0
+        for part in colored:
+            part["rgb"][:, axis] = np.rint(np.clip((part["rgb"][:, axis] - low) / (high - low), 0.0, 1.0) * 65535.0)
+
+
+def _limit(header: Any, prototype: Any, name: str, end: str) -> float:
+    """NaN when neither the scan nor the numbers' own type says it."""
+    if header.node.isDefined(f"colorLimits/{name}{end}"):
+        return float(header.node["colorLimits"][f"{name}{end}"].value())
+    value = float(getattr(prototype[name], end.lower())())
+    return value if abs(value) < 1e30 else np.nan
 
 
 def _cartesian(piece: dict[str, np.ndarray]) -> np.ndarray:

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -22,15 +24,53 @@ _NEW = [("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("intensity", "<u2"), ("bit_fi
         ("point_source_id", "<u2"), ("gps_time", "<f8")]
 _GPS = [("gps_time", "<f8")]
 _RGB = [("red", "<u2"), ("green", "<u2"), ("blue", "<u2")]
-_FORMATS = {0: _OLD, 1: _OLD + _GPS, 2: _OLD + _RGB, 3: _OLD + _GPS + _RGB, 4: _OLD + _GPS, 5: _OLD + _GPS + _RGB,
-            6: _NEW, 7: _NEW + _RGB, 8: _NEW + _RGB + [("nir", "<u2")], 9: _NEW, 10: _NEW + _RGB}
+_NIR = [("nir", "<u2")]
+_WAVE = [("wave", "V29")]  # where its waveform lies: not read
+_FORMATS = {0: _OLD, 1: _OLD + _GPS, 2: _OLD + _RGB, 3: _OLD + _GPS + _RGB, 4: _OLD + _GPS + _WAVE,
+            5: _OLD + _GPS + _RGB + _WAVE, 6: _NEW, 7: _NEW + _RGB, 8: _NEW + _RGB + _NIR, 9: _NEW + _WAVE,
+            10: _NEW + _RGB + _NIR + _WAVE}
+
+# data_type of an extra dimension, from 1; 11 to 30 are pairs and triples of the same
+_EXTRA_TYPES = ("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f4", "<f8")
+_NO_DATA, _SCALE, _OFFSET = 1, 8, 16  # bits of its options
+
+MOST_SECONDS = 1e12  # 30,000 years: a GPS time beyond was never one
 
 # attribute → the field of a record it comes from
 _SCALARS = {"intensity": "intensity", "user_data": "user_data", "point_source_id": "point_source_id",
             "scan_angle": "scan_angle", "scan_angle_rank": "scan_angle_rank", "nir": "nir"}
+_OURS = {*_SCALARS, "positions", "rgb", "class", "gps_time", "return_number", "number_of_returns"}
 
 MISSING = ("LAZ and COPC files need the Python packages laspy and lazrs: Patina's extension for Blender 4.2 and later "
            "brings them; elsewhere run \"{python}\" -m pip install --user laspy lazrs, or unpack the file to LAS")
+
+
+@dataclass(frozen=True)
+class Extra:
+    """A dimension that follows the fields of the point format."""
+
+    name: str
+    kind: str  # of numpy; raw bytes: "V" and their number
+    count: int  # of values a point
+    options: int
+    no_data: bytes  # 24: three of the widest type
+    scale: tuple[float, ...]  # 3
+    offset: tuple[float, ...]
+
+    def values(self, raw: np.ndarray, axis: int) -> np.ndarray:
+        """(n,) of one of its values: bytes as they are, else float32; NaN where the file says that there is none."""
+        number = np.dtype(self.kind)
+        empty = np.zeros(len(raw), bool)
+        if self.options & _NO_DATA:
+            widest = "<f8" if number.kind == "f" else f"<{number.kind}8"
+            empty = raw == np.frombuffer(self.no_data, widest)[axis].astype(number)
+        scaled = self.options & (_SCALE | _OFFSET)
+        if not scaled and not empty.any():
+            return raw if number.itemsize == 1 else raw.astype(np.float32)
+        values = raw * (self.scale[axis] if self.options & _SCALE else 1.0) + (self.offset[axis] if self.options & _OFFSET
+                                                                              else 0.0)
+        values[empty] = np.nan
+        return values.astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -46,6 +86,7 @@ class Header:
     lower: np.ndarray
     upper: np.ndarray
     crs: str
+    extras: tuple[Extra, ...] = ()
 
 
 def _fail(path: Path, what: str) -> native.PatinaError:
@@ -61,27 +102,58 @@ def read_header(path: Path) -> Header:
         box = struct.unpack_from("<12d", head, 131)
         if head[24:26] >= b"\x01\x04" and len(head) >= 255:
             count = struct.unpack_from("<Q", head, 247)[0] or count
-        crs = _crs(file, header_size, min(records, 4096), data_offset)
+        crs, extras = _records(file, head, header_size, min(records, 4096), data_offset)
     return Header(f"{head[24]}.{head[25]}", count, form & 0x3F, bool(form & 0xC0), record_size, data_offset,
-                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), crs)
+                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), crs, extras)
 
 
-def _crs(file, at: int, records: int, end: int) -> str:
-    """The text of the coordinate system: WKT, else what the GeoTIFF keys say in words."""
-    words = ""
+def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int) -> tuple[str, tuple[Extra, ...]]:
+    """Of the variable records, before the points and behind them: the text of the coordinate system (WKT, else what the
+    GeoTIFF keys say in words), and the extra dimensions."""
+    wkt = words = ""
+    extras: tuple[Extra, ...] = ()
+    for user, number, data in itertools.chain(_before(file, at, records, end), _behind(file, head)):
+        if user == b"LASF_Projection" and number in {2112, 34737}:
+            text = data.rstrip(b"\0").decode("utf-8", "replace")
+            wkt, words = (wkt or text, words) if number == 2112 else (wkt, words or text)
+        elif user == b"LASF_Spec" and number == 4:
+            extras = extras or tuple(_extra(data[i:i + 192]) for i in range(0, len(data) - 191, 192))
+    return wkt or words, extras
+
+
+def _before(file: BinaryIO, at: int, records: int, end: int) -> Iterator[tuple[bytes, int, bytes]]:
     for _ in range(records):
         file.seek(at)
         record = file.read(54)
         if len(record) < 54 or at + 54 > end:
-            break
-        user, number, length = record[2:18].rstrip(b"\0"), *struct.unpack_from("<HH", record, 18)
-        if user == b"LASF_Projection" and number in {2112, 34737}:
-            text = file.read(length).rstrip(b"\0").decode("utf-8", "replace")
-            if number == 2112:
-                return text
-            words = text
+            return
+        number, length = struct.unpack_from("<HH", record, 18)
+        yield record[2:18].rstrip(b"\0"), number, file.read(length)
         at += 54 + length
-    return words
+
+
+def _behind(file: BinaryIO, head: bytes) -> Iterator[tuple[bytes, int, bytes]]:
+    """LAS 1.4 alone."""
+    at, records = struct.unpack_from("<QI", head, 235) if head[24:26] >= b"\x01\x04" and len(head) >= 247 else (0, 0)
+    for _ in range(min(records, 4096)):
+        if at > 1 << 62:
+            return
+        file.seek(at)
+        record = file.read(60)
+        if len(record) < 60:
+            return
+        number, length = struct.unpack_from("<HQ", record, 18)
+        yield record[2:18].rstrip(b"\0"), number, file.read(min(length, 1 << 20))
+        at += 60 + length
+
+
+def _extra(record: bytes) -> Extra:
+    kind, options = record[2], record[3]
+    name = record[4:36].split(b"\0")[0].decode("utf-8", "replace").strip()
+    if not 1 <= kind <= 30:  # nobody says what it is, only how long
+        return Extra(name, f"V{options}", 1, 0, b"", (), ())
+    return Extra(name, _EXTRA_TYPES[(kind - 1) % 10], 1 + (kind - 1) // 10, options, record[40:64],
+                 struct.unpack_from("<3d", record, 112), struct.unpack_from("<3d", record, 136))
 
 
 def preview(path: Path) -> list[str]:
@@ -91,10 +163,30 @@ def preview(path: Path) -> list[str]:
     return [f"LAS {header.version}, point format {header.form}{', compressed' * header.compressed}",
             f"{header.points:,} points", f"{size[0]:,.1f} x {size[1]:,.1f} x {size[2]:,.1f}",
             *(["colours"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
+            *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
             *([header.crs[:60]] * bool(header.crs))]
 
 
+def _record(path: Path, header: Header) -> np.dtype:
+    """Of a point: the fields of its format, then the extra dimensions as "extra 0", ..., as far as the record holds them."""
+    fields = _FORMATS.get(header.form)
+    if fields is None:
+        raise _fail(path, f"point format {header.form} is not one of LAS 1.0 to 1.4")
+    size = np.dtype(fields).itemsize
+    if header.record_size < size:
+        raise _fail(path, f"records of {header.record_size} bytes cannot hold point format {header.form}")
+    more = []
+    for index, extra in enumerate(header.extras):
+        kind = np.dtype((extra.kind, (extra.count,)))
+        if size + kind.itemsize > header.record_size:
+            break
+        more += [(f"extra {index}", extra.kind, (extra.count,))] * bool(kind.itemsize)
+        size += kind.itemsize
+    return np.dtype(fields + more + [("more", f"V{header.record_size - size}")] * (header.record_size > size))
+
+
 def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray]:
+    kind = _record(path, header)
     if header.compressed:
         try:
             import laspy
@@ -105,18 +197,14 @@ def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray]:
         try:
             with laspy.open(str(path)) as file:
                 for points in file.chunk_iterator(size):
-                    yield points.array
+                    yield points.array.view(kind)  # packed as in the file, under our names
         except (laspy.errors.LaspyException, lazrs.LazrsError, ValueError, OSError) as error:
             raise _fail(path, f"cannot be unpacked: {error}") from None
+        except BaseException as error:  # what lazrs has not thought of is none of Exception's kinds
+            if type(error).__name__ != "PanicException":
+                raise
+            raise _fail(path, f"cannot be unpacked: {error}") from None
         return
-    fields = _FORMATS.get(header.form)
-    if fields is None:
-        raise _fail(path, f"point format {header.form} is not one of LAS 1.0 to 1.4")
-    kind = np.dtype(fields)
-    if header.record_size < kind.itemsize:
-        raise _fail(path, f"records of {header.record_size} bytes cannot hold point format {header.form}")
-    padding = header.record_size - kind.itemsize
-    kind = np.dtype(fields + [("more", f"V{padding}")] * bool(padding))
     have = (path.stat().st_size - header.data_offset) // kind.itemsize
     if have < header.points:
         raise _fail(path, f"ends after {max(have, 0):,} of {header.points:,} points")
@@ -193,9 +281,37 @@ def _read(path: Path, header: Header, wanted: Filter, progress: Progress) -> job
             found["gps_time"] = piece["gps_time"][keep]
         if "red" in names:
             found["rgb"] = np.stack([piece[name][keep] for name in ("red", "green", "blue")], 1)
-        columns.add(found)
+        columns.add(_extras(header, piece, keep) | found)
         yield jobs.Pause()
     return _assemble(path, header, origin, columns)
+
+
+def _extras(header: Header, piece: np.ndarray, keep: np.ndarray | slice) -> dict[str, np.ndarray]:
+    """Values of the extra dimensions by name; of those with two or three, with a number behind it."""
+    found = {}
+    for index, extra in enumerate(header.extras):
+        if f"extra {index}" not in piece.dtype.names or extra.kind[0] == "V":
+            continue
+        raw = piece[f"extra {index}"][keep]
+        for axis in range(extra.count):
+            name = extra.name or f"extra {index}"
+            name = name if extra.count == 1 else f"{name} {axis}"
+            name = f"extra {name}" if name in _OURS or name in found else name
+            found[name] = extra.values(raw[:, axis], axis)
+    return found
+
+
+def _normals_of(header: Header, columns: _Columns) -> np.ndarray | None:
+    """Out of extra dimensions, as CloudCompare and PDAL write them."""
+    by_name = {extra.name.lower(): extra.name for extra in header.extras}
+    for names in (("normalx", "normaly", "normalz"), ("nx", "ny", "nz")):
+        if all(name in by_name for name in names):
+            found = [columns.take(by_name[name]) for name in names]
+            normals = np.zeros((columns.count, 3), np.float32)
+            for axis, values in enumerate(found):
+                normals[:, axis] = 0.0 if values is None else values
+            return normals if any(values is not None for values in found) else None
+    return None
 
 
 def _assemble(path: Path, header: Header, origin: tuple[float, float, float], columns: _Columns) -> PointFile:
@@ -209,12 +325,15 @@ def _assemble(path: Path, header: Header, origin: tuple[float, float, float], co
     scalars = {}
     times = columns.take("gps_time")
     if times is not None:  # float32 holds no GPS second: kept from the first one on
-        start = float(np.nanmin(times)) if np.isfinite(times).any() else 0.0
+        good = np.abs(times) <= MOST_SECONDS  # no NaN either
+        start = float(times[good].min()) if good.any() else 0.0
+        times[~good] = np.nan
         times -= start
         scalars["gps_time"] = times.astype(np.float32)
         notes["gps_time_start"] = start
     del times
+    normals = _normals_of(header, columns)
     for name in columns:
         values = columns.take(name)
         scalars[name] = values if values.dtype.itemsize == 1 else values.astype(np.float32)
-    return PointFile(path.stem, positions, None, colors, scalars, origin, 0, notes)
+    return PointFile(path.stem, positions, normals, colors, scalars, origin, 0, notes)

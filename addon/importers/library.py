@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-from itertools import islice
 from pathlib import Path
 
 from .. import jobs, native
@@ -22,7 +20,6 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         task = native.File.start(str(path), inner)
     yield task
     with task.result() as file:
-        scanners = _scanners(path) if file.format == "PTX" else []
         return PointFile(
             name=path.stem,
             positions=file.positions(),
@@ -31,18 +28,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
             origin=file.origin,
             invalid=file.invalid_positions,
-            notes=scanners_of(scanners, file.origin)).filtered(wanted)
-
-
-def _scanners(path: Path) -> list[list[float]]:
-    """Where the scans of a PTX were taken: the last row of each one's matrix. The library has found the file good."""
-    places = []
-    with open(path, "rb") as file:
-        lines = (line for line in file if line.strip())
-        while head := list(islice(lines, 10)):
-            places.append([float(word) for word in head[9].split()[:3]])
-            deque(islice(lines, int(head[0]) * int(head[1])), maxlen=0)  # its points
-    return places
+            notes=scanners_of(file.stations(), file.origin)).filtered(wanted)
 
 
 def preview(path: Path) -> list[str]:

@@ -16,7 +16,7 @@ from ..sync.analysis import SCANNERS
 
 
 def positions(obj: bpy.types.Object | None) -> np.ndarray:
-    """(n, 3) in the object's coordinates; n is 0 where nothing is known."""
+    """(n, 3) in the object's coordinates, one a scan, NaN for one that does not say; n is 0 where nothing is known."""
     known = obj.data.get(SCANNERS) if obj and obj.data else None
     return np.empty((0, 3)) if known is None else np.array(known, np.float64).reshape(-1, 3)
 
@@ -40,6 +40,9 @@ class PATINA_OT_camera_at_scanner(Operator):
         known = positions(obj)
         if self.scan >= len(known):
             self.report({'ERROR'}, f"Patina: '{obj.name}' has scans 0 to {len(known) - 1}, there is no {self.scan}")
+            return {'CANCELLED'}
+        if not np.isfinite(known[self.scan]).all():
+            self.report({'ERROR'}, f"Patina: scan {self.scan} of '{obj.name}' does not say where its scanner stood")
             return {'CANCELLED'}
         data = bpy.data.cameras.new(f"{obj.name} scan {self.scan}")
         data.type = 'PANO' if self.panoramic else 'PERSP'

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 from bpy.types import Context, Panel
 
 from ..engine import PatinaRenderEngine
@@ -37,7 +38,7 @@ class PATINA_PT_scanner(_DataPanel, Panel):
         return context.engine in cls.COMPAT_ENGINES and len(scanner.positions(context.object)) > 0
 
     def draw(self, context: Context) -> None:
-        count = len(scanner.positions(context.object))
+        count = int(np.isfinite(scanner.positions(context.object)).all(axis=1).sum())
         self.layout.label(text=f"{count} position{'s' * (count > 1)} of scanners")
         self.layout.operator(scanner.PATINA_OT_camera_at_scanner.bl_idname)
 

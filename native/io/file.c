@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -42,10 +43,53 @@ void pt_clip_name(char *name, size_t size, const char *path)
     memcpy(name + 3, end, strlen(end) + 1);
 }
 
+int pt_file_add_attribute(struct patina_file *file, const char *name, uint32_t type, void *data)
+{
+    struct pt_column *grown = realloc(file->attributes, (file->attribute_count + 1) * sizeof *grown);
+    if (!grown) {
+        free(data);
+        return PATINA_ERROR_MEMORY;
+    }
+    file->attributes = grown;
+    struct pt_column *column = &grown[file->attribute_count++];
+    *column = (struct pt_column){ .type = type, .data = data };
+    snprintf(column->name, sizeof column->name, "%s", name);
+    return PATINA_OK;
+}
+
+const struct pt_column *pt_file_find_attribute(const struct patina_file *file, const char *name)
+{
+    for (uint32_t i = 0; i < file->attribute_count; i++)
+        if (!strcmp(file->attributes[i].name, name))
+            return &file->attributes[i];
+    return NULL;
+}
+
 // ---- open ----------------------------------------------------------------------------------------------------------
+
+// Formats that only the add-on reads, by their first bytes; NULL for others.
+static const char *format_of_add_on(const struct pt_input *input)
+{
+    static const struct {
+        const char *start, *format;
+    } known[] = {
+        { "LASF", "LAS, LAZ or COPC" }, { "ASTM-E57", "E57" }, { "# .PCD", "PCD" }, { "VERSION .7", "PCD" }, { "VERSION 0.7", "PCD" },
+        { "camera ", "conf" },          { "bmesh ", "conf" },  { "mesh ", "conf" },
+    };
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (input->size >= strlen(known[i].start) && !memcmp(input->data, known[i].start, strlen(known[i].start)))
+            return known[i].format;
+    return NULL;
+}
 
 static int read_input(const struct pt_input *input, patina_file **out)
 {
+    const char *elsewhere = format_of_add_on(input);
+    if (elsewhere)
+        return pt_fail(NULL, PATINA_ERROR_FORMAT,
+                       "%s: a file of format %s, which Patina's add-on for Blender reads and exports as PLY; here PLY, XYZ, CSV, PTS "
+                       "and PTX are read",
+                       input->name, elsewhere);
     struct patina_file *file = calloc(1, sizeof *file);
     if (!file)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
@@ -125,6 +169,7 @@ void patina_file_destroy(patina_file *file)
     for (uint32_t i = 0; i < file->attribute_count; i++)
         free(file->attributes[i].data);
     free(file->attributes);
+    free(file->scans);
     free(file->position);
     free(file->normal);
     free(file->color);
@@ -145,6 +190,15 @@ static int hand_out(const patina_file *file, const char *call, void *caller, siz
     return PATINA_OK;
 }
 
+// Stations are told by scan, so all scans must have one.
+static uint32_t count_stations(const patina_file *file)
+{
+    for (uint32_t i = 0; i < file->scan_count; i++)
+        if (file->scans[i].parallel)
+            return 0;
+    return file->scan_count;
+}
+
 int patina_file_get_info(const patina_file *file, patina_file_info *info)
 {
     if (!file || !info)
@@ -155,7 +209,8 @@ int patina_file_get_info(const patina_file *file, patina_file_info *info)
                               .position_type = file->position_type,
                               .color_type = file->color_type,
                               .has_normals = file->normal != NULL,
-                              .invalid_positions = file->invalid_positions };
+                              .invalid_positions = file->invalid_positions,
+                              .stations = count_stations(file) };
     memcpy(ours.format, file->format, sizeof ours.format);
     memcpy(ours.origin, file->origin, sizeof ours.origin);
     memcpy(ours.box_min, file->box_min, sizeof ours.box_min);
@@ -282,6 +337,22 @@ int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t siz
         if (file->count)
             memcpy(rgba, file->color, (size_t)file->count * 4 * sizeof *rgba);
     }
+    return PATINA_OK;
+}
+
+int patina_file_read_stations(const patina_file *file, double *xyz, size_t size)
+{
+    if (!file || (!xyz && count_stations(file)))
+        return pt_fail(file ? &file->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_file_read_stations: %s is NULL",
+                       file ? "the buffer" : "file");
+    uint32_t count = count_stations(file);
+    if (!count)
+        return pt_fail(&file->handle, PATINA_ERROR_EMPTY, "patina_file_read_stations: the file has no stations");
+    if (size / (3 * sizeof *xyz) < count)
+        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT,
+                       "patina_file_read_stations: a buffer of %zu bytes cannot hold %u stations", size, count);
+    for (uint32_t i = 0; i < count; i++)
+        memcpy(xyz + 3 * i, file->scans[i].station, 3 * sizeof *xyz);
     return PATINA_OK;
 }
 

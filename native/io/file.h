@@ -14,6 +14,15 @@ struct pt_column {
     void *data;    // count elements of that type, tightly packed
 };
 
+// Points that one scanner took from one place, column by column or row by row; attributes "row" and "column" say where
+// each lies in its grid.
+struct pt_scan {
+    uint64_t first, count;  // points
+    uint32_t columns, rows; // 0: no grid
+    double station[3];      // where the scanner stood, in the file's coordinates; `parallel`: the direction towards it
+    bool parallel;
+};
+
 // Immutable once opened. All pointers are owned; a column that the file lacks is NULL.
 struct patina_file {
     struct pt_handle handle;       // first: patina_message() takes any handle
@@ -29,6 +38,8 @@ struct patina_file {
     void *color;                   // 4 (RGBA) a point; alpha is opaque where the file has none
     struct pt_column *attributes;
     uint32_t attribute_count;
+    struct pt_scan *scans; // in the order of the points; attribute "scan" counts them from 0
+    uint32_t scan_count;
 };
 
 // The bytes that a reader is given. name: what messages call the file, short enough for one.
@@ -50,6 +61,13 @@ bool pt_text_is(const struct pt_input *input);
 void pt_file_place(struct patina_file *file, double *staged);
 // Sets the box and invalid_positions from file->position.
 void pt_file_measure(struct patina_file *file);
+
+// Normals of the points of scans with a grid, towards the scanner, from the fit of a plane to the grid's neighbours; points
+// in no surface get 0. Nothing where the file has normals, or no scan a grid. file->position must be placed.
+int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input);
+// Takes over the data of a new last attribute.
+int pt_file_add_attribute(struct patina_file *file, const char *name, uint32_t type, void *data);
+const struct pt_column *pt_file_find_attribute(const struct patina_file *file, const char *name);
 
 // Bytes of one element of a patina_type; 0 for PATINA_NONE and unknown ones.
 size_t pt_type_size(uint32_t type);

@@ -36,8 +36,21 @@ struct ply_header {
     struct ply_element elements[PLY_MOST_ELEMENTS];
     uint32_t property_count;
     struct ply_property properties[PLY_MOST_PROPERTIES];
+    uint32_t grid_columns, grid_rows; // from "obj_info num_cols", "num_rows"
+    bool crlf;          // the header's lines end with CR LF
     uint64_t body;      // offset of the first byte behind the header
     uint64_t body_line; // its line number
+};
+
+// What a fault in the rows is: an error, a line in the log, nothing.
+enum ply_tone { PLY_REFUSE, PLY_WARN, PLY_QUIET };
+
+// A place in the rows; elements are read one after the other.
+struct ply_cursor {
+    const struct pt_input *input;
+    const struct ply_header *header;
+    uint64_t offset, line; // of the next row
+    enum ply_tone tone;
 };
 
 // Where the values of one vertex property go. data NULL: nowhere.
@@ -46,22 +59,70 @@ struct ply_target {
     uint32_t type; // of the column: any patina_type
     uint32_t step; // in elements, from point to point
     double scale;  // values are multiplied by it
+    double offset; // and this is added, of 8-bit columns
     bool wrap;     // negative values are bytes that a writer called signed: -1 is 255
 };
 
 int ply_read_header(const struct pt_input *input, struct ply_header *header);
 
-// Read the rows up to and with header->elements[vertex], of which property i goes to targets[i].
-int ply_read_binary(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
-                    const struct ply_target *targets);
-int ply_read_ascii(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
-                   const struct ply_target *targets);
+// The lists of one property, handed on row by row.
+struct ply_lists {
+    uint32_t property; // of the element
+    void (*take)(void *context, uint64_t row, const double *items, size_t count);
+    void *context;
+    double *items; // of the row, from malloc; NULL at first
+    size_t room;
+};
+
+// Reads the rows of the element that begins at the cursor, which comes behind them; property i goes to targets[i].
+// targets NULL: values go nowhere; without lists, too, the rows of a text are passed over without a look at what they hold.
+int ply_read_rows(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                  struct ply_lists *lists);
+int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                    struct ply_lists *lists);
+int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                   struct ply_lists *lists);
+// Room for the items of a row. PATINA_ERROR_MEMORY.
+int ply_make_room(const struct ply_cursor *at, struct ply_lists *lists, size_t count);
+// Tells what is behind the last element, where the cursor is.
+void ply_warn_of_rest(struct ply_cursor at);
+
+// Refuses a binary body in which each line feed became carriage return and line feed, as copying it as text makes it.
+int ply_check_line_ends(const struct pt_input *input, const struct ply_header *header);
+
+// Normals from faces: each corner's face normal by the corner's angle (Thuermer and Wuethrich, Computing Vertex Normals
+// from Polygonal Facets, 1998), so that they do not depend on how a polygon was cut into triangles.
+struct ply_faces {
+    const float *position; // 3 a point
+    uint64_t points;
+    float *normal; // 3 a point, zeros at first
+    bool strips;   // a row is a strip of triangles; -1 begins the next one (Stanford's tristrips)
+    uint64_t used, bad; // faces
+    uint64_t bad_row;   // of the first bad one
+    double bad_point;   // that it names
+};
+
+// The list of the element that names points; -1 without one.
+int64_t ply_find_corners(const struct ply_header *header, const struct ply_element *element);
+void ply_take_face(void *faces, uint64_t row, const double *corners, size_t count); // ply_lists.take
+void ply_finish_faces(struct ply_faces *faces); // unit lengths; points without a face keep 0
+
+// Which point lies in which cell of a scanner's grid, row by row of at most one point.
+struct ply_grid {
+    uint32_t columns;
+    uint64_t points;
+    uint16_t *row, *column; // a point; PLY_NO_CELL
+};
+enum { PLY_NO_CELL = UINT16_MAX };
+
+void ply_take_cell(void *grid, uint64_t cell, const double *points, size_t count); // ply_lists.take
 
 // Puts n values at points first, first + 1, ... of a column; integers are clamped to what their type holds.
 void ply_store(const struct ply_target *target, uint64_t first, size_t n, const double *values);
-// Error when the file, from offset on, cannot hold the rows that the element declares.
-int ply_check_count(const struct pt_input *input, const struct ply_header *header, const struct ply_element *element,
-                    uint64_t offset);
+// Error when the file, from the cursor on, cannot hold the rows that the element declares.
+int ply_check_count(const struct ply_cursor *at, const struct ply_element *element);
+// Says what is wrong in the cursor's tone. Returns PATINA_ERROR_FORMAT.
+int ply_fault(const struct ply_cursor *at, const char *format, ...) __attribute__((format(printf, 2, 3)));
 // Copies bytes of a file into a message: at most 40 of them, what is not printable ASCII as '?'.
 const char *ply_quote(char quoted[44], const void *bytes, size_t size);
 // Sets the progress to offset / size. PATINA_ERROR_CANCELLED when the caller wants no more.

@@ -9,6 +9,7 @@
 enum { POLL_ROWS = 4096 };
 
 struct text {
+    struct ply_cursor *cursor; // brought here at the end
     const struct pt_input *input;
     const uint8_t *at, *end;
     uint64_t line; // number of the line that `at` is in
@@ -48,10 +49,9 @@ static int start_row(struct text *t, const struct ply_element *element, uint64_t
 {
     for (skip_blanks(t); line_ends(t); skip_blanks(t)) {
         if (t->at == t->end)
-            return pt_fail(NULL, PATINA_ERROR_FORMAT,
-                           "%s: the file ends at line %llu, behind %llu of the %llu rows of element %s", t->input->name,
-                           (unsigned long long)t->line, (unsigned long long)i, (unsigned long long)element->count,
-                           element->name);
+            return ply_fault(t->cursor, "%s: the file ends at line %llu, behind %llu of the %llu rows of element %s",
+                             t->input->name, (unsigned long long)t->line, (unsigned long long)i,
+                             (unsigned long long)element->count, element->name);
         next_line(t);
     }
     return PATINA_OK;
@@ -78,77 +78,79 @@ static int read_value(struct text *t, uint32_t type, bool byte, const char *prop
     char quoted[44];
     const uint8_t *behind = pt_parse_number(t->at, t->end, t->c_locale, value);
     if (!behind)
-        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: line %llu: '%s' is not a number (property %s)", t->input->name,
-                       (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property);
+        return ply_fault(t->cursor, "%s: line %llu: '%s' is not a number (property %s)", t->input->name,
+                         (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property);
     if (type != PATINA_FLOAT32 && type != PATINA_FLOAT64 && (!fits(type, byte, *value) || *value != trunc(*value)))
-        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: line %llu: '%s' does not fit property %s of type %s",
-                       t->input->name, (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property,
-                       ply_type_name(type));
+        return ply_fault(t->cursor, "%s: line %llu: '%s' does not fit property %s of type %s", t->input->name,
+                         (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property,
+                         ply_type_name(type));
     t->at = behind;
     return PATINA_OK;
 }
 
 static int short_line(const struct text *t, const char *property)
 {
-    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: line %llu ends before property %s", t->input->name,
-                   (unsigned long long)t->line, property);
+    return ply_fault(t->cursor, "%s: line %llu ends before property %s", t->input->name,
+                     (unsigned long long)t->line, property);
 }
 
-static int skip_list(struct text *t, const struct ply_property *property)
+// The items of a list, handed on or passed over.
+static int read_list(struct text *t, const struct ply_property *property, struct ply_lists *lists, uint64_t i)
 {
     double count = 0;
+    size_t got = 0;
     int code = read_value(t, property->count_type, false, property->name, &count);
     if (code)
         return code;
     if (count < 0)
-        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: line %llu: list %s has the count %.0f", t->input->name,
-                       (unsigned long long)t->line, property->name, count);
-    for (; count > 0; count--) {
+        return ply_fault(t->cursor, "%s: line %llu: list %s has the count %.0f", t->input->name,
+                         (unsigned long long)t->line, property->name, count);
+    for (; (double)got < count && !code; got++) {
         skip_blanks(t);
         if (line_ends(t))
             return short_line(t, property->name);
-        t->at += token_length(t);
+        if (!lists)
+            t->at += token_length(t);
+        else if (!(code = ply_make_room(t->cursor, lists, got + 1)))
+            code = read_value(t, property->type, false, property->name, &lists->items[got]);
     }
-    return PATINA_OK;
+    if (lists && !code)
+        lists->take(lists->context, i, lists->items, got);
+    return code;
 }
 
 static int read_row(struct text *t, const struct ply_property *properties, uint32_t property_count,
-                    const struct ply_target *targets, uint64_t i)
+                    const struct ply_target *targets, struct ply_lists *lists, uint64_t i)
 {
     for (uint32_t k = 0; k < property_count; k++) {
         const struct ply_property *property = &properties[k];
         skip_blanks(t);
         if (line_ends(t)) {
-            // A list that the rows lack is no loss: lists are not kept.
-            if (property->count_type != PATINA_NONE)
+            if (property->count_type != PATINA_NONE) // a list that the rows lack is no loss
                 continue;
             return short_line(t, property->name);
         }
         double value = 0;
         int code = property->count_type != PATINA_NONE
-                       ? skip_list(t, property)
-                       : read_value(t, property->type, targets[k].wrap, property->name, &value);
+                       ? read_list(t, property, lists && lists->property == k ? lists : NULL, i)
+                       : read_value(t, property->type, targets && targets[k].wrap, property->name, &value);
         if (code)
             return code;
-        if (targets[k].data)
+        if (targets && targets[k].data)
             ply_store(&targets[k], i, 1, &value);
     }
     skip_blanks(t);
     char quoted[44];
     if (!line_ends(t))
-        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: line %llu goes on with '%s' behind the last of %u properties",
-                       t->input->name, (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)),
-                       property_count);
+        return ply_fault(t->cursor, "%s: line %llu goes on with '%s' behind the last of %u properties", t->input->name,
+                         (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property_count);
     return PATINA_OK;
 }
 
-// targets NULL: the rows are passed over, a line each, without a look at what they hold.
-static int read_element(struct text *t, const struct ply_header *header, const struct ply_element *element,
-                        const struct ply_target *targets)
+static int read_element(struct text *t, const struct ply_element *element, const struct ply_target *targets,
+                        struct ply_lists *lists)
 {
-    if (element->properties == 0)
-        return PATINA_OK;
-    int code = ply_check_count(t->input, header, element, (uint64_t)(t->at - t->input->data));
+    int code = PATINA_OK;
     for (uint64_t i = 0; i < element->count && !code; i++) {
         if (i % POLL_ROWS == 0)
             code = ply_poll(t->input, (uint64_t)(t->at - t->input->data));
@@ -156,43 +158,32 @@ static int read_element(struct text *t, const struct ply_header *header, const s
             code = start_row(t, element, i);
         if (code)
             break;
-        if (targets)
-            code = read_row(t, header->properties + element->first, element->properties, targets, i);
-        while (!targets && !line_ends(t))
+        if (targets || lists)
+            code = read_row(t, t->cursor->header->properties + element->first, element->properties, targets, lists, i);
+        while (!targets && !lists && !line_ends(t))
             t->at++;
         next_line(t);
     }
     return code;
 }
 
-// A count that is too small leaves points out: that deserves a line in the log.
-static void warn_of_rest(struct text *t, const struct ply_header *header, uint32_t vertex)
+int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                   struct ply_lists *lists)
 {
-    for (uint32_t e = vertex + 1; e < header->element_count; e++)
-        if (header->elements[e].count)
-            return;
-    for (skip_blanks(t); t->at != t->end && line_ends(t); skip_blanks(t))
-        next_line(t);
-    if (t->at != t->end)
-        pt_log(PT_LOG_WARNING, "%s: line %llu and what follows is more than the header declares, and was not read",
-               t->input->name, (unsigned long long)t->line);
-}
-
-int ply_read_ascii(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
-                   const struct ply_target *targets)
-{
-    struct text t = { .input = input,
-                      .at = input->data + header->body,
-                      .end = input->data + input->size,
-                      .line = header->body_line,
+    int code = element->properties ? ply_check_count(at, element) : PATINA_OK;
+    if (code || element->properties == 0)
+        return code;
+    struct text t = { .cursor = at,
+                      .input = at->input,
+                      .at = at->input->data + at->offset,
+                      .end = at->input->data + at->input->size,
+                      .line = at->line,
                       .c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0) };
     if (!t.c_locale)
-        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
-    int code = PATINA_OK;
-    for (uint32_t e = 0; e <= vertex && !code; e++)
-        code = read_element(&t, header, &header->elements[e], e == vertex ? targets : NULL);
-    if (!code)
-        warn_of_rest(&t, header, vertex);
+        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", at->input->name);
+    code = read_element(&t, element, targets, lists);
+    at->offset = (uint64_t)(t.at - at->input->data);
+    at->line = t.line;
     freelocale(t.c_locale);
     return code;
 }

@@ -11,9 +11,8 @@ enum {
 };
 
 struct bytes {
-    const struct pt_input *input;
-    uint64_t offset; // of the next row
-    bool swap;       // the file's byte order is not this machine's
+    struct ply_cursor *at;
+    bool swap; // the file's byte order is not this machine's
 };
 
 static uint16_t read16(const uint8_t *p, bool swap)
@@ -105,8 +104,8 @@ static int read_fixed(struct bytes *b, const struct ply_property *properties, co
     double values[BLOCK];
     for (uint64_t first = 0; first < element->count; first += BLOCK) {
         size_t n = element->count - first < BLOCK ? (size_t)(element->count - first) : BLOCK;
-        const uint8_t *p = b->input->data + b->offset;
-        int code = first % POLL_ROWS ? PATINA_OK : ply_poll(b->input, b->offset);
+        const uint8_t *p = b->at->input->data + b->at->offset;
+        int code = first % POLL_ROWS ? PATINA_OK : ply_poll(b->at->input, b->at->offset);
         if (code)
             return code;
         for (uint32_t k = 0; k < element->properties; k++) {
@@ -116,80 +115,83 @@ static int read_fixed(struct bytes *b, const struct ply_property *properties, co
             }
             p += pt_type_size(properties[k].type);
         }
-        b->offset += n * row;
+        b->at->offset += n * row;
     }
     return PATINA_OK;
 }
 
 static int ends_early(const struct bytes *b, const struct ply_element *element, uint64_t i)
 {
-    return pt_fail(NULL, PATINA_ERROR_FORMAT,
-                   "%s: the file ends at byte %llu, inside row %llu of the %llu of element %s (from byte %llu on)",
-                   b->input->name, (unsigned long long)b->input->size, (unsigned long long)i,
-                   (unsigned long long)element->count, element->name, (unsigned long long)b->offset);
+    return ply_fault(b->at, "%s: the file ends at byte %llu, inside row %llu of the %llu of element %s (from byte %llu on)",
+                     b->at->input->name, (unsigned long long)b->at->input->size, (unsigned long long)i,
+                     (unsigned long long)element->count, element->name, (unsigned long long)b->at->offset);
 }
 
-// One row with lists; targets NULL: passed over.
-static int read_loose_row(struct bytes *b, const struct ply_property *properties, const struct ply_element *element,
-                          const struct ply_target *targets, uint64_t i)
+// The items of a list, handed on or passed over.
+static int read_items(struct bytes *b, const struct ply_property *property, const struct ply_element *element,
+                      struct ply_lists *lists, uint64_t i, double count)
 {
-    const uint8_t *data = b->input->data;
+    struct ply_cursor *at = b->at;
+    if (count < 0)
+        return ply_fault(at, "%s: byte %llu: list %s of row %llu has the count %.0f", at->input->name,
+                         (unsigned long long)(at->offset - pt_type_size(property->count_type)), property->name,
+                         (unsigned long long)i, count);
+    size_t item = pt_type_size(property->type);
+    uint64_t size = (uint64_t)count * item; // below 2^35
+    if (at->input->size - at->offset < size)
+        return ends_early(b, element, i);
+    int code = lists ? ply_make_room(at, lists, (size_t)count) : PATINA_OK;
+    if (lists && !code) {
+        load(lists->items, at->input->data + at->offset, item, (size_t)count, property->type, b->swap);
+        lists->take(lists->context, i, lists->items, (size_t)count);
+    }
+    at->offset += size;
+    return code;
+}
+
+static int read_loose_row(struct bytes *b, const struct ply_property *properties, const struct ply_element *element,
+                          const struct ply_target *targets, struct ply_lists *lists, uint64_t i)
+{
     double value;
-    for (uint32_t k = 0; k < element->properties; k++) {
+    int code = PATINA_OK;
+    for (uint32_t k = 0; k < element->properties && !code; k++) {
         bool list = properties[k].count_type != PATINA_NONE;
         uint32_t type = list ? properties[k].count_type : properties[k].type;
-        if (b->input->size - b->offset < pt_type_size(type))
+        if (b->at->input->size - b->at->offset < pt_type_size(type))
             return ends_early(b, element, i);
-        load(&value, data + b->offset, 0, 1, type, b->swap);
-        if (list && value < 0)
-            return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: byte %llu: list %s of row %llu has the count %.0f",
-                           b->input->name, (unsigned long long)b->offset, properties[k].name, (unsigned long long)i,
-                           value);
-        b->offset += pt_type_size(type);
-        uint64_t items = list ? (uint64_t)value * pt_type_size(properties[k].type) : 0; // below 2^35
-        if (b->input->size - b->offset < items)
-            return ends_early(b, element, i);
-        b->offset += items;
-        if (targets && targets[k].data)
+        load(&value, b->at->input->data + b->at->offset, 0, 1, type, b->swap);
+        b->at->offset += pt_type_size(type);
+        if (list)
+            code = read_items(b, &properties[k], element, lists && lists->property == k ? lists : NULL, i, value);
+        else if (targets && targets[k].data)
             ply_store(&targets[k], i, 1, &value);
-    }
-    return PATINA_OK;
-}
-
-static int read_element(struct bytes *b, const struct ply_header *header, const struct ply_element *element,
-                        const struct ply_target *targets)
-{
-    const struct ply_property *properties = header->properties + element->first;
-    uint64_t row = fixed_row(properties, element->properties);
-    if (element->properties == 0)
-        return PATINA_OK;
-    int code = ply_check_count(b->input, header, element, b->offset);
-    if (code)
-        return code;
-    if (row && targets)
-        return read_fixed(b, properties, element, row, targets);
-    if (row) {
-        b->offset += element->count * row;
-        return PATINA_OK;
-    }
-    for (uint64_t i = 0; i < element->count && !code; i++) {
-        if (i % POLL_ROWS == 0)
-            code = ply_poll(b->input, b->offset);
-        if (!code)
-            code = read_loose_row(b, properties, element, targets, i);
     }
     return code;
 }
 
-int ply_read_binary(const struct pt_input *input, const struct ply_header *header, uint32_t vertex,
-                    const struct ply_target *targets)
+int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, const struct ply_target *targets,
+                    struct ply_lists *lists)
 {
+    const struct ply_property *properties = at->header->properties + element->first;
     bool big_machine = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
-    struct bytes b = { .input = input,
-                       .offset = header->body,
-                       .swap = (header->format == PLY_BIG_ENDIAN) != big_machine };
-    int code = PATINA_OK;
-    for (uint32_t e = 0; e <= vertex && !code; e++)
-        code = read_element(&b, header, &header->elements[e], e == vertex ? targets : NULL);
+    struct bytes b = { .at = at, .swap = (at->header->format == PLY_BIG_ENDIAN) != big_machine };
+    uint64_t row = fixed_row(properties, element->properties);
+    if (element->properties == 0)
+        return PATINA_OK;
+    int code = ply_check_count(at, element);
+    if (code)
+        return code;
+    if (row && targets)
+        return read_fixed(&b, properties, element, row, targets);
+    if (row) {
+        at->offset += element->count * row;
+        return PATINA_OK;
+    }
+    for (uint64_t i = 0; i < element->count && !code; i++) {
+        if (i % POLL_ROWS == 0)
+            code = ply_poll(at->input, at->offset);
+        if (!code)
+            code = read_loose_row(&b, properties, element, targets, lists, i);
+    }
     return code;
 }

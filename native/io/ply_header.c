@@ -33,7 +33,7 @@ static const struct {
     { "float", PATINA_FLOAT32 },   { "double", PATINA_FLOAT64 }, { "int8", PATINA_INT8 },
     { "uint8", PATINA_UINT8 },     { "int16", PATINA_INT16 },    { "uint16", PATINA_UINT16 },
     { "int32", PATINA_INT32 },     { "uint32", PATINA_UINT32 },  { "float32", PATINA_FLOAT32 },
-    { "float64", PATINA_FLOAT64 },
+    { "float64", PATINA_FLOAT64 }, { "bool", PATINA_UINT8 }, // 0 or 1: no type of the format, but written
 };
 
 const char *ply_type_name(uint32_t type)
@@ -135,6 +135,7 @@ static int read_magic(struct reader *r)
     for (i += 3; i < size && i < PLY_LONGEST_HEADER && !pt_is_line_end(data[i]); i++)
         ;
     r->mac = i < size && data[i] == '\r' && (i + 1 == size || data[i + 1] != '\n');
+    r->header->crlf = i < size && data[i] == '\r' && !r->mac;
     return next_line(r);
 }
 
@@ -252,6 +253,23 @@ static int read_comment(struct reader *r)
     return code;
 }
 
+// Sizes of a scanner's grid, as the Stanford repository's range images say them. Others mean nothing here.
+static void read_info(struct reader *r)
+{
+    uint32_t *size = r->word_count == 3 && is(r->words[1], "num_cols")   ? &r->header->grid_columns
+                     : r->word_count == 3 && is(r->words[1], "num_rows") ? &r->header->grid_rows
+                                                                          : NULL;
+    uint32_t value = 0;
+    for (size_t i = 0; size && i < r->words[2].length && value < PLY_NO_CELL; i++) {
+        uint8_t c = r->words[2].text[i];
+        if (c < '0' || c > '9')
+            return;
+        value = value * 10 + (uint32_t)(c - '0');
+    }
+    if (size)
+        *size = value;
+}
+
 // Old Blender exporters forgot the word "comment" on their own line. Before the first element an unknown line can
 // change nothing of what follows, so it is let pass there; later it might be a misspelt property.
 static int read_line(struct reader *r)
@@ -265,6 +283,8 @@ static int read_line(struct reader *r)
         return read_format(r);
     if (is(key, "comment"))
         return read_comment(r);
+    if (is(key, "obj_info"))
+        read_info(r);
     if (is(key, "obj_info") || r->header->element_count == 0)
         return PATINA_OK;
     return fail(r, "unknown keyword", key);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // From header to columns: which property is what, room for the columns, then the rows of either kind.
 //
-// Only the elements up to the points are read: faces and range grids behind them are neither needed nor checked.
+// Elements behind the points are not needed: where the file ends in one of them, that is told and the points stay. Faces
+// give normals where there are no others.
 // Integer colours of type char, short, int and uint are taken as 0..255 (their writers meant bytes), uchar is 0..255,
-// ushort 0..65535, float and double are linear. What is no position, normal or colour becomes an attribute; lists are
-// left out.
+// ushort 0..65535, float and double are linear. A Gaussian splat without colours has the sRGB colour of its base, the
+// constant term of its spherical harmonics (Kerbl et al., 3D Gaussian Splatting, 2023). What is no position, normal or
+// colour becomes an attribute; lists are left out.
 #include "../progress.h"
 #include "ply.h"
 
@@ -22,6 +24,8 @@ static const char *const color_names[][FAMILY] = { { "red", "green", "blue", "al
                                                    { "r", "g", "b", "a" },
                                                    { "diffuse_red", "diffuse_green", "diffuse_blue",
                                                      "diffuse_alpha" } };
+static const char *const splat_names[][FAMILY] = { { "f_dc_0", "f_dc_1", "f_dc_2", NULL } };
+static const double harmonic = 0.28209479177387814; // Y00 = sqrt(1 / (4 pi))
 
 struct plan {
     const struct pt_input *input;
@@ -32,6 +36,8 @@ struct plan {
     struct ply_target *targets;            // one a property
     bool *taken;                           // one a property: it is part of a position, normal or colour
     double *staged;                        // positions whose detail float32 may not hold
+    const struct ply_element *faces;       // that normals come from; NULL: none, or the points have normals
+    const struct ply_element *grid;        // of a scanner; NULL: none
 };
 
 static int out_of_memory(const struct plan *plan)
@@ -156,13 +162,32 @@ static void fill_alpha(struct patina_file *file)
     }
 }
 
+static int plan_splat_colors(struct plan *plan)
+{
+    struct patina_file *file = plan->file;
+    int64_t found[FAMILY];
+    if (!find_family(plan, splat_names, 1, found))
+        return PATINA_OK;
+    file->color_type = PATINA_UINT8;
+    file->color = column(plan, 4);
+    if (!file->color)
+        return out_of_memory(plan);
+    fill_alpha(file);
+    for (int c = 0; c < 3; c++) {
+        aim(plan, found[c], (uint8_t *)file->color + c, PATINA_UINT8, 4);
+        plan->targets[found[c]].scale = 255 * harmonic;
+        plan->targets[found[c]].offset = 127.5;
+    }
+    return PATINA_OK;
+}
+
 static int plan_colors(struct plan *plan)
 {
     struct patina_file *file = plan->file;
     const struct ply_property *p = plan->properties;
     int64_t found[FAMILY];
     if (!find_family(plan, color_names, sizeof color_names / sizeof *color_names, found))
-        return PATINA_OK;
+        return plan_splat_colors(plan);
     uint32_t type = color_class(p[found[0]].type);
     if (type != color_class(p[found[1]].type) || type != color_class(p[found[2]].type))
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: properties %s, %s and %s mix the types %s, %s and %s",
@@ -223,13 +248,126 @@ static const struct ply_element *find_points(const struct ply_header *header)
     return NULL;
 }
 
+// Reads the points, and passes over what stands before them. `before`: where the faces begin if they do.
+static int read_to_points(const struct plan *plan, struct ply_cursor *at, struct ply_cursor *before)
+{
+    int code = PATINA_OK;
+    for (const struct ply_element *e = plan->header->elements; e <= plan->points && !code; e++) {
+        if (e == plan->faces)
+            *before = *at;
+        code = ply_read_rows(at, e, e == plan->points ? plan->targets : NULL, NULL);
+    }
+    return code;
+}
+
+// A fault in the faces is no loss of points: a line in the log.
+static int read_faces(const struct plan *plan, struct ply_cursor *at)
+{
+    struct patina_file *file = plan->file;
+    struct ply_faces faces = { .position = file->position, .points = file->count };
+    struct ply_lists lists = { .take = ply_take_face, .context = &faces };
+    faces.strips = !strcmp(plan->faces->name, "tristrips");
+    faces.normal = file->normal = calloc(file->count + 1, 3 * sizeof *file->normal);
+    if (!file->normal)
+        return out_of_memory(plan);
+    lists.property = (uint32_t)ply_find_corners(plan->header, plan->faces);
+    at->tone = PLY_WARN;
+    int code = ply_read_rows(at, plan->faces, NULL, &lists);
+    free(lists.items);
+    ply_finish_faces(&faces);
+    if (faces.bad)
+        pt_log(PT_LOG_WARNING, "%s: %llu faces name points that are not there, and were left out; the first, %llu, names %.0f of %llu",
+               plan->input->name, (unsigned long long)faces.bad, (unsigned long long)faces.bad_row, faces.bad_point,
+               (unsigned long long)file->count);
+    if (!faces.used) {
+        free(file->normal);
+        file->normal = NULL;
+    }
+    return code;
+}
+
+// Range images as the Stanford repository has them: each cell of a grid lists the point in it, if there is one. They were
+// taken along -z, row by row from below. Where the file ends in them the grid is left out.
+static int read_grid(const struct plan *plan, struct ply_cursor *at)
+{
+    struct patina_file *file = plan->file;
+    struct ply_grid grid = { .columns = plan->header->grid_columns, .points = file->count };
+    struct ply_lists lists = { .take = ply_take_cell, .context = &grid };
+    lists.property = (uint32_t)ply_find_corners(plan->header, plan->grid);
+    grid.row = column(plan, sizeof *grid.row);
+    grid.column = column(plan, sizeof *grid.column);
+    file->scans = calloc(1, sizeof *file->scans);
+    int code = grid.row && grid.column && file->scans ? PATINA_OK : out_of_memory(plan);
+    if (!code) {
+        memset(grid.row, 0xFF, file->count * sizeof *grid.row);
+        memset(grid.column, 0xFF, file->count * sizeof *grid.column);
+        at->tone = PLY_WARN;
+        code = ply_read_rows(at, plan->grid, NULL, &lists);
+        free(lists.items);
+    }
+    if (code) {
+        free(grid.row);
+        free(grid.column);
+        return code;
+    }
+    file->scans[0] = (struct pt_scan){ .count = file->count, .columns = plan->header->grid_columns,
+                                       .rows = plan->header->grid_rows, .station = { 0, 0, 1 }, .parallel = true };
+    file->scan_count = 1;
+    code = pt_file_add_attribute(file, "column", PATINA_UINT16, grid.column);
+    if (code)
+        free(grid.row);
+    else
+        code = pt_file_add_attribute(file, "row", PATINA_UINT16, grid.row);
+    return code ? out_of_memory(plan) : pt_file_grid_normals(file, plan->input);
+}
+
+// Passes over what stands behind the points. Where the file ends too early there, a line in the log says so.
+static int read_behind(const struct plan *plan, struct ply_cursor *at)
+{
+    const struct ply_element *end = plan->header->elements + plan->header->element_count;
+    at->tone = PLY_WARN;
+    for (const struct ply_element *e = plan->points + 1; e < end; e++) {
+        int code = e == plan->faces  ? read_faces(plan, at)
+                   : e == plan->grid ? read_grid(plan, at)
+                                     : ply_read_rows(at, e, NULL, NULL);
+        if (code)
+            return code == PATINA_ERROR_FORMAT ? PATINA_OK : code;
+    }
+    ply_warn_of_rest(*at);
+    return PATINA_OK;
+}
+
+static const struct ply_element *find_faces(const struct plan *plan)
+{
+    static const char *const names[] = { "face", "faces", "tristrips" };
+    const struct ply_header *header = plan->header;
+    for (size_t n = 0; n < sizeof names / sizeof *names && !plan->file->normal; n++)
+        for (uint32_t e = 0; e < header->element_count; e++)
+            if (!strcmp(header->elements[e].name, names[n]) && header->elements[e].count &&
+                ply_find_corners(header, &header->elements[e]) >= 0)
+                return &header->elements[e];
+    return NULL;
+}
+
+// A grid behind the points that has as many cells as it says.
+static const struct ply_element *find_grid(const struct plan *plan)
+{
+    const struct ply_header *h = plan->header;
+    for (const struct ply_element *e = plan->points + 1; e < h->elements + h->element_count; e++)
+        if (!strcmp(e->name, "range_grid") && e->count == (uint64_t)h->grid_columns * h->grid_rows && e->count &&
+            h->grid_columns < PLY_NO_CELL && h->grid_rows < PLY_NO_CELL && ply_find_corners(h, e) >= 0 &&
+            !pt_file_find_attribute(plan->file, "row") && !pt_file_find_attribute(plan->file, "column"))
+            return e;
+    return NULL;
+}
+
 static int read_points(struct plan *plan)
 {
     static const char *const formats[] = { "", "PLY ascii", "PLY binary_little_endian", "PLY binary_big_endian" };
     struct patina_file *file = plan->file;
-    uint32_t vertex = (uint32_t)(plan->points - plan->header->elements);
+    struct ply_cursor at = { plan->input, plan->header, plan->header->body, plan->header->body_line, PLY_REFUSE };
     // Before a byte is allocated; again by the readers of the rows, where elements stand before the points.
-    int code = ply_check_count(plan->input, plan->header, plan->points, plan->header->body);
+    int code = ply_check_count(&at, plan->points);
     if (code)
         return code;
     if (plan->points->count > UINT32_MAX - 1)
@@ -245,14 +383,19 @@ static int read_points(struct plan *plan)
     if ((code = plan_positions(plan)) || (code = plan_normals(plan)) || (code = plan_colors(plan)) ||
         (code = plan_attributes(plan)))
         return code;
-    code = plan->header->format == PLY_ASCII ? ply_read_ascii(plan->input, plan->header, vertex, plan->targets)
-                                             : ply_read_binary(plan->input, plan->header, vertex, plan->targets);
-    if (code)
+    plan->faces = find_faces(plan);
+    plan->grid = find_grid(plan);
+    struct ply_cursor before = at;
+    if ((code = ply_check_line_ends(plan->input, plan->header)) || (code = read_to_points(plan, &at, &before)))
         return code;
     if (plan->staged) {
         pt_file_place(file, plan->staged);
         plan->staged = NULL;
     }
+    if (plan->faces && plan->faces < plan->points && (code = read_faces(plan, &before)) && code != PATINA_ERROR_FORMAT)
+        return code;
+    if ((code = read_behind(plan, &at)))
+        return code;
     pt_file_measure(file);
     pt_progress_set(plan->input->progress, 1);
     return PATINA_OK;

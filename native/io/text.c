@@ -33,8 +33,11 @@ struct text {
     bool float_colors; // 0..1
     double maximum;    // of integer colours: 255 or 65535
     double *staged;
-    float *scan;        // of a PTX: each point's scan number, from 0
     float **attributes; // a column each, in the order of the columns
+    // Of a PTX:
+    uint32_t most;   // columns or rows of a grid, or scans
+    uint32_t room;   // of file->scans
+    void *places[3]; // each point's scan, column and row, from 0: uint16, or uint32 where `most` does not fit
 };
 
 // ---- lines -----------------------------------------------------------------------------------------------------------
@@ -202,6 +205,8 @@ static void guess_colors(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t 
 
 struct scan {
     uint64_t left;     // points still to come
+    uint64_t cell;     // behind the last one: column by column
+    uint32_t columns, rows;
     double matrix[16]; // as in the file: rows of the transposed
 };
 
@@ -219,10 +224,44 @@ static bool read_scan(struct text *t, struct scan *scan)
         else if (i >= 6)
             memcpy(scan->matrix + 4 * (i - 6), values, 4 * sizeof *values);
     }
-    if (!(size[0] >= 0 && size[1] >= 0 && size[0] * size[1] < 4294967295.0))
+    if (!(size[0] >= 0 && size[1] >= 0 && size[0] < 4294967295.0 && size[1] < 4294967295.0 &&
+          size[0] * size[1] < 4294967295.0 && size[0] == floor(size[0]) && size[1] == floor(size[1])))
         return false;
-    scan->left = (uint64_t)(size[0] * size[1]);
+    scan->columns = (uint32_t)size[0];
+    scan->rows = (uint32_t)size[1];
+    scan->left = (uint64_t)scan->columns * scan->rows;
+    scan->cell = 0;
     return true;
+}
+
+static int keep_scan(struct text *t, const struct scan *scan, uint64_t first)
+{
+    struct patina_file *file = t->file;
+    if (file->scan_count == t->room) {
+        uint32_t room = 2 * t->room + 8;
+        struct pt_scan *grown = realloc(file->scans, room * sizeof *grown);
+        if (!grown)
+            return PATINA_ERROR_MEMORY;
+        file->scans = grown;
+        t->room = room;
+    }
+    struct pt_scan *kept = &file->scans[file->scan_count++];
+    *kept = (struct pt_scan){.first = first, .columns = scan->columns, .rows = scan->rows};
+    memcpy(kept->station, scan->matrix + 12, sizeof kept->station);
+    return PATINA_OK;
+}
+
+static void keep_places(struct text *t, const struct scan *scan, uint64_t i)
+{
+    uint64_t cell = scan->cell - 1;
+    const uint64_t values[3] = {t->file->scan_count - 1, cell / scan->rows, cell % scan->rows};
+    t->file->scans[t->file->scan_count - 1].count++;
+    for (int k = 0; k < 3; k++) {
+        if (t->most < UINT16_MAX)
+            ((uint16_t *)t->places[k])[i] = (uint16_t)values[k];
+        else
+            ((uint32_t *)t->places[k])[i] = (uint32_t)values[k];
+    }
 }
 
 // ---- rows ------------------------------------------------------------------------------------------------------------------
@@ -267,7 +306,8 @@ static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
 static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], uint64_t *count)
 {
     struct scan scan = {0};
-    uint64_t i = 0, scans = 0, polled = 0;
+    uint64_t i = 0, polled = 0;
+    uint32_t scans = 0;
     uint32_t strange;
     while (find_line(t)) {
         double values[MOST_COLUMNS] = {0};
@@ -281,6 +321,11 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
             if (!read_scan(t, &scan))
                 return fail_at(t, "the header of a PTX scan was expected");
             scans++;
+            t->most = scan.columns > t->most ? scan.columns : t->most;
+            t->most = scan.rows > t->most ? scan.rows : t->most;
+            t->most = scans > t->most ? scans : t->most;
+            if (storing && keep_scan(t, &scan, i))
+                return PATINA_ERROR_MEMORY;
             continue;
         }
         uint32_t words = read_line(t, values, &strange);
@@ -296,6 +341,7 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
         }
         if (t->ptx) {
             scan.left--;
+            scan.cell++;
             if (values[0] == 0.0 && values[1] == 0.0 && values[2] == 0.0)
                 continue; // the beam met nothing
             place(&scan, values);
@@ -304,8 +350,8 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
             memcpy(sample[i], values, sizeof values);
         if (storing) {
             store(t, i, values);
-            if (t->scan)
-                t->scan[i] = (float)(scans - 1);
+            if (t->ptx)
+                keep_places(t, &scan, i);
         }
         i++;
     }
@@ -323,14 +369,20 @@ static void rewind_text(struct text *t, const uint8_t *body, uint64_t line)
 
 // ---- columns -----------------------------------------------------------------------------------------------------------------
 
-static int add_attribute(struct text *t, const char *name, float **data)
+static int add_attribute(struct text *t, const char *name, uint32_t type, void **data)
 {
-    struct pt_column *column = &t->file->attributes[t->file->attribute_count];
-    column->data = *data = malloc(t->file->count * sizeof(float) + 1);
-    column->type = PATINA_FLOAT32;
-    snprintf(column->name, sizeof column->name, "%s", name);
-    t->file->attribute_count += *data != NULL;
-    return *data ? PATINA_OK : PATINA_ERROR_MEMORY;
+    *data = malloc(t->file->count * pt_type_size(type) + 1);
+    return *data ? pt_file_add_attribute(t->file, name, type, *data) : PATINA_ERROR_MEMORY;
+}
+
+static int make_places(struct text *t)
+{
+    static const char *const names[] = {"scan", "column", "row"};
+    uint32_t type = t->most < UINT16_MAX ? PATINA_UINT16 : PATINA_UINT32;
+    for (int k = 0; k < 3; k++)
+        if (add_attribute(t, names[k], type, &t->places[k]))
+            return PATINA_ERROR_MEMORY;
+    return PATINA_OK;
 }
 
 static int make_columns(struct text *t)
@@ -338,17 +390,20 @@ static int make_columns(struct text *t)
     struct patina_file *file = t->file;
     uint32_t attribute = 0;
     t->attributes = calloc(MOST_COLUMNS, sizeof *t->attributes);
-    file->attributes = calloc(MOST_COLUMNS + 1, sizeof *file->attributes);
     t->staged = malloc(file->count * 3 * sizeof *t->staged + 1);
-    if (!t->attributes || !file->attributes || !t->staged)
+    if (!t->attributes || !t->staged)
         return PATINA_ERROR_MEMORY;
     for (uint32_t c = 0; c < t->columns; c++) {
         if (!t->names[c][0])
             snprintf(t->names[c], NAME_SIZE, "column_%u", c + 1);
-        if (t->roles[c] == ATTRIBUTE && add_attribute(t, t->names[c], &t->attributes[attribute++]))
+        void *data = NULL;
+        if (t->roles[c] != ATTRIBUTE)
+            continue;
+        if (add_attribute(t, t->names[c], PATINA_FLOAT32, &data))
             return PATINA_ERROR_MEMORY;
+        t->attributes[attribute++] = data;
     }
-    if (t->ptx && add_attribute(t, "scan", &t->scan))
+    if (t->ptx && make_places(t))
         return PATINA_ERROR_MEMORY;
     if (has(t, NX) && !(file->normal = malloc(file->count * 3 * sizeof(float) + 1)))
         return PATINA_ERROR_MEMORY;
@@ -458,6 +513,7 @@ int pt_text_read(struct patina_file *file, const struct pt_input *input)
             code = PATINA_ERROR_MEMORY;
     } else {
         pt_file_place(file, t.staged);
+        code = pt_file_grid_normals(file, input);
     }
     if (!code) {
         snprintf(file->format, sizeof file->format, "%s", t.ptx ? "PTX" : t.pts ? "PTS" : t.named ? "CSV" : "XYZ");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "analysis.h"
+#include "free_space.h"
 #include "kernel_args.h"
 #include "memory.h"
 #include "orient.h"
@@ -234,6 +235,15 @@ static double base_of(const patina_cloud *cloud)
     return most > 0.0 ? fmax(least / 4.0, most / 4096.0) : box / 32768.0;
 }
 
+// Makes strides explicit.
+static int check_arrays(patina_analysis_desc *desc)
+{
+    const uint32_t lines = 1u << PATINA_UINT16 | 1u << PATINA_UINT32 | 1u << PATINA_INT32;
+    int error = pt_check_array(&desc->station, "station", 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1);
+    error = error ? error : pt_check_array(&desc->row, "row", lines, 1, 1);
+    return error ? error : pt_check_array(&desc->column, "column", lines, 1, 1);
+}
+
 int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *desc)
 {
     if (!cloud || !desc || desc->struct_size != sizeof *desc)
@@ -246,8 +256,32 @@ int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *des
     for (uint32_t i = 0; i < 3 * desc->station_count; i++)
         if (!isfinite(desc->stations[i]))
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: station %u is nowhere", i / 3);
-    patina_array station = desc->station;
-    return pt_check_array(&station, "station", 1u << PATINA_UINT8 | 1u << PATINA_UINT16, 1, 1);
+    patina_analysis_desc checked = *desc;
+    const int error = check_arrays(&checked);
+    return error ? error : pt_free_space_check(desc);
+}
+
+static void gather_shapes(struct pt_chunk *chunk, const uint32_t *shapes)
+{
+    memset(chunk->shapes, 0, sizeof chunk->shapes);
+    for (uint32_t i = 0; i < chunk->count; i++) {
+        const uint32_t sight = shapes[i] >> PT_SHAPE_SIGHT_SHIFT & 255u;
+        chunk->shapes[sight / 32] |= 1u << sight % 32;
+    }
+}
+
+static int mark_free_space(struct walk *walk, struct pt_pool *pool)
+{
+    struct pt_free_space job = { .cloud = walk->cloud,
+                                 .desc = walk->desc,
+                                 .spacing_base = walk->out->spacing_base,
+                                 .progress = walk->progress,
+                                 .begin = 0.8,
+                                 .end = 1.0,
+                                 .shapes = walk->out->shapes };
+    const int error = pt_free_space_mark(&job, pool);
+    walk->out->seen_through = job.marked;
+    return error;
 }
 
 // Sides that neither the caller nor a station told.
@@ -298,12 +332,15 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     pt_neighbours_destroy(&walk->tree);
     if (error)
         return error;
+    if (walk->desc->free_space && (error = mark_free_space(walk, pool)))
+        return error;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         for (int kind = 0; kind < 6; kind++)
             out->kinds[kind] += walk->tallies[c].kinds[kind];
         out->estimated += walk->tallies[c].estimated;
     }
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        gather_shapes(&out->chunks[c], out->shapes + out->chunks[c].first);
         out->chunks[c].cone_cosine = -2.0f;
         if (out->oriented)
             pt_chunk_cone(&out->chunks[c], out->surface + out->chunks[c].first);
@@ -316,8 +353,7 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
                         struct pt_analysis *out)
 {
     patina_analysis_desc checked = *desc;
-    if (desc->station.data && !checked.station.stride)
-        checked.station.stride = desc->station.type == PATINA_UINT16 ? 2 : 1;
+    check_arrays(&checked); // checked already
     struct walk walk = { .cloud = cloud,
                          .desc = &checked,
                          .out = out,
@@ -364,6 +400,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->info.estimated_normals = analysis->estimated;
     for (int kind = 0; kind < 6; kind++)
         cloud->info.kinds[kind] = analysis->kinds[kind];
+    cloud->info.seen_through = analysis->seen_through;
     pt_pages_free(cloud->surface, cloud->slots * 4);
     pt_pages_free(cloud->shapes, cloud->slots * 4);
     free(cloud->chunks);

@@ -11,7 +11,7 @@ struct pt_analysis {
     struct pt_chunk *chunks;
     uint64_t slots;
     double spacing_base;
-    uint64_t estimated, kinds[6];
+    uint64_t estimated, kinds[6], seen_through;
     int oriented;
 };
 

@@ -46,6 +46,34 @@ static int invert_clip(const patina_clip *clip, struct pt_inverse_clip *out)
     return out->shape == PT_CLIP_PLANE ? invert_plane(linear, clip->cut, out->inverse) : invert_box(linear, out->inverse);
 }
 
+// ---- shapes --------------------------------------------------------------------------------------------------------------
+
+int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8])
+{
+    const patina_cloud_style *style = &instance->style;
+    uint32_t any = 0;
+    memset(hidden, 0, 8 * sizeof *hidden);
+    const int asked = style->hidden_kinds || style->least_certainty > 0.0f || style->free_space == PATINA_FREE_SPACE_USE;
+    if (!asked || !instance->cloud->info.has_shapes)
+        return 0;
+    for (uint32_t sight = 0; sight < 256; sight++) {
+        const uint32_t word = sight << PT_SHAPE_SIGHT_SHIFT;
+        const float certainty = (float)(word >> PT_SHAPE_CERTAINTY_SHIFT & 15u) / 15.0f;
+        const uint32_t out = (style->hidden_kinds >> (word >> PT_SHAPE_KIND_SHIFT & 7u) & 1u) |
+                             (certainty < style->least_certainty) |
+                             (style->free_space == PATINA_FREE_SPACE_USE && (word & PT_SHAPE_SEEN_THROUGH));
+        hidden[sight / 32] |= out << sight % 32;
+        any |= out;
+    }
+    return any != 0;
+}
+
+int pt_is_marked(const struct pt_instance *instance)
+{
+    return instance->style.free_space == PATINA_FREE_SPACE_SHOW && instance->cloud->info.seen_through &&
+           instance->style.color_source == PATINA_COLOR_OWN;
+}
+
 // ---- the sieve -----------------------------------------------------------------------------------------------------------
 
 struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance,
@@ -53,6 +81,7 @@ struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_
 {
     const patina_cloud_info *info = &instance->cloud->info;
     struct pt_sieve sieve = { .instance = instance, .clips = room };
+    sieve.hiding_shapes = pt_hidden_shapes(instance, sieve.hidden_shapes);
     for (int k = 0; k < 8; k++)
         sieve.hiding |= info->has_classes && (instance->style.hidden_classes[k] & info->class_bits[k]);
     for (int keeps = 1; keeps >= 0 && !instance->style.clip_off; keeps--) {
@@ -105,13 +134,13 @@ static int inside(const struct pt_inverse_clip *clip, const double row[9], const
     return whole ? 1 : -1;
 }
 
-// By class: 1 hidden, 0 drawn, -1 some of each.
-static int hidden(const struct pt_sieve *sieve, const struct pt_chunk *chunk)
+// By class or shape: 1 hidden, 0 drawn, -1 some of each. has: of the chunk's points.
+static int hides(const uint32_t hidden[8], const uint32_t has[8])
 {
     uint32_t out = 0, in = 0;
-    for (int k = 0; k < 8 && sieve->hiding; k++) {
-        out |= chunk->classes[k] & sieve->instance->style.hidden_classes[k];
-        in |= chunk->classes[k] & ~sieve->instance->style.hidden_classes[k];
+    for (int k = 0; k < 8; k++) {
+        out |= has[k] & hidden[k];
+        in |= has[k] & ~hidden[k];
     }
     return !out ? 0 : in ? -1 : 1;
 }
@@ -134,12 +163,14 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
 {
     struct pt_division found = { 0 };
     double linear[9], object[3], origin[3];
-    if (!sieve->count && !sieve->keeping && !sieve->hiding)
+    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes)
         return PT_WHOLE; // of most scenes all are
-    int by_class = hidden(sieve, chunk), kept = !sieve->keeping;
-    if (by_class == 1)
+    int by_class = sieve->hiding ? hides(sieve->instance->style.hidden_classes, chunk->classes) : 0;
+    int by_shape = sieve->hiding_shapes ? hides(sieve->hidden_shapes, chunk->shapes) : 0, kept = !sieve->keeping;
+    if (by_class == 1 || by_shape == 1)
         return PT_CUT_AWAY;
     found.by_class = by_class != 0;
+    found.by_shape = by_shape != 0;
     pt_split_matrix(sieve->instance->style.world_from_object, linear, object);
     pt_apply(linear, chunk->origin, origin);
     for (int k = 0; k < 3; k++)
@@ -154,7 +185,7 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
             return PT_CUT_AWAY;
     if (division)
         *division = found;
-    return found.count || found.by_class ? PT_DIVIDED : PT_WHOLE;
+    return found.count || found.by_class || found.by_shape ? PT_DIVIDED : PT_WHOLE;
 }
 
 void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What clips and hidden classes leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
+// What clips, hidden classes and hidden shapes leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
 #ifndef PT_CLIP_H
 #define PT_CLIP_H
 
@@ -19,15 +19,23 @@ struct pt_sieve {
     uint32_t count, keeps;
     int keeping; // some box keeps, if only a flat one
     int hiding;  // some class that the cloud has is hidden
+    uint32_t hidden_shapes[8]; // what pt_hidden_shapes says
+    int hiding_shapes;
 };
 
 enum pt_side { PT_CUT_AWAY, PT_DIVIDED, PT_WHOLE };
 
-// How a divided chunk is divided: by which of the sieve's clips, and whether by class.
+// How a divided chunk is divided: by which of the sieve's clips, and whether by class or shape.
 struct pt_division {
     uint32_t count, keeps;
-    int by_class;
+    int by_class, by_shape;
 };
+
+// Which of the bytes from PT_SHAPE_SIGHT_SHIFT on of a shape the style hides, as sift_args has them. 0: none, or the cloud
+// has no shapes.
+int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8]);
+// Whether what stations saw through is to be shown in it.
+int pt_is_marked(const struct pt_instance *instance);
 
 // The sieve of an instance. room: for the scene's clips, kept by the sieve.
 struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance,

@@ -91,6 +91,12 @@ static int check_color(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: exposure must be between -32 and 32 stops, contrast between 0 and 16");
     if (style->clip_off > 1)
         return fail(scene, "cloud style: clip_off is 0 or 1");
+    if (style->free_space > PATINA_FREE_SPACE_USE)
+        return fail(scene, "cloud style: no such free_space");
+    if (style->hidden_kinds >> 6)
+        return fail(scene, "cloud style: hidden_kinds has unknown bits");
+    if (!(style->least_certainty >= 0.0f && style->least_certainty <= 1.0f))
+        return fail(scene, "cloud style: least_certainty must be within 0 and 1");
     style->contrast = style->contrast == 0.0f ? 1.0f : style->contrast;
     return PATINA_OK;
 }

@@ -10,10 +10,10 @@
 struct columns {
     uint64_t count;
     float *position, *normal, *spacing, *half_axes, *sigma, *certainty;
-    uint8_t *kind;
+    uint8_t *kind, *seen_through;
 };
 
-enum { ROW = 24 + 12 + 4 + 8 + 4 + 4 + 1, ROWS = 4096 }; // with positions in float64
+enum { ROW = 24 + 12 + 4 + 8 + 4 + 4 + 2, ROWS = 4096 }; // with positions in float64
 
 static int allocate(struct columns *c, uint64_t count)
 {
@@ -24,7 +24,8 @@ static int allocate(struct columns *c, uint64_t count)
         if (!(*floats[i] = malloc(count * widths[i] * sizeof(float) + 1)))
             return PATINA_ERROR_MEMORY;
     c->kind = malloc(count + 1);
-    return c->kind ? PATINA_OK : PATINA_ERROR_MEMORY;
+    c->seen_through = malloc(count + 1);
+    return c->kind && c->seen_through ? PATINA_OK : PATINA_ERROR_MEMORY;
 }
 
 static void release(struct columns *c)
@@ -36,6 +37,7 @@ static void release(struct columns *c)
     free(c->sigma);
     free(c->certainty);
     free(c->kind);
+    free(c->seen_through);
 }
 
 static char *put(char *at, const void *bytes, size_t size)
@@ -61,6 +63,7 @@ static int write_rows(FILE *file, const struct columns *c, const double origin[3
             at = put(at, &c->sigma[i], 4);
             at = put(at, &c->certainty[i], 4);
             at = put(at, &c->kind[i], 1);
+            at = put(at, &c->seen_through[i], 1);
         }
         good = fwrite(block, (size_t)(at - block), 1, file) == 1;
     }
@@ -83,7 +86,8 @@ static int write_ply(const char *path, const struct columns *c, const double ori
         fprintf(file,
                 "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
                 "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
-                "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nend_header\n",
+                "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nproperty "
+                "uchar seen_through\nend_header\n",
                 __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
                 type, type);
         good = write_rows(file, c, origin, wide) && !ferror(file);
@@ -101,7 +105,8 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, patina_
     patina_cloud *cloud = NULL;
     patina_file_info info = {.struct_size = sizeof info};
     patina_cloud_info built = {.struct_size = sizeof built};
-    const patina_analysis_desc desc = {.struct_size = sizeof desc, .neighbours = neighbours, .keep_normals = 1};
+    patina_analysis_desc desc = {.struct_size = sizeof desc, .neighbours = neighbours, .keep_normals = 1};
+    struct tool_stations stations = {0};
     int code = patina_file_open(in, progress, &file);
     if (!code)
         code = patina_file_get_info(file, &info);
@@ -112,12 +117,17 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, patina_
     if (!code)
         code = patina_file_cloud(file, 0, progress, &cloud);
     if (!code)
+        code = tool_take_stations(file, &stations);
+    tool_describe_stations(&stations, &desc);
+    desc.free_space = desc.station_count > 1; // one alone sees through nothing
+    if (!code)
         code = patina_cloud_analyse(cloud, &desc, progress);
+    tool_free_stations(&stations);
     if (!code)
         code = patina_cloud_get_info(cloud, &built);
     const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .normal = columns->normal, .spacing = columns->spacing,
                                           .half_axes = columns->half_axes, .sigma = columns->sigma, .kind = columns->kind,
-                                          .certainty = columns->certainty};
+                                          .certainty = columns->certainty, .seen_through = columns->seen_through};
     if (!code)
         code = patina_cloud_neighbourhoods(cloud, &wanted, NULL);
     int result = code ? tool_failed(in, NULL, code) : TOOL_OK;
@@ -126,9 +136,10 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, patina_
         tool_say("%s: cannot be written: %s", out, strerror(errno));
         result = TOOL_FAILED;
     } else if (!code) {
-        static const char *const kinds[] = {"unknown", "surface", "border", "line", "volume", "stray"};
         for (int i = 0; i < 6; i++)
-            printf("%-11s %llu\n", kinds[i], (unsigned long long)built.kinds[i]);
+            printf("%-12s %llu\n", tool_kinds[i], (unsigned long long)built.kinds[i]);
+        if (desc.free_space)
+            printf("seen_through %llu\n", (unsigned long long)built.seen_through);
     }
     patina_cloud_destroy(cloud);
     patina_file_destroy(file);

@@ -34,6 +34,24 @@ static int parse_between(const char *text, double least, double most, float *val
     return 0;
 }
 
+const char *const tool_kinds[6] = {"unknown", "surface", "border", "line", "volume", "stray"};
+
+static int parse_kinds(const char *text, uint32_t *hidden)
+{
+    for (;;) {
+        const size_t length = strcspn(text, ",");
+        uint32_t kind = 0;
+        while (kind < 6 && (strlen(tool_kinds[kind]) != length || memcmp(tool_kinds[kind], text, length)))
+            kind++;
+        if (kind == 6)
+            return -1;
+        *hidden |= 1u << kind;
+        if (!text[length])
+            return 0;
+        text += length + 1;
+    }
+}
+
 static int parse_classes(const char *text, uint32_t hidden[8])
 {
     double n[CLASSES];
@@ -92,6 +110,17 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
         return parse_between(value, 0.01, 16, &color->contrast);
     if (!strcmp(name, "--hide-classes"))
         return parse_classes(value, color->hidden);
+    if (!strcmp(name, "--hide-kinds"))
+        return parse_kinds(value, &color->hidden_kinds);
+    if (!strcmp(name, "--least-certainty"))
+        return parse_between(value, 0, 1, &color->least_certainty);
+    if (!strcmp(name, "--free-space")) {
+        static const char *const words[] = {"off", "show", "use"};
+        for (color->free_space = 0; color->free_space < 3; color->free_space++)
+            if (!strcmp(value, words[color->free_space]))
+                return 0;
+        return -1;
+    }
     if (!strcmp(name, "--clip-box"))
         return parse_box(value, 0, color);
     if (!strcmp(name, "--cut-box"))
@@ -130,7 +159,8 @@ static int take_scalars(const patina_file *file, const char *name, patina_cloud 
     return code;
 }
 
-int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out)
+int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out,
+                    struct tool_stations *stations)
 {
     patina_file *file = NULL;
     int code = patina_file_open(path, progress, &file);
@@ -138,6 +168,8 @@ int tool_load_cloud(const char *path, const struct tool_color *color, patina_pro
         code = patina_file_cloud(file, 0, progress, out);
     if (!code && color->source == PATINA_COLOR_SCALAR)
         code = take_scalars(file, color->attribute, *out);
+    if (!code)
+        code = tool_take_stations(file, stations);
     patina_file_destroy(file);
     return code;
 }
@@ -151,6 +183,9 @@ int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, fl
     style->exposure = color->exposure;
     style->contrast = color->contrast;
     memcpy(style->hidden_classes, color->hidden, sizeof style->hidden_classes);
+    style->free_space = color->free_space;
+    style->hidden_kinds = color->hidden_kinds;
+    style->least_certainty = color->least_certainty;
     for (int k = 0; k < 2; k++)
         style->ramp_range[k] = color->has_range ? (float)color->range[k] : classes ? 255.0f * (float)k : 0.0f;
     if (color->source == PATINA_COLOR_SCALAR && !color->has_range && !classes)

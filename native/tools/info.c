@@ -28,6 +28,8 @@ static void print_file(const patina_file_info *info)
     }
     printf("normals     %s\n", info->has_normals ? "yes" : "no");
     printf("colours     %s\n", info->color_type ? type_name(info->color_type) : "no");
+    if (info->stations)
+        printf("stations    %u\n", info->stations);
 }
 
 static void print_attributes(const patina_file *file, uint32_t count)

@@ -354,6 +354,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("--headlight is one light from the camera: without --sun, --shadows and --panorama");
     if (options->line_options && !options->has_lines)
         return tool_misuse("--line-... options need --lines");
+    if (options->analysis && (options->color.free_space || options->color.hidden_kinds || options->color.least_certainty > 0))
+        return tool_misuse("--free-space, --hide-kinds and --least-certainty need the analysis");
     if (!options->file_count && !options->mesh_count)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)

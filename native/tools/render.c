@@ -85,9 +85,11 @@ static int load_meshes(struct job *job)
     return TOOL_OK;
 }
 
-static int analyse(struct job *job, patina_cloud *cloud)
+static int analyse(struct job *job, patina_cloud *cloud, const struct tool_stations *stations)
 {
-    const patina_analysis_desc desc = {.struct_size = sizeof desc, .threads = job->options.threads, .keep_normals = 1};
+    patina_analysis_desc desc = {.struct_size = sizeof desc, .threads = job->options.threads, .keep_normals = 1};
+    tool_describe_stations(stations, &desc);
+    desc.free_space = job->options.color.free_space != PATINA_FREE_SPACE_OFF;
     const double start = now_ms();
     const int code = job->options.analysis ? PATINA_OK : patina_cloud_analyse(cloud, &desc, job->progress);
     job->analysis_ms += job->options.analysis ? 0 : now_ms() - start;
@@ -112,9 +114,11 @@ static int load_clouds(struct job *job)
     tool_cancellable(job->progress, NULL);
     for (int i = 0; i < options->file_count; i++) {
         patina_cloud_info info = {.struct_size = sizeof info};
-        code = tool_load_cloud(options->files[i], &options->color, job->progress, &job->clouds[i]);
+        struct tool_stations stations = {0};
+        code = tool_load_cloud(options->files[i], &options->color, job->progress, &job->clouds[i], &stations);
         if (!code)
-            code = analyse(job, job->clouds[i]);
+            code = analyse(job, job->clouds[i], &stations);
+        tool_free_stations(&stations);
         if (!code)
             code = patina_cloud_get_info(job->clouds[i], &info);
         if (code)

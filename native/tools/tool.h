@@ -46,6 +46,8 @@ struct tool_color {
     const char *ramp; // NULL: viridis
     float fixed[3], exposure, contrast;
     uint32_t hidden[8];
+    uint32_t free_space, hidden_kinds; // of patina_cloud_style
+    float least_certainty;
     patina_clip clips[TOOL_CLIPS];
     int clip_count;
     float tint[4]; // and width; 0: none
@@ -93,8 +95,24 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
 
 // ---- clouds --------------------------------------------------------------------------------------------------------
 
+// What a file knows of its scanner; count 0: nothing.
+struct tool_stations {
+    uint32_t count;
+    double *places;
+    uint16_t *station;    // of each point
+    int32_t *row, *column; // NULL: not known
+};
+
+int tool_take_stations(const patina_file *file, struct tool_stations *out); // a patina_error; free in any case
+// Into the description of an analysis, which needs them until it is done.
+void tool_describe_stations(const struct tool_stations *stations, patina_analysis_desc *desc);
+void tool_free_stations(struct tool_stations *stations);
+
+extern const char *const tool_kinds[6]; // patina_kind
+
 // Each returns a patina_error. table: room for the ramp, read until the cloud is added.
-int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out);
+int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out,
+                    struct tool_stations *stations);
 int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, float table[PATINA_MAX_RAMP][3],
                    patina_cloud_style *style);
 int tool_add_clips(const struct tool_color *color, patina_scene *scene);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: which points of divided chunks are drawn: those that clips and hidden classes leave; twin of
+// sift: which points of divided chunks are drawn: those that clips, hidden classes and hidden shapes leave; twin of
 // native/device_cpu/kernels/sift.c
 //
 // A workgroup takes a chunk, an invocation PT_SLOTS_A_WORD of its points at a time.
@@ -14,6 +14,7 @@ layout(std430, binding = 2) readonly buffer positions_block { float positions[];
 layout(std430, binding = 3) readonly buffer classes_block { uint classes[]; }; // four bytes a word
 layout(std430, binding = 4) readonly buffer clips_block { clip_view clips[]; };
 layout(std430, binding = 5) writeonly buffer drawn_block { uint drawn[]; };
+layout(std430, binding = 6) readonly buffer shapes_block { uint shapes[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
@@ -29,10 +30,16 @@ bool inside(uint clip, vec3 p)
            pt_abs(pt_clip_row(clip, 2u, p)) <= 1.0;
 }
 
-bool hidden(uint slot)
+bool hidden_class(uint slot)
 {
     uint class_of = (classes[slot >> 2] >> (8u * (slot & 3u))) & 255u;
     return (args.hidden[class_of >> 5] >> (class_of & 31u) & 1u) != 0u;
+}
+
+bool hidden_shape(uint slot)
+{
+    uint sight = shapes[slot] >> PT_SHAPE_SIGHT_SHIFT & 255u;
+    return (args.hidden_shapes[sight >> 5] >> (sight & 31u) & 1u) != 0u;
 }
 
 void main()
@@ -47,7 +54,8 @@ void main()
         for (uint i = 0u; i < PT_SLOTS_A_WORD; i++) {
             uint slot = PT_SLOTS_A_WORD * w + i, at = 3u * base + slot;
             vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
-            bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden(chunk.first + slot);
+            bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden_class(chunk.first + slot);
+            cut = cut || (args.by_shape != 0u && hidden_shape(chunk.first + slot));
             for (uint k = chunk.clip_first; k < keeps; k++)
                 keep = keep || inside(k, p);
             for (uint k = keeps; k < cuts; k++)

@@ -34,6 +34,7 @@
 #define PT_SHAPE_KIND_SHIFT 22
 #define PT_SHAPE_CERTAINTY_SHIFT 25
 #define PT_SHAPE_SEEN_THROUGH (1u << 29) // a scanner looked through where it lies
+#define PT_SHAPE_SIGHT_SHIFT 22          // kind, certainty and seen through are a byte: what hides points is a set of such
 #define PT_SHAPE_UP -1e-4f // n.z of which s is 1
 #define PT_KIND_UNKNOWN 0u
 #define PT_KIND_SURFACE 1u
@@ -183,11 +184,13 @@ struct clip_view {
     float tint[3], strength, width;
 };
 
-// sift: which points are drawn. A hidden class takes them all; of clips: in one that keeps, if there are any, in none that
-// cuts. Bit-equal everywhere, as scatter is.
+// sift: which points are drawn. A hidden class takes them all, a hidden shape too; of clips: in one that keeps, if there are
+// any, in none that cuts. Bit-equal everywhere, as scatter is.
 struct sift_args {
     uint32_t by_class;  // 1: classes are there, and some are hidden
     uint32_t hidden[8]; // bit c % 32 of word c / 32: class c
+    uint32_t by_shape;  // 1: shapes are there, and some are hidden
+    uint32_t hidden_shapes[8]; // likewise, of the byte from PT_SHAPE_SIGHT_SHIFT on
 };
 
 // scatter: points -> least key a pixel. [D 3.1]; behind a layer only points with z > limit at their pixel count. [D 5]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Clips and hidden classes, as patina.h says: kept is what lies in one of the boxes that keep, if there are any, in no box that
-// cuts, and on the right side of every plane.
+// Clips, hidden classes and hidden shapes, as patina.h says: kept is what lies in one of the boxes that keep, if there are
+// any, in no box that cuts, and on the right side of every plane.
 #include "reference.h"
 #include "tolerances.h"
 
@@ -24,7 +24,7 @@ static enum ref_truth beyond(const struct clip_view *plane, const double p[3])
 }
 
 enum ref_truth ref_sift(const struct sift_args *args, const struct chunk_view *chunk, const float *positions,
-                        const uint8_t *classes, const struct clip_view *clips, uint32_t slot)
+                        const uint8_t *classes, const uint32_t *shapes, const struct clip_view *clips, uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
     const double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]};
@@ -38,6 +38,13 @@ enum ref_truth ref_sift(const struct sift_args *args, const struct chunk_view *c
     if (args->by_class) {
         uint8_t class = classes[chunk->first + slot];
         if (args->hidden[class / 32] >> class % 32 & 1u)
+            return REF_NO;
+    }
+    if (args->by_shape) {
+        const uint32_t shape = shapes[chunk->first + slot];
+        const uint32_t kind = shape >> PT_SHAPE_KIND_SHIFT & 7u, certainty = shape >> PT_SHAPE_CERTAINTY_SHIFT & 15u;
+        const uint32_t sight = kind + 8 * certainty + (shape & PT_SHAPE_SEEN_THROUGH ? 128 : 0);
+        if (args->hidden_shapes[sight / 32] >> sight % 32 & 1u)
             return REF_NO;
     }
     if (kept == REF_NO || cut == REF_YES)

@@ -99,7 +99,8 @@ def test_analyse_writes_columns():
     assert int(counts["surface"]) > 2900, counts
     header, rows = (FOLDER / "known.ply").read_bytes().split(b"end_header\n")
     names = [line.split()[-1].decode() for line in header.splitlines() if line.startswith(b"property")]
-    assert names == ["x", "y", "z", "nx", "ny", "nz", "spacing", "radius", "radius_minor", "sigma", "certainty", "kind"], names
+    assert names == ["x", "y", "z", "nx", "ny", "nz", "spacing", "radius", "radius_minor", "sigma", "certainty", "kind",
+                     "seen_through"], names
     assert b"element vertex 3000" in header and len(rows) % 3000 == 0
     assert "points      3000" in run("info", "known.ply").stdout
     for arguments in (["analyse"], ["analyse", "analyse.ply"], ["analyse", "analyse.ply", "-o", "x.ply", "--neighbours", "99"]):
@@ -110,6 +111,43 @@ def test_analysis_is_timed_and_can_be_left_out():
     ball("timed.ply", 5000)
     on, off = (json.loads(run("render", "timed.ply", *FRONT, "--stats", "json", "--analysis", word).stdout) for word in ("on", "off"))
     assert on["analysis_ms"] > 0 and off["analysis_ms"] == 0
+
+
+def two_stations(path):
+    """A wall seen from two places, and a stray of the first before it. PTX."""
+    lines = []
+    for number, (sx, sy) in enumerate(((-0.8, 0.0), (0.8, 0.0))):
+        columns, rows = 60, 40
+        lines += [columns, rows, f"{sx} {sy} 0", "1 0 0", "0 1 0", "0 0 1", "1 0 0 0", "0 1 0 0", "0 0 1 0", f"{sx} {sy} 0 1"]
+        for column in range(columns):
+            for row in range(rows):
+                a, e = math.radians(60 + column), math.radians(row - 20)
+                x, y, z = 6 / math.tan(a), 6.0, 6 / math.sin(a) * math.tan(e)
+                if number == 0 and column == 30 and row == 20:
+                    x, y, z = 0.0, 4.0, 0.0
+                lines.append(f"{x:.5f} {y:.5f} {z:.5f} 0.5 200 200 200")
+    (FOLDER / path).write_text("\n".join(str(line) for line in lines) + "\n")
+
+
+def test_free_space():
+    two_stations("stations.ptx")
+    counts = dict(line.split() for line in run("analyse", "stations.ptx", "-o", "seen.ply").stdout.splitlines())
+    assert int(counts["seen_through"]) == 1, counts
+
+    def at(*arguments):
+        run("render", "stations.ptx", "-o", "seen.png", "--size", "64x64", "--look", "-0.8,0,0,-0.8,3,0,40", "--fill", "off", "--smooth",
+            "off", "--antialias", "off", *arguments)
+        return [pixel[:3] for row in read_png("seen.png")[3] for pixel in row]
+
+    off, shown, used = (at("--free-space", word) for word in ("off", "show", "use"))
+    assert off != shown != used != off
+    assert sum(pixel[0] > 200 and pixel[1] < 60 for pixel in shown) == 1 and not sum(pixel[1] < 60 < pixel[0] for pixel in used)
+    assert at("--hide-kinds", "surface,border") != off and at("--least-certainty", "1") != off
+    ball("alone.ply", 1000)
+    assert "stations" in run("render", "alone.ply", *FRONT, "-o", "x.png", "--free-space", "use", code=1).stderr
+    for arguments in (["--free-space", "maybe"], ["--hide-kinds", "surface,cheese"], ["--hide-kinds", ""], ["--least-certainty", "2"],
+                      ["--free-space", "use", "--analysis", "off"]):
+        run("render", "alone.ply", *FRONT, "-o", "x.png", *arguments, code=2)
 
 
 # ---- wrong use -----------------------------------------------------------------------------------------------------
@@ -164,6 +202,16 @@ def test_missing_and_broken_files():
             assert name in done.stderr and not done.stdout, done.stderr
     assert "line" in run("info", "broken.ply", code=1).stderr
     assert not (FOLDER / "x.png").exists() and not (FOLDER / "x.ply").exists()
+
+
+def test_formats_of_the_add_on():
+    """Files that only the add-on reads are told as such, not as broken ones."""
+    for name, head, word in (("a.las", b"LASF" + bytes(300), "LAS, LAZ or COPC"), ("a.e57", b"ASTM-E57" + bytes(100), "E57"),
+                             ("a.pcd", b"# .PCD v0.7\nVERSION 0.7\n", "PCD"), ("a.conf", b"camera 0 0 0 0 0 0 1\n", "conf")):
+        (FOLDER / name).write_bytes(head)
+        for arguments in (("info", name), ("render", name, "-o", "x.png"), ("convert", name, "x.ply")):
+            error = run(*arguments, code=1).stderr
+            assert f"{name}: a file of format {word}, which Patina's add-on for Blender reads" in error, error
 
 
 def test_unwritable_output():

@@ -11,98 +11,14 @@
 
 #include <cmocka.h>
 
+#include "files.h"
+
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#define XYZ "property float x\nproperty float y\nproperty float z\n"
-#define ASCII "ply\nformat ascii 1.0\n"
-#define LITTLE "ply\nformat binary_little_endian 1.0\n"
-#define BIG "ply\nformat binary_big_endian 1.0\n"
-
-// ---- helpers -------------------------------------------------------------------------------------------------------
-
-static patina_file *open_bytes(const void *data, size_t size)
-{
-    patina_file *file = NULL;
-    char message[512] = "";
-    if (patina_file_open_memory(data, size, &file) != PATINA_OK) {
-        patina_message(NULL, message, sizeof message);
-        fail_msg("%s", message);
-    }
-    return file;
-}
-
-static patina_file *open_text(const char *text)
-{
-    return open_bytes(text, strlen(text));
-}
-
-static patina_file_info info_of(const patina_file *file)
-{
-    patina_file_info info = { .struct_size = sizeof info };
-    assert_int_equal(patina_file_get_info(file, &info), PATINA_OK);
-    return info;
-}
-
-// The file must be refused with this code and a message that holds these words.
-static void refuse_bytes(const void *data, size_t size, int code, const char *words)
-{
-    patina_file *file = (patina_file *)8;
-    char message[512] = "";
-    int got = patina_file_open_memory(data, size, &file);
-    patina_message(NULL, message, sizeof message);
-    if (got != code || file || !strstr(message, words))
-        fail_msg("wanted %d '%s', got %d '%s'", code, words, got, message);
-}
-
-static void refuse(const char *text, const char *words)
-{
-    refuse_bytes(text, strlen(text), PATINA_ERROR_FORMAT, words);
-}
-
-static void expect_positions(const patina_file *file, const float *wanted, size_t values)
-{
-    float xyz[64];
-    assert_true(values <= 64 && info_of(file).count * 3 == values);
-    assert_int_equal(patina_file_read_positions(file, xyz, values * sizeof *xyz), PATINA_OK);
-    for (size_t i = 0; i < values; i++)
-        if (!(xyz[i] == wanted[i]) && !(isnan(xyz[i]) && isnan(wanted[i])))
-            fail_msg("value %zu is %.9g, wanted %.9g", i, (double)xyz[i], (double)wanted[i]);
-}
-
-static void expect_one(const char *text, float x, float y, float z)
-{
-    patina_file *file = open_text(text);
-    expect_positions(file, (float[]){ x, y, z }, 3);
-    patina_file_destroy(file);
-}
-
-static void expect_bytes(const patina_file *file, const uint8_t *wanted, size_t values)
-{
-    uint8_t rgba[64];
-    assert_int_equal(patina_file_read_colors_u8(file, rgba, sizeof rgba), PATINA_OK);
-    assert_memory_equal(rgba, wanted, values);
-}
-
-// A header and a body that may hold zeros.
-struct blob {
-    uint8_t bytes[1024];
-    size_t size;
-};
-
-static struct blob blob(const char *header, const void *body, size_t size)
-{
-    struct blob b;
-    b.size = strlen(header) + size;
-    assert_true(b.size <= sizeof b.bytes);
-    memcpy(b.bytes, header, strlen(header));
-    memcpy(b.bytes + strlen(header), body, size);
-    return b;
-}
 
 // ---- text ----------------------------------------------------------------------------------------------------------
 

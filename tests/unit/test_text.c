@@ -106,6 +106,56 @@ static void test_ptx(void **state)
     patina_file_destroy(file);
 }
 
+enum { COLUMNS = 60, ROWS = 40 };
+
+// A wall at y = 5 seen from the middle of its scanner, a column of the grid at a time; a board before its middle. The
+// distance errs by up to 4 mm either way. Returns the text's new end.
+static char *put_wall(char *text, double x, double y, uint32_t *random)
+{
+    text += sprintf(text, "%d\n%d\n%g %g 2\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n%g %g 2 1\n", COLUMNS, ROWS, x, y, x, y);
+    for (int column = 0; column < COLUMNS; column++)
+        for (int row = 0; row < ROWS; row++) {
+            double u = (column - COLUMNS / 2) * 0.01, v = (row - ROWS / 2) * 0.01, depth = abs(column - 30) < 10 ? 3 : 5;
+            *random = *random * 1664525u + 1013904223u;
+            depth += 0.008 * ((*random >> 8) / 16777216.0 - 0.5);
+            text += row == 7 && column == 3 ? sprintf(text, "0 0 0 0\n") : sprintf(text, "%.5f %.5f %.5f 0.5\n", u * depth, depth, v * depth);
+        }
+    return text;
+}
+
+// Row, column, scan and station of each point; normals out of the grid face the scanner, at the board's edges too.
+static void test_ptx_grid(void **state)
+{
+    (void)state;
+    enum { POINTS = COLUMNS * ROWS - 1 };
+    char *text = malloc(2 * COLUMNS * ROWS * 40u);
+    uint32_t random = 7;
+    assert_non_null(text);
+    put_wall(put_wall(text, 500000, 20, &random), 500003, -1, &random);
+    patina_file *file = read(text);
+    patina_file_info info = info_of(file);
+    double stations[6];
+    static float n[2 * POINTS * 3], scan[2 * POINTS], column[2 * POINTS], row[2 * POINTS];
+    assert_true(info.count == 2 * POINTS && info.has_normals && info.stations == 2);
+    assert_int_equal(patina_file_read_stations(file, stations, sizeof stations - 1), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_file_read_stations(file, stations, sizeof stations), PATINA_OK);
+    assert_true(stations[0] == 500000 && stations[1] == 20 && stations[2] == 2 && stations[3] == 500003 && stations[4] == -1);
+    assert_int_equal(patina_file_read_attribute(file, 1, scan, sizeof scan), PATINA_OK);
+    assert_int_equal(patina_file_read_attribute(file, 2, column, sizeof column), PATINA_OK);
+    assert_int_equal(patina_file_read_attribute(file, 3, row, sizeof row), PATINA_OK);
+    assert_int_equal(patina_file_read_normals(file, n, sizeof n), PATINA_OK);
+    int far = 0;
+    for (int i = 0; i < 2 * POINTS; i++) {
+        int cell = i % POINTS + (i % POINTS >= 3 * ROWS + 7);
+        assert_true(scan[i] == (float)(i / POINTS) && column[i] == (float)(cell / ROWS) && row[i] == (float)(cell % ROWS));
+        assert_true(n[3 * i + 1] < -0.9f); // towards the scanner, within 26 degrees
+        far += n[3 * i + 1] > -0.995f;     // beyond 6 degrees
+    }
+    assert_true(far < POINTS / 50);
+    patina_file_destroy(file);
+    free(text);
+}
+
 static void refuse(const char *text, const char *part)
 {
     patina_file *file = NULL;
@@ -132,6 +182,7 @@ int main(void)
         cmocka_unit_test(test_columns),
         cmocka_unit_test(test_values),
         cmocka_unit_test(test_ptx),
+        cmocka_unit_test(test_ptx_grid),
         cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: which points of divided chunks are drawn: those that clips and hidden classes leave; twin of
+// sift: which points of divided chunks are drawn: those that clips, hidden classes and hidden shapes leave; twin of
 // shaders/kernels/sift.comp
 //
 // Distances to a clip are sums of products in one written order, as scatter's: what is cut is cut on every device.
@@ -8,7 +8,7 @@
 
 struct sift {
     const struct pt_cpu_call *call;
-    uint32_t hides[256]; // by class
+    uint32_t hides[256], hides_shape[256]; // by class, by the shape's byte
 };
 
 // Of a plane: cut.
@@ -27,18 +27,25 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
 {
     const struct sift_args *args = sift->call->arguments;
     const struct clip_view *clips = (const struct clip_view *)pt_cpu_data(sift->call, 3) + chunk->clip_first;
-    const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                      vf_load(positions + 2 * (size_t)chunk->padded + i) };
     vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
-    for (uint32_t k = 0; k < chunk->clip_keeps; k++)
-        keep = vm_or(keep, inside(&clips[k], p));
-    for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
-        cut = vm_or(cut, inside(&clips[k], p));
+    if (chunk->clip_count) { // else positions need not come from memory
+        const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                          vf_load(positions + 2 * (size_t)chunk->padded + i) };
+        for (uint32_t k = 0; k < chunk->clip_keeps; k++)
+            keep = vm_or(keep, inside(&clips[k], p));
+        for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
+            cut = vm_or(cut, inside(&clips[k], p));
+    }
     if (args->by_class) {
         const vm all = vm_first(PT_LANES);
         vi slot = vi_add(vi_set(chunk->first + i), vi_lanes());
         vi class = vi_and(vi_gather_bytes(pt_cpu_data(sift->call, 2), slot, all), vi_set(255));
         cut = vm_or(cut, vi_lt_unsigned(vi_set(0), vi_gather(sift->hides, class, all)));
+    }
+    if (args->by_shape) {
+        const uint32_t *shapes = (const uint32_t *)pt_cpu_data(sift->call, 5) + chunk->first + i;
+        vi sight = vi_and(vi_shr(vi_load(shapes), PT_SHAPE_SIGHT_SHIFT), vi_set(255));
+        cut = vm_or(cut, vi_lt_unsigned(vi_set(0), vi_gather(sift->hides_shape, sight, vm_first(PT_LANES))));
     }
     return vm_bits(vm_and(keep, vm_not(cut))) & PT_ALL;
 }
@@ -65,8 +72,10 @@ int PT_KERNEL_ENTRY(sift)(const struct pt_cpu_call *call)
 {
     const struct sift_args *args = call->arguments;
     struct sift sift = { .call = call };
-    for (uint32_t class = 0; class < 256; class++)
-        sift.hides[class] = args->hidden[class / 32] >> class % 32 & 1u;
+    for (uint32_t i = 0; i < 256; i++) {
+        sift.hides[i] = args->hidden[i / 32] >> i % 32 & 1u;
+        sift.hides_shape[i] = args->hidden_shapes[i / 32] >> i % 32 & 1u;
+    }
     pt_parallel(call->pool, (uint32_t)(call->buffers[0]->size / sizeof(struct chunk_view)), 4, sift_chunks, &sift);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

@@ -188,6 +188,7 @@ typedef struct patina_cloud_info {
     uint32_t normals_oriented; // 1: every normal knows its side, as given or by a station; PATINA_SIDES_VOTED: some by votes
     uint64_t estimated_normals; // of points whose normal the analysis found
     uint64_t kinds[6];       // drawn points of each patina_kind
+    uint64_t seen_through;   // drawn points that some station saw through: patina_analysis_desc.free_space
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -228,6 +229,11 @@ typedef struct patina_analysis_desc {
     uint32_t station_count;  // places of the scanner, in object units: estimated normals face the one that ...
     const double *stations;  // 3 each
     patina_array station;    // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
+    uint32_t free_space;     // 1 = points that a station, not their own, saw through are marked: its samples around the
+                             // direction to the point lie farther. Needs stations and station. 4 bytes meanwhile for each of
+                             // a station's directions, 128 MiB at most
+    patina_array row, column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell free space how
+                             // far apart the directions are. Optional: else found from how dense they are
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -247,6 +253,7 @@ typedef struct patina_neighbourhoods {
     float *sigma;       // thickness: noise, and disagreement of scans; 0 = unknown
     uint8_t *kind;      // patina_kind
     float *certainty;   // 0..1: how well that explains the neighbours
+    uint8_t *seen_through; // 1: by some station, see patina_analysis_desc.free_space
     // From the `neighbours` nearest, walked anew for any cloud.
     uint32_t neighbours; // 1..64
     uint32_t threads;    // 0 = one per core
@@ -305,6 +312,7 @@ typedef struct patina_file_info {
     double origin[3];       // float64 origin that positions are relative to; 0 unless float32 would lose detail
     double box_min[3], box_max[3]; // of all finite positions, origin included
     uint64_t invalid_positions;
+    uint32_t stations;      // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
 } patina_file_info;
 
 typedef struct patina_file_attribute {
@@ -314,7 +322,8 @@ typedef struct patina_file_attribute {
 } patina_file_attribute;
 
 // Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS or PTX file whole; formats are told apart by content. Errors name
-// the byte offset (binary) or line (text).
+// the byte offset (binary) or line (text). Points of a scanner's grid (PTX, range_grid of a PLY) have the attributes "row" and
+// "column", those of a PTX "scan" too. A PLY's faces, and a scanner's grid, give normals where there are no others.
 PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
 PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
 PATINA_API void patina_file_destroy(patina_file *file);
@@ -325,6 +334,7 @@ PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, s
 PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);
 PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size);   // sRGB
 PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
+PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz, size_t size); // file coordinates: origin included
 PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
 // Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
 // gives it classes.
@@ -353,6 +363,9 @@ enum patina_color_source {
 #define PATINA_MAX_RAMP 256
 // A ramp by name: grey, viridis, heat, spectrum, relief, diverging; classes: of LAS classes, for a range of 0 to 255.
 PATINA_API int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3]);
+
+// SHOW: magenta in place of their own colour (with color_source OWN). USE: they are not drawn and cast no shadow.
+enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, PATINA_FREE_SPACE_USE = 2 };
 
 // What a cloud leaves out of shadows [D 6].
 enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2, PATINA_SHADOW_NO_SELF = 4 };
@@ -384,6 +397,10 @@ typedef struct patina_cloud_style {
     float contrast;               // 0..16: slope in stops around mid grey (0.18), after exposure; 0 = 1
     uint32_t hidden_classes[8];   // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
     uint32_t clip_off;            // 1 = clips leave this cloud whole
+    // Of clouds that were analysed; nothing for others:
+    uint32_t free_space;          // patina_free_space: what becomes of points that a station saw through
+    uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
+    float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
 } patina_cloud_style;
 
 typedef struct patina_mesh_style {

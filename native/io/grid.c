@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Normals of scans from their grids. A scanner's error lies along its rays, while the rays themselves are known well: so
+// positions are fitted as a linear function of column and row (least squares over a window), and the normal is the cross
+// product of the two slopes. Neighbours in space would mix both errors, and take in what lies behind an edge.
+//
+// A cell belongs to a window when a chain of cells leads to it from the middle without a step in depth: a step is more than
+// STEEP times the way across the rays and NOISE sigma. Sigma comes from the second differences along the columns. The window
+// grows where sigma is large beside the way from cell to cell, until the slope is known to LOOSE.
+#include "file.h"
+
+#include "../progress.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { WIDEST = 5, SIDE = 2 * WIDEST + 1, MOST_SAMPLES = 65536, POLL_POINTS = 65536 };
+
+static const double steep = 4;    // 76 degrees from the ray's own plane
+static const double noise = 4;    // sigmas that are no step
+static const double loose = 0.05; // of a slope: 3 degrees
+
+struct grid {
+    const struct pt_scan *scan;
+    const float *position; // of the file
+    double station[3];     // relative to the file's origin
+    uint32_t *points;      // of each cell, column by column; NONE
+    double sigma;          // of a depth
+};
+
+enum { NONE = UINT32_MAX };
+
+static uint32_t point_at(const struct grid *g, int64_t column, int64_t row)
+{
+    if (column < 0 || row < 0 || column >= g->scan->columns || row >= g->scan->rows)
+        return NONE;
+    return g->points[(uint64_t)column * g->scan->rows + (uint64_t)row];
+}
+
+static void place_of(const struct grid *g, uint32_t point, double p[3])
+{
+    for (int k = 0; k < 3; k++)
+        p[k] = (double)g->position[3 * (size_t)point + (size_t)k];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// From p towards the scanner, of length 1.
+static void towards(const struct grid *g, const double p[3], double d[3])
+{
+    for (int k = 0; k < 3; k++)
+        d[k] = g->station[k] - (g->scan->parallel ? 0 : p[k]);
+    double length = sqrt(dot(d, d));
+    for (int k = 0; k < 3; k++)
+        d[k] /= length;
+}
+
+// Along the direction d, and across it.
+static double depth_and_way(const double a[3], const double b[3], const double d[3], double *way)
+{
+    const double v[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
+    double depth = dot(v, d);
+    *way = sqrt(fmax(dot(v, v) - depth * depth, 0));
+    return fabs(depth);
+}
+
+// ---- the noise of a scan -------------------------------------------------------------------------------------------
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double depth_of(const struct grid *g, uint32_t point)
+{
+    double p[3], d[3];
+    place_of(g, point, p);
+    if (g->scan->parallel)
+        return dot(p, g->station);
+    for (int k = 0; k < 3; k++)
+        d[k] = p[k] - g->station[k];
+    return sqrt(dot(d, d));
+}
+
+static int measure_noise(struct grid *g)
+{
+    uint64_t cells = (uint64_t)g->scan->columns * g->scan->rows, step = cells / MOST_SAMPLES + 1;
+    double *samples = malloc(MOST_SAMPLES * sizeof *samples);
+    size_t count = 0;
+    if (!samples)
+        return PATINA_ERROR_MEMORY;
+    for (uint64_t i = 1; i + 1 < cells; i += step) {
+        if (i % g->scan->rows == 0 || (i + 1) % g->scan->rows == 0 || g->points[i - 1] == NONE || g->points[i] == NONE ||
+            g->points[i + 1] == NONE)
+            continue;
+        double bend = depth_of(g, g->points[i - 1]) - 2 * depth_of(g, g->points[i]) + depth_of(g, g->points[i + 1]);
+        if (isfinite(bend))
+            samples[count++] = fabs(bend);
+    }
+    qsort(samples, count, sizeof *samples, compare);
+    g->sigma = count ? samples[count / 2] / (0.6745 * sqrt(6)) : 0;
+    free(samples);
+    return PATINA_OK;
+}
+
+// ---- the fit of one point ------------------------------------------------------------------------------------------
+
+struct window {
+    double at[SIDE][SIDE][3]; // positions, [column][row]
+    bool in[SIDE][SIDE];
+};
+
+// How many cells the window must reach so that the slope is known well: its error is sigma / (way sqrt(sum of squares)).
+static int reach_of(const struct grid *g, double way)
+{
+    for (int r = 1; r < WIDEST; r++) {
+        double squares = (2 * r + 1) * (2 * r + 1) * r * (r + 1) / 3.0;
+        if (g->sigma <= loose * way * sqrt(squares))
+            return r;
+    }
+    return WIDEST;
+}
+
+static int sign(int v)
+{
+    return (v > 0) - (v < 0);
+}
+
+// Takes in the cells of ring r that a cell of the ring within leads to; returns the mean way to those of them beside it.
+static double take_ring(const struct grid *g, struct window *w, int64_t column, int64_t row, int r, const double d[3])
+{
+    double sum = 0;
+    int found = 0;
+    for (int u = -r; u <= r; u++)
+        for (int v = -r; v <= r; v += abs(u) == r ? 1 : 2 * r) {
+            int a = u - sign(u) * (abs(u) == r), b = v - sign(v) * (abs(v) == r);
+            uint32_t point = point_at(g, column + u, row + v);
+            double *q = w->at[WIDEST + u][WIDEST + v], way;
+            w->in[WIDEST + u][WIDEST + v] = false;
+            if (point == NONE || !w->in[WIDEST + a][WIDEST + b])
+                continue;
+            place_of(g, point, q);
+            double depth = depth_and_way(w->at[WIDEST + a][WIDEST + b], q, d, &way);
+            if (!(depth <= steep * way + noise * g->sigma)) // not for NaN either
+                continue;
+            w->in[WIDEST + u][WIDEST + v] = true;
+            if (u == 0 || v == 0) {
+                sum += way;
+                found++;
+            }
+        }
+    return found ? sum / found : 0;
+}
+
+// Slopes of position over column and row, by least squares over the window; false where its cells do not span a plane.
+static bool fit(const struct window *w, int r, double by_column[3], double by_row[3])
+{
+    double n = 0, su = 0, sv = 0, suu = 0, suv = 0, svv = 0, sp[3] = { 0 }, sup[3] = { 0 }, svp[3] = { 0 };
+    for (int u = -r; u <= r; u++)
+        for (int v = -r; v <= r; v++) {
+            if (!w->in[WIDEST + u][WIDEST + v])
+                continue;
+            n++, su += u, sv += v, suu += u * u, suv += u * v, svv += v * v;
+            for (int k = 0; k < 3; k++) {
+                double p = w->at[WIDEST + u][WIDEST + v][k] - w->at[WIDEST][WIDEST][k];
+                sp[k] += p, sup[k] += u * p, svp[k] += v * p;
+            }
+        }
+    suu -= su * su / n, suv -= su * sv / n, svv -= sv * sv / n; // about the mean
+    double determinant = suu * svv - suv * suv;
+    if (n < 3 || determinant < 0.1) // three cells in a corner: 1/3; on a line: 0
+        return false;
+    for (int k = 0; k < 3; k++) {
+        double up = sup[k] - su * sp[k] / n, vp = svp[k] - sv * sp[k] / n;
+        by_column[k] = (svv * up - suv * vp) / determinant;
+        by_row[k] = (suu * vp - suv * up) / determinant;
+    }
+    return true;
+}
+
+static void find_normal(const struct grid *g, int64_t column, int64_t row, float normal[3])
+{
+    struct window w;
+    double d[3], a[3], b[3], *p = w.at[WIDEST][WIDEST];
+    place_of(g, point_at(g, column, row), p);
+    towards(g, p, d);
+    w.in[WIDEST][WIDEST] = true;
+    int reach = reach_of(g, take_ring(g, &w, column, row, 1, d));
+    for (int r = 2; r <= reach; r++)
+        take_ring(g, &w, column, row, r, d);
+    if (!fit(&w, reach, a, b))
+        return;
+    double n[3] = { a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0] };
+    double length = sqrt(dot(n, n)) * (dot(n, d) < 0 ? -1 : 1);
+    for (int k = 0; k < 3; k++)
+        normal[k] = length != 0 && isfinite(length) ? (float)(n[k] / length) : 0;
+}
+
+// ---- scans ---------------------------------------------------------------------------------------------------------
+
+static uint64_t value_at(const struct pt_column *column, uint64_t i)
+{
+    return column->type == PATINA_UINT16 ? ((const uint16_t *)column->data)[i] : ((const uint32_t *)column->data)[i];
+}
+
+static int scan_normals(struct patina_file *file, const struct pt_input *input, const struct pt_scan *scan,
+                        const struct pt_column *columns, const struct pt_column *rows)
+{
+    uint64_t cells = (uint64_t)scan->columns * scan->rows;
+    struct grid g = { .scan = scan, .position = file->position };
+    if (!cells)
+        return PATINA_OK;
+    g.points = malloc(cells * sizeof *g.points); // the file has a line or a row for each
+    if (!g.points)
+        return PATINA_ERROR_MEMORY;
+    memset(g.points, 0xFF, cells * sizeof *g.points);
+    for (int k = 0; k < 3; k++)
+        g.station[k] = scan->station[k] - (scan->parallel ? 0 : file->origin[k]);
+    for (uint64_t i = scan->first; i < scan->first + scan->count; i++)
+        if (value_at(columns, i) < scan->columns && value_at(rows, i) < scan->rows)
+            g.points[value_at(columns, i) * scan->rows + value_at(rows, i)] = (uint32_t)i;
+    int code = measure_noise(&g);
+    for (uint64_t i = scan->first; i < scan->first + scan->count && !code; i++) {
+        if (i % POLL_POINTS == 0 && pt_progress_cancelled(input->progress))
+            code = pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: reading was cancelled", input->name);
+        if (value_at(columns, i) < scan->columns && value_at(rows, i) < scan->rows)
+            find_normal(&g, (int64_t)value_at(columns, i), (int64_t)value_at(rows, i), file->normal + 3 * i);
+    }
+    free(g.points);
+    return code;
+}
+
+int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input)
+{
+    const struct pt_column *columns = pt_file_find_attribute(file, "column"), *rows = pt_file_find_attribute(file, "row");
+    bool any = false;
+    for (uint32_t s = 0; s < file->scan_count; s++)
+        any |= file->scans[s].columns > 1 && file->scans[s].rows > 1;
+    if (file->normal || !any || !columns || !rows)
+        return PATINA_OK;
+    file->normal = calloc(file->count + 1, 3 * sizeof *file->normal);
+    int code = file->normal ? PATINA_OK : PATINA_ERROR_MEMORY;
+    for (uint32_t s = 0; s < file->scan_count && !code; s++)
+        code = scan_normals(file, input, &file->scans[s], columns, rows);
+    if (code == PATINA_ERROR_MEMORY)
+        pt_fail(NULL, code, "%s: no memory for the normals of %llu points", input->name, (unsigned long long)file->count);
+    return code;
+}

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a file knows of its scanner, for an analysis: stations, and of each point its scan, row and column.
+#include "tool.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// The attribute by this name as numbers; *out stays NULL where there is none.
+static int read_numbers(const patina_file *file, const char *name, int32_t **out)
+{
+    patina_file_info info = {.struct_size = sizeof info};
+    patina_file_attribute attribute = {.struct_size = sizeof attribute};
+    int code = patina_file_get_info(file, &info);
+    uint32_t index = 0;
+    for (; index < info.attributes && !code; index++) {
+        code = patina_file_get_attribute(file, index, &attribute);
+        if (!code && !strcmp(attribute.name, name))
+            break;
+    }
+    if (code || index == info.attributes)
+        return code;
+    float *values = malloc(info.count * sizeof *values + 1); // exact: whole numbers below 2^24
+    *out = malloc(info.count * sizeof **out + 1);
+    code = values && *out ? patina_file_read_attribute(file, index, values, info.count * sizeof *values) : PATINA_ERROR_MEMORY;
+    for (uint64_t i = 0; i < info.count && !code; i++)
+        (*out)[i] = values[i] >= 0 && values[i] < 0x1p24f ? (int32_t)values[i] : -1;
+    free(values);
+    return code;
+}
+
+int tool_take_stations(const patina_file *file, struct tool_stations *out)
+{
+    patina_file_info info = {.struct_size = sizeof info};
+    int32_t *scan = NULL;
+    *out = (struct tool_stations){0};
+    int code = patina_file_get_info(file, &info);
+    if (code || !info.stations || info.stations > UINT16_MAX)
+        return code;
+    code = read_numbers(file, "scan", &scan);
+    if (!code && !scan && info.stations > 1)
+        return PATINA_OK; // whose points are whose is not known
+    out->count = info.stations;
+    out->places = malloc(3 * sizeof(double) * info.stations);
+    out->station = calloc(info.count + 1, sizeof *out->station);
+    if (!code)
+        code = out->places && out->station ? patina_file_read_stations(file, out->places, 3 * sizeof(double) * info.stations)
+                                           : PATINA_ERROR_MEMORY;
+    for (uint64_t i = 0; i < info.count && scan && !code; i++)
+        out->station[i] = scan[i] >= 0 && scan[i] < UINT16_MAX ? (uint16_t)scan[i] : UINT16_MAX;
+    free(scan);
+    if (!code)
+        code = read_numbers(file, "row", &out->row);
+    return code ? code : read_numbers(file, "column", &out->column);
+}
+
+void tool_describe_stations(const struct tool_stations *stations, patina_analysis_desc *desc)
+{
+    if (!stations->count)
+        return;
+    desc->station_count = stations->count;
+    desc->stations = stations->places;
+    desc->station = (patina_array){.data = stations->station, .type = PATINA_UINT16, .components = 1};
+    desc->row = (patina_array){.data = stations->row, .type = PATINA_INT32, .components = 1};
+    desc->column = (patina_array){.data = stations->column, .type = PATINA_INT32, .components = 1};
+}
+
+void tool_free_stations(struct tool_stations *stations)
+{
+    free(stations->places);
+    free(stations->station);
+    free(stations->row);
+    free(stations->column);
+    *stations = (struct tool_stations){0};
+}
