@@ -141,7 +141,7 @@ class _CloudStyle(_Descriptor):
                 ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p), ("ramp_count", c_uint32),
                 ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
                 ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
-                ("hidden_kinds", c_uint32), ("least_certainty", c_float)]
+                ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float)]
 
 
 class _Clip(_Descriptor):

@@ -14,7 +14,7 @@ from .. import native, styles
 from . import attributes, sequence
 
 SCANNERS = "patina_scanners"  # of the data: x, y, z of each, as the points' own coordinates
-SCAN = "scan"  # point attribute: by which of them
+SCAN, ROW, COLUMN = "scan", "row", "column"  # point attributes: by which of them, and where in its grid
 
 # Modifiers whose points move without a curve of their own.
 _MOVING = {'ARMATURE', 'BUILD', 'CLOTH', 'DYNAMIC_PAINT', 'EXPLODE', 'FLUID', 'HOOK', 'MESH_SEQUENCE_CACHE', 'OCEAN',
@@ -26,6 +26,11 @@ _MOVING_NODES = {'GeometryNodeInputSceneTime', 'GeometryNodeSimulationInput'}
 class Stations:
     places: np.ndarray  # (n, 3) float64
     of_points: np.ndarray | None  # (count, 1) uint16: which of them saw each point; None: the nearest
+    grid: tuple[np.ndarray, np.ndarray] | None = None  # (count, 1) uint32: row and column of each
+
+    @property
+    def tells_free_space(self) -> bool:
+        return self.of_points is not None and len(self.places) > 1
 
 
 def label(cloud: native.Cloud) -> str:
@@ -39,17 +44,26 @@ def wanted(obj: bpy.types.Object) -> bool:
 
 def stations(obj: bpy.types.Object, count: int) -> Stations | None:
     known = obj.original.data.get(SCANNERS)
-    return of_columns(known, attributes.scalars(obj.data, count, SCAN)) if known else None
+    return of_columns(known, *(attributes.scalars(obj.data, count, name) for name in (SCAN, ROW, COLUMN))) if known else None
 
 
-def of_columns(places: Iterable[float], scan: np.ndarray | None) -> Stations | None:
-    """places: x, y, z of each. scan: numbers of all points, or None."""
+def of_columns(places: Iterable[float], scan: np.ndarray | None = None, row: np.ndarray | None = None,
+               column: np.ndarray | None = None) -> Stations | None:
+    """places: x, y, z of each, NaN where that is not known. The others: numbers of all points, or None."""
     found = np.array(places, np.float64).reshape(-1, 3)
-    if not len(found):
+    somewhere = np.isfinite(found).all(axis=1)
+    if not somewhere.any():
         return None
-    # a file may know the places of some scans only
-    known = scan is not None and len(scan) and scan.min() >= 0 and scan.max() < len(found)
-    return Stations(found, np.ascontiguousarray(scan, np.uint16).reshape(-1, 1) if known else None)
+    scan = _whole(scan, len(found), np.uint16) if somewhere.all() else None
+    grid = (_whole(row, 1 << 24, np.uint32), _whole(column, 1 << 24, np.uint32))
+    return Stations(found[somewhere], scan, None if scan is None or grid[0] is None or grid[1] is None else grid)
+
+
+def _whole(values: np.ndarray | None, end: int, kind: type) -> np.ndarray | None:
+    """(count, 1); None where not all of them are numbers from 0 on below the end."""
+    if values is None or not len(values) or not (values.min() >= 0 and values.max() < end):
+        return None
+    return np.ascontiguousarray(values, kind).reshape(-1, 1)
 
 
 def _moves(obj: bpy.types.Object) -> bool:

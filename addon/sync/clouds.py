@@ -73,6 +73,10 @@ class CloudStyle:
     hidden_classes: tuple[int, ...] = (0,) * 8
     clip_off: int = 0
     radius: float = 0.0
+    largest_gap: float = 0.0
+    free_space: int = 0
+    hidden_kinds: int = 0
+    least_certainty: float = 0.0
 
 
 class Pending:
@@ -372,9 +376,9 @@ def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:
     return (*base, number)
 
 
-def _attribute_names(obj: bpy.types.Object) -> tuple[str, ...]:
+def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
     return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute, colors.scalar_name(obj),
-            obj.patina.colors.class_attribute, obj.patina.radius_attribute)
+            obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored)
 
 
 def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
@@ -409,6 +413,8 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
                               ("scalar", scalar, scalars), ("class", class_name, classes)):
         if name and found is None:
             notices.append(f"'{obj.name}' has no point attribute '{name}' to take as {kind}")
+    if obj.patina.hide_uncolored:
+        opacities = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
     stations = analysis.stations(obj, count) if analyzed else None
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations)
@@ -430,6 +436,10 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         transparency=1.0 - patina.opacity,
         shadow_off=_shadow_off(obj),
         radius=patina.radius,
+        largest_gap=patina.largest_gap,
+        free_space=enum_number(patina, "free_space"),
+        hidden_kinds=int(patina.hide_stray) << native.KINDS.index("STRAY"),
+        least_certainty=patina.least_certainty,
         **colors.style_fields(obj))
 
 

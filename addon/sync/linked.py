@@ -34,6 +34,7 @@ class Source:
     origin: Corner | None = None  # float64, that the cloud shall be relative to; None: the file's own
     scalar: str = ""  # that a ramp is laid over
     analyzed: bool = True
+    hide_uncolored: bool = False
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.kept.name)
@@ -60,22 +61,23 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    found = source(path, origin, scalar_name(obj), analysis.wanted(obj))
+    found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
     if found is None:
         notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
     return found
 
 
-def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed: bool = True) -> Source | None:
+def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed: bool = True,
+           hide_uncolored: bool = False) -> Source | None:
     try:
         status = path.stat()
     except OSError:
         return None
     name = f"{path.resolve()}{origin or ''}"
     place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
-    state = hashlib.blake2b(f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed}".encode(), digest_size=6).hexdigest()
+    state = hashlib.blake2b(f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}".encode(), digest_size=6).hexdigest()
     folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed)
+    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
@@ -95,14 +97,15 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         pass  # not there yet, of another version, or damaged: it is made anew
     parts = 3 if source.analyzed else 2
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
-    scan = points.scalars.get(analysis.SCAN) if source.analyzed else None
+    seen_by = [points.scalars.get(name) for name in (analysis.SCAN, analysis.ROW, analysis.COLUMN)]
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
+    shown = attributes.without_uncolored(None, points.colors) if source.hide_uncolored else None
     with progress.part(1, parts).inner() as inner:
-        task = native.Cloud.start(points.positions, points.normals, points.colors, None, inner, origin=offset,
+        task = native.Cloud.start(points.positions, points.normals, points.colors, shown, inner, origin=offset,
                                   scalars=_column(points, source.scalar), classes=_classes(points))
     yield task
     cloud = task.result()
@@ -110,7 +113,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         part = progress.part(2, parts)
         part.doing = analysis.label(cloud)
         with part.inner() as inner:
-            task = analyzing.start(cloud, analysis.of_columns(scanners, scan), inner)
+            task = analyzing.start(cloud, analysis.of_columns(scanners, *seen_by), inner)
         yield task
         task.result()
     try:

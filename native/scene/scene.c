@@ -152,6 +152,8 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: transparency must be between 0 and 1");
     if (!(style->radius >= 0.0f) || !isfinite(style->radius))
         return fail(scene, "cloud style: radius must be 0 or more");
+    if (!(style->largest_gap >= 0.0f) || !isfinite(style->largest_gap))
+        return fail(scene, "cloud style: largest_gap must be 0 or more");
     if (style->shadow_off > 7)
         return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;

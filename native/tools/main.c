@@ -28,6 +28,7 @@ static const char usage[] =
     "  --surface auto|splats|fill         discs where points lie wide and filling elsewhere, all discs, all filled\n"
     "  --analysis on|off                  points' own spacings and footprints, and normals where a file has none (on)\n"
     "  --radius R                         of the discs, world units (default: the points' own, else 1.75 spacings)\n"
+    "  --largest-gap W                    no disc is wider, world units: wider gaps stay open\n"
     "  --smooth alleviated|gaussian|box|off\n"
     "  --antialias layers|background|off\n"
     "  --lit, --unlit                     default: clouds with colours are shown unlit\n"

@@ -267,6 +267,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_word(value, "on|off", &o->analysis);
     else if (!strcmp(name, "--radius"))
         bad = parse_width(value, &o->radius);
+    else if (!strcmp(name, "--largest-gap"))
+        bad = parse_width(value, &o->largest_gap);
     else if (!strcmp(name, "--iterations"))
         bad = parse_count(value, 0, 1000, &s->fill_iterations);
     else if (!strcmp(name, "--smooth"))

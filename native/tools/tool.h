@@ -67,6 +67,7 @@ struct tool_options {
     uint32_t lighting;              // patina_lighting
     double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
     double radius;                  // of discs, world units; 0: automatic
+    double largest_gap;             // that they close, world units; 0: automatic
     int opacity_count;              // 0: all opaque
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;

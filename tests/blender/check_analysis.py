@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from check_import import import_ply
 from check_linked import dense
-from harness import SCRATCH, add_light, add_points, check, check_close, engine, new_scene, patina, render, reports, sphere, stats
+from harness import SCRATCH, add_light, add_points, check, check_close, engine, linear, new_scene, patina, render, reports, sphere, stats
 
 from patina import native
 from patina.sync import analysis, analyzing, clouds, linked
@@ -270,3 +270,85 @@ def test_frame_points():
         check(np.ptp(rows) > 0.7 * 120 and picture.any(), f"{np.ptp(rows)} of 120 rows")
         bpy.data.objects.remove(obj)
     clouds.CACHE.clear()
+
+
+def test_hidden_points():
+    """Stray, doubtful, uncolored and unclassified points are left out, each by its own switch, without another analysis."""
+    scene = fresh_scene(160, 120)
+    ball = sphere(4000)[0]
+    stray = np.array([[-1.4, 0.9, -4], [1.4, 0.9, -4], [-1.4, -0.9, -4]])
+    points = np.concatenate([ball, stray])
+    rgb = np.full((len(points), 4), 255, np.uint8)
+    black = ball[:, 0] < -0.5
+    rgb[:len(ball)][black, :3] = 0
+    obj = add_points(points, rgb)
+    classes = np.where(points[:, 0] > 0.5, 1, 2).astype(np.float32)
+    obj.data.attributes.new("classification", 'FLOAT', 'POINT').data.foreach_set("value", classes)
+    places = {(round(60 + y / -z * scale), round(80 + x / -z * scale)) for scale in (160 * 50 / 36,) for x, y, z in stray}
+
+    def shown():
+        alpha = render()["Combined"][..., 3] > 0
+        return sum(alpha[row - 2:row + 3, column - 2:column + 3].any() for row, column in places), alpha
+
+    count, everything = shown()
+    check(count == 3 and only_cloud().kinds[5] >= 3, f"{count} of 3 strays, kinds {only_cloud().kinds}")
+    obj.patina.hide_stray = True
+    count, alpha = shown()
+    check(count == 0 and alpha.sum() > 0.9 * everything.sum() and not said("Analyzing"), f"{count} strays, {alpha.sum()} pixels")
+    obj.patina.hide_stray = False
+    obj.patina.least_certainty = 1.0
+    check(shown()[1].sum() < 0.7 * everything.sum() and not said("Analyzing"), "doubtful ones")
+    obj.patina.least_certainty = 0.0
+    obj.patina.hide_unclassified = True
+    count, alpha = shown()
+    check(count == 2 and not alpha[50:70, 80 + 40:80 + 50].any() and alpha[:, 30:80].any(), "unclassified")
+    obj.patina.hide_unclassified = False
+    obj.patina.hide_uncolored = True
+    count, alpha = shown()
+    check(count == 3 and not alpha[55:65, 80 - 50:80 - 40].any() and alpha[:, 100:].any(), "uncolored")
+    obj.patina.hide_uncolored = False
+    check((shown()[1] == everything).all(), "all again")
+
+
+def test_uncolored_of_a_link():
+    fresh_scene(160, 120)
+    obj, = import_ply(dense("uncolored.ply"), link=True)
+    before = render()["Combined"][..., 3] > 0
+    obj.patina.hide_uncolored = True
+    check(((render()["Combined"][..., 3] > 0) == before).all(), "all have a color")
+
+
+def test_free_space():
+    """What the other scan saw through is shown or left out."""
+    scene = fresh_scene(160, 120)
+    def wall(eye, count, half, y):
+        """Of a grid of directions around the north, the points that a scanner sees on a wall."""
+        x, z = np.meshgrid(np.linspace(-half, half, count), np.linspace(-half, half, count))
+        return np.stack([eye[0] + x.ravel() * y, np.full(x.size, y), eye[2] + z.ravel() * y], 1)
+
+    eyes = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    passer = wall(eyes[0], 18, 0.04, 2)  # stands before the first scanner alone
+    points = np.concatenate([wall(eyes[0], 150, 0.4, 4), passer, wall(eyes[1], 150, 0.4, 4)])
+    scan = np.concatenate([np.zeros(150 * 150 + 324), np.ones(150 * 150)]).astype(np.float32)
+    rgb = np.full((len(points), 4), (0, 200, 0, 255), np.uint8)
+    rgb[150 * 150:150 * 150 + 324, 1] = 100
+    obj = add_points(points, rgb)
+    obj.data[analysis.SCANNERS] = eyes.ravel().tolist()
+    obj.data.attributes.new("scan", 'FLOAT', 'POINT').data.foreach_set("value", scan)
+    scene.camera.location = (0.0, 0.0, 0.4)
+    scene.camera.rotation_euler = (1.47, 0.0, 0.0)
+
+    def counts():
+        picture = render()["Combined"]
+        return int((picture[..., 0] > 0.5).sum()), int((np.abs(picture[..., 1] - linear((100,))[0]) < 0.01).sum())
+
+    magenta, before = counts()
+    marked = only_cloud().neighbourhoods("seen_through")["seen_through"] > 0
+    check(marked.sum() > 300 and marked.sum() == marked[150 * 150:150 * 150 + 324].sum(), f"{marked.sum()} points are seen through")
+    check(not magenta and before > 100, f"off: {magenta}, {before}")
+    obj.patina.free_space = 'SHOW'
+    magenta, dark = counts()
+    check(magenta > 100 and dark < 0.1 * before, f"shown: {magenta}, {dark}")
+    obj.patina.free_space = 'USE'
+    magenta, dark = counts()
+    check(not magenta and dark < 0.1 * before and not said("Analyzing"), f"hidden: {magenta}, {dark}")

@@ -297,6 +297,14 @@ def test_headlight():
     run("render", "head.ply", "-o", "x.png", "--headlight", "--shadows", code=2)
 
 
+def test_largest_gap():
+    wall("gap.ply", lambda x, z: (200, 30, 60), count=12)
+    for name, options in (("wide", ("--radius", "0.2")), ("narrow", ("--radius", "0.05")),
+                          ("limited", ("--radius", "0.2", "--largest-gap", "0.1"))):
+        run("render", "gap.ply", "-o", f"{name}.png", *FRONT, "--surface", "splats", *options)
+    assert read_png("limited.png") == read_png("narrow.png") != read_png("wide.png")
+
+
 def test_transparent_film_is_not_premultiplied():
     wall("film.ply", lambda x, z: (200, 100, 50))
     run("render", "film.ply", "-o", "film.png", *FRONT, "--transparent")

@@ -401,6 +401,7 @@ typedef struct patina_cloud_style {
     uint32_t free_space;          // patina_free_space: what becomes of points that a station saw through
     uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
     float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
+    float largest_gap;            // world units; no disc is wider, whatever its radius; 0 = as wide as it is
 } patina_cloud_style;
 
 typedef struct patina_mesh_style {
