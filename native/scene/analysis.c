@@ -89,9 +89,12 @@ void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbou
         const uint32_t lane = (uint32_t)__builtin_ctz(doubtful);
         sample_of(tree, tree, leaf * PT_LEAF + lane, found, &sample);
         pt_plane_fit(&sample, all_of(&sample), &wide);
-        const int flat = !pt_plane_is_doubtful(&planes[lane]); // and came here for its rows
+        const int flat = !pt_plane_is_doubtful(&planes[lane]); // and came here for its rows, or its border
         if (flat ? !pt_plane_is_doubtful(&wide) : pt_plane_prefers_wide(&planes[lane], &wide)) {
+            struct pt_neighbourhood known = hoods[lane];
             pt_neighbourhood_of(&sample, &wide, &hoods[lane]);
+            if (flat && known.kind == PT_KIND_BORDER && hoods[lane].kind == PT_KIND_BORDER)
+                hoods[lane] = known; // a border to both: the nearer neighbours tell its spacing better
         } else {
             narrow = sample; // the nearest k of them
             narrow.count = k;

@@ -13,6 +13,8 @@
 #define COVER_BORDER 0.5    // across a border
 #define COVER_LINE 0.6      // of a line's points, in spacings along it
 #define COVER_DOT 0.4       // of volume and strays, in distances to the nearest neighbour
+#define COVER_ROUGH 0.8     // of what is hardly a volume (creases, ornaments), in spacings, so that no cracks show there
+#define ROUGH 0.35          // thickness over width, squared: between FLATTEST and this the one turns into the other
 #define UNEVEN 2.5          // spacings along and across differ less than this by chance: of random points two in three
 #define UNEVEN_DOUBT 4.0    // 16 neighbours on rows 1 : 5 hold too few of the rows beside: they overrate them
 #define UNEVEN_MOST 13.0    // what a shape word holds
@@ -259,7 +261,9 @@ static void be_volume(const struct pt_sample *sample, const struct pt_plane *pla
     const double farthest = sqrt(sample->square[sample->count - 1]);
     const double spacing = farthest * cbrt(4.0 * PI / (3.0 * sample->count));
     const double thick = sqrt(plane->value[0] / plane->value[1]);
-    be_dot(PT_KIND_VOLUME, COVER_DOT * nearest, fmin(spacing, 2.0 * nearest), fmin(thick, 1.0), out);
+    const double rough = fmax((ROUGH - plane->value[0] / plane->value[1]) / (ROUGH - FLATTEST), 0.0);
+    const double radius = COVER_DOT * nearest + rough * fmax(COVER_ROUGH * spacing - COVER_DOT * nearest, 0.0);
+    be_dot(PT_KIND_VOLUME, radius, fmin(spacing, 2.0 * nearest), fmin(thick, 1.0), out);
     out->sigma = sqrt(plane->value[0]);
 }
 
@@ -269,7 +273,7 @@ int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_p
     struct pt_neighbourhood surface = { .kind = 0 };
     if (plane->value[0] >= FACING * plane->value[1] || plane->value[1] <= SLIMMEST * plane->value[2])
         return 0;
-    out->has_normal = 1;
+    out->has_normal = out->certainty * out->certainty > ROUGH; // not at creases, whose two sides it would lie between
     for (int k = 0; k < 3; k++) {
         out->normal[k] = plane->axis[0][k];
         out->axis[k] = plane->axis[2][k];
@@ -289,7 +293,7 @@ int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_p
 
 int pt_neighbourhood_is_doubtful(const struct pt_neighbourhood *hood)
 {
-    return hood->has_normal && hood->uneven > UNEVEN_DOUBT;
+    return hood->kind == PT_KIND_BORDER || (hood->has_normal && hood->uneven > UNEVEN_DOUBT);
 }
 
 void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *plane, struct pt_neighbourhood *out)

@@ -38,7 +38,8 @@ int pt_plane_prefers_wide(const struct pt_plane *narrow, const struct pt_plane *
 // A plane through the point that more of its neighbours lie on than on `plane`: on one side of a crease, of a thin wall.
 // 0 where there is none.
 int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane *plane, double within, struct pt_plane *out);
-// RMS distance of the marked neighbours from the plane, or from the quadric where that explains more.
+// RMS distance of the marked neighbours from the plane, or from the quadric where that explains more; of all where the others
+// are sheets beside it.
 double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane);
 
 // From a sample of every `thinning`-th point, where the point's nearest make it a volume: noise that is wider than they reach

@@ -69,26 +69,40 @@ static uint32_t number(const struct walk *walk, uint32_t place)
     return walk->tree->cloud->order[walk->tree->slots[place]];
 }
 
-// Into the sorted list of a lane, where it is near enough.
-static inline void insert(struct walk *walk, uint32_t lane, double square, uint32_t place)
+// ---- a lane's sorted list --------------------------------------------------------------------------------------------------
+
+enum { ROUND = 16 }; // lists are taken so many at a time; what lies behind their end is infinite
+
+static void begin_lane(struct walk *walk, uint32_t lane)
+{
+    for (uint32_t i = 0; i < (walk->k + ROUND - 1) / ROUND * ROUND; i++)
+        walk->found->square[lane][i] = INFINITY;
+    walk->found->count[lane] = 0;
+    walk->worst[lane] = INFINITY;
+}
+
+// Those of a leaf's points that `near` marks, which were near enough when it was made; the leaf's first place.
+static inline void take_each(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first)
 {
     double *squares = walk->found->square[lane];
     uint32_t *places = walk->found->place[lane], count = walk->found->count[lane];
-    if (square >= walk->worst[lane] && count == walk->k &&
-        (square > walk->worst[lane] || number(walk, place) > number(walk, places[count - 1])))
-        return;
-    uint32_t at = count < walk->k ? count : count - 1;
-    while (at > 0 && (squares[at - 1] > square || (squares[at - 1] == square && number(walk, places[at - 1]) > number(walk, place)))) {
-        squares[at] = squares[at - 1];
-        places[at] = places[at - 1];
-        at--;
+    for (; near; near &= near - 1) {
+        const uint32_t other = (uint32_t)__builtin_ctz(near), place = first + other;
+        const double x = square[other];
+        if (count == walk->k && (x > squares[count - 1] ||
+                                 (x == squares[count - 1] && number(walk, place) > number(walk, places[count - 1]))))
+            continue;
+        uint32_t at = count < walk->k ? count++ : count - 1;
+        while (at > 0 && (squares[at - 1] > x || (squares[at - 1] == x && number(walk, places[at - 1]) > number(walk, place)))) {
+            squares[at] = squares[at - 1];
+            places[at] = places[at - 1];
+            at--;
+        }
+        squares[at] = x;
+        places[at] = place;
     }
-    squares[at] = square;
-    places[at] = place;
-    count += count < walk->k;
     walk->found->count[lane] = count;
-    if (count == walk->k)
-        walk->worst[lane] = squares[count - 1];
+    walk->worst[lane] = count == walk->k ? squares[count - 1] : INFINITY;
 }
 
 // ---- plain -----------------------------------------------------------------------------------------------------------------
@@ -124,13 +138,18 @@ static inline uint32_t near_points_plain(const float *xyz, const double place[3]
         lanes |= (uint32_t)(square[i] <= worst) << i;
     return lanes;
 }
+
+static inline void take_plain(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first)
+{
+    take_each(walk, lane, square, near, first);
+}
 #undef TARGET
 #undef LEVEL
 
 #ifdef WITH_AVX
 // ---- AVX2 ------------------------------------------------------------------------------------------------------------------
 
-#define TARGET __attribute__((target("avx2")))
+#define TARGET __attribute__((target("avx2,popcnt")))
 #define LEVEL(name) name##_avx2
 #include "neighbours_walk.h"
 
@@ -163,12 +182,17 @@ TARGET static inline uint32_t near_points_avx2(const float *xyz, const double pl
     }
     return lanes;
 }
+
+TARGET static inline void take_avx2(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first)
+{
+    take_each(walk, lane, square, near, first);
+}
 #undef TARGET
 #undef LEVEL
 
 // ---- AVX-512 ---------------------------------------------------------------------------------------------------------------
 
-#define TARGET __attribute__((target("avx512f,avx512vl,avx512dq")))
+#define TARGET __attribute__((target("avx512f,avx512vl,avx512dq,popcnt")))
 #define LEVEL(name) name##_avx512
 #include "neighbours_walk.h"
 
@@ -201,6 +225,69 @@ TARGET static inline uint32_t near_points_avx512(const float *xyz, const double 
     }
     return lanes;
 }
+
+// The list in registers, `rounds` of 8: what is nearer stays, the rest moves up by one, and the greatest of what moved there
+// and the new one is right for every place. Equal distances go the slow way.
+TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk *walk, uint32_t lane, const double square[PT_LEAF],
+                                                                     uint32_t near, uint32_t first, const uint32_t rounds)
+{
+    double *squares = walk->found->square[lane];
+    uint32_t *places = walk->found->place[lane], count = walk->found->count[lane];
+    const uint32_t last = walk->k - 1;
+    __m512d d[8];
+    __m256i p[8];
+    for (uint32_t i = 0; i < rounds; i++) {
+        d[i] = _mm512_loadu_pd(squares + 8 * i);
+        p[i] = _mm256_loadu_si256((const __m256i *)(places + 8 * i));
+    }
+    for (; near; near &= near - 1) {
+        const uint32_t other = (uint32_t)__builtin_ctz(near);
+        const __m512d x = _mm512_set1_pd(square[other]);
+        __mmask8 nearer[8], equal = 0;
+        for (uint32_t i = 0; i < rounds; i++) {
+            nearer[i] = _mm512_cmp_pd_mask(d[i], x, _CMP_LE_OQ);
+            equal |= _mm512_cmp_pd_mask(d[i], x, _CMP_EQ_OQ);
+        }
+        if (equal) {
+            for (uint32_t i = 0; i < rounds; i++) {
+                _mm512_storeu_pd(squares + 8 * i, d[i]);
+                _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
+            }
+            walk->found->count[lane] = count;
+            walk->worst[lane] = count == walk->k ? squares[last] : INFINITY;
+            take_each(walk, lane, square, near, first);
+            return;
+        }
+        const __m256i place = _mm256_set1_epi32((int)(first + other));
+        for (uint32_t i = rounds; i-- > 0;) {
+            const __m512d below = i ? d[i - 1] : x;
+            const __m512d moved = _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(d[i]), _mm512_castpd_si512(below), 7));
+            const __m256i moved_place = _mm256_alignr_epi32(p[i], i ? p[i - 1] : place, 7);
+            const __mmask8 carried = i ? nearer[i - 1] >> 7 : 1, at = (__mmask8)((nearer[i] << 1 | carried) & ~nearer[i]);
+            d[i] = _mm512_mask_blend_pd(nearer[i], _mm512_max_pd(moved, x), d[i]);
+            p[i] = _mm256_mask_blend_epi32(at, _mm256_mask_blend_epi32(nearer[i], moved_place, p[i]), place);
+        }
+        count += count <= last;
+    }
+    for (uint32_t i = 0; i < rounds; i++) {
+        _mm512_storeu_pd(squares + 8 * i, d[i]);
+        _mm256_storeu_si256((__m256i *)(places + 8 * i), p[i]);
+    }
+    walk->found->count[lane] = count;
+    walk->worst[lane] = count > last ? squares[last] : INFINITY;
+}
+
+TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first)
+{
+    if (walk->k <= 8)
+        take_rounds(walk, lane, square, near, first, 1);
+    else if (walk->k <= 16)
+        take_rounds(walk, lane, square, near, first, 2);
+    else if (walk->k <= 48)
+        take_rounds(walk, lane, square, near, first, 6);
+    else
+        take_rounds(walk, lane, square, near, first, 8);
+}
 #undef TARGET
 #undef LEVEL
 #endif
@@ -212,9 +299,9 @@ void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighb
 {
     struct walk walk = { .tree = tree, .from = from, .found = found, .leaf = leaf, .k = k, .frame = NO_FRAME };
     for (int i = 0; i < PT_LEAF; i++)
-        walk.worst[i] = lanes >> i & 1u ? INFINITY : -1.0;
+        walk.worst[i] = -1.0;
     for (uint32_t left = lanes; left; left &= left - 1)
-        found->count[__builtin_ctz(left)] = 0;
+        begin_lane(&walk, (uint32_t)__builtin_ctz(left));
     if (!lanes)
         return;
 #ifdef WITH_AVX

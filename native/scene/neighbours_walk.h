@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The walk of neighbours_find.c, once for each set of instructions: LEVEL(name) names it, TARGET is its attribute, TESTS the
-// two functions below in those instructions. The same operations in the same order at every level: the same results.
+// The walk of neighbours_find.c, once for each set of instructions: LEVEL(name) names it, TARGET is its attribute; the three
+// functions that are only declared here are written in those instructions. The same operations in the same order at every level: the same results.
 
 // Lanes whose point lies within its worst distance of the box; places of lanes in the box's frame.
 TARGET static inline uint32_t LEVEL(near_box)(const struct walk *walk, const double low[3], const double high[3]);
 // Squares of the distances from one place to a leaf's points; returns the lanes that are at most `worst` away.
 TARGET static inline uint32_t LEVEL(near_points)(const float *xyz, const double place[3], double worst, double square[PT_LEAF]);
 
+// Takes those that `near` marks into the lane's list.
+TARGET static inline void LEVEL(take)(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first);
+
 TARGET static void LEVEL(walk_leaf)(struct walk *walk, uint32_t leaf, uint32_t lanes)
 {
     const struct pt_neighbours *tree = walk->tree;
     const float *xyz = tree->places + (size_t)leaf * 3 * PT_LEAF;
     _Alignas(64) double square[PT_LEAF];
+    const uint32_t held = pt_leaf_lanes(tree, leaf);
     for (; lanes; lanes &= lanes - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(lanes);
         const double place[3] = { walk->place[0][lane], walk->place[1][lane], walk->place[2][lane] };
         uint32_t near = LEVEL(near_points)(xyz, place, walk->worst[lane], square);
         if (leaf == walk->leaf && tree == walk->from)
             near &= ~(1u << lane);
-        for (near &= pt_leaf_lanes(tree, leaf); near; near &= near - 1) {
-            const uint32_t other = (uint32_t)__builtin_ctz(near);
-            insert(walk, lane, square[other], leaf * PT_LEAF + other);
-        }
+        near &= held;
+        if (near)
+            LEVEL(take)(walk, lane, square, near, leaf * PT_LEAF);
     }
 }
 

@@ -10,6 +10,8 @@
 #define FLAT_BEST 0.6 // more neighbours are better when they bring it below this part: noise falls to a third, creases stay
 #define BENT 7e-4     // a quadric may explain it: at less, sigma is below a thirtieth of the spacing
 #define TIGHT 0.4     // RMS in parts of a slab's half thickness; of points spread over it, 0.58
+#define TIGHTER 0.1   // nobody's noise: two in five are enough then
+#define SHEET 0.3     // spread of their distances from the plane in parts of the mean: at a crease 0.58
 #define LINEAR 0.1    // narrowness squared: 16 neighbours on one row of a scan
 
 static void rotate(double a[3][3], double v[3][3], int p, int q)
@@ -136,11 +138,14 @@ int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane 
                 best = inside;
         }
     const int found = __builtin_popcountll(best);
-    if (2 * found < (int)sample->count || 5 * found < 7 * known || found < 5)
+    if (5 * found < 2 * (int)sample->count || found < 5)
         return 0;
     pt_plane_fit(sample, best, out);
-    if (out->value[0] > TIGHT * TIGHT * within * within)
-        return 0; // they fill the slab, as any would: no plane
+    const double rms = sqrt(out->value[0]);
+    if (rms > TIGHT * within) // they fill the slab, as any would: no plane
+        return 0;
+    if (rms > TIGHTER * within && (2 * found < (int)sample->count || 5 * found < 7 * known))
+        return 0;
     const double place = along(out->axis[0], out->mean);
     const uint64_t again = within_of(sample, out->axis[0], place, within);
     if (__builtin_popcountll(again) >= found)
@@ -181,8 +186,35 @@ static double quadric_residual(const struct pt_sample *sample, const struct pt_p
     return squares > 0.0 ? squares : 0.0;
 }
 
+// Neighbours off the plane that lie on sheets beside it, as another scan's do: the variance of all of them. Those of a crease
+// spread from the plane on. 0 where there are none.
+static double sheet_variance(const struct pt_sample *sample, const struct pt_plane *plane)
+{
+    double off = 0.0, off_squares = 0.0, sum = 0.0, squares = 0.0;
+    uint32_t outside = 0;
+    for (uint32_t i = 0; i < sample->count; i++) {
+        const double z = along(plane->axis[0], sample->offset[i]);
+        sum += z;
+        squares += z * z;
+        if (plane->inside >> i & 1u)
+            continue;
+        outside++;
+        off += fabs(z);
+        off_squares += z * z;
+    }
+    if (8 * outside < sample->count)
+        return 0.0;
+    off /= outside;
+    if (off_squares / outside - off * off > SHEET * SHEET * off * off)
+        return 0.0;
+    return fmax(squares - sum * sum / (sample->count + 1.0), 0.0) / sample->count;
+}
+
 double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane)
 {
+    const double sheets = sheet_variance(sample, plane);
+    if (sheets > 0.0)
+        return sqrt(sheets);
     const double n = plane->count;
     double variance = plane->count > 3 ? plane->value[0] * n / (n - 3.0) : plane->value[0];
     if (plane->count < 10 || !(variance > BENT * plane->value[1]))

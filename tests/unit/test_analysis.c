@@ -183,6 +183,38 @@ static void test_torus(void **state)
     points_free(&points);
 }
 
+// Noise, and the distance of two scans of one wall, show as sigma; a curve does not.
+static void test_sigma(void **state)
+{
+    (void)state;
+    enum { COUNT = 20000 };
+    static double p[COUNT][3];
+    for (int kind = 0; kind < 4; kind++) {
+        struct pcg random = pcg_seed(11);
+        const double spacing = 0.01, apart = kind == 3 ? 1.5 * spacing : 0.0;
+        for (int i = 0; i < COUNT; i++) {
+            p[i][0] = pcg_unit(&random);
+            p[i][1] = 2.0 * pcg_unit(&random);
+            double noise = -6.0;
+            for (int k = 0; k < 12; k++)
+                noise += pcg_unit(&random);
+            p[i][2] = kind == 0 ? 0.0 : kind == 1 ? 0.5 * p[i][0] * p[i][0] : kind == 2 ? 0.4 * spacing * noise : 0.05 * spacing * noise;
+            p[i][2] += i % 2 ? apart : 0.0;
+        }
+        patina_cloud *cloud = build_doubles(&p[0][0], COUNT);
+        analyse(cloud, 0);
+        struct read r = read_cloud(cloud);
+        double mean = 0.0;
+        for (int i = 0; i < COUNT; i++)
+            mean += (double)r.sigma[i] / COUNT / spacing;
+        printf("  sigma of %s: %.3f spacings\n",
+               kind == 0 ? "a plane" : kind == 1 ? "a bent plane" : kind == 2 ? "noise of 0.4" : "two scans 1.5 apart", mean);
+        assert_true(kind < 2 ? mean < 0.03 : kind == 2 ? fabs(mean - 0.4) < 0.08 : mean > 0.5 && mean < 0.9);
+        read_free(&r);
+        patina_cloud_destroy(cloud);
+    }
+}
+
 // Rows 1 : 10 give ellipses across them; the grid's rim is a border; a wire is a line; points above are strays.
 static void test_kinds(void **state)
 {
@@ -506,7 +538,7 @@ static void test_soft(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_neighbours), cmocka_unit_test(test_torus),       cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_neighbours), cmocka_unit_test(test_torus),       cmocka_unit_test(test_kinds), cmocka_unit_test(test_sigma),
         cmocka_unit_test(test_far_away),   cmocka_unit_test(test_hard),        cmocka_unit_test(test_words),
         cmocka_unit_test(test_threads),    cmocka_unit_test(test_orientation), cmocka_unit_test(test_votes), cmocka_unit_test(test_saved_and_task),
         cmocka_unit_test(test_cancel_and_refusals), cmocka_unit_test(test_soft),
