@@ -49,7 +49,8 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
             return {'CANCELLED'}
         try:
             with self._progress.part(0, 2).inner() as inner:
-                task = native.Cloud.start(positions, attributes.normals(data, count, obj.patina.normal_attribute), None, None, inner)
+                normals = attributes.normals(data, count, obj.patina.normal_attribute)
+                task = native.Cloud.start(positions, normals, None, None, inner)
             yield task
             cloud = task.result()
             part = self._progress.part(1, 2)
@@ -111,7 +112,8 @@ class PATINA_OT_frame_points(Operator):
             self.report({'WARNING'}, "There are no points to frame")
             return {'CANCELLED'}
         camera = context.scene.camera
-        place, scale = camera.evaluated_get(depsgraph).camera_fit_coords(depsgraph, [value for corner in corners for value in corner])
+        flat = [value for corner in corners for value in corner]
+        place, scale = camera.evaluated_get(depsgraph).camera_fit_coords(depsgraph, flat)
         rotation = camera.matrix_world.to_quaternion()
         camera.matrix_world = Matrix.LocRotScale(place, rotation, camera.matrix_world.to_scale())
         if camera.data.type == 'ORTHO':
@@ -124,7 +126,7 @@ class PATINA_OT_frame_points(Operator):
         far = max((corner - place).length for corner in corners)
         if camera.data.clip_end < far:
             camera.data.clip_end = 1.2 * far
-            self.report({'INFO'}, f"Patina: the camera sees {camera.data.clip_end:.4g} far now")
+            self.report({'INFO'}, f"Patina: the camera sees as far as {camera.data.clip_end:.4g} now")
 
 
 def _has_points(obj: bpy.types.Object) -> bool:

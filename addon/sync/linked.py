@@ -75,7 +75,8 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
         return None
     name = f"{path.resolve()}{origin or ''}"
     place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
-    state = hashlib.blake2b(f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}".encode(), digest_size=6).hexdigest()
+    made_of = f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}"
+    state = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
     folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
     return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
 

@@ -279,6 +279,26 @@ def test_headlight_follows_the_view():
         check_close(picture[height // 2, width // 2, 0], 0.8 * 3.0 / np.pi, 0.02, f"the middle, turned by {turn}")
 
 
+def test_what_is_hidden_follows():
+    """Gaps, doubts and strays change the picture at once, and nothing is read or analyzed again."""
+    scene = setup()
+    scene.patina.surface = 'SPLATS'
+    obj = add_points(np.concatenate([sphere(3000, 1.5, (0, 0, 0))[0], [[2.2, 1.0, 0.0]]]))
+    obj.patina.lighting = 'UNLIT'
+    yield lambda: settled(3001) and shown().shown.clouds[0].cloud.has_shapes
+    found = shown()
+    covered = [float((found.shown.color[..., 3] > 0).mean())]
+    reads = found.trusted.reads
+    for name, value in (("largest_gap", 0.02), ("hide_stray", True), ("least_certainty", 1.0)):
+        before = found.pictures
+        setattr(obj.patina, name, value)
+        obj.update_tag(refresh={'OBJECT'})
+        yield lambda: newer(before)() and settled(3001)
+        covered.append(float((found.shown.color[..., 3] > 0).mean()))
+        check(covered[-1] < covered[-2], f"{name}: {covered}")
+    check(found.trusted.reads == reads, "read again")
+
+
 def test_analyze_is_undone():
     """A user's Analyze goes on beside Blender; one step of undo takes the attributes back."""
     setup()
