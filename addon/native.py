@@ -134,6 +134,11 @@ class _FileAttribute(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("type", c_uint32)]
 
 
+class _GridDesc(_Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", c_void_p), ("column", c_void_p),
+                ("row", c_void_p), ("station", c_double * 3)]
+
+
 class _CloudStyle(_Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
@@ -292,6 +297,7 @@ _CALLS = {
     "patina_task_render": (c_void_p, c_void_p, c_void_p, c_uint32, _OUT),
     "patina_task_build": (POINTER(_CloudDesc), c_void_p, _OUT),
     "patina_task_set_colors": (c_void_p, POINTER(_Array), _OUT),
+    "patina_task_grid_normals": (POINTER(_GridDesc), c_void_p, c_void_p, _OUT),
     "patina_task_fingerprint": (POINTER(_CloudDesc), POINTER(c_uint64), _OUT),
     "patina_task_open_file": (c_char_p, c_void_p, _OUT),
     "patina_task_save": (c_void_p, c_char_p, _OUT),
@@ -464,6 +470,7 @@ class Device(_Handle):
         self._call("get_info", byref(info))
         self.name = info.name.decode()
         self.description = info.description.decode("utf-8", "replace")
+        self.hardware = bool(info.hardware)
 
 
 def _view(array: np.ndarray | None, count: int) -> _Array:
@@ -496,6 +503,17 @@ def start_fingerprint(*arrays: np.ndarray | None) -> Task:
     positions, normals, colors, opacities, radii, scalars, classes."""
     values = (c_uint64 * 2)()
     return Task("fingerprint", byref(_describe(*arrays)), values, keep=(arrays, values), finish=lambda task: tuple(values))
+
+
+def start_grid_normals(positions: np.ndarray, columns: np.ndarray, rows: np.ndarray, station: Sequence[float]) -> Task:
+    """A task that gives (n, 3) normals of a scan's points, towards its scanner, out of its grid; 0 0 0 where there is none."""
+    positions = np.ascontiguousarray(positions, np.float32)
+    columns, rows = (np.ascontiguousarray(values, np.uint32) for values in (columns, rows))
+    normals = np.empty((len(positions), 3), np.float32)
+    grid = _GridDesc(count=len(positions), position=positions.ctypes.data, column=columns.ctypes.data, row=rows.ctypes.data,
+                     station=tuple(station))
+    return Task("grid_normals", byref(grid), None, normals.ctypes.data,
+                keep=(positions, columns, rows, normals), finish=lambda task: normals)
 
 
 class Cloud(_Handle):

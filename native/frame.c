@@ -360,6 +360,8 @@ static int run_together(struct render *render, const struct pt_pass *passes, uin
     }
     if (!error)
         error = render->frame->device->ops->finish_picture(render->frame->device, bound, count);
+    if (!error) // as after any pass: its time is that of its work
+        error = render->frame->device->ops->finish(render->frame->device);
     free(bound);
     free(buffers);
     return error;

@@ -102,7 +102,7 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
 {
     struct pt_plan *plan = builder->plan;
     struct fill_args args = {.view = pt_view_at(plan, level),
-                             .phases = PT_FILL_BACKGROUND | PT_FILL_OCCLUDED,
+                             .phases = PT_FILL_BACKGROUND | (level && plan->discs_count ? 0 : PT_FILL_OCCLUDED),
                              .iterations = plan->iterations,
                              .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
                              .refined = plan->quality == PATINA_QUALITY_REFINED,
@@ -138,7 +138,8 @@ static void plan_pyramid(struct pt_builder *builder)
                                  .coarse_width = coarse.width,
                                  .coarse_height = coarse.height,
                                  .refined = plan->quality == PATINA_QUALITY_REFINED,
-                                 .least = least_distance(plan)};
+                                 .least = least_distance(plan),
+                                 .background = plan->discs_count > 0};
         PT_REASON(
             PT_ADD(builder, push, args,
                    {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),
@@ -504,9 +505,9 @@ static void plan_surfaces(struct pt_builder *builder)
         }
     if (!estimate)
         pt_skip(builder, "normals", "every cloud in view has normals");
+    plan_filling(builder);
     if (discs)
         pt_plan_blend(builder);
-    plan_filling(builder);
 }
 
 // Returns the plane that holds the layer's colour.

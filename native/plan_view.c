@@ -20,8 +20,6 @@ enum { DEFAULT_LAYERS = 8 };
 // Half an axis of a footprint, pixels, from which on points are discs: narrower ones are closed by filling as well, in a third of
 // the time. A spacing of 1.4 pixels.
 #define WIDE_FOOTPRINT 1.9
-// Fills of what discs leave open: at most one pixel in 300, where points lie at random.
-enum { PINHOLES = 2 };
 
 struct camera {
     double axes[9], position[3];
@@ -445,8 +443,7 @@ static int compare_weighted(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// The chunks' spacings with the area that they cover; those that face away only when asked for. Where some are points, what is
-// drawn as discs does not count.
+// The chunks' spacings with the area that they cover; those that face away only when asked for.
 static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *survey, int away, struct weighted *list,
                              double *area)
 {
@@ -454,7 +451,7 @@ static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *su
     for (uint32_t i = 0; i < plan->instance_count; i++)
         for (uint32_t c = 0; c < survey->seen_count[i]; c++) {
             const struct seen *seen = &survey->seen[i][c];
-            if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away) || (seen->wide && survey->points))
+            if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away))
                 continue;
             list[count++] = (struct weighted){ seen->spacing_px, seen->area_px };
             *area += seen->area_px;
@@ -492,18 +489,16 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
 // exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.65 (0.37 points a pixel) n alone leaves holes open
 // (2.7% of a disc at 0.3 points a pixel), so coarser levels halve s down to 1 first: 0.14% open. Starting them earlier,
 // at 1.35, closes 0.5 points a pixel better (0.04% for 0.32%) but lets steep planes grow by up to 0.5% at 1 point a pixel.
-static void choose_filling(const patina_settings *settings, const struct survey *survey, struct pt_plan *plan)
+static void choose_filling(const patina_settings *settings, struct pt_plan *plan)
 {
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
     plan->quality = settings->quality;
     plan->fill = settings->fill;
     plan->levels = plan->iterations = 0;
-    if (survey->discs && !survey->points) {
+    if (settings->surface == PATINA_SURFACE_SPLATS) {
         plan->means = PT_MEANS_SPLATS;
         plan->expected = pt_expected_error(plan->means, s);
-        if (settings->surface != PATINA_SURFACE_SPLATS && plan->fill == PATINA_FILL_CLOSED)
-            plan->iterations = asked ? asked : PINHOLES;
         return;
     }
     if (settings->error_target > 0.0f)
@@ -782,7 +777,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     int error = look_around(scene, plan, &survey);
     if (error)
         return error;
-    choose_filling(&scene->settings, &survey, plan);
+    choose_filling(&scene->settings, plan);
     choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;

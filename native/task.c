@@ -31,6 +31,8 @@ struct patina_task {
     patina_file *file; // opened, until it is taken
     patina_analysis_desc analyse;
     struct pt_analysis analysis; // computed, until it is applied
+    patina_grid_desc grid;
+    float *normals;
 };
 
 static void *thread_main(void *argument)
@@ -90,6 +92,8 @@ static int analyse(struct patina_task *task)
 
 static int fingerprint(struct patina_task *task) { return pt_desc_fingerprint(&task->desc, task->fingerprint); }
 
+static int grid_normals(struct patina_task *task) { return patina_grid_normals(&task->grid, task->progress, task->normals); }
+
 int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
                        patina_task **out)
 {
@@ -139,6 +143,13 @@ int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], p
     if (!desc || desc->struct_size != sizeof *desc || !values)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: bad arguments");
     return start(&(struct patina_task){ .work = fingerprint, .desc = *desc, .fingerprint = values }, out);
+}
+
+int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals, patina_task **out)
+{
+    if (!grid || grid->struct_size != sizeof *grid)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_grid_normals: grid->struct_size is not %zu", sizeof *grid);
+    return start(&(struct patina_task){ .work = grid_normals, .grid = *grid, .progress = progress, .normals = normals }, out);
 }
 
 // Starts a task that has a path.

@@ -4,6 +4,14 @@
 add_custom_target(all_tests)
 add_custom_target(fuzz_tests)
 add_dependencies(all_tests fuzz_tests)
+
+# Exact rays for the virtual scans; tests/truth/scans/rays.py loads it.
+add_library(truth_rays SHARED EXCLUDE_FROM_ALL ${ROOT}/tests/truth/scans/rays.c ${ROOT}/tests/truth/scans/albedo.c)
+target_compile_options(truth_rays PRIVATE ${WARNINGS})
+target_link_libraries(truth_rays PRIVATE m Threads::Threads)
+set_target_properties(truth_rays PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests/truth)
+add_dependencies(all_tests truth_rays)
+
 find_library(CMOCKA cmocka)
 if(NOT CMOCKA)
     message(STATUS "cmocka not found: no C tests")

@@ -57,8 +57,12 @@ int pt_gl_key64_works(struct pt_gl_device *d)
     GLuint program = 0;
     if (!d->gl.ARB_gpu_shader_int64 || !d->gl.NV_shader_atomic_int64)
         return 0;
-    if (pt_gl_program(d, "lib/key64_test.glsl", "", &program) != PATINA_OK)
+    if (pt_gl_program(d, "lib/key64_test.glsl", "", &program) != PATINA_OK) {
+        if (!d->lost)
+            pt_log(PT_LOG_WARNING, "%s: 64-bit atomics do not compile, 32-bit ones are used: %s", d->base.info.description,
+                   d->message);
         return 0;
+    }
     int works = run(d, program);
     d->gl.DeleteProgram(program);
     if (!works && !d->lost)

@@ -22,8 +22,8 @@ static const double loose = 0.05; // of a slope: 3 degrees
 
 struct grid {
     const struct pt_scan *scan;
-    const float *position; // of the file
-    double station[3];     // relative to the file's origin
+    const float *position; // of all points
+    double station[3];     // in the same coordinates
     uint32_t *points;      // of each cell, column by column; NONE
     double sigma;          // of a depth
 };
@@ -202,35 +202,42 @@ static void find_normal(const struct grid *g, int64_t column, int64_t row, float
 
 // ---- scans ---------------------------------------------------------------------------------------------------------
 
-static uint64_t value_at(const struct pt_column *column, uint64_t i)
+// Where the points lie in the grid: columns of uint16 or of uint32.
+struct cells {
+    const void *column, *row;
+    bool wide;
+};
+
+static uint64_t value_at(const void *values, bool wide, uint64_t i)
 {
-    return column->type == PATINA_UINT16 ? ((const uint16_t *)column->data)[i] : ((const uint32_t *)column->data)[i];
+    return wide ? ((const uint32_t *)values)[i] : ((const uint16_t *)values)[i];
 }
 
-static int scan_normals(struct patina_file *file, const struct pt_input *input, const struct pt_scan *scan,
-                        const struct pt_column *columns, const struct pt_column *rows)
+// g: scan, position and station are set. Cancelled when the progress says so; the caller has the words for errors.
+static int find_normals(struct grid *g, const struct cells *cells, struct patina_progress *progress, float *normals)
 {
-    uint64_t cells = (uint64_t)scan->columns * scan->rows;
-    struct grid g = { .scan = scan, .position = file->position };
-    if (!cells)
+    const struct pt_scan *scan = g->scan;
+    uint64_t count = (uint64_t)scan->columns * scan->rows;
+    if (!count)
         return PATINA_OK;
-    g.points = malloc(cells * sizeof *g.points); // the file has a line or a row for each
-    if (!g.points)
+    g->points = malloc(count * sizeof *g->points);
+    if (!g->points)
         return PATINA_ERROR_MEMORY;
-    memset(g.points, 0xFF, cells * sizeof *g.points);
-    for (int k = 0; k < 3; k++)
-        g.station[k] = scan->station[k] - (scan->parallel ? 0 : file->origin[k]);
-    for (uint64_t i = scan->first; i < scan->first + scan->count; i++)
-        if (value_at(columns, i) < scan->columns && value_at(rows, i) < scan->rows)
-            g.points[value_at(columns, i) * scan->rows + value_at(rows, i)] = (uint32_t)i;
-    int code = measure_noise(&g);
-    for (uint64_t i = scan->first; i < scan->first + scan->count && !code; i++) {
-        if (i % POLL_POINTS == 0 && pt_progress_cancelled(input->progress))
-            code = pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: reading was cancelled", input->name);
-        if (value_at(columns, i) < scan->columns && value_at(rows, i) < scan->rows)
-            find_normal(&g, (int64_t)value_at(columns, i), (int64_t)value_at(rows, i), file->normal + 3 * i);
+    memset(g->points, 0xFF, count * sizeof *g->points);
+    for (uint64_t i = scan->first; i < scan->first + scan->count; i++) {
+        uint64_t column = value_at(cells->column, cells->wide, i), row = value_at(cells->row, cells->wide, i);
+        if (column < scan->columns && row < scan->rows)
+            g->points[column * scan->rows + row] = (uint32_t)i;
     }
-    free(g.points);
+    int code = measure_noise(g);
+    for (uint64_t i = scan->first; i < scan->first + scan->count && !code; i++) {
+        uint64_t column = value_at(cells->column, cells->wide, i), row = value_at(cells->row, cells->wide, i);
+        if (i % POLL_POINTS == 0 && pt_progress_cancelled(progress))
+            code = PATINA_ERROR_CANCELLED;
+        if (column < scan->columns && row < scan->rows)
+            find_normal(g, (int64_t)column, (int64_t)row, normals + 3 * i);
+    }
+    free(g->points);
     return code;
 }
 
@@ -244,9 +251,39 @@ int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input)
         return PATINA_OK;
     file->normal = calloc(file->count + 1, 3 * sizeof *file->normal);
     int code = file->normal ? PATINA_OK : PATINA_ERROR_MEMORY;
-    for (uint32_t s = 0; s < file->scan_count && !code; s++)
-        code = scan_normals(file, input, &file->scans[s], columns, rows);
+    const struct cells cells = { columns->data, rows->data, columns->type == PATINA_UINT32 };
+    for (uint32_t s = 0; s < file->scan_count && !code; s++) {
+        struct grid g = { .scan = &file->scans[s], .position = file->position };
+        for (int k = 0; k < 3; k++)
+            g.station[k] = g.scan->station[k] - (g.scan->parallel ? 0 : file->origin[k]);
+        code = find_normals(&g, &cells, input->progress, file->normal);
+    }
     if (code == PATINA_ERROR_MEMORY)
         pt_fail(NULL, code, "%s: no memory for the normals of %llu points", input->name, (unsigned long long)file->count);
+    if (code == PATINA_ERROR_CANCELLED)
+        pt_fail(NULL, code, "%s: reading was cancelled", input->name);
     return code;
+}
+
+int patina_grid_normals(const patina_grid_desc *desc, patina_progress *progress, float *normals)
+{
+    if (!desc || desc->struct_size != sizeof *desc || (desc->count && !(desc->position && desc->column && desc->row && normals)))
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grid_normals: bad arguments");
+    struct pt_scan scan = { .count = desc->count };
+    struct grid g = { .scan = &scan, .position = desc->position };
+    memcpy(g.station, desc->station, sizeof g.station);
+    if (desc->count)
+        memset(normals, 0, desc->count * 3 * sizeof *normals);
+    uint64_t columns = 0, rows = 0;
+    for (uint64_t i = 0; i < desc->count; i++) {
+        columns = desc->column[i] >= columns ? desc->column[i] + 1ull : columns;
+        rows = desc->row[i] >= rows ? desc->row[i] + 1ull : rows;
+    }
+    // A grid that is nearly empty is none, and its numbers may be anything.
+    if (desc->count > UINT32_MAX - 1 || columns > UINT32_MAX || rows > UINT32_MAX || columns * rows > 64 * desc->count + 65536)
+        return PATINA_OK;
+    scan.columns = (uint32_t)columns;
+    scan.rows = (uint32_t)rows;
+    int code = find_normals(&g, &(struct cells){ desc->column, desc->row, true }, progress, normals);
+    return code ? pt_fail(NULL, code, "normals of a scanner's grid: %s", patina_error_text(code)) : PATINA_OK;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "analysis.h"
+#include "beams.h"
 #include "free_space.h"
 #include "kernel_args.h"
 #include "memory.h"
@@ -19,6 +20,7 @@ struct walk {
     const patina_analysis_desc *desc;
     struct pt_analysis *out;
     struct pt_neighbours tree, coarse;
+    struct pt_beams beams;
     patina_progress *progress;
     uint32_t k;
     int given; // normals that the cloud has know their side
@@ -44,7 +46,7 @@ static void sample_of(const struct pt_neighbours *tree, const struct pt_neighbou
 static uint64_t all_of(const struct pt_sample *sample) { return sample->count >= 64 ? ~0ull : (1ull << sample->count) - 1ull; }
 
 static void look_from_afar(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf,
-                           struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF])
+                           struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
 {
     struct pt_sample sample;
     struct pt_plane plane;
@@ -62,11 +64,13 @@ static void look_from_afar(const struct pt_neighbours *tree, const struct pt_nei
         pt_plane_fit(&sample, all_of(&sample), &plane);
         if (sample.count == PT_NEIGHBOURS_MOST)
             pt_neighbourhood_from_afar(&sample, &plane, FAR_THINNING, &hoods[lane]);
+        if (limit)
+            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
     }
 }
 
 void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k,
-                      struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF])
+                      struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
 {
     const uint32_t lanes = pt_leaf_lanes(tree, leaf), wider = WIDER * k < PT_NEIGHBOURS_MOST ? WIDER * k : PT_NEIGHBOURS_MOST;
     struct pt_plane planes[PT_LEAF], wide;
@@ -80,6 +84,9 @@ void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbou
         const int more = wider > k && sample.count == k;
         if (!more || !pt_plane_is_doubtful(&planes[lane]))
             pt_neighbourhood_of(&sample, &planes[lane], &hoods[lane]);
+        const int doubts = more && (pt_plane_is_doubtful(&planes[lane]) || pt_neighbourhood_is_doubtful(&hoods[lane]));
+        if (limit && !doubts)
+            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
         if (more && (pt_plane_is_doubtful(&planes[lane]) || pt_neighbourhood_is_doubtful(&hoods[lane])))
             doubtful |= 1u << lane;
     }
@@ -100,48 +107,23 @@ void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbou
             narrow.count = k;
             pt_neighbourhood_of(&narrow, &planes[lane], &hoods[lane]);
         }
+        if (limit)
+            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
     }
-    look_from_afar(tree, coarse, leaf, found, hoods);
+    look_from_afar(tree, coarse, leaf, found, hoods, limit, context);
 }
 
 // ---- a chunk ---------------------------------------------------------------------------------------------------------------
 
-static uint32_t station_of(const patina_analysis_desc *desc, uint32_t number, const double p[3])
-{
-    if (desc->station.data) {
-        const char *at = (const char *)desc->station.data + number * desc->station.stride;
-        uint16_t wide;
-        memcpy(&wide, at, desc->station.type == PATINA_UINT16 ? 2 : 0);
-        const uint32_t index = desc->station.type == PATINA_UINT16 ? wide : *(const uint8_t *)at;
-        if (index < desc->station_count)
-            return index;
-    }
-    uint32_t nearest = 0;
-    double least = INFINITY;
-    for (uint32_t s = 0; s < desc->station_count; s++) {
-        double square = 0.0;
-        for (int k = 0; k < 3; k++)
-            square += (desc->stations[3 * s + k] - p[k]) * (desc->stations[3 * s + k] - p[k]);
-        nearest = square < least ? s : nearest;
-        least = fmin(least, square);
-    }
-    return nearest;
-}
-
 // Turns the normal as what is known says; returns whether anything is.
-static int orient(const struct walk *walk, const struct pt_chunk *chunk, uint32_t slot, uint32_t given, double n[3])
+static int orient(const struct pt_beam *beam, const double p[3], uint32_t given, double n[3])
 {
     double towards[3];
-    const uint32_t i = slot - chunk->first;
     if (given != PT_NORMAL_NONE) {
         pt_decode_normal(given, towards);
-    } else if (walk->desc->station_count) {
-        double p[3];
-        for (uint32_t k = 0; k < 3; k++)
-            p[k] = chunk->origin[k] + (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + i];
-        const double *at = walk->desc->stations + 3 * station_of(walk->desc, walk->cloud->order[slot], p);
+    } else if (beam) {
         for (int k = 0; k < 3; k++)
-            towards[k] = at[k] - p[k];
+            towards[k] = beam->place[k] - p[k];
     } else {
         return 0;
     }
@@ -151,15 +133,40 @@ static int orient(const struct walk *walk, const struct pt_chunk *chunk, uint32_
     return 1;
 }
 
+// The beam that took a point, and where that lies; NULL where no station is known.
+static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_chunk *chunk, uint32_t slot, double p[3])
+{
+    for (uint32_t k = 0; k < 3; k++)
+        p[k] = chunk->origin[k] + (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + slot - chunk->first];
+    return walk->beams.count ? &walk->beams.each[pt_beam_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
+}
+
+struct limited { // by a chunk's beams
+    const struct walk *walk;
+    uint32_t chunk;
+};
+
+static void limit_point(void *context, uint32_t place, const struct pt_sample *sample, struct pt_neighbourhood *hood)
+{
+    const struct limited *limited = context;
+    double p[3];
+    const struct pt_beam *beam =
+        beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], limited->walk->tree.slots[place], p);
+    if (beam)
+        pt_beam_limit(beam, p, sample, hood);
+}
+
 static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, struct pt_neighbourhood *hood)
 {
     const struct pt_chunk *chunk = &walk->cloud->chunks[chunk_index];
     struct tally *tally = &walk->tallies[chunk_index];
     const uint32_t given = walk->given ? walk->cloud->surface[slot] & PT_NORMAL_BITS : PT_NORMAL_NONE;
     uint32_t bits = given;
+    double p[3];
+    const struct pt_beam *beam = beam_of(walk, chunk, slot, p);
     tally->kinds[hood->kind]++;
     if (hood->has_normal && !(walk->desc->keep_normals && given != PT_NORMAL_NONE)) {
-        tally->unoriented += !orient(walk, chunk, slot, given, hood->normal);
+        tally->unoriented += !orient(beam, p, given, hood->normal);
         tally->estimated++;
         bits = pt_encode_normal(hood->normal);
     }
@@ -202,11 +209,12 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     float spacings[PT_CHUNK_POINTS];
     (void)thread;
     for (uint32_t c = begin; c < end; c++) {
+        struct limited limited = { walk, c };
         uint32_t known = 0;
         for (uint32_t leaf = walk->tree.chunk_leaf[c]; leaf < walk->tree.chunk_leaf[c + 1]; leaf++) {
             if (pt_progress_cancelled(walk->progress))
                 return;
-            pt_describe_leaf(&walk->tree, &walk->coarse, leaf, walk->k, &found, hoods);
+            pt_describe_leaf(&walk->tree, &walk->coarse, leaf, walk->k, &found, hoods, limit_point, &limited);
             for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
                 const uint32_t lane = (uint32_t)__builtin_ctz(left);
                 write_point(walk, c, walk->tree.slots[leaf * PT_LEAF + lane], &hoods[lane]);
@@ -322,7 +330,9 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     if (cloud->chunk_count)
         memcpy(out->chunks, cloud->chunks, cloud->chunk_count * sizeof *out->chunks);
     out->spacing_base = base_of(cloud);
-    int error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, pool, walk->progress, 0.0, 0.04);
+    int error = pt_beams_create(cloud, walk->desc, &walk->beams);
+    if (!error)
+        error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, pool, walk->progress, 0.0, 0.04);
     if (!error)
         error = pt_neighbours_create(&walk->coarse, cloud, FAR_STRATA, pool, walk->progress, 0.04, 0.05);
     if (error) {
@@ -367,6 +377,7 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
     struct pt_pool *pool = pt_pool_create(desc->threads, 0);
     int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
+    pt_beams_destroy(&walk.beams);
     free(walk.tallies);
     if (error)
         pt_analysis_free(out);

@@ -22,8 +22,7 @@ struct pt_chunk {
     uint32_t count, padded;          // padded slots repeat the last point
     uint32_t classes[8];             // of its points: bits as in patina_cloud_info.class_bits
     uint32_t shapes[8];              // of its points, drawn or not: bit c % 32 of word c / 32: the byte c from PT_SHAPE_SIGHT_SHIFT on
-    float reach, footprint;          // of its points' footprints, half axes, object units: the greatest; what nine of ten stay
-                                     // below. 0 without shapes
+    float reach, footprint;          // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
 };
 
 // Whether a cloud still lives, shared with the devices that hold its buffers.

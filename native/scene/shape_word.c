@@ -9,7 +9,7 @@
 
 static void frame_of(const double n[3], double t1[3], double t2[3])
 {
-    const double s = n[2] >= 0.0 ? 1.0 : -1.0, q = -1.0 / (s + n[2]), b = n[0] * n[1] * q;
+    const double s = n[2] >= (double)PT_SHAPE_UP ? 1.0 : -1.0, q = -1.0 / (s + n[2]), b = n[0] * n[1] * q;
     t1[0] = 1.0 + s * n[0] * n[0] * q;
     t1[1] = s * b;
     t1[2] = -s * n[0];

@@ -203,7 +203,9 @@ void main()
     uint of = instance_of(key.x);
     if (key.y == PT_KEY_EMPTY_Z || of == args.instances)
         return;
-    float opacity = sum_of(at + 6u), weight = pt_max(sum_of(at + 14u), 1.0);
+    float opacity = sum_of(at + 6u), weight = sum_of(at + 14u);
+    if (weight < 1.0)
+        return; // what was filled shows no disc: it takes its source's
     vec3 color = vec3(0.0);
     if (1.0 <= opacity) {
         precise vec3 mean = vec3(sum_of(at), sum_of(at + 2u), sum_of(at + 4u)) * pt_rcp(opacity);

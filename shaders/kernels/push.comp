@@ -77,7 +77,7 @@ void main()
             precise float least = z - pt_least_distance(view, least_distance, z);
             bool some = z < empty;
             found |= uint(!some && is_covered(level, upper == 0u ? below : above, empty)) << (y + upper - corner.y);
-            asked |= uint(some && inside && level.x < least) << (y + upper - corner.y);
+            asked |= uint(some && inside && level.x < least && args.background == 0u) << (y + upper - corner.y);
         }
         below = level;
         level = above;

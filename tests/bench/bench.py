@@ -14,8 +14,11 @@ of them, in the same order; "absent" what could not be measured, and why.
     --readme  every figure that README.md quotes, written into it: half an hour; with --only, those of these groups
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
-into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), session (ten
-minutes of work in Blender), analysis (what every point knows, 10 million). With --quick they take a million points, and one minute.
+into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
+scans against exact views; half an hour more where these are not kept yet), session (ten minutes of work in Blender), analysis (what
+every point knows, 10 million). With --quick they take a million points, and one minute.
+Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor) and
+scaling (threads up to all cores).
 """
 
 from __future__ import annotations
@@ -42,6 +45,7 @@ import plots
 import quoted
 import readme
 import report
+import scans
 import soft
 import stage
 import window
@@ -52,7 +56,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "session", "analysis")
+           "leaves", "scans", "session", "analysis", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -120,7 +124,30 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
     else:
         found.append(case_of("steady", "sphere", main, 256, density=1.0, frames=frames, steady=1))
     found += papers.cases(main, quick)
+    for group, make in (("graphics", on_graphics), ("scaling", over_threads)):
+        if group in options.only:
+            found += make(quick)
     return [one for one in found if not options.only or one["group"] in options.only]
+
+
+def on_graphics(quick: bool) -> list[dict[str, Any]]:
+    """The torus on a graphics processor, and on the processor with all its threads. Held against the truth where there is one
+    that takes no minutes."""
+    large = [] if quick else [{"points": 10_000_000}, {"points": 100_000_000}, {"size": 4096, "unheld": 1}]
+    asked = [{}, {"quality": "paper"}, {"quality": "unfilled"}, {"quality": "splats"}, *large,
+             *({"mode": mode} for mode in ("shadows kept", "shadows 1")),
+             *({"mode": mode, "unheld": 1} for mode in ("shadows 10", "6 layers", "lines 2", "eye-dome lighting",
+                                                        "ambient obscurance", "depth of field"))]
+    return [case_of("graphics", device=device, **{"points": 1_000_000, **one}, graphics=int(device == "gl-egl"))
+            for one in asked for device in ("gl-egl", "cpu")]
+
+
+def over_threads(quick: bool) -> list[dict[str, Any]]:
+    """The processor with 1, 2, 4, ... and all threads."""
+    cores = machine.cores()
+    asked = [{}] if quick else [{}, {"points": 10_000_000}, {"size": 4096, "unheld": 1}]
+    return [case_of("scaling", threads=threads, **{"points": 1_000_000, **one})
+            for one in asked for threads in sorted({*(2**k for k in range(8) if 2**k <= cores), cores})]
 
 
 def too_large(case: dict[str, Any]) -> str:
@@ -196,6 +223,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             split(result, row)
     if not options.only or "shadows" in options.only:
         result["soft"] = soft.measure(options.device[0])
+    if "scans" in options.only or ((options.full or options.readme) and not options.only):
+        result["scans"] = scans.measure(options.quick)
     for name, (group, title, part) in PARTS.items():
         everything = options.full or options.readme or group == "hard"
         if group in options.only or (everything and not options.only):

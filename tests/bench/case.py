@@ -157,6 +157,8 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
     if mode.missing():
         raise native.PatinaError(f"not built yet: the library has no '{mode.missing()}'")
     device = native.Device(case["device"], case["threads"])
+    if case.get("graphics") and not device.hardware:
+        raise native.PatinaError(f"not a graphics processor: {device.description}")
     shown = stages.stage_of(case)
     upload_ms = []
     for _ in range(3 if case["points"] <= 1_000_000 and case.get("uploads") else 1):
@@ -183,7 +185,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
     stats = frame.stats()
     frame.render(make(0.0, ALL_PASSES))
     error, read_ms = {}, 0.0
-    if scene_known and not mode.lines:  # the truth has none
+    if scene_known and not mode.lines and not case.get("unheld"):  # the truth has no lines
         start = time.perf_counter()
         planes = picture(frame)
         read_ms = 1e3 * (time.perf_counter() - start)

@@ -178,6 +178,35 @@ def soft(found: dict[str, Any] | None, path: Path) -> bool:
     return True
 
 
+def scans(rows: list[Row] | None, path: Path, title: str) -> bool:
+    """False surface against PSNR, a dot a scene and a large one for their mean, of every mode."""
+    if not rows:
+        return False
+    figure, axes = plt.subplots(1, 2, figsize=(13, 5.6), sharey=True)
+    for axis, held_out in zip(axes, (False, True)):
+        for number, mode in enumerate(dict.fromkeys(row["mode"] for row in rows)):
+            places = []
+            for scene in dict.fromkeys(row["scene"] for row in rows if row["held_out"] == held_out):
+                some = [row for row in rows if row["mode"] == mode and row["scene"] == scene]
+                if some:
+                    places.append((100.0 * sum(row["false"] for row in some) / len(some),
+                                   sum(row["psnr"] for row in some) / len(some)))
+            if places:
+                color = plt.get_cmap("tab20")(number % 20)
+                axis.plot(*zip(*places), ".", color=color, alpha=0.5)
+                axis.plot(sum(x for x, _ in places) / len(places), sum(y for _, y in places) / len(places),
+                          "s" if mode.startswith("vtk") else "o", color=color, markeredgecolor="black", markersize=10, label=mode)
+        axis.set(xlabel="false surface, % of scanned pixels", title="scenes held out" if held_out else "scenes for tuning")
+        axis.grid(True, alpha=0.25)
+    axes[0].set_ylabel("PSNR over scanned pixels, dB")
+    axes[0].legend(fontsize=8)
+    figure.suptitle(f"Virtual scans against exact views (upper left is better): {title}", fontsize=10)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return True
+
+
 def draw(result: dict[str, Any], folder: Path) -> list[str]:
     """Draws what the run holds; the names of the files."""
     title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
@@ -187,6 +216,7 @@ def draw(result: dict[str, Any], folder: Path) -> list[str]:
     for name, done in (("pareto.png", lambda path: pareto(against, path, title)),
                        ("scaling.png", lambda path: scaling(result, path)),
                        ("passes.png", lambda path: passes(joined(result, "headline", "points"), path)),
+                       ("scans.png", lambda path: scans(result.get("scans"), path, title)),
                        ("soft.png", lambda path: soft(result.get("soft"), path)),
                        ("densities.png", lambda path: bool(scenes) and densities(scenes, path))):
         if done(folder / name):

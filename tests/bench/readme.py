@@ -82,6 +82,43 @@ def effects(result: dict[str, Any]) -> str:
     return table(["what", "quality", "ms", "peer", "ms", "ratio"], body)
 
 
+WHAT = {"surface": "opaque", "6 layers": "six layers, half transparent", "shadows kept": "hard shadows, only the camera moves",
+        "shadows 1": "hard shadows, the sun moves too", "shadows 10": "soft shadows of 10 samples, the sun moves too",
+        "lines 2": "lines 2 pixels wide"}
+
+
+def graphics(result: dict[str, Any]) -> str:
+    """A graphics processor beside the processor: the same pictures, so one error stands for both."""
+    rows = joined(result, "graphics")
+    key = ("points", "width", "mode", "quality")
+    beside = {tuple(row[k] for k in key): row["ms_median"] for row in rows if row["device"] == "cpu"}
+    body, drawn = [], [row for row in rows if row["device"] != "cpu"]
+    for row in drawn:
+        e, ms, other = row["error"], row["ms_median"], beside.get(tuple(row[k] for k in key))
+        depth = f"{e['depth_rms_spacings']:.2f}" if "depth_rms_spacings" in e else "–"
+        body.append([count(row["points"]), f"{row['width']}²", WHAT.get(row["mode"], row["mode"]),
+                     QUALITIES.get(row["quality"], row["quality"]), f"{ms:.2f}",
+                     f"{other:.1f} ({other / ms:.1f}×)" if other else "–", depth,
+                     f"{e['color_psnr']:.1f}" if "color_psnr" in e else "–"])
+    head = ["points", "picture", "what", "quality", "ms", "processor, ms", "depth rms, spacings", "PSNR, dB"]
+    return (f"{result['date']}, {drawn[0]['device_description']}, beside {result['processor']}, {result['cores']} cores.\n\n" +
+            table(head, body))
+
+
+def scaling(result: dict[str, Any]) -> str:
+    """What more threads bring, and how many times as fast as one they are."""
+    rows = joined(result, "scaling")
+    threads = sorted({row["threads"] for row in rows})
+    lines: dict[tuple[int, int], dict[int, float]] = {}
+    for row in rows:
+        lines.setdefault((row["points"], row["width"]), {})[row["threads"]] = row["ms_median"]
+    body = [[count(points), f"{width}²",
+             *(f"{ms[n]:.1f} ({ms[1] / ms[n]:.1f}×)" if n in ms and 1 in ms else "–" for n in threads)]
+            for (points, width), ms in lines.items()]
+    return (f"{result['date']}, {result['processor']}, {result['cores']} cores; ms a frame.\n\n" +
+            table(["points", "picture", *(f"{n} thread{'s' * (n > 1)}" for n in threads)], body))
+
+
 def inside(result: dict[str, Any]) -> str:
     """A camera among the points, with and without their normals."""
     body = [[NAMES.get(name_of(row), name_of(row)), count(row["points"]), "no" if row.get("bare") else "yes",
@@ -162,6 +199,14 @@ def update(result: dict[str, Any], root: Path) -> str:
     for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("cues", cues), ("styles", styles)):
         if joined(result, name):
             parts[name] = part(result)
+    if result.get("scans"):
+        import scans
+        parts["scans"] = scans.markdown(result["scans"])
+        plots.scans(result["scans"], root / ".pictures/scans.png", title)
+    if any(row["device"] != "cpu" for row in joined(result, "graphics")):
+        parts["graphics"] = graphics(result)
+    if any(row["threads"] > 1 for row in joined(result, "scaling")):
+        parts["scaling"] = scaling(result)
     for quality in ("paper", "refined"):
         if papers.ratios(result, quality):
             parts[f"papers {quality}"] = papers.table(result, quality)

@@ -108,12 +108,17 @@ def markdown(result: dict[str, Any]) -> str:
                          ("styles", "Styles, one row each"),
                          ("scenes", "Scenes and densities"), ("layers", "Nested tori, opacities 0.3, 0.5, 1"),
                          ("shadows", "A ball's shadow on a plane"), ("patterns", "Patterns and noise"),
-                         ("steady", "Steadiness under a slow turn")):
+                         ("steady", "Steadiness under a slow turn"),
+                         ("graphics", "On a graphics processor, and on the processor"), ("scaling", "Over threads")):
         rows = joined(result, group)
         if rows:
             text += [f"## {title}", "", errors_table(rows), ""]
     if result.get("soft"):
         text += [soft.markdown(result["soft"]), ""]
+    if result.get("scans"):
+        import scans
+        text += ["## Virtual scans against exact views", "", scans.markdown(result["scans"]), "",
+                 *(f"- {name}: {meaning}" for name, meaning in scans.metrics.MEANING.items()), ""]
     if joined(result, "papers"):
         text += [papers.markdown(result), ""]
     for part in result["parts"].values():

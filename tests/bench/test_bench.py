@@ -4,15 +4,19 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
+import bench  # noqa: E402
+import case as cases  # noqa: E402
 import plots  # noqa: E402
 import quoted  # noqa: E402
 import readme  # noqa: E402
@@ -92,6 +96,39 @@ class Bench(unittest.TestCase):
                  "slopes": {"title": "", "text": "new"}}
         readme.update({**self.result, "parts": parts}, self.out)
         self.assertEqual(path.read_text(), "<!-- bench leaves -->\nold\n<!-- end -->\n<!-- bench slopes -->\nnew\n<!-- end -->\n")
+
+    def test_graphics_refuses_software(self) -> None:
+        """Figures of a graphics processor come from one, or are not there."""
+        case = bench.case_of("graphics", device="gl-egl", points=10_000, size=64, frames=1, graphics=1)
+        library = str(HERE.parents[1] / "build/out/release/libpatina.so")
+        for driver, wanted in (("software", False), ("hardware", True)):
+            with mock.patch.dict(os.environ, PATINA_GL_AS=driver, PATINA_LIBRARY=library):
+                try:
+                    row = cases.measure(case)
+                except cases.native.PatinaError as error:
+                    row = {**case, "unavailable": str(error)}
+            self.assertEqual("unavailable" not in row, wanted, row.get("unavailable"))
+            result = {**self.result, "rows": [], "details": [], "absent": []}
+            bench.split(result, row)
+            path = self.out / "README.md"
+            path.write_text("<!-- bench graphics -->\nold\n<!-- end -->\n")
+            readme.update(result, self.out)
+            self.assertEqual("old" not in path.read_text(), wanted)
+
+    def test_graphics_and_scaling(self) -> None:
+        row, detail = self.result["rows"][0], self.result["details"][0]
+        rows = [{**row, "device": device, "mode": mode, "threads": threads, "ms_median": ms}
+                for device, mode, threads, ms in (("gl-egl", "surface", 0, 2.0), ("cpu", "surface", 0, 5.0),
+                                                  ("gl-egl", "6 layers", 0, 4.0), ("cpu", "surface", 1, 12.0),
+                                                  ("cpu", "surface", 2, 8.0))]
+        groups = ["graphics"] * 3 + ["scaling"] * 2
+        result = {**self.result, "rows": rows, "details": [{**detail, "group": group, "device_description": "Some GPU"}
+                                                           for group in groups]}
+        table = readme.graphics(result).splitlines()
+        self.assertIn("Some GPU", table[0])
+        self.assertIn("| 2.00 | 5.0 (2.5×) |", table[4])
+        self.assertIn("| six layers, half transparent | refined | 4.00 | – |", table[5])
+        self.assertTrue(readme.scaling(result).endswith("| 12.0 (1.0×) | 8.0 (1.5×) |"))
 
     def test_quoted(self) -> None:
         library = HERE.parents[1] / "build/out/release/libpatina.so"

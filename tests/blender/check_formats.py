@@ -518,6 +518,18 @@ def test_e57_fields():
     check(np.isnan(stations[1:]).all(), f"a scan of points alone has no station: {stations}")
 
 
+def test_e57_grid():
+    """Two scans of a wall: the one with a grid gets normals towards its scanner, with an empty cell and a step in depth."""
+    cells = [(row, column) for column in range(6) for row in range(5) if (row, column) != (2, 2)]
+    wall = places(*((column * 0.1, 3 if column < 3 else 5, row * 0.1) for row, column in cells))
+    grid = {"rowIndex": ("integer", (0, 9), [row for row, _ in cells]), "columnIndex": ("integer", (0, 9), [c for _, c in cells])}
+    path = e57_file("grid.e57", wall | {"pose": ((1, 0, 0, 0), (5e5, 0, 0))}, wall | grid | {"pose": ((1, 0, 0, 0), (5e5, 9, 0))})
+    points = e57.read(path, importers.Filter(), importers.Progress())
+    check(not points.normals[:len(cells)].any(), "a scan without a grid has none")
+    check_close(points.normals[len(cells):], [(0, -1, 0)] * len(cells), 1e-4, "normals")
+    check(e57.read(path, importers.Filter(every=2), importers.Progress()).normals is None, "a thinned grid is none")
+
+
 def test_e57_colors():
     """Of 8 bits, of 16, and within declared limits; side by side in one file."""
     def colors(limits, *rgb):

@@ -209,7 +209,8 @@ static void run_entry(void **state)
         fail_msg("%s: %s: %d failures", h.label, h.test->name, h.failures);
 }
 
-static void open_devices(const char *wanted)
+// key64: OpenGL without 64-bit atomics is an error, for a run that is there to try them.
+static void open_devices(const char *wanted, int key64)
 {
     int known = !strcmp(wanted, "all");
     for (int i = 0; i < CHOICES; i++) {
@@ -225,6 +226,9 @@ static void open_devices(const char *wanted)
         if (patina_device_create(&desc, &slots[i].device) != PATINA_OK) {
             slots[i].device = NULL;
             patina_message(NULL, slots[i].reason, sizeof slots[i].reason);
+        } else if (key64 && !strncmp(choices[i].name, "gl", 2) && !slots[i].device->info.key64) {
+            fprintf(stderr, "%s has no 64-bit atomics\n", slots[i].device->info.description);
+            exit(2);
         }
     }
     if (!known) {
@@ -236,16 +240,19 @@ static void open_devices(const char *wanted)
 int harness_main(int argc, char **argv, const struct harness_case *cases, size_t count)
 {
     const char *wanted = "all";
+    int key64 = 0;
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--device") && i + 1 < argc) {
             wanted = argv[++i];
+        } else if (!strcmp(argv[i], "--key64")) {
+            key64 = 1;
         } else {
-            fprintf(stderr, "usage: %s [--device NAME|all]\n", argv[0]);
+            fprintf(stderr, "usage: %s [--device NAME|all] [--key64]\n", argv[0]);
             return 2;
         }
     }
     setvbuf(stdout, NULL, _IOLBF, 0);
-    open_devices(wanted);
+    open_devices(wanted, key64);
     size_t most = count * CHOICES, used = 0;
     struct CMUnitTest *tests = calloc(most + 1, sizeof *tests);
     struct entry *entries = calloc(most + 1, sizeof *entries);

@@ -45,6 +45,8 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
     struct ref_pixel pixel = ref_pixel(planes->keys[index], planes->from[index]);
     struct ref_range threshold = ref_exactly(INFINITY);
     if (pixel.id != PT_KEY_EMPTY_ID || !isinf(pixel.z.lo)) {
+        if (args->background)
+            return pixel;
         threshold = ref_difference(pixel.z,
                                    ref_level_distance(view, planes->normal, planes->deff, pixel.from, pixel.z));
     }

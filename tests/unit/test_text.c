@@ -156,6 +156,31 @@ static void test_ptx_grid(void **state)
     free(text);
 }
 
+// The same for arrays of a caller's; numbers that make no grid of the points give no normals, and take no memory.
+static void test_grid_normals(void **state)
+{
+    (void)state;
+    float position[9][3], n[9][3];
+    uint32_t column[9], row[9];
+    for (uint32_t i = 0; i < 9; i++) {
+        column[i] = i / 3, row[i] = i % 3;
+        position[i][0] = (float)column[i], position[i][1] = 7, position[i][2] = (float)row[i];
+    }
+    patina_grid_desc desc = {.struct_size = sizeof desc, .count = 9, .position = position[0], .column = column, .row = row, .station = {1, 20, 1}};
+    assert_int_equal(patina_grid_normals(&desc, NULL, n[0]), PATINA_OK);
+    for (int i = 0; i < 9; i++)
+        assert_true(n[i][0] == 0 && n[i][1] == 1 && n[i][2] == 0);
+    column[4] = UINT32_MAX, row[5] = 4000000000u;
+    assert_int_equal(patina_grid_normals(&desc, NULL, n[0]), PATINA_OK);
+    assert_true(n[0][1] == 0);
+    desc.count = 0;
+    assert_int_equal(patina_grid_normals(&desc, NULL, NULL), PATINA_OK);
+    desc.count = 9;
+    assert_int_equal(patina_grid_normals(&desc, NULL, NULL), PATINA_ERROR_ARGUMENT);
+    desc.struct_size = 0;
+    assert_int_equal(patina_grid_normals(&desc, NULL, n[0]), PATINA_ERROR_ARGUMENT);
+}
+
 static void refuse(const char *text, const char *part)
 {
     patina_file *file = NULL;
@@ -183,6 +208,7 @@ int main(void)
         cmocka_unit_test(test_values),
         cmocka_unit_test(test_ptx),
         cmocka_unit_test(test_ptx_grid),
+        cmocka_unit_test(test_grid_normals),
         cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -244,11 +244,12 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
                 continue;
             vf sums[SUMS], color[4], n[4];
             sums_of(tile, pixel, some, sums);
+            some = vm_and(some, vf_le(one, sums[7])); // what was filled shows none: it takes its source's
             vm colored = vm_and(some, vf_le(one, sums[3]));
             vf share = vf_rcp(vf_select(colored, sums[3], one));
             for (int k = 0; k < 3; k++)
                 color[k] = vf_select(colored, sums[k] * share, zero);
-            vf weight = vf_max(sums[7], one);
+            const vf weight = vf_max(sums[7], one);
             color[3] = vf_select(vf_lt(sums[3], weight), vf_min(sums[3] * vf_rcp(weight), one), one); // opaque: 1 exactly
             vf_load4(normals + 4 * at, n);
             mean_normal(bins->view, sums, px, py, of_discs(bins, vi_load_id(keys + at), some, 1), n);

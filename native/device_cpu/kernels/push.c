@@ -31,6 +31,8 @@ static uint32_t asked(const struct push *push, uint32_t x, uint32_t y, vf parent
     vm some = vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
     vf t = vf_select(some, z - pt_least_distance(&push->args->view, push->args->least, z), z); // what is nearer covers it
     uint32_t bits = vm_bits(vm_and(lanes, vf_lt(parent, t)));
+    if (push->args->background)
+        bits &= ~vm_bits(some);
     return x < rect[0] ? bits & ~((1u << (rect[0] - x)) - 1u) : bits;
 }
 

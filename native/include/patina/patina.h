@@ -336,6 +336,18 @@ PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba
 PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
 PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz, size_t size); // file coordinates: origin included
 PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
+// A scanner's grid, of one scan: which column and row each point lies in, and where the scanner stood, in the positions'
+// coordinates.
+typedef struct patina_grid_desc {
+    size_t struct_size;
+    uint64_t count;
+    const float *position; // 3 a point
+    const uint32_t *column, *row;
+    double station[3];
+} patina_grid_desc;
+// Normals as patina_file_open finds them in grids, towards the scanner, 3 a point into `normals`; 0 0 0 where a point lies in no
+// surface, and everywhere where the grid is nearly empty.
+PATINA_API int patina_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals);
 // Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
 // gives it classes.
 PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
@@ -741,6 +753,8 @@ PATINA_API int patina_task_apply(patina_task *task); // waits; PATINA_ERROR_EMPT
 // against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
 // written once the task is done. About as fast as memory is read.
 PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);
+PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals,
+                                        patina_task **out); // patina_grid_normals
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Virtual scans against exact views: our own settings, and VTK's points of 1 to 7 pixels, alike.
+
+    build/out/venv/bin/python tests/bench/scans.py [--scenes tuning|held|all|NAMES] [--cameras 0,1,…] [--modes MODE,…]
+        [--json FILE] [--quick]
+
+MODE: default, stations (normals face the scanners), filling, discs (ours); vtk 1, vtk 3 EDL, … (VTK); the default is all but
+stations."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(ROOT / "tests"), str(HERE)]
+
+from report import table  # noqa: E402
+from truth.scans import metrics, run  # noqa: E402
+from truth.scans.exact import Stage, camera  # noqa: E402
+from truth.scans.scenes import FOV, HEIGHT, SKY, STEP, WIDTH, Scene  # noqa: E402
+from truth.scans.solids import linear  # noqa: E402
+
+PYTHON = "/usr/bin/python3"  # Debian's, for its VTK
+OURS = {"default": ("on", []), "stations": ("stations", []), "filling": ("off", []), "discs": ("off", ["surface=1"])}
+VTK = ("vtk 1", "vtk 2", "vtk 3", "vtk 4", "vtk 5", "vtk 7", "vtk 3 EDL", "vtk 5 EDL")
+NEAR, FAR = 0.05, 500.0
+
+
+def _screen() -> list[str]:
+    if os.environ.get("DISPLAY"):
+        return []
+    return [shutil.which("xvfb-run"), "-a", "-s", "-screen 0 1280x1280x24"] if shutil.which("xvfb-run") else []
+
+
+def vtk_version() -> str:
+    """Of Debian's Python, or "" where there is none."""
+    try:
+        done = subprocess.run([PYTHON, "-c", "import vtk; print(vtk.vtkVersion().GetVTKVersion())"], capture_output=True, text=True)
+    except OSError:
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def vtk_rows(scenes: list[Scene], cameras: list[int], modes: list[str]) -> Iterator[dict[str, Any]]:
+    """Rows as run.measure gives them, with "mode"."""
+    sizes = [mode.removeprefix("vtk ") for mode in modes]
+    for scene in scenes:
+        stage = Stage(scene)
+        views = [(index, 0.0) for index in cameras] + [(index, STEP) for index in cameras if scene.views[index].motion]
+        with tempfile.TemporaryDirectory() as folder:
+            source = Path(folder) / "scan.npz"
+            np.savez(source, position=stage.scan.position.astype(np.float32), color=stage.scan.color,
+                     matrix=np.stack([camera(scene.views[index], step).matrix for index, step in views]), fov=FOV, width=WIDTH,
+                     height=HEIGHT, near=NEAR, far=FAR, sky=np.array(SKY))
+            done = subprocess.run([*_screen(), PYTHON, str(HERE / "peer_scans.py"), str(source), folder, *sizes],
+                                  capture_output=True, text=True)
+            if done.returncode:
+                raise OSError(f"VTK: {done.stderr.strip().splitlines()[-1:]}")
+            times = json.loads(done.stdout.splitlines()[-1])
+            for size in sizes:
+                pictures = []
+                for number in range(len(views)):
+                    with np.load(Path(folder) / f"{size.replace(' ', '_')}-{number}.npz") as arrays:
+                        pictures.append((linear(arrays["rgb"] / 255.0).astype(np.float32), arrays["depth"]))
+                for number, index in enumerate(cameras):
+                    row = {"scene": scene.name, "held_out": scene.held_out, "camera": index, "points": len(stage.scan),
+                           "mode": f"vtk {size}", **metrics.measure(stage.view(index), *pictures[number]),
+                           "ms": times[size][number]}
+                    if scene.views[index].motion:
+                        moved = pictures[views.index((index, STEP))][0]
+                        row["flicker"] = metrics.flicker((stage.view(index), stage.view(index, True)),
+                                                         (pictures[number][0], moved))
+                    yield row
+
+
+def our_rows(scenes: list[Scene], cameras: list[int], mode: str) -> list[dict[str, Any]]:
+    analysis, settings = OURS[mode]
+    options = argparse.Namespace(device="cpu", threads=0, analysis=analysis, set=settings, style=[], effect=[], hook=None)
+    rows = run.measure(run.Drawer(options), scenes, cameras)
+    return [{**row, "mode": mode} for row in rows]
+
+
+def means(rows: list[dict[str, Any]], held_out: bool) -> dict[str, float]:
+    """Of a mode; scenes weigh alike."""
+    names = dict.fromkeys(row["scene"] for row in rows if row["held_out"] == held_out)
+    return run.mean([run.mean([row for row in rows if row["scene"] == name]) for name in names])
+
+
+def markdown(rows: list[dict[str, Any]]) -> str:
+    """A line a mode, over the scenes that rules were tuned on and over the others."""
+    head = ["", *run.TITLES]
+    body = []
+    for held_out, title in ((False, "scenes for tuning"), (True, "scenes held out")):
+        for mode in dict.fromkeys(row["mode"] for row in rows):
+            some = [row for row in rows if row["mode"] == mode]
+            if any(row["held_out"] == held_out for row in some):
+                body.append([f"{title}: {NAMES.get(mode, mode.replace('vtk', 'VTK, pixels:'))}", *run.cells(means(some, held_out))])
+    return table(head, body)
+
+
+NAMES = {"default": "Patina", "stations": "Patina, scanners known", "filling": "Patina, filling alone",
+         "discs": "Patina, discs of 1.75 spacings"}
+SHOWN = ("default", "filling", "discs", *VTK)  # of the bench
+
+
+def all_rows(scenes: list[Scene], cameras: list[int], modes: list[str]) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for mode in modes:
+        if mode in OURS:
+            rows += our_rows(scenes, cameras, mode)
+    wanted = [mode for mode in modes if mode.startswith("vtk")]
+    if wanted and vtk_version():
+        rows += vtk_rows(scenes, cameras, wanted)
+    return rows
+
+
+def measure(quick: bool) -> list[dict[str, Any]]:
+    """Rows of the bench. quick: two scenes, two cameras."""
+    if quick:
+        return all_rows(run.scenes_of("railing,stairs"), [0, 1], ["default", "filling", "vtk 3"])
+    return all_rows(run.scenes_of("all"), list(range(8)), list(SHOWN))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", default="all")
+    parser.add_argument("--cameras", default="0,1,2,3,4,5,6,7")
+    parser.add_argument("--modes", default=",".join(SHOWN))
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    rows = all_rows(run.scenes_of(options.scenes), [int(one) for one in options.cameras.split(",")], options.modes.split(","))
+    print(markdown(rows))
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Virtual scanners: what stations, an aircraft, or photographs bring home of a world of triangles.
+
+A beam is six rays: its middle and five around it. Where they meet surfaces at different distances, the range is between
+them in proportion (a mixed pixel), if they lie within the length of the pulse; else most of it decides. Noise lies along the
+beam; each station is off by a small turn and shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scenes import Survey
+from .solids import World
+
+AROUND = 5  # rays of a beam beside its middle
+PULSE = 1.5  # metres; surfaces further apart than this are told apart, as a rule
+LOWEST = -62.0  # degrees; a station does not see the ground beneath its tripod
+HIGHEST = 85.0
+DARK = 0.04  # linear albedo below which half of the returns are lost
+CHUNK = 1 << 18
+
+
+@dataclass(eq=False)
+class Scan:
+    """position float64 (n, 3) as told; color uint8 sRGB (n, 3); scan, row, column int32 (n,); stations (k, 3). What only the
+    truth knows: true_position (n, 3), surface (n,) of the nearest part in the beam, -1 for a place between two; interval
+    (n,): metres between samples across the beam, cosine (n,) at the surface, normal float32 (n, 3) toward the scanner, beam (n, 3)
+    float32: the way of the light. shape: rows and columns of each scan's grid."""
+
+    position: np.ndarray
+    color: np.ndarray
+    scan: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    stations: np.ndarray
+    true_position: np.ndarray
+    surface: np.ndarray
+    interval: np.ndarray
+    cosine: np.ndarray
+    normal: np.ndarray
+    beam: np.ndarray
+    shape: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+def srgb_bytes(linear: np.ndarray) -> np.ndarray:
+    value = np.clip(linear, 0.0, 1.0)
+    return np.rint(255.0 * np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)).astype(np.uint8)
+
+
+def beams(world: World, origin: np.ndarray, direction: np.ndarray, survey: Survey, random: np.random.Generator,
+          aperture: float = 0.006) -> dict[str, np.ndarray]:
+    """Unit directions (n, 3), origin (3,) or (n, 3) → index of the beams that return (k,), range (k,) without noise, colour,
+    surface, true_position, cosine, each (k, ...)."""
+    found: list[dict[str, np.ndarray]] = []
+    for begin in range(0, len(direction), CHUNK):
+        way = direction[begin : begin + CHUNK]
+        start = origin[begin : begin + CHUNK] if origin.ndim == 2 else origin
+        n = len(way)
+        u = np.cross(way, np.array([0.31, 0.52, 0.795]))
+        u /= np.linalg.norm(u, axis=1)[:, None]
+        v = np.cross(way, u)
+        t, triangle = np.empty((AROUND + 1, n)), np.empty((AROUND + 1, n), np.int32)
+        place, rgb = np.empty((AROUND + 1, n, 3)), np.zeros((AROUND + 1, n, 3), np.float32)
+        for k in range(AROUND + 1):
+            turn, wide = 2.0 * np.pi * k / AROUND, 0.35 * (k > 0)
+            out = wide * (np.cos(turn) * u + np.sin(turn) * v)
+            from_, ray = start + aperture * out, way + survey.divergence * out
+            t[k], triangle[k] = world.rays.trace(from_, ray)
+            hit = triangle[k] >= 0
+            place[k] = np.where(hit[:, None], from_ + np.where(hit, t[k], 0.0)[:, None] * ray, np.nan)
+            rgb[k, hit] = world.rays.albedo(place[k, hit], triangle[k, hit])
+        met = np.isfinite(t)
+        count = met.sum(axis=0)
+        nearest = np.where(met, t, np.inf).min(axis=0)
+        first = met & (t < nearest + 0.05)  # of the nearest surface
+        share = first.sum(axis=0) / np.maximum(count, 1)
+        with np.errstate(invalid="ignore"):
+            behind = np.nansum(np.where(met & ~first, t, 0.0), axis=0) / np.maximum((met & ~first).sum(axis=0), 1)
+            near = np.sum(np.where(first, t, 0.0), axis=0) / np.maximum(first.sum(axis=0), 1)
+        mixed = (share < 1.0) & (count > 0)
+        blend = mixed & (behind - near < PULSE)
+        far_wins = mixed & ~blend & (random.random(n) > share)
+        range_ = np.where(blend, share * near + (1.0 - share) * behind, np.where(far_wins, behind, near))
+        chosen = np.where(blend[None], met, np.where(far_wins[None], met & ~first, first))
+        weight = chosen[..., None] / np.maximum(chosen.sum(axis=0), 1)[None, :, None]
+        color = (weight * rgb).sum(axis=0)
+        which = np.where(chosen[0], 0, chosen.argmax(axis=0))
+        each = np.arange(n)
+        tri = triangle[which, each]
+        truth = place[which, each]
+        slope = np.einsum("ij,ij->i", way, world.normal[tri])
+        cosine, normal = np.abs(slope), world.normal[tri] * -np.sign(slope)[:, None]
+        between = blend & (np.abs(range_ - t[which, each]) > 0.02)
+        lost = (count < 3) | (random.random(n) < survey.drop)
+        lost |= random.random(n) > np.clip(cosine / 0.06, 0.0, 1.0)
+        lost |= (color.mean(axis=1) < DARK) & (random.random(n) < 0.5)
+        keep = np.flatnonzero(~lost)
+        found.append({"index": keep + begin, "range": range_[keep], "color": color[keep], "true_position": truth[keep],
+                      "surface": np.where(between[keep], -1, world.surface[tri[keep]]), "cosine": cosine[keep],
+                      "normal": normal[keep].astype(np.float32), "beam": way[keep].astype(np.float32)})
+    return {name: np.concatenate([one[name] for one in found]) for name in found[0]}
+
+
+def _small_turn(random: np.random.Generator, angle: float) -> np.ndarray:
+    x, y, z = random.normal(scale=angle, size=3)
+    q, _ = np.linalg.qr(np.array([[1.0, -z, y], [z, 1.0, -x], [-y, x, 1.0]]))
+    return q * np.sign(np.diag(q))
+
+
+def _finish(parts: list[dict[str, np.ndarray]], stations: np.ndarray, shape: np.ndarray, random: np.random.Generator) -> Scan:
+    whole = {name: np.concatenate([one[name] for one in parts]) for name in parts[0]}
+    color = srgb_bytes(whole["color"]).astype(np.int16) + np.rint(random.normal(scale=1.5, size=whole["color"].shape)).astype(np.int16)
+    return Scan(whole["position"], np.clip(color, 0, 255).astype(np.uint8), whole["scan"].astype(np.int32),
+                whole["row"].astype(np.int32), whole["column"].astype(np.int32), stations, whole["true_position"],
+                whole["surface"].astype(np.int32), whole["interval"], whole["cosine"], whole["normal"], whole["beam"], shape)
+
+
+def stations(world: World, survey: Survey, random: np.random.Generator) -> Scan:
+    """Spherical grids, row 0 lowest."""
+    rows, columns = int((HIGHEST - LOWEST) / survey.step), int(round(360.0 / survey.step))
+    rise = np.radians(LOWEST + survey.step * np.arange(rows))
+    parts = []
+    for number, eye in enumerate(survey.stations):
+        eye = np.asarray(eye, float)
+        turn = np.radians(survey.step * (np.arange(columns) + 0.37 * number))
+        a, e = np.meshgrid(turn, rise)
+        way = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], axis=2).reshape(-1, 3)
+        got = beams(world, eye, way, survey, random)
+        index = got.pop("index")
+        noisy = got["range"] + random.normal(scale=survey.noise, size=len(index))
+        shift = random.normal(scale=survey.registration / np.sqrt(3.0), size=3)
+        place = eye + (noisy[:, None] * way[index]) @ _small_turn(random, 2e-4).T + shift
+        parts.append({**got, "position": place, "scan": np.full(len(index), number), "row": index // columns,
+                      "column": index % columns, "interval": got["range"] * np.radians(survey.step)})
+    return _finish(parts, np.array(survey.stations), np.array([[rows, columns]] * len(survey.stations)), random)
+
+
+def airborne(world: World, survey: Survey, random: np.random.Generator) -> Scan:
+    """Two strips of parallel lines, seen from 20 degrees to either side, 200 m away; no stations are told."""
+    x0, y0, x1, y1 = survey.area
+    parts = []
+    for number, tilt in enumerate((20.0, -20.0)):
+        step = survey.step * np.sqrt(2.0)
+        x, y = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
+        x = x + random.normal(scale=0.1 * step, size=x.shape)
+        y = y + random.normal(scale=0.1 * step, size=y.shape)
+        columns = x.shape[1]
+        down = np.array([np.sin(np.radians(tilt)), 0.0, -np.cos(np.radians(tilt))])
+        sway = np.radians(4.0) * np.sin(np.linspace(0, np.pi, columns))[None, :, None] * np.array([0.0, 1.0, 0.0])
+        way = (down + np.broadcast_to(sway, (*x.shape, 3))).reshape(-1, 3)
+        way = way / np.linalg.norm(way, axis=1)[:, None]
+        eye = np.stack([x, y, np.zeros_like(x)], axis=2).reshape(-1, 3) - 200.0 * way
+        got = beams(world, eye, way, survey, random)
+        index = got.pop("index")
+        noisy = got["range"] + random.normal(scale=survey.noise, size=len(index))
+        shift = random.normal(scale=survey.registration / np.sqrt(3.0), size=3)
+        parts.append({**got, "position": eye[index] + noisy[:, None] * way[index] + shift, "scan": np.full(len(index), number),
+                      "row": index // columns, "column": index % columns, "interval": np.full(len(index), step)})
+    return _finish(parts, np.zeros((0, 3)), np.zeros((0, 2), int), random)
+
+
+def photos(world: World, survey: Survey, random: np.random.Generator) -> Scan:
+    """Pixels of photographs, more where they are textured; depth noise along the view rays that grows with the distance, in
+    patches; holes where nothing is textured; no grids are told."""
+    each = int(4.0 * survey.count / len(survey.stations))
+    parts = []
+    for number, eye in enumerate(survey.stations):
+        eye = np.asarray(eye, float)
+        middle = 0.5 * (world.corners.reshape(-1, 3).min(axis=0) + world.corners.reshape(-1, 3).max(axis=0))
+        back = eye - middle * [1.0, 1.0, 0.8]
+        back /= np.linalg.norm(back)
+        right = np.cross([0.0, 0.0, 1.0], back)
+        right /= np.linalg.norm(right)
+        up = np.cross(back, right)
+        uv = random.uniform(-1.0, 1.0, (each, 2)) * np.tan(np.radians(38.0))
+        way = uv[:, :1] * right + uv[:, 1:] * up - back
+        way /= np.linalg.norm(way, axis=1)[:, None]
+        got = beams(world, eye, way, survey, random, 0.0)
+        index = got.pop("index")
+        _, other = world.rays.trace(eye, way[index] + 0.002 * random.normal(size=(len(index), 3)))
+        hit = other >= 0
+        contrast = np.zeros(len(index))
+        near = world.rays.albedo(got["true_position"] + 0.008 * random.normal(size=(len(index), 3)), np.where(hit, other, 0))
+        contrast[hit] = np.abs(near - got["color"]).mean(axis=1)[hit]
+        keep = np.flatnonzero(random.random(len(index)) < np.clip(0.3 + 12.0 * contrast, 0.0, 1.0))
+        got, index = {name: values[keep] for name, values in got.items()}, index[keep]
+        patch = np.sin(31.0 * got["true_position"][:, 0] + number) * np.sin(27.0 * got["true_position"][:, 2] + 2.0 * number)
+        depth = got["range"] * survey.noise * (random.normal(size=len(index)) + 0.7 * patch)
+        stray = random.random(len(index)) < 0.004
+        depth[stray] += random.normal(scale=0.06, size=int(stray.sum()))
+        shift = random.normal(scale=0.001, size=3)
+        place = eye + (got["range"] + depth)[:, None] * way[index] + shift
+        alone = got["range"] * 2.0 * np.tan(np.radians(38.0)) * np.sqrt(1.0 / (0.65 * each))
+        parts.append({**got, "position": place, "scan": np.full(len(index), number), "row": np.zeros(len(index)),
+                      "column": np.zeros(len(index)), "interval": alone})
+    return _finish(parts, np.zeros((0, 3)), np.zeros((0, 2), int), random)
+
+
+PATTERNS = {"stations": stations, "airborne": airborne, "photos": photos}
+
+
+def scan(world: World, survey: Survey, seed: int = 1) -> Scan:
+    return PATTERNS[survey.pattern](world, survey, np.random.default_rng(seed))
