@@ -146,7 +146,7 @@ class _CloudStyle(_Descriptor):
                 ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p), ("ramp_count", c_uint32),
                 ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
                 ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
-                ("hidden_kinds", c_uint32), ("least_certainty", c_float)]
+                ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float)]
 
 
 class _Clip(_Descriptor):
@@ -272,6 +272,7 @@ _CALLS = {
     "patina_cloud_analyse": (c_void_p, POINTER(_AnalysisDesc), c_void_p),
     "patina_cloud_neighbourhoods": (c_void_p, POINTER(_Neighbourhoods), c_void_p),
     "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
+    "patina_cloud_dense_box": (c_void_p, c_void_p, c_void_p),
     "patina_scene_set_camera": (c_void_p, POINTER(_Camera)),
     "patina_scene_set_lines": (c_void_p, POINTER(_Lines)),
     "patina_scene_set_settings": (c_void_p, POINTER(_Settings)),
@@ -445,7 +446,7 @@ class Task(_Handle):
         self._finish = finish
 
     def done(self) -> bool:
-        return bool(library().patina_task_done(self._handle))
+        return not self._finalizer.alive or bool(library().patina_task_done(self._handle))
 
     def result(self) -> Any:
         """Waits; raises what the call would have raised, else gives its result. Once: then the task is closed."""
@@ -599,7 +600,7 @@ class Cloud(_Handle):
 
     def start_analysis(self, neighbours: int = 0, stations: np.ndarray | None = None, station: np.ndarray | None = None,
                        keep_normals: bool = True, progress: Progress | None = None, free_space: bool = False,
-                       grid: tuple[np.ndarray, np.ndarray] | None = None) -> Task:
+                       grid: tuple[np.ndarray, np.ndarray] | None = None, threads: int = 0) -> Task:
         """analyse, beside pictures: its result() changes the cloud, and no picture of it may be drawn then."""
         def apply(task: Task) -> None:
             task._call("apply")
@@ -607,7 +608,7 @@ class Cloud(_Handle):
 
         stations = None if stations is None else np.ascontiguousarray(stations, np.float64)
         return Task("analyse", self._handle,
-                    byref(self._describe_analysis(neighbours, stations, station, keep_normals, 0, free_space, grid)),
+                    byref(self._describe_analysis(neighbours, stations, station, keep_normals, threads, free_space, grid)),
                     _handle_of(progress), keep=(self, stations, station, grid, progress), finish=apply)
 
     def neighbourhoods(self, *names: str, neighbours: int = 16, progress: Progress | None = None,
@@ -626,6 +627,12 @@ class Cloud(_Handle):
         """Other scalars for the same points; as start_colors."""
         self._call("set_scalars", byref(_view(scalars, self.count)))
         self.has_scalars = scalars is not None
+
+    def dense_box(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Of the points without strays."""
+        lower, upper = (c_double * 3)(), (c_double * 3)()
+        self._call("dense_box", lower, upper)
+        return tuple(lower), tuple(upper)
 
     def scalar_range(self, share: float) -> tuple[float, float]:
         """The scalars that this share of the points lies below and above."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from . import jobs, native
 from .sync import Camera, DeviceChoice, SceneDescription
+from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
 
 ANTIALIAS_OFF = 2  # PATINA_ANTIALIAS_OFF
@@ -88,7 +89,8 @@ def _with_frame(description: SceneDescription, work: Callable[[native.Frame, nat
     device = device_for(description.device)
     with native.Scene() as scene, native.Frame(device) as frame:
         describe(scene, description, [])
-        jobs.run(lambda: work(frame, scene), frame.cancel, lambda: False)
+        with ANALYSES.drawing():
+            jobs.run(lambda: work(frame, scene), frame.cancel, lambda: False)
 
 
 def _load_shadows(frame: native.Frame, description: SceneDescription) -> str:
@@ -137,7 +139,8 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
                     picture[name][region[1] - y0:region[3] - y0, region[0] - x0:region[2] - x0] = pixels
                 done += 1
 
-        jobs.run(work, frame.cancel, lambda: poll((done + frame.progress()) / len(regions)))
+        with ANALYSES.drawing():
+            jobs.run(work, frame.cancel, lambda: poll((done + frame.progress()) / len(regions)))
         return Picture(picture, stats, device.name, notice)
 
 
@@ -218,7 +221,8 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
     scene.set_camera(**asdict(description.camera))
     if description.lines:
         scene.set_lines(**asdict(description.lines))
-    for light in description.lights:
+    headlight = [description.headlight.of(description.camera)] if description.headlight else []
+    for light in [*description.lights, *headlight]:
         scene.add_light(**asdict(light))
     for clip in description.clips:
         scene.add_clip(**asdict(clip))

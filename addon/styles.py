@@ -329,9 +329,9 @@ def dress(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
 
 
 def _set(owner: bpy.types.ID, names: Iterable[str], values: dict[str, Any], kept: list[str]) -> None:
-    animated, changed = _animated(owner), False
+    moving, changed = animated(owner), False
     for path, kind in _properties(owner.patina.bl_rna, names):
-        if f"patina.{path}" in animated:
+        if f"patina.{path}" in moving:
             kept.append(f"{owner.name}: {path}")
             continue
         group, name = _owner(owner.patina, path)
@@ -348,7 +348,7 @@ def _get(group: bpy.types.PropertyGroup, name: str) -> Any:
     return value if isinstance(value, (bool, int, float, str)) else tuple(value)
 
 
-def _animated(owner: bpy.types.ID) -> set[str]:
+def animated(owner: bpy.types.ID) -> set[str]:
     """Paths of properties that curves or drivers set."""
     data = owner.animation_data
     if data is None:

@@ -22,6 +22,9 @@ from gpu_extras.batch import batch_for_shader
 
 from . import native, pace, render, sync
 from .jobs import Pause, Steps
+from .sync import analysis
+from .sync.analyzing import ANALYSES
+from .sync.clouds import CACHE
 
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
@@ -156,10 +159,11 @@ class Viewport:
         if self._progress:
             self._progress.cancel()
         if self._task:
-            self._task.close()  # before what it uses
+            ANALYSES.end_frame(self._task, close=True)  # before what it uses
         if self._steps:
             self._steps.close()
         self._drawn = self._frame = self._steps = self._task = None  # here, for textures go on Blender's thread
+        ANALYSES.wish(self, [])
         _VIEWPORTS.discard(self)
         if self in _TURNS:
             _TURNS.remove(self)
@@ -189,6 +193,9 @@ class Viewport:
             return "Reading points"
         if not self.shown:
             return ""
+        under_way = [item.cloud for item in self.shown.clouds if item.cloud in ANALYSES]
+        if under_way:
+            return analysis.label(under_way[0])
         return f"{self.shown.stats['points']:,} points, {self.shown.stats['ms']:.0f} ms, {self.shown.device}"
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
@@ -249,9 +256,19 @@ class Viewport:
             self._spare = [self.shown.color, self.shown.depth] if self.shown else []
             self.shown = shown
             self.pictures += 1
+            self._wish_analyses()
             if shown.stats["shadow_pending"] and not self._wanted:
                 self._wanted = wish  # more samples of soft shadows
         return True
+
+    def _wish_analyses(self) -> None:
+        pending = [item.cloud for item in self.shown.wish.scene.clouds if item.cloud.analyzed]
+        ANALYSES.wish(self, [(cloud.built, cloud.stations) for cloud in pending])
+
+    def analyzed(self, clouds: list[native.Cloud]) -> None:
+        """Of these clouds all is known now: what it shows of them is drawn again."""
+        if self._last and self.shown and any(item.cloud in clouds for item in self.shown.clouds):
+            self._ask(self._last.level)
 
     def wants(self) -> bool:
         return self._wanted is not None
@@ -294,13 +311,19 @@ class Viewport:
             render.describe(scene, description, ["DEPTH"])
             settings = description.settings
             x0, y0, x1, y1 = settings.region
-            task = frame.start(scene, ("COMBINED", "DEPTH"), y1 - y0, x1 - x0, self._spare)
+            def start() -> native.Task:
+                return frame.start(scene, ("COMBINED", "DEPTH"), y1 - y0, x1 - x0, self._spare)
+
+            while (task := ANALYSES.begin_frame(start)) is None:
+                yield Pause()
             self._rendering = True
             try:
                 yield task
+                ANALYSES.end_frame(task)
                 planes = task.result()
             finally:
                 self._rendering = False
+                ANALYSES.end_frame(task)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
@@ -332,6 +355,7 @@ def forget_points() -> None:
 def close_all() -> None:
     for viewport in list(_VIEWPORTS):
         viewport.close()
+    ANALYSES.clear()
     _compiled.clear()
 
 
@@ -345,8 +369,11 @@ def _work(until: float) -> None:
 
 def _tick() -> float | None:
     _work(time.monotonic() + STAY)
-    again = False
+    changed = ANALYSES.advance(CACHE.final())
+    again = ANALYSES.busy()
     for viewport in list(_VIEWPORTS):
+        if changed:
+            viewport.analyzed(changed)
         again |= viewport.tick()
     return TICK if again else None
 

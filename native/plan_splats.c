@@ -40,7 +40,8 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
                                                              : cloud->shapes       ? PT_RADII_SHAPES
                                                                                    : PT_RADII_NONE,
                                                 .radius = instance->radius,
-                                                .radius_scale = instance->radius_scale};
+                                                .radius_scale = instance->radius_scale,
+                                                .radius_most = instance->radius_most};
         chunks += instance->chunk_count;
         for (uint32_t c = 0; c < instance->chunk_count; c++)
             points += instance->chunks[c].count;

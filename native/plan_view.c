@@ -178,12 +178,15 @@ static int knows_discs(const struct patina_scene *scene, const struct pt_instanc
             instance->cloud->shapes && pt_disc_ids(scene));
 }
 
-// Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
-static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
-                         const struct pt_chunk *chunk, double thinned, int most)
+// No disc is wider than this; 0: as wide as it is.
+static double radius_most(const struct pt_instance *instance, double thinned)
 {
-    if (!knows_discs(scene, instance))
-        return 0.0;
+    return fmin(0.5 * (double)instance->style.largest_gap * thinned, (double)PT_DISC_MOST);
+}
+
+static double own_reach(const struct pt_instance *instance, const struct object *object, const struct pt_chunk *chunk,
+                        double thinned, int most)
+{
     if (instance->style.radius > 0.0f)
         return (double)instance->style.radius * thinned;
     if (instance->cloud->info.has_radii)
@@ -191,6 +194,16 @@ static double disc_reach(const struct patina_scene *scene, const struct pt_insta
     if (instance->cloud->shapes)
         return (double)(most ? chunk->reach : chunk->footprint) * object->scale * thinned;
     return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
+}
+
+// Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
+static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
+                         const struct pt_chunk *chunk, double thinned, int most)
+{
+    if (!knows_discs(scene, instance))
+        return 0.0;
+    const double reach = own_reach(instance, object, chunk, thinned, most), limit = radius_most(instance, thinned);
+    return limit > 0.0 ? fmin(reach, limit) : reach;
 }
 
 // Whether a box lies beyond one side of the view, its part behind the camera too, where the screen bounds nothing. q: of its
@@ -651,6 +664,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     out->discs = wide;
     out->marked = pt_is_marked(instance);
     out->radius = (float)fmin((double)instance->style.radius * thinning(scene), (double)PT_DISC_MOST);
+    out->radius_most = (float)radius_most(instance, thinning(scene));
     out->radius_scale = (float)fmin(survey->objects[i].scale * thinning(scene), (double)PT_DISC_MOST);
     set_instance(&survey->camera, &survey->objects[i], instance, thinning(scene), &out->args);
     out->args.id_base += id_base;

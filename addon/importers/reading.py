@@ -72,12 +72,23 @@ class Progress:
         self._given = given
         self._native: native.Progress | None = None
         self._part: tuple[Progress, float] | None = None  # under way, and its share of the whole
+        self._doing = "Reading points"
 
     def value(self) -> float:
         inner, part = self._native, self._part
         if part:
             return self._value + part[1] * part[0].value()
         return inner.value() if inner else self._value
+
+    @property
+    def doing(self) -> str:
+        """What is under way, for the artist."""
+        part = self._part
+        return part[0].doing if part else self._doing
+
+    @doing.setter
+    def doing(self, what: str) -> None:
+        self._doing = what
 
     def cancel(self) -> None:
         self._cancelled = True
@@ -103,10 +114,14 @@ class Progress:
     @contextlib.contextmanager
     def inner(self) -> Iterator[native.Progress]:
         """For a call of the library. Stays open until this object goes, for other threads may look at it."""
-        self._native = self._given or native.Progress()
-        if self._cancelled:
-            self._native.cancel()
+        self.follow(self._given or native.Progress())
         yield self._native
+
+    def follow(self, progress: native.Progress) -> None:
+        """From now on this one says how far it is, and is cancelled."""
+        self._native = progress
+        if self._cancelled:
+            progress.cancel()
 
 
 def colors_of(rgb: np.ndarray) -> np.ndarray:

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from . import (clips, colors, combine, export_points, import_points, linked_points, plan, scanner, shadows, styles,
+from . import (analyze, clips, colors, combine, export_points, import_points, linked_points, plan, scanner, shadows, styles,
                view_transform)
 
-_MODULES = (clips, colors, import_points, export_points, combine, linked_points, plan, scanner, shadows, styles,
+_MODULES = (analyze, clips, colors, import_points, export_points, combine, linked_points, plan, scanner, shadows, styles,
             view_transform)
 
 

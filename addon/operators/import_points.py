@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import bpy
@@ -14,23 +13,18 @@ from bpy_extras.io_utils import ImportHelper
 from .. import importers, jobs, native, styles
 from ..importers import PointFile, origin
 from ..sync import linked, sequence
-from . import scanner
-
-TICK = 0.01  # seconds from one look at a user's import to the next
-SHARE = 0.03  # seconds that a look reads, and a step beyond
+from ..sync.analysis import SCANNERS
+from .steps import Stepped
 
 _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked at last
 
 
-class PATINA_OT_import_points(Operator, ImportHelper):
+class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
     """Import point files with colours, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf"""
 
     bl_idname = "import_scene.patina_points"
     bl_label = "Import Points"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
-
-    _invoked = False  # by a user, not by a script
-    _steps = None  # of the import under way; Blender evaluates annotations here
 
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in importers.FORMATS), options={'HIDDEN'})
     files: CollectionProperty(type=OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
@@ -80,47 +74,9 @@ class PATINA_OT_import_points(Operator, ImportHelper):
             for line in lines:
                 column.label(text=line)
 
-    # Files are read in steps: a script waits for the last one; a user's Blender goes on between them, and Esc ends it.
-
     def execute(self, context: Context) -> set[str]:
         self._progress = importers.Progress()
-        self._steps = self._link(context) if self.link else self._import(context)
-        if not self._invoked:
-            return jobs.finish(self._steps)
-        self._task = None
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {'RUNNING_MODAL'}
-
-    def modal(self, context: Context, event: bpy.types.Event) -> set[str]:
-        """A user's import goes on at each tick of a timer; all else that he does waits for its end."""
-        if event.type == 'ESC':
-            self._progress.cancel()
-        elif event.type != 'TIMER':
-            return {'RUNNING_MODAL'}
-        done, until = set(), time.monotonic() + SHARE
-        try:
-            while time.monotonic() < until:
-                if self._task is None or self._task.done():
-                    self._task = next(self._steps)
-                else:
-                    time.sleep(0.001)
-        except StopIteration as end:
-            done = end.value
-        text = f"Reading points: {100.0 * self._progress.value():.0f} %, Esc ends it"
-        context.workspace.status_text_set(None if done else text)
-        if not done:
-            return {'RUNNING_MODAL'}
-        context.window_manager.event_timer_remove(self._timer)
-        self._invoked = False  # other settings in the panel of the last operator: that waits
-        return done
-
-    def cancel(self, context: Context) -> None:
-        """Blender ends it, or the choice of files was given up."""
-        if self._steps:
-            self._progress.cancel()
-            self._steps.close()
-            context.workspace.status_text_set(None)
+        return self.begin(context, self._link(context) if self.link else self._import(context))
 
     def _import(self, context: Context) -> jobs.Steps[set[str]]:
         found, paths = [], self._paths()
@@ -138,7 +94,8 @@ class PATINA_OT_import_points(Operator, ImportHelper):
         for mesh, own in found:
             self._add(context, bpy.data.objects.new(mesh.name, mesh), own, shared)
         count = sum(len(mesh.vertices) for mesh, _ in found)
-        self.report({'INFO'}, f"Imported {count:,} points from {len(found)} file{'s' * (len(found) > 1)}")
+        self.report({'INFO'}, f"Imported {count:,} points from {len(found)} file{'s' * (len(found) > 1)}. In the sidebar, Patina > "
+                              "Frame Points aims the camera")
         return {'FINISHED'}
 
     def _ended(self, meshes: list[bpy.types.Mesh]) -> set[str]:
@@ -168,7 +125,7 @@ class PATINA_OT_import_points(Operator, ImportHelper):
             if name in found:
                 continue
             try:
-                source = linked.source(first)
+                source = linked.source(first, analyzed=name == first)  # of a sequence none is
                 if source is None:
                     raise native.PatinaError("there is no such file")
                 importers.reader(first)
@@ -182,11 +139,12 @@ class PATINA_OT_import_points(Operator, ImportHelper):
             name = path.stem.replace("#", "").rstrip("_-. ") or path.stem if self.sequence else path.stem
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
             if item.scanners:
-                obj.data[scanner.PROPERTY] = item.scanners
+                obj.data[SCANNERS] = item.scanners
             obj.patina.linked_file = str(path)
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, shared)
-        self.report({'INFO'}, f"Linked {sum(item.cloud.count for item in found.values()):,} points")
+        self.report({'INFO'}, f"Linked {sum(item.cloud.count for item in found.values()):,} points. In the sidebar, Patina > "
+                              "Frame Points aims the camera")
         return {'FINISHED'} if found else {'CANCELLED'}
 
     def _named(self, path: Path) -> tuple[Path, Path]:

@@ -11,12 +11,13 @@ from bpy.props import BoolProperty, IntProperty
 from bpy.types import Context, Operator
 from mathutils import Matrix, Vector
 
-PROPERTY = "patina_scanners"  # of the data: x, y, z of each, as the points' own coordinates
+from ..sync.analysis import SCANNERS
+
 
 
 def positions(obj: bpy.types.Object | None) -> np.ndarray:
     """(n, 3) in the object's coordinates, one a scan, NaN for one that does not say; n is 0 where nothing is known."""
-    known = obj.data.get(PROPERTY) if obj and obj.data else None
+    known = obj.data.get(SCANNERS) if obj and obj.data else None
     return np.empty((0, 3)) if known is None else np.array(known, np.float64).reshape(-1, 3)
 
 

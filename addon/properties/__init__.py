@@ -161,6 +161,14 @@ class PatinaObjectProperties(PropertyGroup):
     cull_back: BoolProperty(
         name="Backface Culling", override=_OVERRIDE, default=False,
         description="Leave out points that face away; only where the points have normals")
+    analysis: EnumProperty(
+        name="Analysis", override=_OVERRIDE, default='AUTO',
+        description="Whether Patina finds out from each point's neighbors how wide, how thick and which way the surface is there",
+        items=(
+            ('AUTO', "Automatic", "In the background, once; not for sequences and points that move, which would be analyzed in "
+                                  "every frame", 0),
+            ('ALWAYS', "Always", "Sequences and points that move too, in every frame", 1),
+            ('OFF', "Off", "Nothing is computed ahead: one spacing holds for many points", 2)))
     d_min: FloatProperty(
         name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
         unit='LENGTH', precision=4,
@@ -173,6 +181,31 @@ class PatinaObjectProperties(PropertyGroup):
     radius_attribute: StringProperty(
         name="Disc Radii", override=_OVERRIDE,
         description="Point attribute of numbers: the radius of each point's disc")
+    largest_gap: FloatProperty(
+        name="Largest Gap", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH',
+        precision=4,
+        description="Where points are discs none is wider than this, so that wider gaps stay open. 0: as wide as the neighbors of "
+                    "each point say")
+    free_space: EnumProperty(
+        name="Free Space", override=_OVERRIDE, default='OFF',
+        description="Points that another scan of the same file saw through: what passed by, reflections, edges that are not there. "
+                    "For clouds that know where their scanners stood",
+        items=(
+            ('OFF', "Off", "They are points as all others", 0),
+            ('SHOW', "Show", "They are magenta, where the points have their own colors", 1),
+            ('USE', "Hide", "They are not drawn and cast no shadow", 2)))
+    hide_stray: BoolProperty(
+        name="Stray", override=_OVERRIDE, default=False,
+        description="Points that are far from what their neighbors are part of are not drawn and cast no shadow")
+    hide_uncolored: BoolProperty(
+        name="Uncolored", override=_OVERRIDE, default=False,
+        description="Of points with colors, those that are quite black or have none are left out")
+    hide_unclassified: BoolProperty(
+        name="Unclassified", override=_OVERRIDE, default=False,
+        description="Points of the classes 0, never classified, and 1, unassigned, are not drawn and cast no shadow")
+    least_certainty: FloatProperty(
+        name="Least Certainty", override=_OVERRIDE, default=0.0, min=0.0, max=1.0, subtype='FACTOR',
+        description="Points whose neighbors leave more doubt about what they are part of are not drawn and cast no shadow")
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much the surface hides of what lies behind it")

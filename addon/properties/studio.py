@@ -39,6 +39,13 @@ class PatinaStudioProperties(PropertyGroup):
     ambient: FloatVectorProperty(
         name="Ambient", override=_OVERRIDE, default=(0.1, 0.1, 0.1), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
         description="Light from everywhere")
+    use_headlight: BoolProperty(
+        name="Headlight", override=_OVERRIDE, default=False,
+        description="A light shines from the camera or the view, beside the other lights and without shadows, on all points that "
+                    "are lit: scans without colors are seen from everywhere")
+    headlight: FloatProperty(
+        name="Strength", override=_OVERRIDE, default=3.0, min=0.0, soft_max=10.0,
+        description="Watts a square meter, as of Blender's suns: at 3.14 a surface that faces the camera shows its own color")
     use_background: BoolProperty(
         name="Background", override=_OVERRIDE, default=False,
         description="A colour of its own lies behind the points, in place of the world's")

@@ -18,7 +18,7 @@ from .camera import Camera, CameraError, Focus, Panorama, View, final_view, view
 from .clips import Clip, of_view as view_clips
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
 from .effects import Effects
-from .lights import Light
+from .lights import Headlight, Light
 from .lines import Lines
 from .meshes import MeshItem
 from .settings import DeviceChoice, Settings
@@ -36,6 +36,7 @@ class SceneDescription:
     meshes: list[MeshItem]
     clips: list[Clip]
     lights: list[Light]
+    headlight: Headlight | None
     lines: Lines | None
     camera: Camera
     panorama: Panorama | None  # all around from where the camera stands
@@ -83,6 +84,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         meshes=[item for item in items if isinstance(item, MeshItem)],
         clips=clips.collect(depsgraph),
         lights=lights.collect(depsgraph, notices),
+        headlight=lights.headlight(scene, view, notices),
         lines=lines.read(scene, view.camera),
         camera=view.camera,
         panorama=view.panorama,

@@ -104,6 +104,14 @@ def opacities(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     return None if values is None else np.ascontiguousarray(values[:, -1:])
 
 
+def without_uncolored(values: np.ndarray | None, rgb: np.ndarray | None) -> np.ndarray | None:
+    """Opacities that leave out points without a color: black as nothing else in a photograph, or no number."""
+    if rgb is None:
+        return values
+    colored = ((rgb[:, :3] > 0).any(axis=1) & ~np.isnan(rgb[:, :3]).any(axis=1)).astype(np.float32).reshape(-1, 1)
+    return colored if values is None else values * colored
+
+
 def scalars(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     """(count, 1) float32 of the named attribute."""
     attribute = _find(data, name, _NUMBERS) if name else None

@@ -16,7 +16,8 @@ from .. import jobs, native
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import attributes, clips, colors, estimates, linked, meshes
+from . import analysis, attributes, clips, colors, estimates, linked, meshes
+from .analyzing import ANALYSES
 from .camera import row_major
 
 # Clouds that the last picture did not use may stay up to this many bytes (24 a point): enough for the other view
@@ -37,6 +38,8 @@ class PointArrays:
     scalars: np.ndarray | None = None  # (n, 1) float32
     classes: np.ndarray | None = None  # (n, 1) uint8
     radii: np.ndarray | None = None  # (n, 1) float32
+    analyzed: bool = False
+    stations: analysis.Stations | None = None  # where the scanners stood
 
     def fingerprint(self) -> Steps[tuple[int, int]]:
         """Of the places, normals, opacities, radii and classes, and of the colours and scalars: what Blender's update tags miss
@@ -70,6 +73,10 @@ class CloudStyle:
     hidden_classes: tuple[int, ...] = (0,) * 8
     clip_off: int = 0
     radius: float = 0.0
+    largest_gap: float = 0.0
+    free_space: int = 0
+    hidden_kinds: int = 0
+    least_certainty: float = 0.0
 
 
 class Pending:
@@ -80,6 +87,8 @@ class Pending:
         self._identity = identity
         self._arrays: PointArrays | None = arrays
         self._cloud: native.Cloud | None = None
+        self.analyzed = arrays is not None and arrays.analyzed  # in time; a linked one is before it is seen
+        self.stations = arrays.stations if arrays else None
 
     @property
     def built(self) -> native.Cloud | None:
@@ -133,6 +142,9 @@ class CloudCache:
             with self._lock:
                 self._finals -= 1
 
+    def final(self) -> bool:
+        return self._finals > 0
+
     def obtain(self, identity: tuple, arrays: PointArrays, progress: native.Progress | None = None,
                recolor: bool = False) -> Steps[native.Cloud]:
         """The cloud of these points: the one that is there, that one with new colours (recolor), or a new one."""
@@ -142,7 +154,7 @@ class CloudCache:
             if fingerprint == known:
                 self._entries[identity] = (known, cloud)
                 return cloud
-            recolor = recolor and not self._finals and known[:1] == fingerprint[:1]
+            recolor = recolor and not self._finals and known[:1] == fingerprint[:1] and cloud not in ANALYSES
         if recolor:  # out of the cache: nobody takes it meanwhile
             task = cloud.start_colors(arrays.colors)
         else:
@@ -225,7 +237,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
                 continue
         patina = depsgraph.scene_eval.patina
         faces_as = 0 if not solid else TRIANGLES if patina.meshes == 'TRIANGLES' else patina.mesh_points
-        place = link.identity() if link else (obj.data.as_pointer(), faces_as, *_attribute_names(obj))
+        place = link.identity() if link else (obj.data.as_pointer(), faces_as, *_attribute_names(obj), analysis.wanted(obj))
         if place not in taken:
             identity = place if link else (*_identity(obj, used), faces_as)
             used.add(identity)
@@ -260,8 +272,11 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
         name = obj.name
         progress = Progress()
 
+        def stopped() -> bool:
+            return poll(f"{progress.doing} of '{name}'", progress.value())
+
         def pause() -> None:
-            if poll(f"Reading points of '{name}'", progress.value()):
+            if stopped():
                 raise native.PatinaCancelled("cancelled", native.CANCELLED)
 
         if identity[-1] == TRIANGLES:
@@ -275,9 +290,13 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
             if link:
                 return jobs.finish(CACHE.obtain_linked(link, progress))
             with progress.inner() as inner:
-                return jobs.finish(CACHE.obtain(identity, arrays, inner))
+                cloud = jobs.finish(CACHE.obtain(identity, arrays, inner))
+            if arrays.analyzed and not cloud.has_shapes:
+                progress.doing = analysis.label(cloud)
+                ANALYSES.finish(cloud, arrays.stations, progress.follow)
+            return cloud
 
-        cloud = jobs.run(work, progress.cancel, lambda: poll(f"Reading points of '{name}'", progress.value()))
+        cloud = jobs.run(work, progress.cancel, stopped)
         if cloud.invalid_positions:
             notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
         if link and link.scalar and not cloud.has_scalars:
@@ -350,16 +369,16 @@ def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:
     owner = obj.original if original == obj.data else original
     # session_uid came with Blender 4.1
     base = (type(owner).__name__, getattr(owner, "session_uid", None) or owner.name_full, obj.type,
-            *_attribute_names(obj))
+            *_attribute_names(obj), analysis.wanted(obj))
     number = 0
     while (*base, number) in used:
         number += 1
     return (*base, number)
 
 
-def _attribute_names(obj: bpy.types.Object) -> tuple[str, ...]:
+def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
     return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute, colors.scalar_name(obj),
-            obj.patina.colors.class_attribute, obj.patina.radius_attribute)
+            obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored)
 
 
 def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
@@ -394,7 +413,11 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
                               ("scalar", scalar, scalars), ("class", class_name, classes)):
         if name and found is None:
             notices.append(f"'{obj.name}' has no point attribute '{name}' to take as {kind}")
-    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii)
+    if obj.patina.hide_uncolored:
+        opacities = attributes.without_uncolored(opacities, rgb)
+    analyzed = analysis.wanted(obj)
+    stations = analysis.stations(obj, count) if analyzed else None
+    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations)
 
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
@@ -413,6 +436,10 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         transparency=1.0 - patina.opacity,
         shadow_off=_shadow_off(obj),
         radius=patina.radius,
+        largest_gap=patina.largest_gap,
+        free_space=enum_number(patina, "free_space"),
+        hidden_kinds=int(patina.hide_stray) << native.KINDS.index("STRAY"),
+        least_certainty=patina.least_certainty,
         **colors.style_fields(obj))
 
 

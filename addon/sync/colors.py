@@ -14,6 +14,7 @@ from ..properties.colors import CLASSES
 
 OWN = 0  # PATINA_COLOR_OWN
 SCALAR = 2  # PATINA_COLOR_SCALAR
+UNCLASSIFIED = 1 << 0 | 1 << 1  # bits of the classes: never classified, unassigned
 
 
 def style_fields(obj: bpy.types.Object) -> dict[str, Any]:
@@ -24,7 +25,7 @@ def style_fields(obj: bpy.types.Object) -> dict[str, Any]:
         "ramp_range": _range(group),
         "exposure": group.exposure,
         "contrast": group.contrast,
-        "hidden_classes": hidden_classes(group),
+        "hidden_classes": _hidden_classes(obj),
         "clip_off": int(not group.use_clips),
     }
 
@@ -52,6 +53,11 @@ def _range(group: bpy.types.PropertyGroup) -> tuple[float, float]:
     if group.use_range:
         return (group.range_min, group.range_max)
     return (0.0, 255.0) if group.ramp == 'CLASSES' and group.source == 'SCALAR' else (0.0, 0.0)
+
+
+def _hidden_classes(obj: bpy.types.Object) -> tuple[int, ...]:
+    first, *others = hidden_classes(obj.patina.colors)
+    return (first | UNCLASSIFIED * obj.patina.hide_unclassified, *others)
 
 
 def hidden_classes(group: bpy.types.PropertyGroup) -> tuple[int, ...]:

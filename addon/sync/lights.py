@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import bpy
 from mathutils import Matrix, Vector
 
+from .camera import Camera, View
+
 TYPES = {'SUN': 1, 'POINT': 2, 'SPOT': 3, 'AREA': 4}  # patina_light_type
 MOST = 32  # lights of a scene in the library
 # Of an area light's power Cycles radiates pi / 4 in Blender 3.4, all of it in 4.2, 4.5 and 5.0: measured.
@@ -35,6 +37,28 @@ class Light:
     shadows: int
 
 
+@dataclass(frozen=True)
+class Headlight:
+    """Goes where the camera goes."""
+
+    color: tuple[float, float, float]
+    power: float
+
+    def of(self, camera: Camera) -> Light:
+        back = Vector(camera.world_from_camera[2:11:4]).normalized()
+        return _sun(self.color, self.power, -back, 0.0, False)
+
+
+def headlight(scene: bpy.types.Scene, view: View, notices: list[str]) -> Headlight | None:
+    studio = scene.patina.studio
+    if not studio.use_headlight or studio.headlight <= 0.0:
+        return None
+    if view.panorama:
+        notices.append("the headlight is off: a panorama looks everywhere")
+        return None
+    return Headlight((1.0, 1.0, 1.0), studio.headlight)
+
+
 def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Light]:
     if depsgraph.scene_eval.patina.studio.use_light:
         return _studio(depsgraph.scene_eval)
@@ -48,9 +72,10 @@ def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Light]:
         if power <= 0.0 or max(color) <= 0.0:  # zero would mean "default" to the library
             continue
         lights.append(_light(obj.data, instance.matrix_world, color, power, use_shadows))
-    if len(lights) > MOST:
-        notices.append(f"only the {MOST} strongest of {len(lights)} lights shine")
-        lights = sorted(lights, key=lambda light: -light.power * max(light.color))[:MOST]
+    most = MOST - depsgraph.scene_eval.patina.studio.use_headlight
+    if len(lights) > most:
+        notices.append(f"only the {most} strongest of {len(lights)} lights shine")
+        lights = sorted(lights, key=lambda light: -light.power * max(light.color))[:most]
     return lights
 
 
@@ -68,11 +93,14 @@ def _studio(scene: bpy.types.Scene) -> list[Light]:
             continue
         around = heading + azimuth
         toward = Vector((math.sin(around) * math.cos(height), -math.cos(around) * math.cos(height), math.sin(height)))
-        lights.append(Light(
-            type=TYPES['SUN'], color=tuple(studio.color), power=strength, position=(0.0, 0.0, 0.0),
-            direction=tuple(-toward), side=(0.0, 0.0, 0.0), angle=studio.angle, radius=0.0, size=(0.0, 0.0), shape=0,
-            cone=0.0, blend=0.0, shadows=int(shadows)))
+        lights.append(_sun(tuple(studio.color), strength, -toward, studio.angle, shadows))
     return lights
+
+
+def _sun(color: tuple[float, float, float], power: float, direction: Vector, angle: float, shadows: bool) -> Light:
+    return Light(
+        type=TYPES['SUN'], color=color, power=power, position=(0.0, 0.0, 0.0), direction=tuple(direction),
+        side=(0.0, 0.0, 0.0), angle=angle, radius=0.0, size=(0.0, 0.0), shape=0, cone=0.0, blend=0.0, shadows=int(shadows))
 
 
 def _light(data: bpy.types.Light, matrix: Matrix, color: tuple[float, float, float], power: float,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Linked clouds: objects that name a file which only the library reads. Blender holds a box.
 
-A cloud is built at the first time and saved in Blender's folder of user data; later it is mapped from there.
+A cloud is built at the first time, analyzed, and saved in Blender's folder of user data; later it is mapped from there.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import importers, jobs, native
 from ..importers.origin import PROPERTY
-from . import attributes, sequence
+from . import analysis, analyzing, attributes, sequence
 from .colors import scalar_name
 
 Corner = tuple[float, float, float]
@@ -33,6 +33,8 @@ class Source:
     kept: Path
     origin: Corner | None = None  # float64, that the cloud shall be relative to; None: the file's own
     scalar: str = ""  # that a ramp is laid over
+    analyzed: bool = True
+    hide_uncolored: bool = False
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.kept.name)
@@ -59,22 +61,24 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    found = source(path, origin, scalar_name(obj))
+    found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
     if found is None:
         notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
     return found
 
 
-def source(path: Path, origin: Corner | None = None, scalar: str = "") -> Source | None:
+def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed: bool = True,
+           hide_uncolored: bool = False) -> Source | None:
     try:
         status = path.stat()
     except OSError:
         return None
     name = f"{path.resolve()}{origin or ''}"
     place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
-    state = hashlib.blake2b(f"{status.st_size} {status.st_mtime_ns} {scalar}".encode(), digest_size=6).hexdigest()
+    made_of = f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}"
+    state = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
     folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar)
+    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
@@ -92,17 +96,27 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         return found
     except (native.PatinaError, OSError, ValueError, KeyError):
         pass  # not there yet, of another version, or damaged: it is made anew
-    points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, 2))
+    parts = 3 if source.analyzed else 2
+    points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
+    seen_by = [points.scalars.get(name) for name in (analysis.SCAN, analysis.ROW, analysis.COLUMN)]
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
-    with progress.part(1, 2).inner() as inner:
-        task = native.Cloud.start(points.positions, points.normals, points.colors, None, inner, origin=offset,
+    shown = attributes.without_uncolored(None, points.colors) if source.hide_uncolored else None
+    with progress.part(1, parts).inner() as inner:
+        task = native.Cloud.start(points.positions, points.normals, points.colors, shown, inner, origin=offset,
                                   scalars=_column(points, source.scalar), classes=_classes(points))
     yield task
     cloud = task.result()
+    if source.analyzed:
+        part = progress.part(2, parts)
+        part.doing = analysis.label(cloud)
+        with part.inner() as inner:
+            task = analyzing.start(cloud, analysis.of_columns(scanners, *seen_by), inner)
+        yield task
+        task.result()
     try:
         for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
             old.unlink()

@@ -174,6 +174,9 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         patina, data = context.object.patina, context.object.data
         layout.prop(patina, "lighting")
         layout.prop(patina, "cull_back")
+        layout.prop(patina, "analysis")
+        if not patina.linked_file:
+            layout.operator("object.patina_analyze", text="Analyze to Attributes")
         column = layout.column(align=True)
         column.prop(patina, "d_min")
         estimate = estimates.layer_distance(context.object.name_full)
@@ -184,6 +187,9 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         row = layout.row()
         row.active = context.scene.patina.surface != 'FILL'
         row.prop(patina, "radius")
+        row = layout.row()
+        row.active = context.scene.patina.surface != 'FILL'
+        row.prop(patina, "largest_gap")
         layout.prop(patina, "opacity")
         column = layout.column()
         if patina.linked_file:
@@ -197,6 +203,27 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         column.prop_search(patina, "radius_attribute", data, "attributes")
         column.prop(patina, "color")
         column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
+
+
+class PATINA_PT_hidden(_PatinaObjectPanel, Panel):
+    bl_label = "Hidden Points"
+    bl_parent_id = "PATINA_PT_points"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        patina = context.object.patina
+        column = layout.column(heading="Hide")
+        row = column.row()
+        row.active = patina.analysis != 'OFF'
+        row.prop(patina, "hide_stray")
+        column.prop(patina, "hide_uncolored")
+        column.prop(patina, "hide_unclassified")
+        column = layout.column()
+        column.active = patina.analysis != 'OFF'
+        column.prop(patina, "least_certainty")
+        column.prop(patina, "free_space")
 
 
 class PATINA_PT_shading(_PatinaObjectPanel, Panel):
@@ -265,6 +292,6 @@ class PATINA_PT_light(PatinaPanel, Panel):
 
 
 _CLASSES = (PATINA_PT_surface, PATINA_PT_transparency, PATINA_PT_shadows, PATINA_PT_film, PATINA_PT_performance,
-            PATINA_PT_passes, PATINA_PT_points, PATINA_PT_shading, PATINA_PT_point_shadows, PATINA_PT_light)
+            PATINA_PT_passes, PATINA_PT_points, PATINA_PT_hidden, PATINA_PT_shading, PATINA_PT_point_shadows, PATINA_PT_light)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

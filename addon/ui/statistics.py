@@ -8,6 +8,7 @@ from bpy.types import Context, Panel, UILayout
 
 from .. import pace, viewport
 from ..engine import PatinaRenderEngine
+from ..sync.analyzing import ANALYSES
 
 
 class SidebarPanel:
@@ -18,6 +19,15 @@ class SidebarPanel:
     @classmethod
     def poll(cls, context: Context) -> bool:
         return context.engine == PatinaRenderEngine.bl_idname
+
+
+class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
+    bl_label = "Camera"
+    bl_order = 1
+
+    def draw(self, context: Context) -> None:
+        self.layout.operator("object.patina_frame_points")
+        self.layout.prop(context.scene.patina.studio, "use_headlight")
 
 
 class PATINA_PT_statistics(SidebarPanel, Panel):
@@ -41,6 +51,9 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
                 ("Picture", f"{stats['width']} x {stats['height']}"), ("Time", f"{stats['ms']:.1f} ms"),
                 ("Planes", f"{stats['plane_bytes'] / 1e6:,.0f} MB"),
                 ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]
+        shares = [share for item in shown.clouds if (share := ANALYSES.progress(item.cloud)) is not None]
+        if shares:
+            rows.append(("Analysis", f"{shares[0]:.0%}"))
         if level != pace.FULL:
             rows.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
         if stats["shadow_samples"]:
@@ -86,6 +99,6 @@ def sentence(layout: UILayout, text: str, icon: str, width: int = 38) -> None:
         line = f"{line} {word}".strip()
 
 
-_CLASSES = (PATINA_PT_statistics, PATINA_PT_statistics_passes)
+_CLASSES = (PATINA_PT_sidebar_camera, PATINA_PT_statistics, PATINA_PT_statistics_passes)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

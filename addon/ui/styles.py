@@ -65,6 +65,22 @@ class PATINA_PT_studio_light(PatinaPanel, Panel):
             layout.prop(studio, name)
 
 
-_CLASSES = (PATINA_MT_styles, PATINA_PT_style, PATINA_PT_sidebar_style, PATINA_PT_studio_light)
+class PATINA_PT_headlight(PatinaPanel, Panel):
+    bl_label = "Headlight"
+    bl_context = "render"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw_header(self, context: Context) -> None:
+        self.layout.prop(context.scene.patina.studio, "use_headlight", text="")
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        studio = context.scene.patina.studio
+        layout.active = studio.use_headlight
+        layout.prop(studio, "headlight")
+
+
+_CLASSES = (PATINA_MT_styles, PATINA_PT_style, PATINA_PT_sidebar_style, PATINA_PT_studio_light, PATINA_PT_headlight)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

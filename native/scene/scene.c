@@ -152,6 +152,8 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: transparency must be between 0 and 1");
     if (!(style->radius >= 0.0f) || !isfinite(style->radius))
         return fail(scene, "cloud style: radius must be 0 or more");
+    if (!(style->largest_gap >= 0.0f) || !isfinite(style->largest_gap))
+        return fail(scene, "cloud style: largest_gap must be 0 or more");
     if (style->shadow_off > 7)
         return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
@@ -445,71 +447,5 @@ int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *contex
         if (pt_mesh_drawn(scene->meshes[i].mesh))
             pt_chunk_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, work, context);
     free(room);
-    return PATINA_OK;
-}
-
-struct framing {
-    int some;
-    double lower[3], upper[3], center[3];
-    const double *x, *y, *z; // the camera's axes
-    double half_x, half_y, distance, radius;
-};
-
-static void grow_box(void *context, const double corner[3])
-{
-    struct framing *f = context;
-    for (int k = 0; k < 3; k++) {
-        f->lower[k] = f->some ? fmin(f->lower[k], corner[k]) : corner[k];
-        f->upper[k] = f->some ? fmax(f->upper[k], corner[k]) : corner[k];
-    }
-    f->some = 1;
-}
-
-// The nearest place from which the corner is in view, with 4% of air.
-static void step_back(void *context, const double corner[3])
-{
-    struct framing *f = context;
-    double p[3];
-    for (int k = 0; k < 3; k++)
-        p[k] = corner[k] - f->center[k];
-    f->distance = fmax(f->distance, pt_dot(p, f->z) + 1.04 * fabs(pt_dot(p, f->x)) / f->half_x);
-    f->distance = fmax(f->distance, pt_dot(p, f->z) + 1.04 * fabs(pt_dot(p, f->y)) / f->half_y);
-    f->radius = fmax(f->radius, sqrt(pt_dot(p, p)));
-}
-
-int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
-                              patina_camera *camera)
-{
-    if (!scene || !camera || camera->struct_size != sizeof *camera || !isfinite(azimuth + elevation + fov_degrees))
-        return fail(scene, "patina_scene_frame_camera: bad arguments");
-    const double degree = 3.14159265358979323846 / 180.0;
-    double ca = cos(azimuth * degree), sa = sin(azimuth * degree);
-    double ce = cos(elevation * degree), se = sin(elevation * degree);
-    const double x[3] = { ca, sa, 0.0 }, y[3] = { -sa * se, ca * se, ce }, z[3] = { sa * ce, -ca * ce, se };
-    double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
-    struct framing framing = { .x = x, .y = y, .z = z, .half_y = tan(0.5 * fov * degree) };
-    framing.half_x = framing.half_y * scene->settings.width / scene->settings.height;
-    if (pt_each_corner(scene, grow_box, &framing))
-        return PATINA_ERROR_MEMORY;
-    for (int k = 0; k < 3; k++)
-        framing.center[k] = 0.5 * (framing.lower[k] + framing.upper[k]);
-    if (pt_each_corner(scene, step_back, &framing))
-        return PATINA_ERROR_MEMORY;
-    double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
-    double reach = framing.radius > 0.0 ? 1.01 * framing.radius : distance;
-    *camera = (patina_camera){ .struct_size = sizeof *camera,
-                               .left = -framing.half_x,
-                               .right = framing.half_x,
-                               .bottom = -framing.half_y,
-                               .top = framing.half_y,
-                               .near_clip = fmax(distance - reach, 1e-3 * distance),
-                               .far_clip = distance + reach };
-    for (int k = 0; k < 3; k++) {
-        camera->world_from_camera[4 * k] = x[k];
-        camera->world_from_camera[4 * k + 1] = y[k];
-        camera->world_from_camera[4 * k + 2] = z[k];
-        camera->world_from_camera[4 * k + 3] = framing.center[k] + distance * z[k];
-    }
-    camera->world_from_camera[15] = 1.0;
     return PATINA_OK;
 }

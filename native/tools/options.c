@@ -169,6 +169,8 @@ static int parse_switch(const char *name, struct tool_options *options)
         options->transparent = 1;
     else if (!strcmp(name, "--shadows"))
         options->shadows = 1;
+    else if (!strcmp(name, "--headlight"))
+        options->headlight = 1;
     else if (!strcmp(name, "--dump-plan"))
         options->dump_plan = 1;
     else if (!strcmp(name, "--verbose"))
@@ -265,6 +267,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_word(value, "on|off", &o->analysis);
     else if (!strcmp(name, "--radius"))
         bad = parse_width(value, &o->radius);
+    else if (!strcmp(name, "--largest-gap"))
+        bad = parse_width(value, &o->largest_gap);
     else if (!strcmp(name, "--iterations"))
         bad = parse_count(value, 0, 1000, &s->fill_iterations);
     else if (!strcmp(name, "--smooth"))
@@ -348,6 +352,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     options->settings.shadow_lazy = 1; // a picture has no use for whole textures, and measured frames are to compute theirs
     if ((options->save_shadows || options->load_shadows) && !options->shadows)
         return tool_misuse("--save-shadows and --load-shadows need --shadows");
+    if (options->headlight && (options->shadows || options->sun || options->panorama[0]))
+        return tool_misuse("--headlight is one light from the camera: without --sun, --shadows and --panorama");
     if (options->line_options && !options->has_lines)
         return tool_misuse("--line-... options need --lines");
     if (options->analysis && (options->color.free_space || options->color.hidden_kinds || options->color.least_certainty > 0))

@@ -110,6 +110,7 @@ static int load_clouds(struct job *job)
     patina_cloud_style style = {.struct_size = sizeof style, .lighting = options->lighting};
     style.cull_back = options->cull ? 1 : 0;
     style.radius = (float)options->radius;
+    style.largest_gap = (float)options->largest_gap;
     float table[PATINA_MAX_RAMP][3];
     tool_cancellable(job->progress, NULL);
     for (int i = 0; i < options->file_count; i++) {

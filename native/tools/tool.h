@@ -67,11 +67,12 @@ struct tool_options {
     uint32_t lighting;              // patina_lighting
     double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
     double radius;                  // of discs, world units; 0: automatic
+    double largest_gap;             // that they close, world units; 0: automatic
     int opacity_count;              // 0: all opaque
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;
     uint32_t analysis;              // 0: clouds are analysed, 1: not
-    int cull, transparent, shadows, sun, json, dump_plan, verbose;
+    int cull, transparent, shadows, headlight, sun, json, dump_plan, verbose;
     float ambient[3];
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
     int repeat; // measured frames; 0 = just the picture

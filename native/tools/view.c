@@ -132,8 +132,13 @@ int tool_lights(patina_scene *scene, const struct tool_options *options, const p
 {
     // From over the left shoulder, flat enough that reliefs show; a cool, weak one from the right opens the shadows.
     const double key[3] = {-0.8, 0.75, 0.45}, fill[3] = {0.9, 0.1, 0.6};
-    const float warm[3] = {1.0f, 0.97f, 0.92f}, cool[3] = {0.8f, 0.9f, 1.0f};
+    const float white[3] = {1.0f, 1.0f, 1.0f}, warm[3] = {1.0f, 0.97f, 0.92f}, cool[3] = {0.8f, 0.9f, 1.0f};
     patina_light_desc sun = sun_from(camera, key, warm, 2.8f), sky = sun_from(camera, fill, cool, 0.6f);
+    if (options->headlight) {
+        const double from[3] = {0, 0, 1};
+        const patina_light_desc lamp = sun_from(camera, from, white, 3.0f);
+        return patina_scene_add_light(scene, &lamp);
+    }
     if (options->sun) {
         const double azimuth = options->sun_at[0] * PI / 180, height = options->sun_at[1] * PI / 180;
         sun.direction[0] = -sin(azimuth) * cos(height);

@@ -52,6 +52,7 @@ def test_mist():
 def test_error_target():
     """A coarse target leaves filling out where it is met without, a fine one keeps it; Quality and Hole Filling give way."""
     scene = dense_scene()
+    scene.patina.surface = 'FILL'
     scene.view_layers[0].patina.use_pass_source = True
 
     def filled():

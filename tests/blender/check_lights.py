@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from check_points import pixel
 from harness import Skip, add_light, add_points, check, check_close, linear, new_scene, render, reports, saved, set_world
+from mathutils import Vector
 
 PIXEL = 2.0 * 36 / 50 / 64  # world size of one at the point, default camera
 POINT = (0.5 * PIXEL, 1.5 * PIXEL, -2.0)  # at a pixel's centre, where deferred shading puts it
@@ -51,6 +52,32 @@ def test_lights_add_up():
     first = shade(scene)
     add_light('SUN', 2.0, direction=(0, 0, -1))
     check_close(shade(scene), 3 * first, 1e-5, "three times the light")
+
+
+def test_headlight():
+    """It shines the way the camera looks, beside the other lights; a panorama has none."""
+    scene = lit_point()
+    scene.patina.studio.use_headlight = True
+    scene.patina.studio.headlight = 2.0
+    once = linear(ALBEDO) * 2.0 / np.pi
+    check_close(shade(scene), once * NORMAL[2], 2e-3 * once.max(), "from the front")
+    add_light('SUN', 2.0, direction=-NORMAL)
+    check_close(shade(scene), once * (1 + NORMAL[2]), 4e-3 * once.max(), "beside a sun")
+    bpy.data.objects.remove(bpy.data.objects["light"])
+    scene.camera.rotation_mode = 'QUATERNION'
+    scene.camera.rotation_quaternion = Vector(-NORMAL).to_track_quat('-Z', 'Y')
+    scene.camera.location = np.array(POINT) + 2 * NORMAL
+    picture = render()["Combined"]
+    row, column = np.argwhere(picture[..., 3] > 0)[0]
+    check_close(picture[row, column, :3], once, 4e-3 * once.max(), "along the normal")
+    for place in ((0, 0), (1, 0), (0, 1)):  # 32 lights are the most
+        for _ in range(11):
+            add_light('SUN', 0.1, location=(*place, 0))
+    render()
+    check(any("only the 31 strongest of 33 lights" in text for _, text in reports), f"{reports}")
+    scene.camera.data.type = 'PANO'
+    render()
+    check(any("headlight is off" in text for _, text in reports), f"{reports}")
 
 
 def test_light_from_behind():

@@ -104,14 +104,14 @@ def test_reading_in_steps():
     """A file that changed is read in tasks, or in short pieces: nobody waits for it, and who loses interest just stops."""
     path = dense("steps.ply", 50000)
     kinds = [type(step).__name__ for step in linked.steps(linked.source(path), patina.importers.Progress())]
-    check(kinds == ["Task"] * 3, f"PLY: {kinds}")  # open, build, save
+    check(kinds == ["Task"] * 4, f"PLY: {kinds}")  # open, build, analyze, save
     import_ply(path)
     points = SCRATCH / "steps.las"
     bpy.ops.export_scene.patina_points(filepath=str(points), kind='LAS')
     piece, las.SMALL_PIECE = las.SMALL_PIECE, 10000
     try:
         kinds = [type(step).__name__ for step in linked.steps(linked.source(points), patina.importers.Progress())]
-        check(kinds == ["Pause"] * 5 + ["Task"] * 2, f"LAS: {kinds}")
+        check(kinds == ["Pause"] * 5 + ["Task"] * 3, f"LAS: {kinds}")
         os.utime(points, (1, 1))
         given_up = linked.steps(linked.source(points), patina.importers.Progress())
         next(given_up)

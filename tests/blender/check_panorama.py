@@ -14,6 +14,7 @@ from mathutils import Euler
 
 from patina import importers
 from patina.operators import scanner
+from patina.sync.analysis import SCANNERS
 
 EYE = (3.0, -2.0, 1.0)
 
@@ -125,7 +126,7 @@ def check_scanner_cameras(origin, link):
     """Through the camera of each scan its points are straight ahead, 2 away."""
     scene = new_scene(128, 64)
     obj, = import_points(two_scans(origin), link=link)
-    check(len(scanner.positions(obj)) == 2, f"{obj.data.get(scanner.PROPERTY)}")
+    check(len(scanner.positions(obj)) == 2, f"{obj.data.get(SCANNERS)}")
     for scan in (0, 1):
         bpy.context.view_layer.objects.active = obj
         bpy.ops.object.patina_camera_at_scanner(scan=scan)

@@ -70,6 +70,24 @@ def test_radius_attribute():
     check(any("no point attribute 'length'" in text for _, text in reports), f"reports {reports}")
 
 
+def test_largest_gap():
+    """Discs are no wider than the largest gap, whatever their radii."""
+    scene, points, obj = discs(0.1)
+    narrow = render()["Combined"]
+    for radius, attribute in ((0.3, None), (0.0, [0.3] * 12)):
+        scene, points, obj = discs(radius, attribute)
+        wide = len(drawn(render()))
+        obj.patina.largest_gap = 0.2
+        check((render()["Combined"] == narrow).all(), f"radius {radius}, radii {attribute}")
+        check(wide > 2 * (narrow[..., 3] > 0).sum(), "they were wider before")
+        obj.patina.largest_gap = 9.0
+        check(len(drawn(render())) == wide, "a gap that none reaches")
+    scene, points, obj = discs()  # as wide as their neighborhoods say, and not always round
+    wide = len(drawn(render()))
+    obj.patina.largest_gap = 0.2
+    check(0 < len(drawn(render())) <= (narrow[..., 3] > 0).sum() < wide, "as wide as they are themselves")
+
+
 def test_blended():
     """Where two discs overlap on one surface, their colours are mixed; a surface behind stays out."""
     scene = new_scene()

@@ -17,6 +17,7 @@ from mathutils import Matrix, Quaternion
 
 from patina import pace, viewport
 from patina.importers import las
+from patina.sync.analyzing import ANALYSES
 
 KEEP = os.environ.get("PATINA_SCREENSHOTS")  # a folder that keeps them
 
@@ -44,7 +45,7 @@ def shown():
 def settled(points):
     """Whether the whole picture of what the view shows now is there, with so many points in the scene."""
     found = shown()
-    return found is not None and found.shown.stats["points"] == points and \
+    return found is not None and not ANALYSES.busy() and found.shown.stats["points"] == points and \
         found.shown.wish.view == viewport.sync.viewport_view(window_region(), area().spaces[0], view(), bpy.context.scene)
 
 
@@ -220,6 +221,100 @@ def test_same_as_final():
     off = np.abs(final - picture.color).max(axis=2) > 0.02  # Blender's float32 matrices move some points by a pixel
     check(picture.color[..., 3].mean() > 0.02, "an empty viewport")
     check(off.mean() < 0.002, f"{off.mean():.2%} of the pixels differ")
+
+
+def test_analysis_refines():
+    """Points without normals are drawn as they are, and again when they are analyzed; then the picture is the final one.
+    Blender goes on all the while, and points that are deleted are waited for no longer."""
+    scene = setup()
+    scene.patina.fill = 'CLOSED'
+    obj = add_points(sphere(400000, 1.5, (0, 0, 0))[0])
+    add_light('SUN', 3.0)
+    yield lambda: shown() and shown().shown.stats["points"] == 400000
+    first = shown().shown
+    check(not first.clouds[0].cloud.has_shapes, "drawn before")
+    check(ANALYSES.busy(), "under way")
+    looks, longest, last = 0, 0.0, time.perf_counter()
+    while ANALYSES.busy():
+        yield lambda: True
+        now = time.perf_counter()
+        looks, longest, last = looks + 1, max(longest, now - last), now
+    print(f"  analyzed while Blender went on {looks} times, waiting at most {longest * 1000:.0f} ms")
+    check(looks > 20, f"Blender went on {looks} times")
+    yield lambda: settled(400000)
+    refined = shown().shown
+    check(refined.clouds[0].cloud.has_shapes and refined.clouds[0].cloud is first.clouds[0].cloud, "the same cloud")
+    check(shown().trusted.reads == 1, f"read {shown().trusted.reads} times")
+    picture = screenshot("analyzed")
+    check((picture[..., :3].max(axis=2) > 0.2).mean() > 0.03, "an empty view")
+    obj.patina.analysis = 'OFF'
+    obj.update_tag(refresh={'OBJECT'})  # as a panel does
+    yield lambda: settled(400000) and not shown().shown.clouds[0].cloud.has_shapes
+    plain = shown().shown.color.copy()
+    check((plain != refined.color).any(), "Off is the same picture")
+    obj.patina.analysis = 'AUTO'
+    obj.update_tag(refresh={'OBJECT'})
+    yield lambda: settled(400000) and shown().shown.clouds[0].cloud.has_shapes
+    obj.data.vertices[0].co.x += 0.1
+    obj.data.update()
+    yield lambda: ANALYSES.busy()
+    bpy.data.objects.remove(obj)
+    yield lambda: settled(0)
+
+
+def test_headlight_follows_the_view():
+    """What the view looks at is lit, from every side."""
+    scene = setup()
+    scene.patina.fill = 'CLOSED'
+    scene.patina.studio.use_headlight = True
+    scene.patina.studio.headlight = 3.0
+    positions, _, normals = sphere(60000, 1.5, (0, 0, 0))
+    add_points(positions, None, normals)
+    for turn in (0.0, 1.5, 3.0):
+        view().view_rotation = Quaternion((0, 1, 0), turn)
+        area().tag_redraw()
+        yield lambda: settled(60000)
+        picture = shown().shown.color
+        height, width = picture.shape[:2]
+        check_close(picture[height // 2, width // 2, 0], 0.8 * 3.0 / np.pi, 0.02, f"the middle, turned by {turn}")
+
+
+def test_what_is_hidden_follows():
+    """Gaps, doubts and strays change the picture at once, and nothing is read or analyzed again."""
+    scene = setup()
+    scene.patina.surface = 'SPLATS'
+    obj = add_points(np.concatenate([sphere(3000, 1.5, (0, 0, 0))[0], [[2.2, 1.0, 0.0]]]))
+    obj.patina.lighting = 'UNLIT'
+    yield lambda: settled(3001) and shown().shown.clouds[0].cloud.has_shapes
+    found = shown()
+    covered = [float((found.shown.color[..., 3] > 0).mean())]
+    reads = found.trusted.reads
+    for name, value in (("largest_gap", 0.02), ("hide_stray", True), ("least_certainty", 1.0)):
+        before = found.pictures
+        setattr(obj.patina, name, value)
+        obj.update_tag(refresh={'OBJECT'})
+        yield lambda: newer(before)() and settled(3001)
+        covered.append(float((found.shown.color[..., 3] > 0).mean()))
+        check(covered[-1] < covered[-2], f"{name}: {covered}")
+    check(found.trusted.reads == reads, "read again")
+
+
+def test_analyze_is_undone():
+    """A user's Analyze goes on beside Blender; one step of undo takes the attributes back."""
+    setup()
+    obj = add_points(sphere(20000, 1.5, (0, 0, 0))[0], name="looked at")
+    bpy.context.view_layer.objects.active = obj
+    yield lambda: settled(20000)
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        bpy.ops.ed.undo_push(message="before")
+        bpy.ops.object.patina_analyze('INVOKE_DEFAULT', True)
+    yield lambda: "certainty" in bpy.data.objects["looked at"].data.attributes
+    yield lambda: settled(20000)
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        bpy.ops.ed.undo()
+    check("certainty" not in bpy.data.objects["looked at"].data.attributes, "undone")
+    yield lambda: settled(20000)
 
 
 def test_depth_of_field_of_the_camera():

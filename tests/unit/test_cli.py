@@ -284,6 +284,27 @@ def test_colors_are_kept_and_rows_are_upright():
     assert read_png("lit.png")[3][20][32] != (200, 30, 60)
 
 
+def test_headlight():
+    """A wall is brightest where it faces the camera, wherever that is."""
+    wall("head.ply", lambda x, z: (128, 128, 128))
+    seen = {}
+    for turn in (0, 60, -60):
+        x, y = 6 * math.sin(math.radians(turn)), -6 * math.cos(math.radians(turn))
+        run("render", "head.ply", "-o", "head.png", "--look", f"{x},{y},0,0,0,0,30", "--size", "64x64", "--smooth", "off", "--lit",
+            "--headlight", "--background", "0,0,0")
+        seen[turn] = read_png("head.png")[3][32][32][0]
+    assert abs(seen[0] - 125) <= 2 and abs(seen[60] - 91) <= 3 and abs(seen[60] - seen[-60]) <= 1, seen
+    run("render", "head.ply", "-o", "x.png", "--headlight", "--shadows", code=2)
+
+
+def test_largest_gap():
+    wall("gap.ply", lambda x, z: (200, 30, 60), count=12)
+    for name, options in (("wide", ("--radius", "0.2")), ("narrow", ("--radius", "0.05")),
+                          ("limited", ("--radius", "0.2", "--largest-gap", "0.1"))):
+        run("render", "gap.ply", "-o", f"{name}.png", *FRONT, "--surface", "splats", *options)
+    assert read_png("limited.png") == read_png("narrow.png") != read_png("wide.png")
+
+
 def test_transparent_film_is_not_premultiplied():
     wall("film.ply", lambda x, z: (200, 100, 50))
     run("render", "film.ply", "-o", "film.png", *FRONT, "--transparent")

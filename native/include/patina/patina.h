@@ -204,6 +204,9 @@ PATINA_API int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array 
 // The scalars that `share` of the points lie below and above, 0 <= share < 0.5; 0: the least and the greatest. What is not
 // finite does not count. PATINA_ERROR_EMPTY without a finite scalar.
 PATINA_API int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2]);
+// The box of a cloud without strays: points outside of the box of 90 percent of them that have hardly another near. Of a
+// cloud without any its own box; an empty cloud has min > max.
+PATINA_API int patina_cloud_dense_box(const patina_cloud *cloud, double box_min[3], double box_max[3]);
 // What every point knows (SPEC 11), from its nearest neighbours among all points: normal, spacing, footprint, thickness, kind.
 enum patina_kind {
     PATINA_KIND_UNKNOWN = 0, // not analysed, alone, or all neighbours at its own place
@@ -410,6 +413,7 @@ typedef struct patina_cloud_style {
     uint32_t free_space;          // patina_free_space: what becomes of points that a station saw through
     uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
     float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
+    float largest_gap;            // world units; no disc is wider, whatever its radius; 0 = as wide as it is
 } patina_cloud_style;
 
 typedef struct patina_mesh_style {
@@ -589,8 +593,9 @@ PATINA_API int patina_scene_set_settings(patina_scene *scene, const patina_setti
 PATINA_API int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects);
 // NULL: no lines, as after patina_scene_create. patina_scene_clear leaves them. On an error there are none.
 PATINA_API int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines);
-// A camera that frames the scene's clouds, as far as clips leave them, seen from `azimuth` degrees around z (0 = from -y) and
-// `elevation` degrees above the horizon, vertical field of view fov_degrees (0 = 45.8).
+// A camera that frames the scene's clouds, as far as clips leave them and without strays (patina_cloud_dense_box), seen from
+// `azimuth` degrees around z (0 = from -y) and `elevation` degrees above the horizon, vertical field of view fov_degrees
+// (0 = 45.8).
 PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation,
                                          double fov_degrees, patina_camera *camera);
 

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every point knows, as attributes; a camera that frames points without their strays."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.types import Context, Event, Operator
+from mathutils import Matrix, Vector
+
+from .. import jobs, native
+from ..importers import NORMAL_NAME, WHOLE, Progress
+from ..sync import analysis, analyzing, attributes, linked
+from .steps import Stepped
+
+# attribute → its type, the key of an element's values
+WRITTEN = {NORMAL_NAME: ('FLOAT_VECTOR', "vector"), "spacing": ('FLOAT', "value"), "radius": ('FLOAT', "value"),
+           "thickness": ('FLOAT', "value"), "kind": ('INT8', "value"), "certainty": ('FLOAT', "value")}
+
+
+class PATINA_OT_analyze(Stepped, Operator):
+    """Find out from the neighbors of each point how the surface lies there, and keep it in attributes: normal, spacing, \
+radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and certainty"""
+
+    bl_idname = "object.patina_analyze"
+    bl_label = "Analyze"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        obj = context.object
+        return (obj is not None and obj.type in {'MESH', 'POINTCLOUD'} and obj.mode == 'OBJECT' and obj.data.library is None
+                and not obj.patina.linked_file)
+
+    def execute(self, context: Context) -> set[str]:
+        self._progress = Progress()
+        return self.begin(context, self._analyze(context.object))
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        self._invoked = True
+        return self.execute(context)
+
+    def _analyze(self, obj: bpy.types.Object) -> jobs.Steps[set[str]]:
+        data = obj.data
+        count = len(data.vertices if obj.type == 'MESH' else data.points)
+        positions = attributes.positions(data, count) if count else None
+        if positions is None:
+            self.report({'ERROR'}, f"Patina: '{obj.name}' has no points")
+            return {'CANCELLED'}
+        try:
+            with self._progress.part(0, 2).inner() as inner:
+                normals = attributes.normals(data, count, obj.patina.normal_attribute)
+                task = native.Cloud.start(positions, normals, None, None, inner)
+            yield task
+            cloud = task.result()
+            part = self._progress.part(1, 2)
+            part.doing = analysis.label(cloud)
+            with part.inner() as inner:
+                task = analyzing.start(cloud, analysis.stations(obj, count), inner)
+            yield task
+            task.result()
+        except native.PatinaCancelled:
+            self.report({'INFO'}, "Patina: nothing was written, for it was ended before")
+            return {'CANCELLED'}
+        except native.PatinaError as error:
+            self.report({'ERROR'}, f"Patina: {error}")
+            return {'CANCELLED'}
+        found = cloud.neighbourhoods("normal", "spacing", "half_axes", "sigma", "kind", "certainty")
+        found["half_axes"] = np.ascontiguousarray(found["half_axes"][:, 0])
+        for name, values in zip(WRITTEN, found.values(), strict=True):
+            _write(data, name, values)
+        data.update() if obj.type == 'MESH' else data.update_tag()
+        kinds = ", ".join(f"{number:,} {name.lower()}" for name, number in zip(native.KINDS, cloud.kinds, strict=True) if number)
+        self.report({'INFO'}, f"Analyzed {count:,} points: {kinds}")
+        return {'FINISHED'}
+
+
+def _write(data: bpy.types.ID, name: str, values: np.ndarray) -> None:
+    """Makes the point attribute, in place of one that is there."""
+    kind, key = WRITTEN[name]
+    known = data.attributes.get(name)
+    if known and (known.domain != 'POINT' or known.data_type != kind):
+        data.attributes.remove(known)
+        known = None
+    attribute = known or data.attributes.new(name, kind, 'POINT')
+    if kind == 'INT8':
+        values = values.astype(WHOLE)
+    attribute.data.foreach_set(key, values.reshape(-1))
+
+
+class PATINA_OT_frame_points(Operator):
+    """Move the scene's camera, without turning it, so that the selected points fill its picture; strays far off do not count"""
+
+    bl_idname = "object.patina_frame_points"
+    bl_label = "Frame Points"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.scene.camera is not None and any(_has_points(obj) for obj in context.selected_objects)
+
+    def execute(self, context: Context) -> set[str]:
+        depsgraph = context.evaluated_depsgraph_get()
+        corners: list[Vector] = []
+        try:
+            for obj in filter(_has_points, context.selected_objects):
+                corners += _corners(obj.evaluated_get(depsgraph), context.scene.frame_current)
+        except native.PatinaError as error:
+            self.report({'ERROR'}, f"Patina: {error}")
+            return {'CANCELLED'}
+        if not corners:
+            self.report({'WARNING'}, "There are no points to frame")
+            return {'CANCELLED'}
+        camera = context.scene.camera
+        flat = [value for corner in corners for value in corner]
+        place, scale = camera.evaluated_get(depsgraph).camera_fit_coords(depsgraph, flat)
+        rotation = camera.matrix_world.to_quaternion()
+        camera.matrix_world = Matrix.LocRotScale(place, rotation, camera.matrix_world.to_scale())
+        if camera.data.type == 'ORTHO':
+            camera.data.ortho_scale = scale
+        self._see(camera, place, corners)
+        return {'FINISHED'}
+
+    def _see(self, camera: bpy.types.Object, place: Vector, corners: list[Vector]) -> None:
+        """Nothing of it may be farther than the camera sees."""
+        far = max((corner - place).length for corner in corners)
+        if camera.data.clip_end < far:
+            camera.data.clip_end = 1.2 * far
+            self.report({'INFO'}, f"Patina: the camera sees as far as {camera.data.clip_end:.4g} now")
+
+
+def _has_points(obj: bpy.types.Object) -> bool:
+    return obj.type in {'MESH', 'POINTCLOUD'}
+
+
+def _corners(obj: bpy.types.Object, frame: int) -> list[Vector]:
+    """Of the box without strays, in the world. Of a mesh with faces, of all of it."""
+    if obj.patina.linked_file:
+        source = linked.source_of(obj, frame, [])
+        if source is None:
+            return []
+        cloud = jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
+    else:
+        count = len(obj.data.vertices if obj.type == 'MESH' else obj.data.points)
+        positions = attributes.positions(obj.data, count) if count else None
+        if positions is None:
+            return []
+        if obj.type == 'MESH' and len(obj.data.polygons):
+            return [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+        cloud = jobs.run(lambda: native.Cloud(positions), lambda: None, lambda: False)
+    box = cloud.dense_box() if cloud.drawn else None
+    return [obj.matrix_world @ Vector(box[i >> k & 1][k] for k in range(3)) for i in range(8)] if box else []
+
+
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_analyze, PATINA_OT_frame_points))

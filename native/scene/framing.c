@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A camera that frames the scene: what is dense of its clouds fills the picture, strays are only kept within the clip range.
+#include "clip.h"
+#include "dense.h"
+#include "scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+struct framing {
+    double (*corners)[3]; // of what is framed
+    size_t count, room;
+    int error;
+    double lower[3], upper[3], center[3];
+    double half_x, half_y, distance, radius;
+};
+
+static void keep_corner(void *context, const double corner[3])
+{
+    struct framing *f = context;
+    if (f->count == f->room) {
+        const size_t room = f->room ? 2 * f->room : 1024;
+        double (*corners)[3] = realloc(f->corners, room * sizeof *corners);
+        if (!corners) {
+            f->error = PATINA_ERROR_MEMORY;
+            return;
+        }
+        f->corners = corners;
+        f->room = room;
+    }
+    for (int k = 0; k < 3; k++) {
+        f->lower[k] = f->count ? fmin(f->lower[k], corner[k]) : corner[k];
+        f->upper[k] = f->count ? fmax(f->upper[k], corner[k]) : corner[k];
+        f->corners[f->count][k] = corner[k];
+    }
+    f->count++;
+}
+
+static int keep_instance(const patina_scene *scene, const struct pt_instance *instance, struct framing *f)
+{
+    const patina_cloud *cloud = instance->cloud;
+    struct pt_inverse_clip *room = malloc((scene->clip_count + 1) * sizeof *room);
+    struct pt_dense *boxes = malloc((cloud->chunk_count + 1) * sizeof *boxes);
+    f->error = !room || !boxes ? PATINA_ERROR_MEMORY : pt_dense_chunks(cloud, boxes);
+    if (!f->error) {
+        const struct pt_sieve sieve = pt_sieve_make(scene, instance, room);
+        for (uint32_t c = 0; c < cloud->chunk_count; c++)
+            if (boxes[c].lower[0] <= boxes[c].upper[0] && pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
+                pt_box_corners(boxes[c].lower, boxes[c].upper, instance->style.world_from_object, keep_corner, f);
+    }
+    free(boxes);
+    free(room);
+    return f->error;
+}
+
+static int keep_scene(const patina_scene *scene, struct framing *f)
+{
+    for (uint32_t i = 0; i < scene->instance_count && !f->error; i++)
+        keep_instance(scene, &scene->instances[i], f);
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        if (pt_mesh_drawn(scene->meshes[i].mesh))
+            pt_chunk_corners(&scene->meshes[i].mesh->box, scene->meshes[i].style.world_from_object, keep_corner, f);
+    if (!f->error && !f->count) // clips left the strays alone
+        f->error = pt_each_corner(scene, keep_corner, f);
+    return f->error;
+}
+
+// The nearest place from which the corner is in view, with 4% of air.
+static void step_back(struct framing *f, const double corner[3], const double x[3], const double y[3], const double z[3])
+{
+    double p[3];
+    for (int k = 0; k < 3; k++)
+        p[k] = corner[k] - f->center[k];
+    f->distance = fmax(f->distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, x)) / f->half_x);
+    f->distance = fmax(f->distance, pt_dot(p, z) + 1.04 * fabs(pt_dot(p, y)) / f->half_y);
+}
+
+static void reach(void *context, const double corner[3])
+{
+    struct framing *f = context;
+    double p[3];
+    for (int k = 0; k < 3; k++)
+        p[k] = corner[k] - f->center[k];
+    f->radius = fmax(f->radius, sqrt(pt_dot(p, p)));
+}
+
+int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
+                              patina_camera *camera)
+{
+    if (!scene || !camera || camera->struct_size != sizeof *camera || !isfinite(azimuth + elevation + fov_degrees))
+        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_scene_frame_camera: bad arguments");
+    const double degree = 3.14159265358979323846 / 180.0;
+    const double ca = cos(azimuth * degree), sa = sin(azimuth * degree);
+    const double ce = cos(elevation * degree), se = sin(elevation * degree);
+    const double x[3] = { ca, sa, 0.0 }, y[3] = { -sa * se, ca * se, ce }, z[3] = { sa * ce, -ca * ce, se };
+    const double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
+    struct framing framing = { .half_y = tan(0.5 * fov * degree) };
+    framing.half_x = framing.half_y * scene->settings.width / scene->settings.height;
+    int error = keep_scene(scene, &framing);
+    for (int k = 0; k < 3; k++)
+        framing.center[k] = 0.5 * (framing.lower[k] + framing.upper[k]);
+    for (size_t i = 0; i < framing.count; i++)
+        step_back(&framing, framing.corners[i], x, y, z);
+    free(framing.corners);
+    if (!error)
+        error = pt_each_corner(scene, reach, &framing);
+    if (error)
+        return pt_fail(&scene->handle, error, "framing the scene: out of memory");
+    const double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
+    const double radius = framing.radius > 0.0 ? 1.01 * framing.radius : distance;
+    *camera = (patina_camera){ .struct_size = sizeof *camera,
+                               .left = -framing.half_x,
+                               .right = framing.half_x,
+                               .bottom = -framing.half_y,
+                               .top = framing.half_y,
+                               .near_clip = fmax(distance - radius, 1e-3 * distance),
+                               .far_clip = distance + radius };
+    for (int k = 0; k < 3; k++) {
+        camera->world_from_camera[4 * k] = x[k];
+        camera->world_from_camera[4 * k + 1] = y[k];
+        camera->world_from_camera[4 * k + 2] = z[k];
+        camera->world_from_camera[4 * k + 3] = framing.center[k] + distance * z[k];
+    }
+    camera->world_from_camera[15] = 1.0;
+    return PATINA_OK;
+}
+
+int patina_cloud_dense_box(const patina_cloud *cloud, double box_min[3], double box_max[3])
+{
+    if (!cloud || !box_min || !box_max)
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_dense_box: bad arguments");
+    struct pt_dense *boxes = malloc((cloud->chunk_count + 1) * sizeof *boxes);
+    if (!boxes || pt_dense_chunks(cloud, boxes)) {
+        free(boxes);
+        return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "the dense box: out of memory");
+    }
+    for (int k = 0; k < 3; k++) {
+        box_min[k] = INFINITY;
+        box_max[k] = -INFINITY;
+        for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+            box_min[k] = fmin(box_min[k], boxes[c].lower[k]);
+            box_max[k] = fmax(box_max[k], boxes[c].upper[k]);
+        }
+    }
+    free(boxes);
+    return PATINA_OK;
+}

@@ -1,0 +1,374 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points that are analyzed: for final pictures, beside viewports, in linked clouds, as attributes; framing without strays."""
+
+import time
+
+import bpy
+import numpy as np
+from check_import import import_ply
+from check_linked import dense
+from harness import (SCRATCH, Skip, add_light, add_points, check, engine, linear, new_scene, render, reports,
+                     sphere, stats)
+
+from patina import native
+from patina.sync import analysis, analyzing, clouds, linked
+
+bpy.utils.user_resource = lambda kind, path="", create=False: str(SCRATCH)  # no test leaves files with the user
+
+
+def only_cloud():
+    """Of the last picture."""
+    (_, cloud), = clouds.CACHE._entries.values()
+    return cloud
+
+
+def fresh_scene(*size):
+    clouds.CACHE.clear()
+    return new_scene(*size)
+
+
+def said(words):
+    return [text for text in stats if text.startswith(words)]
+
+
+def truth(scene, radius=1.0, z=-4.0):
+    """Normals of a sphere as the picture shows them: (height, width, 3), NaN beside it."""
+    width, height = scene.render.resolution_x, scene.render.resolution_y
+    half = np.tan(scene.camera.data.angle_x / 2)
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, ((np.arange(height) + 0.5) * 2 - height) / width)
+    ray = np.stack([x * half, y * half, -np.ones_like(x)], 2)
+    ray /= np.linalg.norm(ray, axis=2)[..., None]
+    along = ray @ [0, 0, z]
+    with np.errstate(invalid='ignore'):
+        distance = along - np.sqrt(along ** 2 - (z * z - radius * radius))
+    return (ray * distance[..., None] - [0, 0, z]) / radius
+
+
+def test_final_is_analyzed():
+    """Points without normals get theirs before the picture; the picture is that of the analyzed cloud, and Off as it was."""
+    scene = fresh_scene()
+    scene.patina.fill = 'CLOSED'
+    obj = add_points(sphere(20000)[0])
+    add_light('SUN', 3.0)
+    picture = render()
+    check(only_cloud().has_shapes, "not analyzed")
+    check(sum(only_cloud().kinds[1:3]) > 19000, f"kinds {only_cloud().kinds}")
+    wanted = truth(scene)
+    inside = np.isfinite(wanted[..., 0]) & (wanted[..., 2] > 0.3) & (picture["Combined"][..., 3] == 1)
+    check(inside.sum() > 300, f"{inside.sum()} pixels")
+    cosine = np.abs((picture["Normal"] * wanted).sum(2)[inside])
+    off = np.degrees(np.arccos(np.minimum(np.quantile(cosine, (0.5, 0.05)), 1)))
+    check(off[0] < 3 and off[1] < 8, f"half of the normals are off by {off[0]:.1f} degrees, one of twenty by {off[1]:.1f}")
+    obj.patina.analysis = 'OFF'
+    plain = render()
+    check(len(clouds.CACHE) == 2, "Off is another cloud")
+    check(not any(cloud.has_shapes for identity, (_, cloud) in clouds.CACHE._entries.items() if not identity[-3]), "Off")
+    check(np.abs(plain["Combined"] - picture["Combined"]).max() > 0.01, "the same picture")
+    obj.patina.analysis = 'AUTO'
+    check((render()["Combined"] == picture["Combined"]).all(), "another picture")
+
+
+def test_once():
+    """What was found stays with the cloud; points that moved are analyzed anew."""
+    scene = fresh_scene()
+    obj = add_points(sphere(200000)[0])
+    start = time.perf_counter()
+    render()
+    print(f"  200,000 points analyzed and rendered in {time.perf_counter() - start:.2f} s")
+    check(said("Analyzing 200,000 points of 'points'"), f"{set(stats)}")
+    cloud = only_cloud()
+    render()
+    check(only_cloud() is cloud and not said("Analyzing"), f"{set(stats)}")
+    obj.data.vertices[0].co.x += 0.5
+    obj.data.update()
+    render()
+    check(only_cloud() is not cloud and only_cloud().has_shapes and said("Analyzing"), f"{set(stats)}")
+    scene.patina.surface = 'FILL'
+    render()
+    check(not said("Analyzing"), "another surface is no reason")
+
+
+def test_cancel():
+    """Esc while points are analyzed ends the render; the next one starts over."""
+    fresh_scene()
+    add_points(sphere(300000)[0])
+    stopped, engine.PatinaRenderEngine._stopped = engine.PatinaRenderEngine._stopped, lambda self: bool(said("Analyzing"))
+    try:
+        picture = render()
+    finally:
+        engine.PatinaRenderEngine._stopped = stopped
+    check(not picture and not reports, f"cancelled: {list(picture)}, {reports}")
+    check(not only_cloud().has_shapes and not analyzing.ANALYSES.busy(), "nothing goes on")
+    check(render() and only_cloud().has_shapes, "the next time")
+
+
+def test_what_moves():
+    """What is different in every frame is analyzed only when asked."""
+    fresh_scene()
+    obj = add_points(sphere(100)[0])
+    check(analysis.wanted(obj), "points that stay")
+    obj.modifiers.new("subsurf", 'SUBSURF')
+    check(analysis.wanted(obj), "a modifier that stays")
+    obj.modifiers.new("wave", 'WAVE')
+    check(not analysis.wanted(obj), "a wave")
+    obj.patina.analysis = 'ALWAYS'
+    check(analysis.wanted(obj), "asked for")
+    obj.patina.analysis = 'AUTO'
+    obj.modifiers.clear()
+    obj.keyframe_insert("location")
+    check(analysis.wanted(obj), "an object that is moved as a whole")
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="other")
+    check(analysis.wanted(obj), "keys that stay")
+    key.keyframe_insert("value")
+    check(not analysis.wanted(obj), "animated keys")
+    group = bpy.data.node_groups.new("nodes", 'GeometryNodeTree')
+    other = add_points(sphere(100)[0], name="other")
+    modifier = other.modifiers.new("nodes", 'NODES')
+    modifier.node_group = group
+    check(analysis.wanted(other), "nodes that stay")
+    group.nodes.new('GeometryNodeInputSceneTime')
+    check(not analysis.wanted(other), "nodes that ask for the time")
+    linking = add_points(sphere(8)[0], name="linked")
+    linking.patina.linked_file = "scan_####.ply"
+    check(not analysis.wanted(linking), "a sequence")
+    linking.patina.linked_file = "scan_0001.ply"
+    check(analysis.wanted(linking), "a file")
+
+
+def test_stations():
+    """Normals face the scanner that saw the point, or where that is not known the nearest one."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60))
+    points = np.stack([x.ravel(), y.ravel(), np.full(x.size, -4.0)], 1)
+    for scan, sides in ((None, (1,)), (np.zeros(len(points)), (1,)), (np.ones(len(points)), (-1,)), (x.ravel() > 0, (1, -1)),
+                        (np.full(len(points), 7), (1,))):
+        fresh_scene()
+        obj = add_points(points)
+        obj.data[analysis.SCANNERS] = [0.0, 0.0, -2.0, 0.0, 0.0, -60.0]
+        if scan is not None:
+            obj.data.attributes.new("scan", 'FLOAT', 'POINT').data.foreach_set("value", np.asarray(scan, np.float32))
+        render()
+        normals = only_cloud().neighbourhoods("normal")["normal"]
+        found = {int(side) for side in np.sign(normals[:, 2])}
+        check(found == set(sides), f"scan {scan}: {found}")
+        if len(sides) == 2:
+            check((np.sign(normals[:, 2]) == np.where(scan, -1, 1)).all(), "each its own")
+
+
+def test_linked_is_kept():
+    """A linked cloud is analyzed before it is kept; opened again it is known at once. Off is a file of its own."""
+    path = dense("analyzed.ply", 60000)
+    fresh_scene()
+    obj, = import_ply(path, link=True)
+    check(linked.source(path).kept.exists() and native.Cloud.open(linked.source(path).kept).has_shapes, "kept analyzed")
+    picture = render()
+    check(only_cloud().has_shapes and not said("Analyzing"), f"{set(stats)}")
+    obj.patina.analysis = 'OFF'
+    render()
+    check(any(not cloud.has_shapes for _, cloud in clouds.CACHE._entries.values()), "Off")
+    check(not linked.source(path).kept.exists(), "one file a scan is kept")
+    obj.patina.analysis = 'AUTO'
+    clouds.CACHE.clear()
+    again = render()
+    check(said("Analyzing 60,000 points of 'analyzed'"), f"{set(stats)}")
+    check((again["Combined"] == picture["Combined"]).all(), "another picture")
+
+
+def test_beside():
+    """What a viewport does: the cloud is drawn meanwhile, changed when no picture is made, and then as a final one has it."""
+    points = np.ascontiguousarray(sphere(100000)[0], np.float32)
+    cloud, who, analyses = native.Cloud(points), object(), analyzing.Analyses()
+    analyses.wish(who, [(cloud, None)])
+    check(analyses.advance(False) == [] and cloud in analyses, "started")
+    while not analyses._jobs[cloud].task.done():
+        time.sleep(0.01)
+    check(analyses.advance(True) == [] and not cloud.has_shapes, "not while a final picture is made")
+    with analyses.drawing():
+        check(analyses.advance(False) == [] and not cloud.has_shapes, "not while a picture is made")
+    check(analyses.advance(False) == [cloud] and cloud.has_shapes, "applied")
+    check(not analyses.busy(), "nothing is left")
+    other = native.Cloud(points)
+    other.analyse()
+    for name, values in cloud.neighbourhoods().items():
+        check((values == other.neighbourhoods(name)[name]).all(), f"{name} differs")
+
+
+def test_beside_is_given_up():
+    """Clouds that nobody shows any more: nobody waits for them."""
+    points = np.ascontiguousarray(sphere(400000)[0], np.float32)
+    cloud, who, analyses = native.Cloud(points), object(), analyzing.Analyses()
+    analyses.wish(who, [(cloud, None)])
+    analyses.advance(False)
+    analyses.wish(who, [])
+    start = time.perf_counter()
+    while analyses.busy():
+        analyses.advance(False)
+    check(time.perf_counter() - start < 2.0 and not cloud.has_shapes, f"after {time.perf_counter() - start:.2f} s")
+    analyses.wish(who, [(cloud, None)])
+    analyses.advance(False)
+    analyses.clear()
+    check(not analyses.busy() and not cloud.has_shapes, "cleared")
+
+
+def test_final_takes_over():
+    """A final picture waits for what a viewport began, and the viewport learns of it."""
+    points = np.ascontiguousarray(sphere(200000)[0], np.float32)
+    cloud, who, analyses, progress = native.Cloud(points), object(), analyzing.Analyses(), []
+    analyses.wish(who, [(cloud, None)])
+    analyses.advance(False)
+    task = analyses._jobs[cloud].task
+    analyses.finish(cloud, None, progress.append)
+    check(cloud.has_shapes and task.done() and len(progress) == 1, "applied")
+    check(analyses.advance(False) == [cloud] and not analyses.busy(), "told")
+
+
+def test_operator():
+    fresh_scene()
+    obj = add_points(np.concatenate([sphere(5000)[0], [[9, 9, 9]]]))
+    bpy.context.view_layer.objects.active = obj
+    check(bpy.ops.object.patina_analyze() == {'FINISHED'}, "finished")
+    data, count = obj.data, 5001
+    found = {}
+    for name, width in (("Normal", 3), ("spacing", 1), ("radius", 1), ("thickness", 1), ("kind", 1), ("certainty", 1)):
+        whole = data.attributes[name].data_type == 'INT8'
+        values = np.empty(count * width, np.int32 if whole else np.float32)
+        data.attributes[name].data.foreach_get("vector" if width == 3 else "value", values)
+        found[name] = values.reshape(count, width)
+    cosine = np.abs((found["Normal"][:-1] * sphere(5000)[2]).sum(1))
+    check(np.quantile(cosine, 0.01) > 0.99, f"normals {np.quantile(cosine, 0.01)}")
+    spacing = np.median(found["spacing"])
+    check(abs(spacing - (4 * np.pi / 5000) ** 0.5) < 0.3 * spacing, f"spacing {spacing}")
+    check((found["kind"][:-1] == 1).mean() > 0.95 and found["kind"][-1] == 5, f"kinds {np.unique(found['kind'], return_counts=True)}")
+    check((found["radius"][:-1] > 0).all() and 0 <= found["certainty"].min() <= found["certainty"].max() <= 1, "radius, certainty")
+    before = found["kind"].copy()
+    check(bpy.ops.object.patina_analyze() == {'FINISHED'}, "a second time")
+    check(len([name for name in data.attributes.keys() if "kind" in name]) == 1, f"{list(data.attributes.keys())}")
+    values = np.empty(count, np.int32)
+    data.attributes["kind"].data.foreach_get("value", values)
+    check((values == before[:, 0]).mean() > 0.99, "other kinds")
+
+
+def test_operator_on_a_point_cloud():
+    fresh_scene()
+    obj = add_points(sphere(3000)[0])
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    try:
+        bpy.ops.object.convert(target='POINTCLOUD')
+    except (RuntimeError, TypeError) as error:
+        raise Skip(f"this Blender makes no point cloud object: {error}") from None
+    obj = bpy.context.view_layer.objects.active
+    check(obj.type == 'POINTCLOUD' and bpy.ops.object.patina_analyze() == {'FINISHED'}, f"{obj.type}")
+    values = np.empty(3000, np.float32)
+    obj.data.attributes["radius"].data.foreach_get("value", values)
+    check((values > 0).all() and np.median(values) < 0.2, f"radii {np.median(values)}")
+    obj.patina.radius_attribute = "radius"
+    bpy.context.scene.patina.surface = 'SPLATS'
+    check((render()["Combined"][..., 3] > 0).sum() > 500, "discs of these radii")
+
+
+def test_frame_points():
+    """The camera keeps its direction; strays do not count; the points fill the picture."""
+    scene = fresh_scene(160, 120)
+    points = sphere(2000, 1.0, (3, 5, -7))[0]
+    clean = None
+    for strays in ([], [[103, 5, -7]], [[103, 5, -7], [3, -95, -7], [3, 5, 93]]):
+        obj = add_points(np.concatenate([points, np.array(strays).reshape(-1, 3)]))
+        obj.select_set(True)
+        scene.camera.location, scene.camera.rotation_euler = (0, 0, 0), (0.3, 0.2, 0.0)
+        bpy.context.view_layer.update()
+        rotation = scene.camera.matrix_world.to_quaternion()
+        check(bpy.ops.object.patina_frame_points() == {'FINISHED'}, "framed")
+        bpy.context.view_layer.update()
+        check((scene.camera.matrix_world.to_quaternion() - rotation).magnitude < 1e-5, "turned")
+        place = np.array(scene.camera.matrix_world.translation)
+        clean = place if clean is None else clean
+        distance = np.linalg.norm(place - [3, 5, -7])
+        check(np.linalg.norm(place - clean) < 0.02 * distance, f"{len(strays)} strays: {place} is not {clean}")
+        picture = render()["Combined"][..., 3] > 0
+        rows, columns = np.nonzero(picture)
+        check(np.ptp(rows) > 0.7 * 120 and picture.any(), f"{np.ptp(rows)} of 120 rows")
+        bpy.data.objects.remove(obj)
+    clouds.CACHE.clear()
+
+
+def test_hidden_points():
+    """Stray, doubtful, uncolored and unclassified points are left out, each by its own switch, without another analysis."""
+    scene = fresh_scene(160, 120)
+    ball = sphere(4000)[0]
+    stray = np.array([[-1.4, 0.9, -4], [1.4, 0.9, -4], [-1.4, -0.9, -4]])
+    points = np.concatenate([ball, stray])
+    rgb = np.full((len(points), 4), 255, np.uint8)
+    black = ball[:, 0] < -0.5
+    rgb[:len(ball)][black, :3] = 0
+    obj = add_points(points, rgb)
+    classes = np.where(points[:, 0] > 0.5, 1, 2).astype(np.float32)
+    obj.data.attributes.new("classification", 'FLOAT', 'POINT').data.foreach_set("value", classes)
+    places = {(round(60 + y / -z * scale), round(80 + x / -z * scale)) for scale in (160 * 50 / 36,) for x, y, z in stray}
+
+    def shown():
+        alpha = render()["Combined"][..., 3] > 0
+        return sum(alpha[row - 2:row + 3, column - 2:column + 3].any() for row, column in places), alpha
+
+    count, everything = shown()
+    check(count == 3 and only_cloud().kinds[5] >= 3, f"{count} of 3 strays, kinds {only_cloud().kinds}")
+    obj.patina.hide_stray = True
+    count, alpha = shown()
+    check(count == 0 and alpha.sum() > 0.9 * everything.sum() and not said("Analyzing"), f"{count} strays, {alpha.sum()} pixels")
+    obj.patina.hide_stray = False
+    obj.patina.least_certainty = 1.0
+    check(shown()[1].sum() < 0.7 * everything.sum() and not said("Analyzing"), "doubtful ones")
+    obj.patina.least_certainty = 0.0
+    obj.patina.hide_unclassified = True
+    count, alpha = shown()
+    check(count == 2 and not alpha[50:70, 80 + 40:80 + 50].any() and alpha[:, 30:80].any(), "unclassified")
+    obj.patina.hide_unclassified = False
+    obj.patina.hide_uncolored = True
+    count, alpha = shown()
+    check(count == 3 and not alpha[55:65, 80 - 50:80 - 40].any() and alpha[:, 100:].any(), "uncolored")
+    obj.patina.hide_uncolored = False
+    check((shown()[1] == everything).all(), "all again")
+
+
+def test_uncolored_of_a_link():
+    fresh_scene(160, 120)
+    obj, = import_ply(dense("uncolored.ply"), link=True)
+    before = render()["Combined"][..., 3] > 0
+    obj.patina.hide_uncolored = True
+    check(((render()["Combined"][..., 3] > 0) == before).all(), "all have a color")
+
+
+def test_free_space():
+    """What the other scan saw through is shown or left out."""
+    scene = fresh_scene(160, 120)
+    def wall(eye, count, half, y):
+        """Of a grid of directions around the north, the points that a scanner sees on a wall."""
+        x, z = np.meshgrid(np.linspace(-half, half, count), np.linspace(-half, half, count))
+        return np.stack([eye[0] + x.ravel() * y, np.full(x.size, y), eye[2] + z.ravel() * y], 1)
+
+    eyes = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    passer = wall(eyes[0], 18, 0.04, 2)  # stands before the first scanner alone
+    points = np.concatenate([wall(eyes[0], 150, 0.4, 4), passer, wall(eyes[1], 150, 0.4, 4)])
+    scan = np.concatenate([np.zeros(150 * 150 + 324), np.ones(150 * 150)]).astype(np.float32)
+    rgb = np.full((len(points), 4), (0, 200, 0, 255), np.uint8)
+    rgb[150 * 150:150 * 150 + 324, 1] = 100
+    obj = add_points(points, rgb)
+    obj.data[analysis.SCANNERS] = eyes.ravel().tolist()
+    obj.data.attributes.new("scan", 'FLOAT', 'POINT').data.foreach_set("value", scan)
+    scene.camera.location = (0.0, 0.0, 0.4)
+    scene.camera.rotation_euler = (1.47, 0.0, 0.0)
+
+    def counts():
+        picture = render()["Combined"]
+        return int((picture[..., 0] > 0.5).sum()), int((np.abs(picture[..., 1] - linear((100,))[0]) < 0.01).sum())
+
+    magenta, before = counts()
+    marked = only_cloud().neighbourhoods("seen_through")["seen_through"] > 0
+    check(marked.sum() > 300 and marked.sum() == marked[150 * 150:150 * 150 + 324].sum(), f"{marked.sum()} points are seen through")
+    check(not magenta and before > 100, f"off: {magenta}, {before}")
+    obj.patina.free_space = 'SHOW'
+    magenta, dark = counts()
+    check(magenta > 100 and dark < 0.1 * before, f"shown: {magenta}, {dark}")
+    obj.patina.free_space = 'USE'
+    magenta, dark = counts()
+    check(not magenta and dark < 0.1 * before and not said("Analyzing"), f"hidden: {magenta}, {dark}")
