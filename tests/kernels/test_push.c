@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// push: from every level of the pyramid to the one below, paper and refined.
+// push: from every level of the pyramid to the one below, paper and refined; all pixels, and empty ones alone.
 #include "harness.h"
 
 #include <string.h>
@@ -12,12 +12,13 @@ struct level {
 
 // Returns how many pixels took their parent's surface.
 static size_t check(struct harness *h, const struct picture *picture, const struct level *fine,
-                    const struct level *coarse, uint32_t refined)
+                    const struct level *coarse, uint32_t refined, uint32_t background)
 {
     struct push_args args = {.view = fine->view,
                              .coarse_width = coarse->view.width,
                              .coarse_height = coarse->view.height,
-                             .refined = refined};
+                             .refined = refined,
+                             .background = background};
     size_t count = (size_t)fine->view.width * fine->view.height, open = 0, taken = 0;
     size_t coarse_count = (size_t)coarse->view.width * coarse->view.height;
     struct pt_buffer *coarse_keys = harness_buffer(h, coarse->keys, coarse_count * 8);
@@ -68,10 +69,13 @@ static void pyramid(struct harness *h, uint32_t width, uint32_t height, int pers
         levels[l] = levels[l - 1];
         picture_pull(h, &levels[l].view, &levels[l].keys, &levels[l].from);
     }
-    size_t taken = 0;
+    size_t taken = 0, alone = 0;
     for (int l = 2; l >= 0; l--)
-        taken += check(h, &picture, &levels[l], &levels[l + 1], refined);
+        taken += check(h, &picture, &levels[l], &levels[l + 1], refined, 0);
     HARNESS_CHECK(h, taken || width * height < 2000 || height == 1);
+    for (int l = 2; l >= 0; l--)
+        alone += check(h, &picture, &levels[l], &levels[l + 1], refined, 1);
+    HARNESS_CHECK(h, alone <= taken);
 }
 
 static void kinds(struct harness *h)
