@@ -46,7 +46,7 @@ static void sample_of(const struct pt_neighbours *tree, const struct pt_neighbou
 static uint64_t all_of(const struct pt_sample *sample) { return sample->count >= 64 ? ~0ull : (1ull << sample->count) - 1ull; }
 
 static void look_from_afar(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf,
-                           struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context)
+                           struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF])
 {
     struct pt_sample sample;
     struct pt_plane plane;
@@ -64,8 +64,6 @@ static void look_from_afar(const struct pt_neighbours *tree, const struct pt_nei
         pt_plane_fit(&sample, all_of(&sample), &plane);
         if (sample.count == PT_NEIGHBOURS_MOST)
             pt_neighbourhood_from_afar(&sample, &plane, FAR_THINNING, &hoods[lane]);
-        if (limit)
-            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
     }
 }
 
@@ -74,19 +72,17 @@ void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbou
 {
     const uint32_t lanes = pt_leaf_lanes(tree, leaf), wider = WIDER * k < PT_NEIGHBOURS_MOST ? WIDER * k : PT_NEIGHBOURS_MOST;
     struct pt_plane planes[PT_LEAF], wide;
-    struct pt_sample sample, narrow;
+    struct pt_sample samples[PT_LEAF], narrow;
     uint32_t doubtful = 0;
     pt_neighbours_find(tree, tree, leaf, lanes, k, found);
     for (uint32_t left = lanes; left; left &= left - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(left);
-        sample_of(tree, tree, leaf * PT_LEAF + lane, found, &sample);
-        pt_plane_fit(&sample, all_of(&sample), &planes[lane]);
-        const int more = wider > k && sample.count == k;
+        struct pt_sample *sample = &samples[lane];
+        sample_of(tree, tree, leaf * PT_LEAF + lane, found, sample);
+        pt_plane_fit(sample, all_of(sample), &planes[lane]);
+        const int more = wider > k && sample->count == k;
         if (!more || !pt_plane_is_doubtful(&planes[lane]))
-            pt_neighbourhood_of(&sample, &planes[lane], &hoods[lane]);
-        const int doubts = more && (pt_plane_is_doubtful(&planes[lane]) || pt_neighbourhood_is_doubtful(&hoods[lane]));
-        if (limit && !doubts)
-            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
+            pt_neighbourhood_of(sample, &planes[lane], &hoods[lane]);
         if (more && (pt_plane_is_doubtful(&planes[lane]) || pt_neighbourhood_is_doubtful(&hoods[lane])))
             doubtful |= 1u << lane;
     }
@@ -94,23 +90,26 @@ void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbou
         pt_neighbours_find(tree, tree, leaf, doubtful, wider, found);
     for (; doubtful; doubtful &= doubtful - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(doubtful);
-        sample_of(tree, tree, leaf * PT_LEAF + lane, found, &sample);
-        pt_plane_fit(&sample, all_of(&sample), &wide);
+        struct pt_sample *sample = &samples[lane];
+        sample_of(tree, tree, leaf * PT_LEAF + lane, found, sample);
+        pt_plane_fit(sample, all_of(sample), &wide);
         const int flat = !pt_plane_is_doubtful(&planes[lane]); // and came here for its rows, or its border
         if (flat ? !pt_plane_is_doubtful(&wide) : pt_plane_prefers_wide(&planes[lane], &wide)) {
             struct pt_neighbourhood known = hoods[lane];
-            pt_neighbourhood_of(&sample, &wide, &hoods[lane]);
+            pt_neighbourhood_of(sample, &wide, &hoods[lane]);
             if (flat && known.kind == PT_KIND_BORDER && hoods[lane].kind == PT_KIND_BORDER)
                 hoods[lane] = known; // a border to both: the nearer neighbours tell its spacing better
         } else {
-            narrow = sample; // the nearest k of them
+            narrow = *sample; // the nearest k of them
             narrow.count = k;
             pt_neighbourhood_of(&narrow, &planes[lane], &hoods[lane]);
         }
-        if (limit)
-            limit(context, leaf * PT_LEAF + lane, &sample, &hoods[lane]);
     }
-    look_from_afar(tree, coarse, leaf, found, hoods, limit, context);
+    look_from_afar(tree, coarse, leaf, found, hoods);
+    for (uint32_t left = limit ? lanes : 0; left; left &= left - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(left);
+        limit(context, leaf * PT_LEAF + lane, &samples[lane], &hoods[lane]);
+    }
 }
 
 // ---- a chunk ---------------------------------------------------------------------------------------------------------------

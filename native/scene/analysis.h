@@ -30,7 +30,7 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
 // What else is known of the point in a place of the tree may shrink its footprint.
 typedef void pt_limit(void *context, uint32_t place, const struct pt_sample *sample, struct pt_neighbourhood *hood);
 
-// The leaf's lanes described: neighbours, plane, kind. found is room to work in.
+// The leaf's lanes described: neighbours, plane, kind; then limited, where limit is not NULL. found is room to work in.
 void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbours *coarse, uint32_t leaf, uint32_t k,
                       struct pt_found *found, struct pt_neighbourhood hoods[PT_LEAF], pt_limit *limit, void *context);
 
