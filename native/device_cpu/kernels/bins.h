@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Points binned to the tiles of the picture that their discs may touch. Threads fill bins of their own, then take tiles: no
-// pixel has two writers. What is done with the discs of a tile must not depend on their order.
+// pixel has two writers. What is done with the discs of a tile must not depend on their order. They come about nearest first, and
+// those behind all that counts in their part of the tile not at all: of a torus, in 0.80 of the time.
 #ifndef PT_BINS_H
 #define PT_BINS_H
 
@@ -8,6 +9,7 @@
 #include "shade.h"
 
 #include <stdatomic.h>
+#include <stdlib.h>
 
 enum {
     PT_DISC_LARGE = 16, // a disc over more tiles than this goes to a bin that every tile looks through
@@ -22,12 +24,15 @@ struct pt_bin_block {
     uint32_t before; // as a head; all that were filled before are full
     uint32_t word[PT_BIN_DISCS];
     float place[PT_BIN_DISCS][4]; // x, y, z, and the bits of the id
-    uint32_t nothing[4];
+    uint32_t order; // of the chunk that it was opened for: later ones are nearer
+    float nearest;  // no pixel of its discs is nearer
+    uint32_t nothing[2];
 };
 
 struct pt_bin_thread {
     uint32_t next, end; // blocks that it may fill
-    uint32_t nothing[14];
+    uint32_t order;     // of the chunk at hand
+    uint32_t nothing[13];
 };
 
 struct pt_bins {
@@ -37,12 +42,14 @@ struct pt_bins {
     const uint32_t *drawn;             // bits of sifted chunks
     uint32_t instances, first, stride; // buffers of instance i start at first + i stride: chunks, positions, surface, radii
     uint32_t columns, rows, bins;      // tiles, and one for the large
+    uint32_t *cursors;                 // for each thread, of the heads of all
     uint32_t *heads;                   // by thread and bin: the block filled last << PT_BIN_SHIFT | discs in it
     struct pt_bin_block *blocks;
     uint32_t room;
     _Atomic uint32_t used;
     // while they are filled
     uint32_t *begins; // see pt_chunk_begins
+    uint64_t *order;  // of chunks, farthest first: their number below
     struct pt_bin_thread *threads;
 };
 
@@ -61,6 +68,12 @@ static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, ui
                                     pt_cpu_data(bins->call, at + 3) };
 }
 
+// No pixel of a disc lies nearer: see pt_patch_show. In orthographic views slopes that cancel may be off by an eighth.
+static inline vf pt_disc_nearest(const struct view_args *view, const struct pt_discs *d)
+{
+    return (d->z - d->radius * vf_set(view->perspective ? 1.002f : 1.25f)) * vf_set(0.999999f);
+}
+
 // Opens a block after the full one that ends at `head`; NULL when there is no room: it is counted, all will be done again.
 static inline struct pt_bin_block *pt_bin_open(struct pt_bins *bins, struct pt_bin_thread *thread, uint32_t *head)
 {
@@ -72,12 +85,14 @@ static inline struct pt_bin_block *pt_bin_open(struct pt_bins *bins, struct pt_b
     if (next >= bins->room)
         return NULL;
     bins->blocks[next].before = *head;
+    bins->blocks[next].order = thread->order;
+    bins->blocks[next].nearest = pt_float(PT_KEY_EMPTY_Z);
     *head = next << PT_BIN_SHIFT;
     return bins->blocks + next;
 }
 
 static inline void pt_bin_put(struct pt_bins *bins, struct pt_bin_thread *thread, uint32_t *head, const float place[4],
-                              uint32_t word)
+                              uint32_t word, float nearest)
 {
     struct pt_bin_block *block = bins->blocks + (*head >> PT_BIN_SHIFT);
     if (*head % (1u << PT_BIN_SHIFT) == PT_BIN_DISCS && !(block = pt_bin_open(bins, thread, head))) // full, or none yet
@@ -85,6 +100,7 @@ static inline void pt_bin_put(struct pt_bins *bins, struct pt_bin_thread *thread
     const uint32_t at = (*head)++ % (1u << PT_BIN_SHIFT);
     memcpy(block->place[at], place, 16);
     block->word[at] = word;
+    block->nearest = pt_min(nearest, block->nearest);
 }
 
 // Points that are looked at before the first of their discs is put into its bin: no branch waits for their arithmetic.
@@ -92,7 +108,7 @@ enum { PT_BIN_BATCH = 256 };
 
 // Some discs, and the tiles that their boxes touch.
 struct pt_bin_batch {
-    float places[PT_BIN_BATCH][4];
+    float places[PT_BIN_BATCH][4], nearest[PT_BIN_BATCH];
     uint32_t words[PT_BIN_BATCH], bins[PT_BIN_BATCH];                       // bins: the first
     uint32_t columns[PT_BIN_BATCH], rows[PT_BIN_BATCH];                     // of tiles, less one
     uint32_t drawn[PT_BIN_BATCH / PT_LANES], wide[PT_BIN_BATCH / PT_LANES]; // wide: over several tiles
@@ -108,6 +124,7 @@ static inline void pt_bin_list(const struct pt_bins *bins, struct pt_bin_batch *
     const vi columns = vi_sub(tiles[2], tiles[0]), rows = vi_sub(tiles[3], tiles[1]);
     vf_store4(batch->places[at], place, PT_ALL);
     vi_store(batch->words + at, word);
+    vf_store(batch->nearest + at, pt_disc_nearest(bins->view, discs));
     vi_store(batch->bins + at, vi_add(vi_mul(tiles[1], vi_set(bins->columns)), tiles[0]));
     vi_store(batch->columns + at, columns);
     vi_store(batch->rows + at, rows);
@@ -122,17 +139,18 @@ static void pt_bin_batch(struct pt_bins *bins, uint32_t thread, const struct pt_
     for (uint32_t at = 0; at < count; at += PT_LANES) {
         for (uint32_t drawn = batch->drawn[at / PT_LANES] & ~batch->wide[at / PT_LANES]; drawn; drawn &= drawn - 1) {
             const uint32_t i = at + (uint32_t)__builtin_ctz(drawn);
-            pt_bin_put(bins, own, heads + batch->bins[i], batch->places[i], batch->words[i]);
+            pt_bin_put(bins, own, heads + batch->bins[i], batch->places[i], batch->words[i], batch->nearest[i]);
         }
         for (uint32_t drawn = batch->wide[at / PT_LANES]; drawn; drawn &= drawn - 1) {
             const uint32_t i = at + (uint32_t)__builtin_ctz(drawn);
             if ((batch->columns[i] + 1) * (uint64_t)(batch->rows[i] + 1) > PT_DISC_LARGE) {
-                pt_bin_put(bins, own, heads + bins->bins - 1, batch->places[i], batch->words[i]);
+                pt_bin_put(bins, own, heads + bins->bins - 1, batch->places[i], batch->words[i], batch->nearest[i]);
                 continue;
             }
             for (uint32_t y = 0; y <= batch->rows[i]; y++)
                 for (uint32_t x = 0; x <= batch->columns[i]; x++)
-                    pt_bin_put(bins, own, heads + batch->bins[i] + y * bins->columns + x, batch->places[i], batch->words[i]);
+                    pt_bin_put(bins, own, heads + batch->bins[i] + y * bins->columns + x, batch->places[i], batch->words[i],
+                               batch->nearest[i]);
         }
     }
 }
@@ -167,16 +185,39 @@ static void pt_bin_chunks(void *context, uint32_t begin, uint32_t end, uint32_t 
     struct pt_bins *bins = context;
     uint32_t instance = 0;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(bins->call); c++) {
-        const struct pt_disc_source source = pt_bin_source(bins, c, &instance);
+        const struct pt_disc_source source = pt_bin_source(bins, (uint32_t)bins->order[c], &instance);
+        bins->threads[thread].order = c;
         pt_bin_chunk(bins, thread, &source);
     }
+}
+
+static int pt_bin_farther(const void *a, const void *b)
+{
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return x < y ? 1 : x > y ? -1 : 0;
+}
+
+// Orders chunks by the depth of their first points, which stands for all.
+static inline void pt_bin_sort(struct pt_bins *bins)
+{
+    const uint32_t count = bins->begins[bins->instances];
+    uint32_t instance = 0;
+    for (uint32_t c = 0; c < count; c++) {
+        const struct pt_disc_source source = pt_bin_source(bins, c, &instance);
+        const struct chunk_view *chunk = source.chunk;
+        const float *r = chunk->row + 6, *p = source.positions;
+        const float z = chunk->count ? r[0] * p[0] + r[1] * p[chunk->padded] + r[2] * p[2 * (size_t)chunk->padded] + chunk->hi[2] : 0.0f;
+        bins->order[c] = (uint64_t)(z > 0.0f ? pt_bits(z) : 0) << 32 | c;
+    }
+    qsort(bins->order, count, sizeof *bins->order, pt_bin_farther);
 }
 
 // Lays them out in scratch memory: itself first, for the next call.
 static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
 {
     const uint32_t threads = pt_pool_threads(bins->call->pool);
-    const size_t list_bytes = threads * sizeof *bins->threads, head_bytes = ((size_t)threads * bins->bins * 4 + 63) / 64 * 64;
+    const size_t list_bytes = threads * sizeof *bins->threads;
+    const size_t head_bytes = ((size_t)threads * (bins->bins + threads) * 4 + 63) / 64 * 64;
     const size_t own_bytes = (sizeof *bins + 63) / 64 * 64, fixed = own_bytes + list_bytes + head_bytes;
     char *memory = pt_cpu_scratch(bins->call, PT_CPU_BINS, fixed + (size_t)blocks * sizeof *bins->blocks);
     if (!memory)
@@ -186,6 +227,7 @@ static inline int pt_bins_lay_out(struct pt_bins *bins, uint32_t blocks)
     bins->room = (uint32_t)(room < PT_BIN_NONE >> PT_BIN_SHIFT ? room : PT_BIN_NONE >> PT_BIN_SHIFT);
     bins->threads = (struct pt_bin_thread *)(void *)(memory + own_bytes);
     bins->heads = (uint32_t *)(void *)(memory + own_bytes + list_bytes);
+    bins->cursors = bins->heads + (size_t)threads * bins->bins;
     bins->blocks = (struct pt_bin_block *)(void *)(memory + own_bytes + list_bytes + head_bytes);
     memset(bins->threads, 0, list_bytes);
     memset(bins->heads, 0xFF, head_bytes);
@@ -199,10 +241,15 @@ static inline int pt_bins_fill(struct pt_bins *bins)
     bins->columns = (bins->view->width + PT_DISC_TILE - 1) / PT_DISC_TILE;
     bins->rows = (bins->view->height + PT_DISC_TILE - 1) / PT_DISC_TILE;
     bins->bins = bins->columns * bins->rows + 1;
-    bins->begins = pt_cpu_scratch(bins->call, 0, ((size_t)bins->instances + 1) * sizeof *bins->begins);
-    if (!bins->begins)
+    uint64_t chunks = 0;
+    for (uint32_t i = 0; i < bins->instances; i++)
+        chunks += bins->call->buffers[bins->first + i * bins->stride]->size / sizeof(struct chunk_view);
+    bins->order = pt_cpu_scratch(bins->call, 0, chunks * sizeof *bins->order + ((size_t)bins->instances + 1) * sizeof *bins->begins);
+    if (!bins->order)
         return PATINA_ERROR_MEMORY;
+    bins->begins = (uint32_t *)(void *)(bins->order + chunks);
     pt_chunk_begins(bins->call, bins->first, bins->stride, bins->instances, bins->begins);
+    pt_bin_sort(bins);
     for (uint32_t needed = 1024;; needed += needed / 4) {
         int error = pt_bins_lay_out(bins, needed);
         if (error)
@@ -226,10 +273,60 @@ static inline void pt_bins_again(struct pt_bins *bins)
     bins->rows = filled->rows;
     bins->bins = filled->bins;
     bins->heads = filled->heads;
+    bins->cursors = filled->cursors;
     bins->blocks = filled->blocks;
 }
 
 // ---- tiles ---------------------------------------------------------------------------------------------------------------
+
+// How far away discs may lie and still count, by cells of 8 x 8 pixels.
+enum { PT_CELL_SHIFT = 3, PT_CELLS = PT_DISC_TILE >> PT_CELL_SHIFT };
+struct pt_farthest {
+    float all;
+    float cell[PT_CELLS * PT_CELLS];   // with those right of it and above
+    float column[PT_CELLS][PT_DISC_TILE]; // by rows of cells: while they are filled
+};
+
+// Of `column`, the greatest of each column of a row of cells, makes the rest.
+static inline void pt_farthest_end(struct pt_farthest *out)
+{
+    float cells[PT_CELLS][PT_CELLS];
+    out->all = 0.0f;
+    for (int y = 0; y < PT_CELLS; y++)
+        for (int x = 0; x < PT_CELLS; x++) {
+            const float *from = out->column[y] + (x << PT_CELL_SHIFT);
+            float most = from[0];
+            for (int i = 1; i < 1 << PT_CELL_SHIFT; i++)
+                most = pt_max(from[i], most);
+            cells[y][x] = most;
+            out->all = pt_max(most, out->all);
+        }
+    for (int y = 0; y < PT_CELLS; y++)
+        for (int x = 0; x < PT_CELLS; x++) {
+            const int up = y + 1 < PT_CELLS ? y + 1 : y, right = x + 1 < PT_CELLS ? x + 1 : x;
+            out->cell[y * PT_CELLS + x] = pt_max(pt_max(cells[y][x], cells[y][right]), pt_max(cells[up][x], cells[up][right]));
+        }
+}
+
+// Takes out of drawn what lies beside the tile, or behind all that counts there.
+static inline void pt_farthest_cull(const struct pt_farthest *farthest, const struct view_args *view, struct pt_disc_tile tile,
+                                    struct pt_discs *d)
+{
+    const vi tile_x = vi_set((uint32_t)tile.x), tile_y = vi_set((uint32_t)tile.y);
+    const vi x0 = vi_sub(vi_select(vi_lt_unsigned(d->box[0], tile_x), tile_x, d->box[0]), tile_x);
+    const vi y0 = vi_sub(vi_select(vi_lt_unsigned(d->box[1], tile_y), tile_y, d->box[1]), tile_y);
+    const vi x1 = vi_sub(d->box[2], tile_x), y1 = vi_sub(d->box[3], tile_y); // beyond the tile, or before it and so far below 0
+    const vm beside = vm_or(vm_or(vi_lt_unsigned(x1, x0), vi_lt_unsigned(y1, y0)),
+                            vm_or(vi_lt_unsigned(vi_set((uint32_t)tile.width - 1), x0),
+                                  vi_lt_unsigned(vi_set((uint32_t)tile.height - 1), y0)));
+    const vi column = vi_shr(x0, PT_CELL_SHIFT), row = vi_shr(y0, PT_CELL_SHIFT), two = vi_set(2);
+    const vm small = vm_and(vi_lt_unsigned(vi_sub(vi_shr(x1, PT_CELL_SHIFT), column), two),
+                            vi_lt_unsigned(vi_sub(vi_shr(y1, PT_CELL_SHIFT), row), two));
+    d->drawn = vm_and(d->drawn, vm_not(beside));
+    const vi cell = vi_add(vi_mul(row, vi_set(PT_CELLS)), column);
+    const vf far = vf_select(small, vf_gather(farthest->cell, cell, vm_and(d->drawn, small)), vf_set(farthest->all));
+    d->drawn = vm_and(d->drawn, vm_not(vf_lt(far, pt_disc_nearest(view, d))));
+}
 
 // What is done with PT_LANES discs of an instance.
 typedef void pt_bin_work(void *context, uint32_t instance, const struct pt_discs *discs);
@@ -262,7 +359,9 @@ static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_bl
 // where the next begin.
 static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct pt_bins *bins, const struct pt_bin_block *block,
                                                                   uint32_t i, uint32_t end, uint32_t *instance,
-                                                                  pt_bin_work *work, void *context)
+                                                                  const struct pt_disc_tile *tile,
+                                                                  const struct pt_farthest *farthest, pt_bin_work *work,
+                                                                  void *context)
 {
     *instance = pt_bin_instance(bins, pt_bin_id(block, i), *instance);
     const struct disc_args *args = &bins->discs[*instance];
@@ -281,26 +380,46 @@ static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct p
     discs.drawn = vm_first(taken);
     pt_disc_size(args, radii, discs.id, word, discs.drawn, &discs);
     pt_disc_reach(bins->view, &discs);
+    pt_disc_box(bins->view, discs.low, discs.high, &discs);
+    pt_farthest_cull(farthest, bins->view, *tile, &discs);
+    if (!vm_bits(discs.drawn))
+        return i + taken;
     pt_disc_shape(bins->view, args, word, &discs);
     pt_disc_tight_box(bins->view, &discs);
     work(context, *instance, &discs);
     return i + taken;
 }
 
-// Calls work for the discs of a bin, up to PT_LANES at a time. colors: 1 where it looks those up.
-static inline __attribute__((always_inline)) void pt_bin_walk(const struct pt_bins *bins, uint32_t bin, int colors,
+// The nearest block of those that the cursors of all threads stand at; NULL: there is none.
+static inline uint32_t *pt_bin_next(const struct pt_bins *bins, uint32_t *cursors, uint32_t threads)
+{
+    uint32_t *next = NULL;
+    for (uint32_t k = 0; k < threads; k++)
+        if (cursors[k] != PT_BIN_NONE && (!next || bins->blocks[cursors[k] >> PT_BIN_SHIFT].order > bins->blocks[*next >> PT_BIN_SHIFT].order))
+            next = cursors + k;
+    return next;
+}
+
+// Calls work for the discs of a bin that may lie on the tile and no farther than what counts, up to PT_LANES at a time, about
+// nearest first. colors: 1 where it looks those up.
+static inline __attribute__((always_inline)) void pt_bin_walk(const struct pt_bins *bins, uint32_t thread, uint32_t bin,
+                                                              const struct pt_disc_tile *tile,
+                                                              const struct pt_farthest *farthest, int colors,
                                                               pt_bin_work *work, void *context)
 {
-    uint32_t instance = 0;
-    for (uint32_t thread = 0; thread < pt_pool_threads(bins->call->pool); thread++) {
-        const struct pt_bin_block *block;
-        for (uint32_t head = bins->heads[(size_t)thread * bins->bins + bin]; head != PT_BIN_NONE; head = block->before) {
-            block = bins->blocks + (head >> PT_BIN_SHIFT);
-            if (block->before != PT_BIN_NONE)
-                pt_bin_ask(bins, bins->blocks + (block->before >> PT_BIN_SHIFT), colors);
-            for (uint32_t i = 0, end = head % (1u << PT_BIN_SHIFT); i < end;)
-                i = pt_bin_some(bins, block, i, end, &instance, work, context);
-        }
+    const uint32_t threads = pt_pool_threads(bins->call->pool);
+    uint32_t instance = 0, *cursors = bins->cursors + (size_t)thread * threads, *next;
+    for (uint32_t k = 0; k < threads; k++)
+        cursors[k] = bins->heads[(size_t)k * bins->bins + bin];
+    while ((next = pt_bin_next(bins, cursors, threads))) {
+        const struct pt_bin_block *block = bins->blocks + (*next >> PT_BIN_SHIFT);
+        const uint32_t end = *next % (1u << PT_BIN_SHIFT);
+        const struct pt_bin_block *before = bins->blocks + (block->before >> PT_BIN_SHIFT);
+        if (block->before != PT_BIN_NONE && !(farthest->all < before->nearest))
+            pt_bin_ask(bins, before, colors);
+        for (uint32_t i = 0; i < end && !(farthest->all < block->nearest);)
+            i = pt_bin_some(bins, block, i, end, &instance, tile, farthest, work, context);
+        *next = block->before;
     }
 }
 

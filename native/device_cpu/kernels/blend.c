@@ -33,6 +33,7 @@ struct tile {
     int64_t wide[TILE_PIXELS][SUMS];
     // of the discs at hand
     struct pt_patches patches;
+    struct pt_farthest farthest;
     struct terms terms;
     uint32_t ids[PT_LANES];
     struct place places[PT_LANES];
@@ -156,17 +157,22 @@ static int load(struct tile *tile, const uint64_t *keys, const float *deff)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     int any = 0;
+    memset(tile->farthest.column, 0, sizeof tile->farthest.column);
     for (int32_t y = 0; y < tile->patches.tile.height; y++) {
         const size_t from = (size_t)(tile->patches.tile.y + y) * tile->bins->view->width + (size_t)tile->patches.tile.x;
         const uint32_t to = (uint32_t)y * PT_DISC_TILE;
         for (uint32_t x = 0; x < (uint32_t)tile->patches.tile.width; x += PT_LANES) { // tiles are whole vectors wide
             vf z = vi_float(vi_load_z(keys + from + x));
-            any |= vm_bits(vm_and(vf_lt(z, empty), vm_first(pt_lanes_left(x, (uint32_t)tile->patches.tile.width)))) != 0;
+            vm some = vm_and(vf_lt(z, empty), vm_first(pt_lanes_left(x, (uint32_t)tile->patches.tile.width)));
+            float *farthest = tile->farthest.column[y >> PT_CELL_SHIFT] + x;
+            any |= vm_bits(some) != 0;
+            vf_store(farthest, vf_select(some, vf_max(z + vf_load(deff + from + x), vf_load(farthest)), vf_load(farthest)));
             vf_store(tile->nearest + to + x, z);
             vi_store(tile->behind + to + x, vi_sub(vf_bits(z + vf_load(deff + from + x)), vf_bits(z)));
             vi_store(tile->id + to + x, vi_load_id(keys + from + x));
         }
     }
+    pt_farthest_end(&tile->farthest);
     return any;
 }
 
@@ -276,8 +282,8 @@ static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t th
         memset(tile->sums, 0, sizeof tile->sums);
         tile->left = SUM_ROOM;
         tile->emptied = 0;
-        pt_bin_walk(bins, t, 1, draw, tile);
-        pt_bin_walk(bins, large, 1, draw, tile);
+        pt_bin_walk(bins, thread, t, &tile->patches.tile, &tile->farthest, 1, draw, tile);
+        pt_bin_walk(bins, thread, large, &tile->patches.tile, &tile->farthest, 1, draw, tile);
         save(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 2), pt_cpu_data(bins->call, 3));
     }
 }

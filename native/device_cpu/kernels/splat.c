@@ -4,7 +4,10 @@
 // Tile by tile, in memory that the first-level cache holds.
 #include "bins.h"
 
-enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE };
+enum {
+    TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE,
+    LOOK_AGAIN = 256, // discs between two looks at how far away the keys of a tile lie
+};
 
 struct tile {
     const struct pt_bins *bins;
@@ -13,7 +16,23 @@ struct tile {
     int limited;
     struct pt_patches patches;
     uint32_t ids[PT_LANES]; // of the discs at hand
+    uint32_t drawn;         // since the keys were looked at
+    struct pt_farthest farthest;
 };
+
+static void look(struct tile *tile)
+{
+    for (uint32_t y = 0; y < PT_CELLS; y++)
+        for (uint32_t x = 0; x < PT_DISC_TILE; x += PT_LANES) {
+            const uint64_t *keys = tile->keys + (y << PT_CELL_SHIFT) * PT_DISC_TILE + x;
+            vf most = vi_float(vi_load_z(keys));
+            for (uint32_t i = 1; i < 1u << PT_CELL_SHIFT; i++)
+                most = vf_max(most, vi_float(vi_load_z(keys + (size_t)i * PT_DISC_TILE)));
+            vf_store(tile->farthest.column[y] + x, most);
+        }
+    pt_farthest_end(&tile->farthest);
+    tile->drawn = 0;
+}
 
 // Takes the least keys.
 static void take_least(void *context, struct pt_patches *list)
@@ -35,10 +54,15 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
     struct tile *tile = context;
     vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)));
     pt_patches_draw(&tile->patches, discs, ~0u, PT_KEYS_AT_ONCE, take_least, tile);
+    tile->drawn += (uint32_t)__builtin_popcount(vm_bits(discs->drawn));
+    if (tile->drawn >= LOOK_AGAIN)
+        look(tile);
 }
 
 static void load(struct tile *tile, const uint64_t *keys, const float *limit)
 {
+    if (tile->patches.tile.width < PT_DISC_TILE || tile->patches.tile.height < PT_DISC_TILE)
+        memset(tile->keys, 0, sizeof tile->keys); // no pixel there lies far away
     for (int32_t y = 0; y < tile->patches.tile.height; y++) {
         const size_t from = (size_t)(tile->patches.tile.y + y) * tile->bins->view->width + (size_t)tile->patches.tile.x;
         memcpy(tile->keys + y * PT_DISC_TILE, keys + from, (size_t)tile->patches.tile.width * 8);
@@ -63,15 +87,15 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
     const float *limit = args->behind ? pt_cpu_data(bins->call, 1 + 4 * args->instances) : NULL;
     const uint32_t large = bins->bins - 1;
     struct tile tile;
-    (void)thread;
     tile.bins = bins;
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
         if (pt_bin_empty(bins, t) && pt_bin_empty(bins, large))
             continue;
         pt_patches_turn(&tile.patches, bins->view, pt_bin_tile(bins, t));
         load(&tile, pt_cpu_data(bins->call, 0), limit);
-        pt_bin_walk(bins, t, 0, draw, &tile);
-        pt_bin_walk(bins, large, 0, draw, &tile);
+        look(&tile);
+        pt_bin_walk(bins, thread, large, &tile.patches.tile, &tile.farthest, 0, draw, &tile);
+        pt_bin_walk(bins, thread, t, &tile.patches.tile, &tile.farthest, 0, draw, &tile);
         save(&tile, pt_cpu_data(bins->call, 0));
     }
 }
