@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import jobs, native
-from .reading import Filter, PointFile, Progress, colors_of, origin_of, scanners_of
+from .reading import Filter, PointFile, Progress, colors_of, grid_normals, origin_of, scanners_of
 
 MISSING = ("E57 files need the Python package pye57: Patina's extension for Blender 4.2 and later brings it; elsewhere "
            "run \"{python}\" -m pip install --user pye57")
@@ -90,28 +90,8 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     points = merge(path.stem, parts, {"crs": crs} if crs else {})
     points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
     if wanted.every == 1:  # a thinned grid is none
-        yield from _grid_normals(points, stations, progress)
+        yield from grid_normals(points, stations, progress)
     return points
-
-
-def _grid_normals(points: PointFile, stations: list[np.ndarray], progress: Progress) -> jobs.Steps[None]:
-    """Gives points of scans with a grid, a station and no normals those of the grid."""
-    if not {"row", "column"} <= points.scalars.keys():
-        return
-    for index, station in enumerate(stations):
-        own = np.flatnonzero(points.scalars["scan"] == index)
-        own = slice(own[0], own[-1] + 1) if len(own) else slice(0)  # scans follow each other
-        if not len(points.positions[own]) or not np.isfinite(station).all() or \
-                points.normals is not None and points.normals[own].any():
-            continue
-        progress.step(1.0)
-        task = native.start_grid_normals(points.positions[own], points.scalars["column"][own], points.scalars["row"][own],
-                                         station - points.origin)
-        yield task
-        normals = task.result()
-        if normals.any():
-            points.normals = np.zeros_like(points.positions) if points.normals is None else points.normals
-            points.normals[own] = normals
 
 
 def _station(header: Any) -> np.ndarray:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import jobs, native
-from .reading import Filter, PointFile, Progress, origin_of
+from .reading import Filter, PointFile, Progress, grid_normals, origin_of, scanners_of
 
 _KINDS = {("F", 4): "<f4", ("F", 8): "<f8", ("U", 1): "u1", ("U", 2): "<u2", ("U", 4): "<u4", ("U", 8): "<u8",
           ("I", 1): "i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8"}
@@ -87,7 +87,27 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         table = yield from _compressed(path, data, at, kind, count, progress)
     else:
         raise _fail(path, f"DATA {form} is not ascii, binary or binary_compressed")
-    return _assemble(path, table, wanted)
+    station = _organise(words, table, count)
+    points = _assemble(path, table, wanted)
+    if station is not None:
+        points.notes |= scanners_of([station], points.origin)
+        if wanted.every == 1:  # a thinned grid is none
+            yield from grid_normals(points, [station], progress)
+    return points
+
+
+def _organise(words: dict[str, list[str]], table: dict[str, np.ndarray], count: int) -> np.ndarray | None:
+    """A picture of points, HEIGHT rows of WIDTH: gives each its row and column. Returns where the sensor was: at zero, unless the
+    file tells of another place, which some writers have put into the points and others have not."""
+    try:
+        width, height = int(words["WIDTH"][0]), int(words["HEIGHT"][0])
+        place = [float(word) for word in words.get("VIEWPOINT", ["0"] * 7)[:3]]
+    except (KeyError, IndexError, ValueError):
+        return None
+    if height < 2 or width < 2 or width * height != count:
+        return None
+    table["row"], table["column"] = (values.astype(np.float32)[:, None] for values in np.divmod(np.arange(count), width))
+    return np.zeros(3) if place == [0.0, 0.0, 0.0] else None
 
 
 def _ascii(path: Path, text: bytes, kind: np.dtype, count: int, progress: Progress) -> jobs.Steps[dict[str, np.ndarray]]:

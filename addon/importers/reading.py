@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .. import native
+from .. import jobs, native
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -150,6 +150,27 @@ def _opaque(rgb: np.ndarray, pieces: list[slice], kind: type, one: float,
 def scanners_of(places: Sequence[Sequence[float]], origin: tuple[float, float, float]) -> dict[str, list[float]]:
     """The note of where scanners stood, in the file's coordinates; none when that is not known."""
     return {"scanners": (np.asarray(places, np.float64) - origin).ravel().tolist()} if len(places) else {}
+
+
+def grid_normals(points: PointFile, stations: Sequence[np.ndarray], progress: Progress) -> jobs.Steps[None]:
+    """Gives points of scans with a grid (scalars row and column), a station (file coordinates; NaN: not known) and no normals
+    those of the grid. Scans follow each other, numbered by the scalar "scan"; without that there is one."""
+    if not {"row", "column"} <= points.scalars.keys():
+        return
+    for index, station in enumerate(stations):
+        own = np.flatnonzero(points.scalars["scan"] == index) if "scan" in points.scalars else np.arange(len(points.positions))
+        own = slice(own[0], own[-1] + 1) if len(own) else slice(0)
+        if not len(points.positions[own]) or not np.isfinite(station).all() or \
+                points.normals is not None and points.normals[own].any():
+            continue
+        progress.step(1.0)
+        task = native.start_grid_normals(points.positions[own], points.scalars["column"][own], points.scalars["row"][own],
+                                         np.subtract(station, points.origin))
+        yield task
+        normals = task.result()
+        if normals.any():
+            points.normals = np.zeros_like(points.positions) if points.normals is None else points.normals
+            points.normals[own] = normals
 
 
 def origin_of(lower: np.ndarray, upper: np.ndarray, detail: float) -> tuple[float, float, float]:

@@ -315,6 +315,19 @@ def test_pcd():
         check_close(attribute_of(obj, "Col", "color_srgb", 4) * 255, [(255, 128, 1, 255), (0, 1, 2, 255)], 1e-3, form)
 
 
+def test_organised_pcd():
+    """A picture of points has rows and columns, a sensor and normals towards it; not one without a second row."""
+    head = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {}\nHEIGHT {}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 12\nDATA ascii\n"
+    rows = "".join("nan nan nan\n" if (u, v) == (1, 1) else f"{u} {v} 9\n" for v in range(3) for u in range(4))
+    points = pcd.read(text_file("grid.pcd", head.format(4, 3) + rows), importers.Filter(), importers.Progress())
+    check_close(points.scalars["column"], [0, 1, 2, 3, 0, 2, 3, 0, 1, 2, 3], 0, "columns")
+    check_close(points.scalars["row"], [0] * 4 + [1] * 3 + [2] * 4, 0, "rows")
+    check_close(points.normals, [(0, 0, -1)] * 11, 1e-5, "normals")
+    check_close(points.notes["scanners"], (0, 0, 0), 0, "sensor")
+    points = pcd.read(text_file("line.pcd", head.format(12, 1) + rows), importers.Filter(), importers.Progress())
+    check(points.normals is None and not points.scalars and not points.notes, "a row of points is no grid")
+
+
 def test_real_pcd():
     path = shared("lidar/samp11-utm.pcd") if (DATA / "lidar/samp11-utm.pcd").exists() else None
     path = path or next(iter(sorted((DATA / "lidar").glob("samp11*.pcd"))), None)
