@@ -175,6 +175,7 @@ static int knows_discs(const struct patina_scene *scene, const struct pt_instanc
 {
     return scene->settings.surface == PATINA_SURFACE_SPLATS ||
            (scene->settings.surface == PATINA_SURFACE_AUTO && scene->settings.fill == PATINA_FILL_CLOSED &&
+            !(scene->settings.error_target > 0.0f) && // whose curves are those of filling
             instance->cloud->shapes && pt_disc_ids(scene));
 }
 
