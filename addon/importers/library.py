@@ -20,6 +20,8 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         task = native.File.start(str(path), inner)
     yield task
     with task.result() as file:
+        # the log is the whole process's; nobody else reads it
+        warnings = [text for level, text in native.log_lines() if level == 1 and path.name in text]
         return PointFile(
             name=path.stem,
             positions=file.positions(),
@@ -28,7 +30,8 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
             origin=file.origin,
             invalid=file.invalid_positions,
-            notes=scanners_of(file.stations(), file.origin)).filtered(wanted)
+            notes=scanners_of(file.stations(), file.origin),
+            warnings=warnings).filtered(wanted)
 
 
 def preview(path: Path) -> list[str]:

@@ -49,6 +49,7 @@ class PointFile:
     invalid: int  # positions that are not finite
     # kept with the mesh: "crs", "gps_time_start", "scanners" (x, y, z of each, relative to origin)
     notes: dict[str, str | float | list[float]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)  # sentences on what the file lacks or has too much
 
     def filtered(self, wanted: Filter) -> PointFile:
         if wanted.keeps_all():

@@ -178,6 +178,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             text = str(error)
             self.report({'ERROR'}, f"Patina: {text}" if path.name in text else f"Patina: {path.name}: {text}")
             return None
+        for text in points.warnings:
+            self.report({'WARNING'}, f"Patina: {text}")
         if points.invalid:
             self.report({'WARNING'}, f"{path.name}: {points.invalid:,} points without a finite position are "
                                      "kept, but never drawn")

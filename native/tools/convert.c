@@ -83,6 +83,7 @@ int tool_convert(int count, char **arguments)
         tool_say("note: %u further attributes of '%s' were left out", info.attributes, arguments[0]);
     result = TOOL_OK;
 done:
+    tool_drain_log(1);
     for (int i = 0; i < 3; i++)
         free(columns[i]);
     patina_file_destroy(file);

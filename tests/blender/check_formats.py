@@ -64,6 +64,18 @@ def test_text():
     check_close(attribute_of(obj, "intensity", "value")[:, 0], (3, 4), 0, "intensity")
 
 
+def test_what_is_wrong_is_told():
+    """Bytes too many, and faces of points that are not there: warnings, with numbers."""
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty char x\nproperty char y\nproperty char z\n"
+    faces = "element face 1\nproperty list uchar uchar vertex_indices\n"
+    for name, body, text in (("long.ply", head.encode() + b"end_header\n" + bytes(10), "7 bytes follow behind byte"),
+                             ("faces.ply", (head + faces).encode() + b"end_header\n" + bytes([0, 0, 0, 3, 0, 0, 9]), "names 9 of 1")):
+        path = SCRATCH / name
+        path.write_bytes(body)
+        points = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+        check(len(points.warnings) == 1 and text in points.warnings[0], f"{points.warnings}")
+
+
 def test_filters():
     new_scene()
     path = text_file("line.xyz", "".join(f"{i} 0 0\n" for i in range(100)))

@@ -214,6 +214,13 @@ def test_formats_of_the_add_on():
             assert f"{name}: a file of format {word}, which Patina's add-on for Blender reads" in error, error
 
 
+def test_bytes_too_many_are_told():
+    (FOLDER / "long.ply").write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                      b"property float z\nend_header\n" + bytes(12 + 7))
+    for arguments in (("info", "long.ply"), ("render", "long.ply", "-o", "x.png"), ("convert", "long.ply", "x.ply")):
+        assert "warning: long.ply: 7 bytes follow behind byte" in run(*arguments).stderr, arguments
+
+
 def test_unwritable_output():
     ball("unwritable.ply", 100)
     assert "no/such" in run("render", "unwritable.ply", "-o", "no/such/x.png", code=1).stderr
