@@ -195,6 +195,12 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
 // No more than the spacings on screen.
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
+// plan_window.c, once the spacings are known: how holes are closed; how many layers; which pixels the planes hold, with a picture
+// that is `guard` pixels wider on each side.
+void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan);
+void pt_choose_layers(const patina_settings *settings, struct pt_plan *plan);
+void pt_choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard);
+static inline uint32_t pt_round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
 // How far, in pixels, the effects of a picture carry influence. (plan_effects.c)
 uint32_t pt_effects_reach(const struct patina_scene *scene);
 // Every chunk of the instance as the plan's view sees it, inside or outside; nothing is culled.

@@ -15,8 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DEFAULT_LAYERS = 8 };
-
 // Half an axis of a footprint, pixels, from which on points are discs: narrower ones are closed by filling as well, in a third of
 // the time. A spacing of 1.4 pixels.
 #define WIDE_FOOTPRINT 1.9
@@ -484,79 +482,6 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
     return PATINA_OK;
 }
 
-// ---- levels, iterations, window ------------------------------------------------------------------------------------------
-
-// How many levels and iterations the spacing asks for. With s = spacing in pixels a pixel stays empty with probability
-// exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.65 (0.37 points a pixel) n alone leaves holes open
-// (2.7% of a disc at 0.3 points a pixel), so coarser levels halve s down to 1 first: 0.14% open. Starting them earlier,
-// at 1.35, closes 0.5 points a pixel better (0.04% for 0.32%) but lets steep planes grow by up to 0.5% at 1 point a pixel.
-static void choose_filling(const patina_settings *settings, struct pt_plan *plan)
-{
-    uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
-    double s = plan->spacing_px;
-    plan->quality = settings->quality;
-    plan->fill = settings->fill;
-    plan->levels = plan->iterations = 0;
-    if (settings->surface == PATINA_SURFACE_SPLATS) {
-        plan->means = PT_MEANS_SPLATS;
-        plan->expected = pt_expected_error(plan->means, s);
-        return;
-    }
-    if (settings->error_target > 0.0f)
-        pt_means_settings(pt_means_for((double)settings->error_target, s), &plan->quality, &plan->fill);
-    plan->means = pt_means_of(plan->quality, plan->fill);
-    plan->expected = pt_expected_error(plan->means, s);
-    if (plan->fill == PATINA_FILL_PAPER)
-        plan->iterations = asked ? asked : 1;
-    if (plan->fill != PATINA_FILL_CLOSED)
-        return;
-    for (; s > 1.65 || (plan->levels && s > 1.0); s *= 0.5)
-        if (plan->levels++ == PT_LEVELS - 2)
-            break;
-    plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : 4;
-}
-
-// An opaque scene has one layer, unless all are asked for as passes.
-static void choose_layers(const patina_settings *settings, struct pt_plan *plan)
-{
-    uint32_t wanted = settings->layers ? settings->layers : DEFAULT_LAYERS;
-    plan->layers = plan->transparent || settings->layer_passes ? wanted : 1;
-}
-
-static uint32_t round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
-
-// How far, in pixels, anything can carry influence: fills and un-fills of both phases and the push at every level, the
-// window of estimated normals (16), the blend of normals (9), smoothing, anti-aliasing and lines. Every layer starts from the filled
-// depth of the one before.
-static uint32_t reach_of(const struct pt_plan *plan)
-{
-    uint32_t layer = 16;
-    for (uint32_t level = 0; level <= plan->levels; level++)
-        layer += (4 * plan->iterations + 3) << level;
-    return plan->layers * layer + 9 + 1 + 1 + pt_line_reach(plan);
-}
-
-static void choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard)
-{
-    const uint32_t *region = scene->settings.region, cell = 1u << plan->levels;
-    const uint32_t full[2] = { scene->settings.width + 2 * guard, scene->settings.height + 2 * guard };
-    uint32_t reach = reach_of(plan) + pt_effects_reach(scene), origin[2], size[2];
-    for (int k = 0; k < 2; k++) {
-        uint32_t first = region[k] + guard, last = region[2 + k] + guard;
-        int whole = region[k] == 0 && last + guard == full[k];
-        origin[k] = whole || first < reach ? 0 : (first - reach) / cell * cell;
-        uint32_t end = round_up(last + reach, cell);
-        size[k] = (whole || end > full[k] ? full[k] : end) - origin[k];
-        plan->crop[k] = first - origin[k];
-        plan->crop[2 + k] = last - first;
-        plan->pixel_offset[k] = region[k];
-    }
-    plan->view.origin_x = (int32_t)origin[0];
-    plan->view.origin_y = (int32_t)origin[1];
-    plan->view.width = size[0];
-    plan->view.height = size[1];
-}
-
 static void set_view(const struct camera *camera, struct view_args *view)
 {
     view->perspective = !camera->orthographic;
@@ -778,18 +703,18 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     int error = look_around(scene, plan, &survey);
     if (error)
         return error;
-    choose_filling(&scene->settings, plan);
-    choose_layers(&scene->settings, plan);
+    pt_choose_filling(&scene->settings, plan);
+    pt_choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;
     // Effects see no farther beyond the picture: a wider guard would fill holes at its border otherwise than without them. Lines
     // would break off there.
-    uint32_t guard = round_up(8 + 4 * cell + pt_line_reach(plan), cell > 16 ? cell : 16);
+    uint32_t guard = pt_round_up(8 + 4 * cell + pt_line_reach(plan), cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
     pad_camera(&survey.camera, guard);
     set_view(&survey.camera, &plan->view);
-    choose_window(scene, plan, guard);
+    pt_choose_window(scene, plan, guard);
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
                        plan->view.width, plan->view.height);
