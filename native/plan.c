@@ -254,7 +254,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
         args.instance.color_format = PT_COLOR_OF_PLANE;
         args.instance.has_opacities = plan->transparent != 0;
     }
-    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && !discs)
+    if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && (!discs || plan->iterations))
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     pt_own_colors(color, &args);
     if (shown)
@@ -349,7 +349,7 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
                                 .shadow = plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
                                 .discs_first = plan->discs_first,
-                                .discs_count = plan->discs_count};
+                                .discs_count = plan->layers > 1 ? 0 : plan->discs_count}; // of layers only the last is there still
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
@@ -411,7 +411,7 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
                      {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_SHADING, 0),
                       pt_plane_at(PT_PLANE_DEPTH, 0), pt_plane_at(PT_PLANE_NORMALS, 0), pt_plane_at(PT_PLANE_SOURCE, 0),
                       pt_plane_at(PT_PLANE_ARRIVED, 0), pt_plane_at(PT_PLANE_SHADOW, 0),
-                      pt_plane_at(extract.discs_count ? PT_PLANE_NORMAL : PT_PLANE_SHADING, 0)}),
+                      pt_plane_at(extract.discs_count ? PT_PLANE_AWAY : PT_PLANE_SHADING, 0)}),
               "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
               extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
@@ -505,9 +505,9 @@ static void plan_surfaces(struct pt_builder *builder)
         }
     if (!estimate)
         pt_skip(builder, "normals", "every cloud in view has normals");
-    plan_filling(builder);
     if (discs)
         pt_plan_blend(builder);
+    plan_filling(builder);
 }
 
 // Returns the plane that holds the layer's colour.

@@ -74,6 +74,6 @@ void pt_plan_splat(struct pt_builder *builder)
 void pt_plan_blend(struct pt_builder *builder)
 {
     const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
-                                    pt_plane_at(PT_PLANE_ALBEDO, 0)};
-    add_discs(builder, 1, planes, 4, NULL);
+                                    pt_plane_at(PT_PLANE_ALBEDO, 0), pt_plane_at(PT_PLANE_AWAY, 0)};
+    add_discs(builder, 1, planes, 5, NULL);
 }

@@ -251,7 +251,7 @@ static int blend_band(struct pt_gl_device *d, const struct blend_args *args, str
         d->gl.ProgramUniform1i(program, 4, (GLint)end);
     }
     for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
-        result = run_discs(d, PT_KERNEL_blend, ADD, i, buffers + 4 + 6 * i, 6, width, end - first, cancel);
+        result = run_discs(d, PT_KERNEL_blend, ADD, i, buffers + 5 + 6 * i, 6, width, end - first, cancel);
     return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_blend, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
 }
 
@@ -274,11 +274,13 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 9, buffers[3]->name, 0, buffers[3]->size, "blend");
     if (result == PATINA_OK)
+        result = pt_gl_bind(d, 11, buffers[4]->name, 0, buffers[4]->size, "blend");
+    if (result == PATINA_OK)
         result = pt_gl_bind_texture(d, 0, buffers[0]);
     if (result == PATINA_OK)
         result = pt_gl_bind_texture(d, 2, buffers[1]);
     if (result == PATINA_OK && args->sifted)
-        result = pt_gl_bind_texture(d, 5, buffers[4 + 6 * args->instances]);
+        result = pt_gl_bind_texture(d, 5, buffers[5 + 6 * args->instances]);
     for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)
         result = blend_band(d, args, buffers, y, y + rows < height ? y + rows : height, cancel);
     return result;

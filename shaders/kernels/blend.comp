@@ -20,6 +20,7 @@ layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; 
 layout(std430, binding = 7) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
 layout(std430, binding = 8) buffer normal_block { vec4 normal[]; };
 layout(std430, binding = 9) writeonly buffer albedo_block { vec4 albedo[]; };
+layout(std430, binding = 11) writeonly buffer away_block { float away_from[]; }; // how many pixels the key's point fell away
 
 layout(location = 3) uniform int band_first;
 layout(location = 4) uniform int band_end;
@@ -79,7 +80,7 @@ void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color
         precise float dx = float(x - d.own.x), dy = float(y - d.own.y);
         precise float away = dx * dx + dy * dy;
         precise float distance_to = away * pt_rsqrt(pt_max(away, 1.0));
-        normal[pixel].w = distance_to;
+        away_from[pixel] = distance_to;
     }
     float weight = disc_weight(view, d, x, y, square, beside);
     uint at = 2u * SUMS * (pixel - uint(band_first) * view.width);
@@ -203,9 +204,7 @@ void main()
     uint of = instance_of(key.x);
     if (key.y == PT_KEY_EMPTY_Z || of == args.instances)
         return;
-    float opacity = sum_of(at + 6u), weight = sum_of(at + 14u);
-    if (weight < 1.0)
-        return; // what was filled shows no disc: it takes its source's
+    float opacity = sum_of(at + 6u), weight = pt_max(sum_of(at + 14u), 1.0);
     vec3 color = vec3(0.0);
     if (1.0 <= opacity) {
         precise vec3 mean = vec3(sum_of(at), sum_of(at + 2u), sum_of(at + 4u)) * pt_rcp(opacity);

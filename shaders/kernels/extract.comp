@@ -13,7 +13,7 @@ layout(std430, binding = 5) writeonly buffer normal_block { float normal[]; }; /
 layout(std430, binding = 6) writeonly buffer source_block { float source[]; };
 layout(std430, binding = 7) readonly buffer arrived_block { float arrived[]; };
 layout(std430, binding = 8) writeonly buffer shadow_block { float shadow[]; };
-layout(std430, binding = 9) readonly buffer discs_block { vec4 disc_normals[]; }; // w: how far off the point fell
+layout(std430, binding = 9) readonly buffer away_block { float away[]; }; // how far off a disc's point fell
 
 float source_value(uint width, uint origin, uint x, uint y)
 {
@@ -55,7 +55,7 @@ void main()
     uint origin = word & ~PT_FROM_MIXED;
     float value = source_value(width, origin, crop_x + x, crop_y + y);
     if (origin == at && read_key(at).x - args.discs_first < args.discs_count)
-        value = 1.0 + disc_normals[at].w;
+        value = 1.0 + away[at];
     source[to] = some ? ((word & PT_FROM_MIXED) != 0u ? -value : value) : 0.0;
 #endif
 }

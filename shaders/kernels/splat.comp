@@ -24,8 +24,8 @@ layout(std430, binding = 6) readonly buffer limit_block { float limit[]; };
 void take(uint pixel, uint z_bits, uint id)
 {
 #if PASS == 0
-    if (z_bits < keys[2u * pixel + 1u])
-        atomicMin(keys[2u * pixel + 1u], z_bits);
+    if (z_bits < keys[2u * pixel + 1u] && z_bits < atomicMin(keys[2u * pixel + 1u], z_bits))
+        keys[2u * pixel] = PT_KEY_EMPTY_ID; // that of a point which scatter left there, farther off: all who come here write this
 #elif PASS == 1
     if (z_bits == keys[2u * pixel + 1u])
         atomicMin(keys[2u * pixel], id);

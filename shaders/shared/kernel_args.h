@@ -267,7 +267,7 @@ struct splat_args {
 // blend: what the discs within d_eff behind the nearest surface of a pixel show there, weighted by how near their centres lie:
 // w = exp(-2 s^2), s = distance over radius; in its own pixel a disc counts as at least a pixel wide. The sums are integers,
 // PT_SUM_SCALE a unit, so that no order shows.
-//   normal.xyz: unit mean; of instances without normals as it was. normal.w: how many pixels away the point of the key fell.
+//   normal.xyz: unit mean; of instances without normals as it was. away: how many pixels off the point of the key fell.
 //   albedo: mean colour, each disc weighted by its opacity too, and the mean opacity.
 struct blend_args {
     struct view_args view;
@@ -599,7 +599,7 @@ struct extract_args {
     struct view_args view;
     uint32_t crop_x, crop_y, crop_width, crop_height;
     uint32_t depth, normal, source, shadow;
-    uint32_t discs_first, discs_count; // of ids: how far a measured pixel lies from such a point is in the normal plane's w
+    uint32_t discs_first, discs_count; // of ids: how far a measured pixel lies from such a point is in the away plane
     float world_from_view[9];
 };
 

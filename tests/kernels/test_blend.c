@@ -10,7 +10,7 @@ enum { SIZES = sizeof sizes / sizeof sizes[0] };
 
 struct planes {
     uint64_t *keys;
-    float *deff, *normal, *albedo;
+    float *deff, *normal, *albedo, *away;
 };
 
 // What blend reads of the points beside their discs.
@@ -68,12 +68,13 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
 {
     const struct scene *points = &scene->points;
     const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct blend_args);
-    struct pt_buffer *buffers[4 + 7 * MOST_INSTANCES];
+    struct pt_buffer *buffers[5 + 7 * MOST_INSTANCES];
     char args[sizeof(struct blend_args) + sizeof scene->discs];
     struct planes out;
     struct pt_buffer *keys = discs_splat(h, scene);
     struct pt_buffer *zero = harness_buffer(h, harness_alloc(h, pixels * 16), pixels * 16);
     struct pt_buffer *albedo = harness_buffer(h, harness_alloc(h, pixels * 16), pixels * 16);
+    struct pt_buffer *away = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     struct pt_buffer *deff = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     struct pt_buffer *from = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     uint32_t n = 0;
@@ -81,6 +82,7 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     buffers[n++] = deff;
     buffers[n++] = zero;
     buffers[n++] = albedo;
+    buffers[n++] = away;
     for (uint32_t i = 0; i < points->count; i++) {
         const struct cloud *cloud = &points->clouds[i];
         struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
@@ -104,8 +106,10 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     harness_run(h, PT_KERNEL_blend, args, head + points->count * sizeof *scene->discs, buffers, n);
     out.normal = harness_read(h, zero);
     out.albedo = harness_read(h, albedo);
+    out.away = harness_read(h, away);
     harness_same(h, "normal", out.normal, pixels * 4, 4, 4, points->view.width);
     harness_same(h, "albedo", out.albedo, pixels * 4, 4, 4, points->view.width);
+    harness_same(h, "away", out.away, pixels, 4, 1, points->view.width);
     // the reference needs the normals as they were
     uint32_t count;
     const struct ref_disc *discs = discs_reference(h, scene, &count);
@@ -152,8 +156,10 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
             if (!harness_near(out.normal[4 * p + (size_t)k], n_of[k], expected.normal_error))
                 harness_fail(h, "normal", x, y, "axis %d: got %.9g, expected %.9g +- %.2g", k, out.normal[4 * p + (size_t)k],
                              n_of[k], expected.normal_error);
-        if (!harness_near(out.normal[4 * p + 3], expected.away, TOL_DISTANCE * expected.away))
-            harness_fail(h, "away", x, y, "got %.9g, expected %.9g", out.normal[4 * p + 3], expected.away);
+        if (!harness_near(out.away[p], expected.away, TOL_DISTANCE * expected.away))
+            harness_fail(h, "away", x, y, "got %.9g, expected %.9g", out.away[p], expected.away);
+        if (out.normal[4 * p + 3] != before[4 * p + 3])
+            harness_fail(h, "normal", x, y, "1 / cosine: got %.9g, it was %.9g", out.normal[4 * p + 3], before[4 * p + 3]);
     }
     harness_unsure(h, unsure, shown, open);
     return out;

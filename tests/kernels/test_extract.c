@@ -40,13 +40,17 @@ static void check(struct harness *h, const struct picture *picture, const float 
         shares[i] = (float)(i % 97) / 96.0f;
     struct pt_buffer *arrived = harness_buffer(h, shares, count * 4);
     struct pt_buffer *shadow = harness_buffer(h, unset, inside * 4);
-    struct pt_buffer *surfaces = harness_buffer(h, picture->normal, count * 16);
-    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source, arrived, shadow, surfaces);
+    float *off = harness_alloc(h, count * 4);
+    for (size_t i = 0; i < count; i++)
+        off[i] = (float)(i % 41) * 0.5f;
+    struct pt_buffer *away = harness_buffer(h, off, count * 4);
+    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source, arrived, shadow, away);
     const float *got_depth = harness_read(h, depth), *got_normal = harness_read(h, normal);
     const float *got_source = harness_read(h, source), *got_shadow = harness_read(h, shadow);
     struct ref_planes planes = picture_planes(picture);
     planes.shading = shading;
     planes.arrived = shares;
+    planes.away = off;
     for (size_t i = 0; i < inside; i++) {
         int x = (int)(i % crop[2]), y = (int)(i / crop[2]);
         struct ref_extract expected = ref_extract(&args, &planes, x, y);

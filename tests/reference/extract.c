@@ -24,7 +24,7 @@ struct ref_extract ref_extract(const struct extract_args *args, const struct ref
     double dx = (double)(from % width) - px, dy = (double)(from / width) - py;
     out.source = 1.0 + sqrt(dx * dx + dy * dy);
     if (from == pixel && ref_key_id(planes->keys[pixel]) - args->discs_first < args->discs_count)
-        out.source = 1.0 + (double)planes->normal[4 * pixel + 3];
+        out.source = 1.0 + (double)planes->away[pixel];
     if (planes->from[pixel] & PT_FROM_MIXED)
         out.source = -out.source;
     return out;

@@ -156,7 +156,7 @@ struct ref_planes {
     const void *colors;      // by id - id_base
     const uint8_t *opacities; // by id - id_base
     const float *through;    // light that earlier layers let through
-    const float *arrived;
+    const float *arrived, *away;
     const float *obscured;
     const float *albedo; // colours without light
     const uint32_t *shadows; // words, by light and id - id_base

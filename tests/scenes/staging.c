@@ -7,8 +7,8 @@
 #include <stdlib.h>
 
 enum { REFINED = PATINA_QUALITY_REFINED, PAPERLY = PATINA_QUALITY_PAPER };
-enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF, DISCS };
-// DISCS: nothing is filled, points are PATINA_SURFACE_SPLATS
+enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF, DISCS, KNOWN };
+// DISCS: nothing is filled, points are PATINA_SURFACE_SPLATS. KNOWN: the cloud is analysed, PATINA_SURFACE_AUTO
 enum { LAYER_PASSES = 1 << PATINA_PASS_COMBINED | 1 << PATINA_PASS_DEPTH | 1 << PATINA_PASS_NORMAL };
 enum { LIT = PATINA_LIGHTING_LIT, UNLIT = PATINA_LIGHTING_UNLIT, AUTO = PATINA_LIGHTING_AUTO };
 
@@ -69,6 +69,13 @@ const struct staging stagings[] = {
     {"discs with opacities", 203, 151, 20000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, DISCS, 0, 0, 1, 0,
      {0.6f, 1, 5, LAYER_PASSES}},
     {"discs among meshes", 203, 151, 9000, POINTS_ALL, STAGE_MESHES, 0, 1, LIT, REFINED, DISCS, 0, 0, 0, 0, OPAQUE},
+    {"footprints, one pixel", 1, 1, 5000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, KNOWN, 0, 0, 0, 0, OPAQUE},
+    {"footprints, density 0.1 to 30", 203, 151, 40000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, KNOWN, 0, 0, 0, 1, OPAQUE},
+    {"footprints without normals, orthographic", 203, 151, 30000, POINTS_COLORS, STAGE_MANY, 1, 0, LIT, REFINED, KNOWN, 0, 0, 1,
+     1, OPAQUE},
+    {"footprints with opacities", 203, 151, 20000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, KNOWN, 0, 0, 1, 1,
+     {0.6f, 1, 5, LAYER_PASSES}},
+    {"footprints among meshes", 203, 151, 9000, POINTS_ALL, STAGE_MESHES, 0, 1, LIT, REFINED, KNOWN, 0, 0, 0, 1, OPAQUE},
 };
 const uint32_t staging_count = sizeof stagings / sizeof stagings[0];
 
@@ -152,6 +159,8 @@ struct stage stage_build(const struct staging *staging)
         thin_out(&points);
     stage.cloud = staging->glass.own_opacity ? upload_with_opacities(&points) : points_upload(&points);
     points_free(&points);
+    if (staging->fill == KNOWN)
+        CHECK(patina_cloud_analyse(stage.cloud, NULL, NULL), stage.cloud);
 
     CHECK(patina_scene_create(&stage.scene), NULL);
     const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -183,8 +192,10 @@ struct stage stage_build(const struct staging *staging)
                        : camera_perspective(eye, target, 45.8, staging->width, staging->height, 0.1, 100.0);
     stage.settings = settings_default(staging->width, staging->height);
     stage.settings.quality = staging->quality;
-    stage.settings.fill = staging->fill == DISCS ? OPEN : staging->fill;
-    stage.settings.surface = staging->fill == DISCS ? PATINA_SURFACE_SPLATS : PATINA_SURFACE_FILL;
+    stage.settings.fill = staging->fill == DISCS ? OPEN : staging->fill == KNOWN ? CLOSED : staging->fill;
+    stage.settings.surface = staging->fill == DISCS   ? PATINA_SURFACE_SPLATS
+                             : staging->fill == KNOWN ? PATINA_SURFACE_AUTO
+                                                      : PATINA_SURFACE_FILL;
     stage.settings.smooth = staging->smooth;
     stage.settings.antialias = staging->antialias;
     stage.settings.film_transparent = staging->film_transparent;

@@ -128,7 +128,7 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
         const size_t at = (size_t)py * width + px;
         const vi source = vm_bits(some) ? pt_source(&finish->planes, at) : vi_set(0);
         if (vm_bits(some) && args->discs_count)
-            value = pt_source_among_discs(args, finish->planes.keys + at, finish->planes.normals + 4 * at, source, mixed, some, px,
+            value = pt_source_among_discs(args, finish->planes.keys + at, finish->away + at, source, mixed, some, px,
                                           py);
         else if (vm_bits(some))
             value = pt_source_value(width, source, mixed, some, px, py);
@@ -280,6 +280,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.normals = pt_cpu_data(call, 4);
             finish.source = pt_cpu_data(call, 5);
             finish.shadow = pt_cpu_data(call, 7);
+            finish.away = pt_cpu_data(call, 8);
         }
     }
     if (finish.shade_count)

@@ -234,7 +234,8 @@ static void mean_normal(const struct view_args *view, const vf sums[SUMS], uint3
     }
 }
 
-static void save(const struct tile *tile, const uint64_t *keys, float *normals, float *albedo)
+// off: how many pixels away the points of the keys fell.
+static void save(const struct tile *tile, const uint64_t *keys, float *normals, float *albedo, float *off)
 {
     const struct pt_bins *bins = tile->bins;
     const vf zero = vf_zero(), one = vf_set(1.0f);
@@ -250,7 +251,6 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
                 continue;
             vf sums[SUMS], color[4], n[4];
             sums_of(tile, pixel, some, sums);
-            some = vm_and(some, vf_le(one, sums[7])); // what was filled shows none: it takes its source's
             vm colored = vm_and(some, vf_le(one, sums[3]));
             vf share = vf_rcp(vf_select(colored, sums[3], one));
             for (int k = 0; k < 3; k++)
@@ -263,7 +263,7 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
             const vi pair = vi_load(own), other = vi_load(own + PT_LANES);
             vf dx = vi_convert(vi_sub(vi_add(vi_set(px), vi_lanes()), vi_evens(pair, other)));
             vf dy = vi_convert(vi_sub(vi_set(py), vi_odds(pair, other))), away = dx * dx + dy * dy;
-            n[3] = away * vf_rsqrt(vf_max(away, one));
+            vf_store_where(off + at, away * vf_rsqrt(vf_max(away, one)), some);
             vf_store4(normals + 4 * at, n, vm_bits(some));
             vf_store4(albedo + 4 * at, color, vm_bits(some));
         }
@@ -284,7 +284,7 @@ static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t th
         tile->emptied = 0;
         pt_bin_walk(bins, thread, t, &tile->patches.tile, &tile->farthest, 1, draw, tile);
         pt_bin_walk(bins, thread, large, &tile->patches.tile, &tile->farthest, 1, draw, tile);
-        save(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 2), pt_cpu_data(bins->call, 3));
+        save(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 2), pt_cpu_data(bins->call, 3), pt_cpu_data(bins->call, 4));
     }
 }
 
@@ -295,7 +295,7 @@ int PT_KERNEL_ENTRY(blend)(const struct pt_cpu_call *call)
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
                             .instances = args->instances,
-                            .first = 4,
+                            .first = 5,
                             .stride = 6 };
     pt_bins_again(&bins);
     if (!pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * sizeof(struct tile)))

@@ -3,8 +3,8 @@
 // is scan and what is invention); twin of shaders/kernels/extract.comp
 #include "extract.h"
 
-// normals: where discs were drawn, the row's.
-static void extract_source(const struct extract_args *args, const uint64_t *keys, const uint32_t *from, const float *normals,
+// away: where discs were drawn, the row's.
+static void extract_source(const struct extract_args *args, const uint64_t *keys, const uint32_t *from, const float *away,
                            uint32_t y, float *out)
 {
     const struct view_args *view = &args->view;
@@ -18,7 +18,7 @@ static void extract_source(const struct extract_args *args, const uint64_t *keys
         vi word = vi_load(from + x), source = vi_and(word, vi_set(~PT_FROM_MIXED));
         vm mixed = vm_not(vi_eq(word, source));
         const uint32_t px = args->crop_x + x, py = args->crop_y + y;
-        vf value = normals ? pt_source_among_discs(args, keys + x, normals + 4 * (size_t)x, source, mixed, some, px, py)
+        vf value = away ? pt_source_among_discs(args, keys + x, away + x, source, mixed, some, px, py)
                            : pt_source_value(view->width, source, mixed, some, px, py);
         vf_store_where(out + x, value, lanes);
     }
@@ -64,7 +64,7 @@ static void extract_row(void *context, uint32_t y)
                        (float *)pt_cpu_data(call, 4) + 3 * out);
     if (args->source)
         extract_source(args, keys, (const uint32_t *)pt_cpu_data(call, 1) + row,
-                       args->discs_count ? (const float *)pt_cpu_data(call, 8) + 4 * row : NULL, y,
+                       args->discs_count ? (const float *)pt_cpu_data(call, 8) + row : NULL, y,
                        (float *)pt_cpu_data(call, 5) + out);
     if (args->shadow)
         extract_shadow(args, keys, (const float *)pt_cpu_data(call, 6) + row, (float *)pt_cpu_data(call, 7) + out);

@@ -36,17 +36,16 @@ static inline vf pt_source_value(uint32_t width, vi source, vm mixed, vm some, u
     return vf_select(some, value, vf_zero());
 }
 
-// The same where some are discs; normals: of the pixels, w how far off a disc's point fell.
-static inline vf pt_source_among_discs(const struct extract_args *args, const uint64_t *keys, const float *normals, vi source,
+// The same where some are discs; away: of the pixels, how far off a disc's point fell.
+static inline vf pt_source_among_discs(const struct extract_args *args, const uint64_t *keys, const float *away, vi source,
                                        vm mixed, vm some, uint32_t x, uint32_t y)
 {
-    vf pixels[4], value = pt_source_value(args->view.width, source, mixed, some, x, y);
+    vf value = pt_source_value(args->view.width, source, mixed, some, x, y);
     const vm filled = pt_filled(source, (size_t)y * args->view.width + x, some);
     const vi number = vi_sub(vi_load_id(keys), vi_set(args->discs_first));
     const vm disc = vm_and(vm_and(some, vm_not(filled)), vi_lt_unsigned(number, vi_set(args->discs_count)));
-    vf_load4(normals, pixels);
-    pixels[3] = vf_set(1.0f) + pixels[3];
-    return vf_select(disc, vf_select(mixed, vf_zero() - pixels[3], pixels[3]), value);
+    const vf far = vf_set(1.0f) + vf_load(away);
+    return vf_select(disc, vf_select(mixed, vf_zero() - far, far), value);
 }
 
 // View-space normals in world space, 0 where nothing is.
