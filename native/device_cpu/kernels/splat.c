@@ -6,7 +6,7 @@
 
 enum {
     TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE,
-    LOOK_AGAIN = 256, // discs between two looks at how far away the keys of a tile lie
+    LOOK_AGAIN = 160, // discs between two looks at how far away the keys of a tile lie
 };
 
 struct tile {
