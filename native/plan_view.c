@@ -703,6 +703,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     int error = look_around(scene, plan, &survey);
     if (error)
         return error;
+    plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
+    plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     pt_choose_filling(&scene->settings, plan);
     pt_choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);
@@ -718,8 +720,6 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "planes of %u x %u pixels are too large: render in regions",
                        plan->view.width, plan->view.height);
-    plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
-    plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = place_instance(scene, plan, &survey, i);
     uint64_t id_base = scene->points;

@@ -6,6 +6,9 @@
 #include "plan_lines.h"
 
 enum { DEFAULT_LAYERS = 8 };
+// Coarse levels at most where points that lie wide apart are discs: these have closed what is wider. On four virtual scans more
+// fill sky (34.6 % in place of 22.2) and show nothing truer; one loses 0.5 dB.
+enum { LEVELS_BESIDE_DISCS = 2 };
 
 // How many levels and iterations the spacing asks for. With s = spacing in pixels a pixel stays empty with probability
 // exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.65 (0.37 points a pixel) n alone leaves holes open
@@ -32,7 +35,7 @@ void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan)
     if (plan->fill != PATINA_FILL_CLOSED)
         return;
     for (; s > 1.65 || (plan->levels && s > 1.0); s *= 0.5)
-        if (plan->levels++ == PT_LEVELS - 2)
+        if (plan->levels++ == (plan->discs_count ? LEVELS_BESIDE_DISCS - 1 : PT_LEVELS - 2))
             break;
     plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : 4;
 }
