@@ -2,15 +2,16 @@
 """Virtual scans against exact views: our own settings, and VTK's points of 1 to 7 pixels, alike.
 
     build/out/venv/bin/python tests/bench/scans.py [--scenes tuning|held|all|NAMES] [--cameras 0,1,…] [--modes MODE,…]
-        [--json FILE] [--quick]
+        [--json FILE] [--add FILE]... [--readme]
 
 MODE: default, stations (normals face the scanners), filling, discs (ours); vtk 1, vtk 3 EDL, … (points of so many
 pixels); cycles 0.02, eevee 0.02, … (spheres of a radius in metres; EEVEE takes minutes a picture on llvmpipe). The default
-is all but stations and eevee."""
+is all but stations and eevee. --add: rows of earlier runs, whose modes are not measured again; --readme: README.md's table."""
 
 from __future__ import annotations
 
 import argparse
+import datetime
 import json
 import os
 import shutil
@@ -161,8 +162,19 @@ def main() -> int:
     parser.add_argument("--cameras", default="0,1,2,3,4,5,6,7")
     parser.add_argument("--modes", default=",".join(SHOWN))
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--add", type=Path, action="append", default=[])
+    parser.add_argument("--readme", action="store_true")
     options = parser.parse_args()
-    rows = all_rows(run.scenes_of(options.scenes), [int(one) for one in options.cameras.split(",")], options.modes.split(","))
+    kept = [row for path in options.add for row in json.loads(path.read_text())]
+    modes = [mode for mode in options.modes.split(",") if mode and mode not in {row["mode"] for row in kept}]
+    rows = all_rows(run.scenes_of(options.scenes), [int(one) for one in options.cameras.split(",")], modes)
+    order = {mode: number for number, mode in enumerate((*OURS, *VTK, *CYCLES))}
+    rows = sorted(rows + kept, key=lambda row: order.get(row["mode"], len(order)))
+    if options.readme:
+        import machine
+        import readme
+        print(readme.update({"scans": rows, "rows": [], "details": [], "parts": {}, "processor": machine.processor(),
+                             "cores": machine.cores(), "date": datetime.date.today().isoformat()}, ROOT))
     print(markdown(rows))
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1))
