@@ -140,6 +140,9 @@ static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_ch
     return walk->beams.count ? &walk->beams.each[pt_beam_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
 }
 
+// Half axes beyond this many of the cloud's median spacings are held against the neighbours' own distances.
+#define FAR_FROM_OTHERS 12.0
+
 struct limited { // by a chunk's beams
     const struct walk *walk;
     uint32_t chunk;
@@ -153,6 +156,8 @@ static void limit_point(void *context, uint32_t place, const struct pt_sample *s
         beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], limited->walk->tree.slots[place], p);
     if (beam)
         pt_beam_limit(beam, p, sample, hood);
+    else if (hood->major > FAR_FROM_OTHERS * limited->walk->cloud->info.spacing)
+        pt_neighbourhood_bound(sample, hood);
 }
 
 static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, struct pt_neighbourhood *hood)

@@ -31,6 +31,8 @@
 #define STRAY_DISTANCE 3.5  // to the second nearest neighbour, in distances of neighbours among each other
 #define ON_PLANE 0.25       // spacings: how near to a plane its points lie
 
+#define MOST_MUTUAL 3.0      // half axes of what lies far from others, in neighbours' distances from each other: 1.8 of even points
+
 // Half axes from the spacings along the two directions of the plane.
 static void cover(double along, double across, struct pt_neighbourhood *out)
 {
@@ -74,6 +76,16 @@ static double mutual_distance(const struct pt_sample *sample)
         nearest[at] = least;
     }
     return count ? sqrt(nearest[count / 2]) : 0.0;
+}
+
+void pt_neighbourhood_bound(const struct pt_sample *sample, struct pt_neighbourhood *hood)
+{
+    const double most = MOST_MUTUAL * mutual_distance(sample);
+    if (!(most > 0.0) || !(hood->major > most))
+        return;
+    hood->spacing = fmin(hood->spacing, most / COVER);
+    hood->major = most;
+    hood->minor = fmin(hood->minor, most);
 }
 
 static void be_dot(uint32_t kind, double radius, double spacing, double certainty, struct pt_neighbourhood *out)

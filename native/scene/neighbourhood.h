@@ -47,6 +47,9 @@ double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *pla
 int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_plane *plane, double thinning,
                                struct pt_neighbourhood *out);
 
+// Bounds the footprint of a point that lies much farther from others than most of its cloud: by how far its neighbours lie from
+// each other. What is left of a surface there closes, a few strays beside it stay small.
+void pt_neighbourhood_bound(const struct pt_sample *sample, struct pt_neighbourhood *hood);
 void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *plane, struct pt_neighbourhood *out);
 
 #endif

@@ -119,12 +119,37 @@ static void test_unknown(void **state)
     assert_true(isfinite(hood.major) && hood.major < 2.1 && hood.minor > 0.0);
 }
 
+// Five strays far above an even plane, with no station, stay dots that do not touch.
+static void test_strays(void **state)
+{
+    (void)state;
+    enum { SIDE = 120, STRAYS = 5, COUNT = SIDE * SIDE + STRAYS };
+    static double p[COUNT][3];
+    static float axes[COUNT][2];
+    static const double stray[STRAYS][3] = {{20, 30, 70}, {31, 38, 76}, {26, 49, 64}, {42, 33, 72}, {37, 55, 81}};
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        p[i][0] = i % SIDE + 0.2 * sin(12.9 * i);
+        p[i][1] = i / SIDE + 0.2 * sin(78.2 * i);
+    }
+    memcpy(p + SIDE * SIDE, stray, sizeof stray);
+    patina_cloud *cloud = NULL;
+    const patina_cloud_desc desc = {.struct_size = sizeof desc, .count = COUNT, .position = {p, PATINA_FLOAT64, 3, 0}};
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    assert_int_equal(patina_cloud_analyse(cloud, NULL, NULL), PATINA_OK);
+    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .half_axes = &axes[0][0]};
+    assert_int_equal(patina_cloud_neighbourhoods(cloud, &wanted, NULL), PATINA_OK);
+    for (int i = SIDE * SIDE; i < COUNT; i++)
+        assert_true(axes[i][0] < 6.5f); // half the distance to the next
+    patina_cloud_destroy(cloud);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_interval),
         cmocka_unit_test(test_footprints),
         cmocka_unit_test(test_unknown),
+        cmocka_unit_test(test_strays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
