@@ -26,9 +26,9 @@ static inline vm inside(const struct clip_view *clip, const vf p[3])
 static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, const float *positions, uint32_t i)
 {
     const struct sift_args *args = sift->call->arguments;
-    const struct clip_view *clips = (const struct clip_view *)pt_cpu_data(sift->call, 3) + chunk->clip_first;
     vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
-    if (chunk->clip_count) { // else positions need not come from memory
+    if (chunk->clip_count) { // else positions need not come from memory, and there may be no clips
+        const struct clip_view *clips = (const struct clip_view *)pt_cpu_data(sift->call, 3) + chunk->clip_first;
         const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
                           vf_load(positions + 2 * (size_t)chunk->padded + i) };
         for (uint32_t k = 0; k < chunk->clip_keeps; k++)
