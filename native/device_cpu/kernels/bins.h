@@ -351,7 +351,8 @@ static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_bl
         instance = pt_bin_instance(bins, pt_bin_id(block, i), instance);
         const struct instance_args *args = &bins->discs[instance].instance;
         const char *of = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 4);
-        __builtin_prefetch(of + pt_color_bytes[args->color_format] * (pt_bin_id(block, i) - args->id_base));
+        if (of) // a cloud without colours
+            __builtin_prefetch(of + pt_color_bytes[args->color_format] * (pt_bin_id(block, i) - args->id_base));
     }
 }
 
