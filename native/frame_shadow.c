@@ -264,31 +264,22 @@ static void set_window(const struct pt_plan *map, const double window[4], float 
     }
 }
 
-static int is_drawn(const struct pt_plan_instance *seen, uint32_t first)
-{
-    uint32_t low = 0, high = seen->chunk_count;
-    while (low < high) {
-        const uint32_t middle = low + (high - low) / 2;
-        if (seen->chunks[middle].first < first)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < seen->chunk_count && seen->chunks[low].first == first;
-}
-
 // Of all chunks of instance i those that the picture drew, as points or as discs: points of the others have no mark. Returns
 // how many.
 static uint32_t keep_seen(const struct pt_plan *plan, uint32_t i, struct chunk_view *chunks, uint32_t count)
 {
-    uint32_t kept = 0;
-    for (uint32_t c = 0, begin = 0; c < count; c++, begin = kept) { // all in the cloud's order
-        for (uint32_t k = 0; k < plan->instance_count && kept == begin; k++) {
-            const struct pt_plan_instance *seen = &plan->instances[k];
-            if (seen->of == i && is_drawn(seen, chunks[c].first))
+    const struct pt_plan_instance *seen[2] = { NULL, NULL };
+    uint32_t ways = 0, kept = 0, next[2] = { 0, 0 };
+    for (uint32_t k = 0; k < plan->instance_count && ways < 2; k++)
+        if (plan->instances[k].of == i)
+            seen[ways++] = &plan->instances[k];
+    for (uint32_t c = 0; c < count; c++) // all in the cloud's order, and a chunk is drawn in one way
+        for (uint32_t k = 0; k < ways; k++)
+            if (next[k] < seen[k]->chunk_count && chunks[c].first == seen[k]->chunks[next[k]].first) {
                 chunks[kept++] = chunks[c];
-        }
-    }
+                next[k]++;
+                break;
+            }
     return kept;
 }
 

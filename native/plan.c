@@ -47,8 +47,7 @@ static void plan_scatter(struct pt_builder *builder)
         refs[count++] = pt_buffer_of(PT_SURFACE, i);
         args.instances++;
         chunks += plan->instances[i].chunk_count;
-        for (uint32_t c = 0; c < plan->instances[i].chunk_count; c++)
-            points += plan->instances[i].chunks[c].count;
+        points += plan->instances[i].points;
     }
     if (args.behind)
         refs[count++] = pt_plane_at(PT_PLANE_LIMIT, 0);

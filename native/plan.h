@@ -125,6 +125,7 @@ struct pt_plan_instance {
     struct chunk_view *chunks; // those in view
     struct pt_bounds *bounds;  // of each of them
     uint32_t chunk_count;
+    uint64_t points;        // of these chunks, drawn ones
     uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
     uint32_t chunks_cut; // of its chunks, those that are sifted
     int by_class, by_shape; // some of them by class, by shape

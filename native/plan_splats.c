@@ -43,8 +43,7 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
                                                 .radius_scale = instance->radius_scale,
                                                 .radius_most = instance->radius_most};
         chunks += instance->chunk_count;
-        for (uint32_t c = 0; c < instance->chunk_count; c++)
-            points += instance->chunks[c].count;
+        points += instance->points;
         count += bind_instance(refs + count, i, blend);
     }
     if (last)

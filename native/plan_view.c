@@ -617,6 +617,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
         join_rect(out->rect, rect);
+        out->points += count;
         plan->points_scattered += count;
     }
     join_rect(plan->view.rect, out->rect);
