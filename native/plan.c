@@ -97,6 +97,11 @@ static float least_distance(const struct pt_plan *plan)
     return 0.999f * least;
 }
 
+// How far an analysed cloud's points close holes beside them, in d_eff (two spacings); discs cover what is theirs already. On
+// four virtual scans with their stations false surface falls from 15.9 to 14 %, thin parts kept rise from 65 to 67 %.
+#define REACH 1.0f
+#define DISC_REACH 0.5f
+
 static void plan_fill_level(struct pt_builder *builder, uint32_t level)
 {
     struct pt_plan *plan = builder->plan;
@@ -106,6 +111,12 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
                              .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
                              .refined = plan->quality == PATINA_QUALITY_REFINED,
                              .least = least_distance(plan)};
+    if (plan->reaches) {
+        args.reach = REACH;
+        args.disc_reach = DISC_REACH;
+        args.discs_first = plan->discs_first;
+        args.from_width = plan->view.width;
+    }
     PT_REASON(PT_ADD(builder, fill, args,
                      {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0)}),

@@ -147,6 +147,7 @@ struct pt_plan {
     struct pt_plan_instance *instances;
     uint32_t instance_count;
     uint32_t discs_first, discs_count; // ids whose points are discs
+    int reaches; // points know how far they spread: holes are closed no farther
     struct pt_plan_mesh *meshes;
     uint32_t mesh_count;
     uint64_t triangles; // of meshes in view; 0: none is

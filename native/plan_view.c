@@ -693,6 +693,15 @@ int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
     return look_around(scene, plan, &survey);
 }
 
+// Whether every cloud knows how far its points spread, and that is to be kept to.
+static int knows_reach(const struct patina_scene *scene)
+{
+    int known = scene->settings.surface == PATINA_SURFACE_AUTO;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        known = known && knows_discs(scene, &scene->instances[i]);
+    return known;
+}
+
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = { 0 };
@@ -707,6 +716,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         return error;
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
+    plan->reaches = knows_reach(scene);
     pt_choose_filling(&scene->settings, plan);
     pt_choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);

@@ -162,6 +162,8 @@ static int fill_step(struct fill *f)
         result = read_counters(f);
     if (all_new && f->args->unfills)
         f->counters.saved = kept + changed;
+    if (!f->counters.woken) // nothing reached any of them
+        f->counters.changed = 0;
     return result;
 }
 

@@ -143,7 +143,42 @@ void wake_tiles(uvec4 rect, uvec2 place)
 
 #endif
 
+const uint NO_PIXEL = 0xFFFFFFFFu;
+
 #if STEP == 1
+
+// Whether the surface that a neighbour shows reaches the pixel.
+bool reaches(view_args view, ivec2 place, uvec2 key, uint source)
+{
+    float scale = float(1u << view.level), z = pt_float(key.y);
+    precise float width = view.perspective != 0u ? view.footprint * z : view.footprint;
+    float share = key.x >= args.discs_first ? args.disc_reach : args.reach;
+    precise float most = (read_deff(source) * share) * pt_rcp(width * read_float4(source).w) + PT_FILL_SLACK * scale;
+    uvec2 at = pt_pixel(source, args.from_width);
+    precise float dx = (float(place.x) + 0.5) * scale - (float(at.x) + 0.5);
+    precise float dy = (float(place.y) + 0.5) * scale - (float(at.y) + 0.5);
+    precise float square = dx * dx + dy * dy, bound = most * most;
+    return square <= bound;
+}
+
+// The neighbour with the least key; with `reach` of those that reach the pixel and are nearer than `threshold`.
+uvec2 least_key(view_args view, ivec2 place, bool reach, float threshold, inout ivec2 best)
+{
+    ivec2 size = ivec2(view.width, view.height);
+    uvec2 key = uvec2(0xFFFFFFFFu);
+    for (int d = 0; d < 8; d++) {
+        ivec2 at = place + ring[d];
+        bool inside = at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
+        at = inside ? at : place;
+        uvec2 other = read_key(uint(at.y * size.x + at.x));
+        bool less = inside && pt_key_less(other, key);
+        if (reach && less)
+            less = pt_float(other.y) < threshold && reaches(view, place, other, texelFetch(from_plane, at.y * size.x + at.x).x);
+        key = less ? other : key;
+        best = less ? at : best;
+    }
+    return key;
+}
 
 // 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
 void main()
@@ -156,26 +191,28 @@ void main()
         return;
     uint pixel = changed[index].pixel;
     ivec2 place = ivec2(pt_pixel(pixel, view.width));
-    int x = place.x, y = place.y;
-    uvec2 key = uvec2(0xFFFFFFFFu);
     ivec2 best = place;
-    for (int d = 0; d < 8; d++) {
-        ivec2 at = place + ring[d];
-        bool inside = at.x >= 0 && at.y >= 0 && at.x < size.x && at.y < size.y;
-        uvec2 other = read_key(inside ? uint(at.y * size.x + at.x) : pixel);
-        bool less = inside && pt_key_less(other, key);
-        key = less ? other : key;
-        best = less ? at : best;
-    }
+    uvec2 old_key = read_key(pixel);
+    uint old_from = texelFetch(from_plane, int(pixel)).x;
+    precise float threshold = pt_float(old_key.y);
+    if (occluded && (unfills || args.reach > 0.0))
+        threshold = threshold - own_distance(view, old_from & ~PT_FROM_MIXED, threshold);
+    uvec2 key = least_key(view, place, false, threshold, best);
     uint source = texelFetch(from_plane, best.y * size.x + best.x).x;
-    if (refined) {
+    bool taken = args.reach == 0.0 || reaches(view, place, key, source);
+    if (!taken) {
+        key = least_key(view, place, true, threshold, best);
+        source = texelFetch(from_plane, best.y * size.x + best.x).x;
+        taken = key != uvec2(0xFFFFFFFFu);
+    }
+    if (refined && taken) {
         float z = pt_float(key.y);
         z = pt_plane_depth(view, read_float4(source).xyz, pt_ray(view, best.x, best.y), z,
-                           pt_ray(view, x, y), own_distance(view, source, z));
+                           pt_ray(view, place.x, place.y), own_distance(view, source, z));
         key.y = pt_bits(z);
     }
-    changed[index] = change(pixel, key.x, key.y, source);
-    if (!unfills)
+    changed[index] = change(taken ? pixel : NO_PIXEL, key.x, key.y, source);
+    if (!unfills || (!taken && all_new == 0u))
         return;
     // An entry filled before in this phase is saved already.
     uint slot = kept + index;
@@ -184,12 +221,7 @@ void main()
             return;
         slot = atomicAdd(saved_count, 1u);
     }
-    uvec2 old_key = read_key(pixel);
-    uint old_from = texelFetch(from_plane, int(pixel)).x;
-    precise float threshold = pt_float(old_key.y);
-    if (occluded)
-        threshold = threshold - own_distance(view, old_from & ~PT_FROM_MIXED, threshold);
-    saved[slot] = saved_pixel(pixel, old_key.x, old_key.y, old_from, threshold);
+    saved[slot] = saved_pixel(taken ? pixel : NO_PIXEL, old_key.x, old_key.y, old_from, threshold);
 }
 
 #elif STEP == 2
@@ -202,6 +234,8 @@ void main()
     if (index >= entries)
         return;
     change c = changed[index];
+    if (c.pixel == NO_PIXEL)
+        return;
     keys[c.pixel] = uvec2(c.id, c.z);
     from[c.pixel] = c.from;
     wake_tiles(rect, pt_pixel(c.pixel, width));
@@ -220,8 +254,6 @@ void main()
 
 #else
 
-const uint NO_PIXEL = 0xFFFFFFFFu;
-
 // 5. Un-filling. changed[].id lists the entries to look at (all: the phase's first step), changed[].pixel those marked:
 // an entry whose pixel shows four consecutive white cells ...
 #if STEP == 4
@@ -233,6 +265,8 @@ void main()
     if (index >= entries)
         return;
     uint entry = all_new != 0u ? index : changed[index].id;
+    if (saved[entry].pixel == NO_PIXEL) // nothing reached it
+        return;
     ivec2 place = ivec2(pt_pixel(saved[entry].pixel, uint(size.x)));
     float threshold = saved[entry].threshold;
     uint white = 0u;

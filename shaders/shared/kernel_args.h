@@ -310,7 +310,11 @@ struct push_args {
     uint32_t background; // 1: empty pixels alone
 };
 
-// fill: hole filling. [D 3.2, 3.3], SPEC 2.2
+#define PT_FILL_SLACK 0.75f // pixels of the level: a neighbour is reached whatever its spacing
+
+// fill: hole filling. [D 3.2, 3.3], SPEC 2.2. With `reach`, a pixel takes the least key among those neighbours whose surfaces
+// reach it, in the occluded phase of those that hide it; where none does it stays as it is. A surface reaches as far as
+// reach d_eff max(|n.v|, C) / footprint pixels of level 0 and PT_FILL_SLACK of this one from where it was measured.
 struct fill_args {
     struct view_args view;
     uint32_t phases;     // PT_FILL_*, in their order
@@ -318,6 +322,9 @@ struct fill_args {
     uint32_t unfills;    // at most so many un-fills; 0 = as in the paper
     uint32_t refined;    // 1: depth of the source's tangent plane
     float least;         // no layer distance in view is below this
+    float reach, disc_reach; // of points, and of discs beyond themselves; reach 0: as far as may be
+    uint32_t discs_first;    // ids from here on are discs'
+    uint32_t from_width;     // of the planes at level 0
 };
 
 // Lights in view space.

@@ -57,8 +57,9 @@ static struct planes check(struct harness *h, const struct picture *picture, con
     return got;
 }
 
-static void both_phases(struct harness *h, struct picture *picture, uint32_t level, uint32_t iterations,
-                        uint32_t unfills, uint32_t refined)
+// reach: 0, or of points; discs, half of the ids, reach half as far.
+static void both_phases_within(struct harness *h, struct picture *picture, uint32_t level, uint32_t iterations,
+                               uint32_t unfills, uint32_t refined, float reach)
 {
     // Extrapolated depths that nearly agree: made to be undecidable.
     int hard = refined && picture->kind != PICTURE_SURFACES && picture->kind != PICTURE_NOISE;
@@ -67,7 +68,11 @@ static void both_phases(struct harness *h, struct picture *picture, uint32_t lev
                              .phases = PT_FILL_BACKGROUND,
                              .iterations = iterations,
                              .unfills = unfills,
-                             .refined = refined};
+                             .refined = refined,
+                             .reach = reach,
+                             .disc_reach = 0.5f * reach,
+                             .discs_first = picture->id_base + (uint32_t)(picture->count / 2),
+                             .from_width = picture->view.width};
     uint64_t *keys = picture->keys;
     uint32_t *from = picture->from;
     for (uint32_t l = 0; l < level; l++)
@@ -83,6 +88,17 @@ static void both_phases(struct harness *h, struct picture *picture, uint32_t lev
             harness_fail(h, "both phases", (int)(i % args.view.width), (int)(i / args.view.width),
                          "got %016llx from %u, expected %016llx from %u", (unsigned long long)whole.keys[i], whole.from[i],
                          (unsigned long long)filled.keys[i], filled.from[i]);
+}
+
+// As far as may be, and no farther than points reach.
+static void both_phases(struct harness *h, struct picture *picture, uint32_t level, uint32_t iterations,
+                        uint32_t unfills, uint32_t refined)
+{
+    struct picture same = *picture;
+    both_phases_within(h, &same, level, iterations, unfills, refined, 0.0f);
+    same = *picture;
+    both_phases_within(h, &same, level, iterations, unfills, refined, 0.43f);
+    both_phases_within(h, picture, level, iterations, unfills, refined, 1.37f);
 }
 
 static void kinds(struct harness *h)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // [D 3.2, 3.3], SPEC 2.2: hole filling, one rule for background and for occluded pixels.
 #include "reference.h"
+#include "tolerances.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -86,14 +87,55 @@ static struct ref_range taken_depth(const struct phase *phase, const struct ref_
                            ref_ray(view, x, y), distance(phase, source));
 }
 
+// Whether the neighbour's surface reaches the pixel: its own pixel lies near enough.
+static enum ref_truth reaches(const struct phase *phase, const struct ref_pixel *neighbour, int x, int y)
+{
+    const struct fill_args *args = phase->args;
+    const struct view_args *view = &args->view;
+    const double scale = (double)(1u << view->level), inverse = phase->normal[4 * (size_t)neighbour->from + 3];
+    const double share = (double)(neighbour->id >= args->discs_first ? args->disc_reach : args->reach);
+    const double d = (double)phase->deff[neighbour->from] * share / ((double)view->footprint * inverse);
+    const double slack = (double)PT_FILL_SLACK * scale, sx = neighbour->from % args->from_width, sy = neighbour->from / args->from_width;
+    const double way = hypot((x + 0.5) * scale - (sx + 0.5), (y + 0.5) * scale - (sy + 0.5));
+    const double least = d / (view->perspective ? neighbour->z.hi : 1.0), most = d / (view->perspective ? neighbour->z.lo : 1.0);
+    if (way <= (least + slack) * (1.0 - TOL_LEVEL))
+        return REF_YES;
+    return way > (most + slack) * (1.0 + TOL_LEVEL) ? REF_NO : REF_UNSURE;
+}
+
+// Leaves of the ring what hides the pixel and reaches it. REF_UNSURE where that cannot be told of what might be taken.
+static enum ref_truth leave_reaching(const struct phase *phase, const struct ref_pixel *pixel, int x, int y, struct ref_pixel ring[8])
+{
+    const struct ref_range threshold = threshold_of(phase, pixel);
+    enum ref_truth some = REF_NO, taken[8];
+    double bound = INFINITY; // what is certainly taken lies before it
+    for (int i = 0; i < 8; i++) {
+        if (ring[i].unsure)
+            return REF_UNSURE;
+        const enum ref_truth before = is_empty(&ring[i]) ? REF_NO : ref_less(ring[i].z, threshold);
+        taken[i] = before == REF_NO ? REF_NO : reaches(phase, &ring[i], x, y);
+        taken[i] = taken[i] == REF_YES ? before : taken[i];
+        if (taken[i] == REF_YES)
+            bound = fmin(bound, ring[i].z.hi);
+    }
+    for (int i = 0; i < 8; i++) {
+        if (taken[i] == REF_UNSURE && ring[i].z.lo <= bound)
+            return REF_UNSURE;
+        if (taken[i] != REF_YES)
+            ring[i] = ref_pixel(REF_EMPTY_KEY, 0);
+        else
+            some = REF_YES;
+    }
+    return some;
+}
+
 // Takes the least key among the neighbours. Neighbours that share it to the last bit show the same point, but as seen
 // from different pixels: the first of the ring is taken, anticlockwise from the right.
-static struct ref_pixel take_least(const struct phase *phase, const struct ref_pixel *pixels, int x, int y)
+static struct ref_pixel take_least(const struct phase *phase, const struct ref_pixel ring[8], int x, int y)
 {
-    struct ref_pixel ring[8], least = ref_pixel(REF_EMPTY_KEY, 0);
+    struct ref_pixel least = ref_pixel(REF_EMPTY_KEY, 0);
     double bound = INFINITY;
     for (int i = 0; i < 8; i++) {
-        ring[i] = at(phase->args, pixels, x + ring_x[i], y + ring_y[i]);
         least.unsure |= ring[i].unsure;
         bound = fmin(bound, ring[i].z.hi);
     }
@@ -145,7 +187,17 @@ static struct ref_pixel fill_pixel(const struct phase *phase, const struct ref_p
         pixel.unsure = 1;
         return pixel;
     }
-    return take_least(phase, pixels, x, y);
+    struct ref_pixel ring[8];
+    for (int i = 0; i < 8; i++)
+        ring[i] = at(phase->args, pixels, x + ring_x[i], y + ring_y[i]);
+    if (phase->args->reach > 0.0f) {
+        const enum ref_truth some = leave_reaching(phase, &pixel, x, y, ring);
+        *changed = some;
+        pixel.unsure |= some == REF_UNSURE;
+        if (some != REF_YES)
+            return pixel;
+    }
+    return take_least(phase, ring, x, y);
 }
 
 static int fill_all(const struct phase *phase, const struct ref_pixel *before, struct ref_pixel *after)

@@ -68,15 +68,84 @@ static void refine(const struct fill *fill, size_t at, size_t end)
     vi_store_keys(e->key + at, vf_bits(z), vi_load_id(e->key + at), vm_bits(lanes));
 }
 
+// ---- reach -----------------------------------------------------------------------------------------------------------------
+
+// Whether the surface that a neighbour shows reaches the pixel (x, y).
+static int reaches(const struct fill *fill, uint32_t x, uint32_t y, uint64_t key, uint32_t source)
+{
+    const struct fill_args *args = fill->args;
+    const struct view_args *view = fill->view;
+    const float scale = (float)(1u << view->level), z = pt_float((uint32_t)(key >> 32));
+    const float width = view->perspective ? view->footprint * z : view->footprint;
+    const float share = (uint32_t)key >= args->discs_first ? args->disc_reach : args->reach;
+    const float most = (fill->deff[source] * share) * pt_rcp(width * fill->normals[4 * (size_t)source + 3]) + PT_FILL_SLACK * scale;
+    const float dx = ((float)x + 0.5f) * scale - ((float)(source % args->from_width) + 0.5f);
+    const float dy = ((float)y + 0.5f) * scale - ((float)(source / args->from_width) + 0.5f);
+    return dx * dx + dy * dy <= most * most;
+}
+
+// The least key of those neighbours that reach the pixel; 0: there is none.
+static int take_reaching(const struct fill *fill, size_t i)
+{
+    const struct entries *e = &fill->entries;
+    const uint32_t x = e->x[i], y = e->y[i], width = fill->view->width;
+    const float threshold = fill->occluded ? e->threshold[i] : pt_float(PT_KEY_EMPTY_Z);
+    uint64_t best = UINT64_MAX;
+    for (int d = 0; d < RING; d++) {
+        const uint32_t qx = x + (uint32_t)(int32_t)ring_x[d], qy = y + (uint32_t)(int32_t)ring_y[d];
+        if (qx >= width || qy >= fill->view->height)
+            continue;
+        const size_t at = (size_t)qy * width + qx;
+        const uint64_t key = fill->keys[at];
+        if (key >= best || !(pt_float((uint32_t)(key >> 32)) < threshold))
+            continue;
+        if (!reaches(fill, x, y, key, fill->from[at]))
+            continue;
+        best = key;
+        e->qx[i] = qx;
+        e->qy[i] = qy;
+        e->from[i] = fill->from[at];
+    }
+    e->key[i] = best;
+    return best != UINT64_MAX;
+}
+
+static void move_new(const struct entries *e, size_t to, size_t from)
+{
+    e->x[to] = e->x[from];
+    e->y[to] = e->y[from];
+    e->qx[to] = e->qx[from];
+    e->qy[to] = e->qy[from];
+    e->from[to] = e->from[from];
+    e->key[to] = e->key[from];
+    e->threshold[to] = e->threshold[from];
+}
+
+// Drops entries that nothing reaches.
+static size_t keep_reached(struct fill *fill, size_t begin, size_t end)
+{
+    const struct entries *e = &fill->entries;
+    size_t kept = begin;
+    for (size_t i = begin; i < end; i++) {
+        if (reaches(fill, e->x[i], e->y[i], e->key[i], e->from[i]) || take_reaching(fill, i))
+            move_new(e, kept++, i);
+        else
+            fill->touched[word_of(fill, e->x[i], e->y[i])] &= ~bit_of(e->x[i]);
+    }
+    return kept;
+}
+
 static void decide_band(struct fill *fill, uint32_t band)
 {
     const size_t base = band * fill->band_entries, kept = base + fill->kept[band];
-    const size_t listed = fill->occluded ? list_hidden(fill, band, kept) : list_empty(fill, band, kept);
-    fill->listed[band] = (uint32_t)(listed - base);
+    size_t listed = fill->occluded ? list_hidden(fill, band, kept) : list_empty(fill, band, kept);
     if (fill->first)
         clear_band(fill, band, fill->filled);
     for (size_t i = kept; i < listed; i += PT_LANES)
         take_least(fill, i, listed);
+    if (fill->args->reach > 0.0f)
+        listed = keep_reached(fill, kept, listed);
+    fill->listed[band] = (uint32_t)(listed - base);
     // only now: the surfaces are under way
     for (size_t i = kept; fill->args->refined && i < listed; i += PT_LANES)
         refine(fill, i, listed);
