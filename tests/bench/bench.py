@@ -212,7 +212,8 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
                  lambda options: window.measure(1_000_000 if options.quick else 10_000_000, options.library)),
     "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
     "analysis": ("analysis", "What every point knows",
-                 lambda options: analysis.measure(1_000_000 if options.quick else 10_000_000, options.library)),
+                 lambda options: analysis.times(1_000_000 if options.quick else 10_000_000, options.library)),
+    "normals": ("analysis", "Normals of known shapes", lambda options: analysis.normals(options.library)),
     "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
 }
 
