@@ -29,7 +29,8 @@ CANCELLED = -7  # PATINA_ERROR_CANCELLED
 INTERNAL = -10  # PATINA_ERROR_INTERNAL
 
 # patina_pass: plane name → (number, channels)
-PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1), "LINE": (5, 1)}
+PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1), "LINE": (5, 1),
+          "CERTAINTY": (6, 1), "THICKNESS": (7, 1)}
 
 MOST_LAYERS = 16  # PATINA_MAX_LAYERS
 MOST_RAMP = 256  # PATINA_MAX_RAMP

@@ -118,6 +118,8 @@ PASSES = (
                lambda layer: layer.use_pass_object_index, _object_index),
     RenderPass("Source", 1, "X", 'VALUE', "SOURCE", lambda layer: layer.patina.use_pass_source),
     RenderPass("Line", 1, "X", 'VALUE', "LINE", lambda layer: layer.patina.use_pass_line),
+    RenderPass("Certainty", 1, "X", 'VALUE', "CERTAINTY", lambda layer: layer.patina.use_pass_certainty),
+    RenderPass("Thickness", 1, "X", 'VALUE', "THICKNESS", lambda layer: layer.patina.use_pass_thickness),
     *(item for number in range(1, MOST_LAYERS + 1) for item in _of_layer(number)),
 )
 

@@ -94,7 +94,9 @@ static int ensure_picture(struct patina_frame *frame, const struct pt_plan *plan
     int error = PATINA_OK;
     for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED && !error; p++) {
         size_t bytes = size_of(plan, (enum pt_plane)p, 0);
-        int unused = (p == PT_PLANE_SHADOW && !plan->light_count) || (p == PT_PLANE_LINES && !(plan->line_radius > 0.0f));
+        const int unused = (p == PT_PLANE_SHADOW && !plan->light_count) || (p == PT_PLANE_LINES && !(plan->line_radius > 0.0f)) ||
+                           (p == PT_PLANE_CERTAINTY && !(plan->assessed >> PATINA_PASS_CERTAINTY & 1u)) ||
+                           (p == PT_PLANE_THICKNESS && !(plan->assessed >> PATINA_PASS_THICKNESS & 1u));
         if (frame->planes[p][0].size == bytes || unused)
             continue;
         total += bytes - frame->planes[p][0].size;
@@ -459,6 +461,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
     frame->all_lit = !plan->light_count;
     frame->has_lines = plan->line_radius > 0.0f;
+    frame->assessed = plan->assessed;
     memcpy(frame->crop, plan->crop, sizeof frame->crop);
     frame->plane_width = plan->view.width;
     frame->keys_valid = 1;
@@ -518,6 +521,8 @@ static const struct {
     [PATINA_PASS_SOURCE] = { PT_PLANE_SOURCE, 1, "SOURCE" },
     [PATINA_PASS_SHADOW] = { PT_PLANE_SHADOW, 1, "SHADOW" },
     [PATINA_PASS_LINE] = { PT_PLANE_LINES, 1, "LINE" },
+    [PATINA_PASS_CERTAINTY] = { PT_PLANE_CERTAINTY, 1, "CERTAINTY" },
+    [PATINA_PASS_THICKNESS] = { PT_PLANE_THICKNESS, 1, "THICKNESS" },
 };
 
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
@@ -532,7 +537,9 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
                        pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, expected,
                        size);
-    if ((pass == PATINA_PASS_SHADOW && frame->all_lit) || (pass == PATINA_PASS_LINE && !frame->has_lines)) { // no plane
+    const uint32_t known = 1u << PATINA_PASS_CERTAINTY | 1u << PATINA_PASS_THICKNESS;
+    if ((pass == PATINA_PASS_SHADOW && frame->all_lit) || (pass == PATINA_PASS_LINE && !frame->has_lines) ||
+        (known & ~frame->assessed) >> pass & 1u) { // no plane
         for (size_t i = 0; i < size / sizeof *pixels; i++)
             pixels[i] = pass == PATINA_PASS_SHADOW ? 1.0f : 0.0f;
         return PATINA_OK;

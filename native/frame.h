@@ -42,6 +42,7 @@ struct patina_frame {
     uint32_t skipped_count;
     uint32_t passes;          // bits of what was rendered
     int has_lines;
+    uint32_t assessed; // passes of certainty and thickness that have planes, bits 1 << PATINA_PASS_*
     struct pt_layer layers[PATINA_MAX_LAYERS];
     uint32_t layer_count;     // scattered
     uint32_t layer_most;      // that the settings allowed

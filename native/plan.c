@@ -587,6 +587,7 @@ static void plan_points(struct pt_builder *builder)
         put_together(builder);
     set_background(&builder->scene->settings, background);
     pt_plan_ink(builder, background);
+    pt_plan_assess(builder);
     pt_plan_paper(builder);
 }
 
@@ -594,7 +595,7 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
     static const char *const others[] = {"raster", "cover",  "mark",  "lit", "limit", "shade",     "obscure", "edl",
                                          "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel",
-                                         "lines",  "ink"};
+                                         "lines",  "ink",    "assess"};
     builder->plan->light_count = 0;
     builder->plan->line_radius = 0.0f;
     skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);

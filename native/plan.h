@@ -47,6 +47,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(SOURCE, 4, 0)         \
     X(SHADOW, 4, 0)         \
     X(LINES, 4, 0)          \
+    X(CERTAINTY, 4, 0)      \
+    X(THICKNESS, 4, 0)      \
     X(LAYER_COMBINED, 16, 0) \
     X(LAYER_DEPTH, 4, 0)    \
     X(LAYER_NORMALS, 12, 0)
@@ -170,6 +172,7 @@ struct pt_plan {
     uint32_t layers;        // at most so many are peeled; 1: no peeling
     int transparent;        // something in view lets light through
     float line_radius;      // of the widest line, pixels; 0: none
+    uint32_t assessed;      // of PATINA_PASS_CERTAINTY and _THICKNESS, bits 1 << those that are asked for and known of something
     struct pt_arena *arena;
 };
 
@@ -180,6 +183,9 @@ static inline uint32_t pt_disc_ids(const struct patina_scene *scene)
     const uint64_t first = scene->points + scene->triangles;
     return first + scene->points < 0xFFFFFFFFu ? (uint32_t)first : 0;
 }
+
+// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2. (plan_view.c)
+double pt_thinning(const struct patina_scene *scene);
 
 // Is there anything in view?
 static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->triangles; }

@@ -97,6 +97,9 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
 void pt_plan_splat(struct pt_builder *builder);
 void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of every instance
 
+// plan_assess.c: certainty and thickness of what the picture shows.
+void pt_plan_assess(struct pt_builder *builder);
+
 // plan.c: normal and layer distance of an instance's pixels.
 void pt_plan_surface(struct pt_builder *builder, uint32_t instance);
 

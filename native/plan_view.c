@@ -363,8 +363,7 @@ static uint32_t drawn_points(const struct patina_scene *scene, const struct pt_c
     return count < chunk->count ? count : chunk->count;
 }
 
-// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2.
-static double thinning(const struct patina_scene *scene)
+double pt_thinning(const struct patina_scene *scene)
 {
     uint32_t strata = scene->settings.strata;
     return strata ? sqrt((double)(1u << (PT_STRATA - strata))) : 1.0;
@@ -393,7 +392,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, clips);
-    const double apart = thinning(scene);
+    const double apart = pt_thinning(scene);
     double rows[9];
     product_rows(camera, object, rows);
     for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f; c++) {
@@ -590,10 +589,10 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     out->of = i;
     out->discs = wide;
     out->marked = pt_is_marked(instance);
-    out->radius = (float)fmin((double)instance->style.radius * thinning(scene), (double)PT_DISC_MOST);
-    out->radius_most = (float)radius_most(instance, thinning(scene));
-    out->radius_scale = (float)fmin(survey->objects[i].scale * thinning(scene), (double)PT_DISC_MOST);
-    set_instance(&survey->camera, &survey->objects[i], instance, thinning(scene), &out->args);
+    out->radius = (float)fmin((double)instance->style.radius * pt_thinning(scene), (double)PT_DISC_MOST);
+    out->radius_most = (float)radius_most(instance, pt_thinning(scene));
+    out->radius_scale = (float)fmin(survey->objects[i].scale * pt_thinning(scene), (double)PT_DISC_MOST);
+    set_instance(&survey->camera, &survey->objects[i], instance, pt_thinning(scene), &out->args);
     out->args.id_base += id_base;
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);

@@ -70,6 +70,9 @@
 // Euclidean distance of the source pass: the root of an exact integer, drivers' sqrt() within 3 ulp; share.
 #define TOL_DISTANCE (8.0 * TOL_UNIT)
 
+// Certainty: n times the rounded 1 / 15; thickness: one product. Share.
+#define TOL_KNOWN (2.0 * TOL_UNIT)
+
 // Our log2: the polynomial 1.5e-7, its last product and the sum; besides, a unit of the result. And our 2^x: 2.3e-7 of the
 // polynomial, three roundings; share.
 #define TOL_LOG 2.5e-7

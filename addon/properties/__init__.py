@@ -262,6 +262,14 @@ class PatinaViewLayerProperties(PropertyGroup):
     use_pass_line: BoolProperty(
         name="Line", default=False, update=_update_passes, override=_OVERRIDE,
         description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
+    use_pass_certainty: BoolProperty(
+        name="Certainty", default=False, update=_update_passes, override=_OVERRIDE,
+        description="How well what each point is taken for explains its neighbours, 0 to 1, of the nearest point; "
+                    "0 where nothing is, or the points were not analyzed")
+    use_pass_thickness: BoolProperty(
+        name="Thickness", default=False, update=_update_passes, override=_OVERRIDE,
+        description="Sigma of the nearest point's surface, in the scene's units: noise, and how far scans disagree; "
+                    "0 where nothing is, or nothing is known")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
         description="Colour, depth and normal of so many layers of surface, the nearest first, as passes of their own; "

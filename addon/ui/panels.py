@@ -162,6 +162,8 @@ class PATINA_PT_passes(PatinaPanel, Panel):
         column.prop(layer, "use_pass_object_index")
         column.prop(layer.patina, "use_pass_source")
         column.prop(layer.patina, "use_pass_line")
+        column.prop(layer.patina, "use_pass_certainty")
+        column.prop(layer.patina, "use_pass_thickness")
         layout.prop(layer.patina, "pass_layers")
 
 

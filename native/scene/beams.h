@@ -11,6 +11,7 @@ struct pt_beams {
     struct pt_beam {
         double place[3]; // object units
         double step;     // radians between rows, and between columns at elevation 0; 0: not known
+        int even;        // 1: columns lie as far apart anywhere, as of a camera or a scanner that does not stand upright
     } *each;
 };
 

@@ -77,7 +77,7 @@ static const char usage[] =
     "  --repeat N                         then measure N frames, the camera turning one degree a frame\n"
     "  --stats json                       one JSON object on standard output\n"
     "  --dump-plan                        the passes, and why\n"
-    "  --dump-planes FOLDER               raw planes of the picture\n"
+    "  --dump-planes FOLDER               raw planes of the picture, its passes among them\n"
     "  --verbose                          the library's log too\n"
     "patina version\n"
     "Exit status: 0 done, 1 failed, 2 wrong use, 130 cancelled.\n";

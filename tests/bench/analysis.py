@@ -152,9 +152,12 @@ def times_table(native, count: int) -> str:
                       "| | s | processor, s | times as fast | by processor |", "|---|---|---|---|---|", *rows])
 
 
-def measure(count: int, path: Path | None = None) -> str:
-    native = library(path)
-    return times_table(native, count) + "\n\n" + normals_table(native)
+def times(count: int, path: Path | None = None) -> str:
+    return times_table(library(path), count)
+
+
+def normals(path: Path | None = None) -> str:
+    return normals_table(library(path))
 
 
 def main() -> None:
@@ -162,7 +165,7 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=10_000_000)
     parser.add_argument("--library", type=Path)
     options = parser.parse_args()
-    print(measure(options.points, options.library))
+    print(times(options.points, options.library) + "\n\n" + normals(options.library))
 
 
 if __name__ == "__main__":

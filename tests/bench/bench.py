@@ -16,7 +16,8 @@ of them, in the same order; "absent" what could not be measured, and why.
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
 scans against exact views; half an hour more where these are not kept yet), independent (shapes that no rule was made on), session
-(ten minutes of work in Blender), analysis (what every point knows, 10 million). With --quick they take a million points, and one
+(ten minutes of work in Blender), analysis (what every point knows, 10 million), walk (frame by frame
+through virtual scans). With --quick they take a million points, and one
 minute. Two are of --only alone, for they need what most machines lack: graphics (OpenGL on a graphics processor beside the processor)
 and scaling (threads up to all cores).
 """
@@ -48,6 +49,7 @@ import report
 import scans
 import soft
 import stage
+import walk
 import window
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,7 +58,7 @@ SURFACES = list(stage.scenes.SURFACES)
 LEVELS = ("cpu-avx2", "cpu-sse42", "cpu-scalar")  # what processors have that are not the best
 GROUPS = ("headline", "levels", "discs", "inside", "points", "pixels", "threads", "scenes", "layers", "shadows", "patterns",
           "steady", "papers", "effects", "lines", "styles", "peers", "cues", "hard", "tests", "meshes", "import", "viewport",
-          "leaves", "scans", "independent", "session", "analysis", "graphics", "scaling")
+          "leaves", "scans", "independent", "session", "analysis", "walk", "graphics", "scaling")
 
 
 def case_of(group: str, surface: str = "torus", device: str = "cpu", size: int = 1024, points: int = 0,
@@ -212,7 +214,9 @@ PARTS: dict[str, tuple[str, str, Callable[[argparse.Namespace], str]]] = {
                  lambda options: window.measure(1_000_000 if options.quick else 10_000_000, options.library)),
     "leaves": ("leaves", "Specks of shadows", lambda options: quoted.leaves(options.library)),
     "analysis": ("analysis", "What every point knows",
-                 lambda options: analysis.measure(1_000_000 if options.quick else 10_000_000, options.library)),
+                 lambda options: analysis.times(1_000_000 if options.quick else 10_000_000, options.library)),
+    "normals": ("analysis", "Normals of known shapes", lambda options: analysis.normals(options.library)),
+    "walk": ("walk", "Walks through virtual scans", lambda options: walk.text(options.quick, options.library)),
     "session": ("session", "A long session", lambda options: quoted.session(1 if options.quick else 10, options.library)),
 }
 

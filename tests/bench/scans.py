@@ -58,7 +58,7 @@ def vtk_version() -> str:
     return done.stdout.strip() if done.returncode == 0 else ""
 
 
-def _command(program: str) -> list[str]:
+def peer_command(program: str) -> list[str]:
     """What draws with VTK's points, Cycles' or EEVEE's spheres: [] where it is not there."""
     if program == "vtk":
         return [*_screen(), PYTHON, str(HERE / "peer_scans.py")] if vtk_version() else []
@@ -70,7 +70,7 @@ def _command(program: str) -> list[str]:
 
 def peer_rows(scenes: list[Scene], cameras: list[int], program: str, sizes: list[str]) -> Iterator[dict[str, Any]]:
     """Rows as run.measure gives them, with "mode". sizes: pixels of VTK's points, metres of Blender's radii."""
-    command = _command(program)
+    command = peer_command(program)
     for scene in scenes if command else ():
         stage = Stage(scene)
         views = [(index, 0.0) for index in cameras] + [(index, STEP) for index in cameras if scene.views[index].motion]

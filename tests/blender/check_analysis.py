@@ -7,8 +7,9 @@ import bpy
 import numpy as np
 from check_import import import_ply
 from check_linked import dense
-from harness import (SCRATCH, Skip, add_light, add_points, check, engine, linear, new_scene, render, reports,
-                     sphere, stats)
+from harness import (SCRATCH, Skip, add_light, add_points, check, check_close, engine, linear, new_scene, render, reports,
+                     saved, sphere, stats, written)
+from mathutils import Matrix
 
 from patina import native
 from patina.sync import analysis, analyzing, clouds, linked
@@ -66,6 +67,45 @@ def test_final_is_analyzed():
     check(np.abs(plain["Combined"] - picture["Combined"]).max() > 0.01, "the same picture")
     obj.patina.analysis = 'AUTO'
     check((render()["Combined"] == picture["Combined"]).all(), "another picture")
+
+
+def test_certainty_and_thickness():
+    """Each pixel has what the analysis found of the point that it shows, in the scene's units; 0 where nothing is known."""
+    scene = fresh_scene(160, 90)
+    scene.patina.fill = 'CLOSED'
+    random = np.random.default_rng(3)
+    places = sphere(30000)[0] + (0, 0, 4)
+    places *= 1 + 0.02 * random.standard_normal((len(places), 1))
+    known = add_points(places, name="known", matrix=Matrix.Translation((-1.1, 0, -4)) @ Matrix.Scale(0.5, 4))
+    unknown = add_points(places, name="unknown", matrix=Matrix.Translation((1.1, 0, -4)) @ Matrix.Scale(0.5, 4))
+    unknown.patina.analysis = 'OFF'
+    layer = scene.view_layers[0]
+    layer.patina.use_pass_certainty = layer.patina.use_pass_thickness = layer.use_pass_object_index = True
+    known.pass_index = 7
+    picture = render()
+    ids = (written[-1][1]["KEYS"][..., 0] & np.uint64(0xFFFFFFFF)).astype(np.int64)
+    shows = next(values for name, values in picture.items() if name in ("IndexOB", "Object Index"))[..., 0] == 7
+    check(shows.sum() > 500 and not shows[:, 80:].any(), f"{shows.sum()} pixels")
+    cloud, = (cloud for _, cloud in clouds.CACHE._entries.values() if cloud.has_shapes)
+    found = cloud.neighbourhoods("sigma", "certainty")
+    sigma, certainty = picture["Thickness"][..., 0], picture["Certainty"][..., 0]
+    check(ids[shows].max() < len(places), "the first object's points have the first numbers")
+    check_close(sigma[shows], 0.5 * found["sigma"][ids[shows]], 1e-6, "thickness")
+    check_close(certainty[shows], found["certainty"][ids[shows]], 1e-6, "certainty")
+    check(0.005 < np.median(sigma[shows]) < 0.02, f"noise of 0.01 is {np.median(sigma[shows]):.4f} thick")
+    check(0 <= certainty.min() and certainty.max() <= 1 and np.median(certainty[shows]) > 0.2, "certainty")
+    check((picture["Combined"][:, 80:, 3] == 1).sum() > 500, "points without an analysis")
+    check(not sigma[~shows].any() and not certainty[~shows].any(), "0 where nothing is known, and where nothing is")
+    if bpy.app.version >= (5, 0, 0):  # the compositor is a node group there
+        return
+    scene.use_nodes = True
+    tree = scene.node_tree
+    tree.nodes.clear()
+    source, target = tree.nodes.new('CompositorNodeRLayers'), tree.nodes.new('CompositorNodeComposite')
+    for name, values in (("Thickness", sigma), ("Certainty", certainty)):
+        tree.links.new(source.outputs[name], target.inputs["Image"])
+        render()
+        check_close(saved()[..., 0], values, 1e-6, f"{name} through the compositor")
 
 
 def test_once():

@@ -294,4 +294,11 @@ struct ref_extract {
 };
 struct ref_extract ref_extract(const struct extract_args *args, const struct ref_planes *planes, int x, int y);
 
+struct ref_assess {
+    double certainty, thickness;
+    int written; // 0: the pixel stays as it is
+};
+// x, y: in the planes, within view.rect; shapes: by id - id_base.
+struct ref_assess ref_assess(const struct assess_args *args, const struct ref_planes *planes, const uint32_t *shapes, int x, int y);
+
 #endif

@@ -217,6 +217,64 @@ static void test_fewer_passes(void **state)
     }
 }
 
+// Each pixel's certainty and thickness are those of the point whose number its key holds, times the instance's scale, and 0
+// where that is a mesh or nothing. scales: of the instances.
+static void check_known(const struct picture *picture, const patina_neighbourhoods *known, uint64_t points, const float *scales,
+                        uint32_t instances)
+{
+    uint64_t sure = 0, thick = 0;
+    for (size_t i = 0; i < (size_t)picture->width * picture->height; i++) {
+        const uint64_t id = picture->keys[i] == KEY_EMPTY ? UINT64_MAX : key_id(picture->keys[i]);
+        const int shown = id < instances * points;
+        const float certainty = shown ? known->certainty[id % points] : 0.0f;
+        const float sigma = shown ? known->sigma[id % points] * scales[id / points] : 0.0f;
+        assert_float_equal(picture->certainty[i], certainty, 1e-6f);
+        assert_float_equal(picture->thickness[i], sigma, 1e-6f * sigma);
+        sure += certainty > 0.5f;
+        thick += sigma > 0.0f;
+    }
+    assert_true(sure > 1000 && thick > 1000);
+}
+
+static void test_certainty_and_thickness(void **state)
+{
+    static const char *const scenes[] = {"footprints, density 0.1 to 30", "footprints among meshes",
+                                         "footprints without normals, orthographic"};
+    const float scales[] = {1.0f, 0.6f, sqrtf(1.22f), 0.5f, 0.0f, 1.0f}; // of longest axes, see staging.c
+    (void)state;
+    for (uint32_t k = 0; k < support_device_count(); k++) {
+        patina_device *device = support_device_open(support_device_name(k), 0, 0);
+        if (!device)
+            continue;
+        for (uint32_t s = 0; s < sizeof scenes / sizeof scenes[0]; s++) {
+            struct stage stage = stage_build(staging_named(scenes[s]));
+            patina_cloud_info info = {.struct_size = sizeof info};
+            CHECK(patina_cloud_get_info(stage.cloud, &info), stage.cloud);
+            patina_neighbourhoods known = {.struct_size = sizeof known};
+            known.certainty = calloc(info.count, sizeof *known.certainty);
+            known.sigma = calloc(info.count, sizeof *known.sigma);
+            assert_true(known.certainty && known.sigma);
+            CHECK(patina_cloud_neighbourhoods(stage.cloud, &known, NULL), stage.cloud);
+            for (uint32_t strata = 0; strata < 5; strata += 4) { // what is left out changes what is drawn, not how thick it is
+                stage.settings.strata = strata;
+                struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+                check_known(&picture, &known, info.count, scales, s == 2 ? 6 : 1);
+                picture_free(&picture);
+            }
+            free(known.certainty);
+            free(known.sigma);
+            stage_free(&stage);
+        }
+        struct stage plain = stage_build(staging_named("small, 1 point a pixel")); // nothing is known of its points
+        struct picture picture = picture_render(device, plain.scene, &plain.camera, &plain.settings);
+        for (size_t i = 0; i < (size_t)picture.width * picture.height; i++)
+            assert_true(picture.certainty[i] == 0.0f && picture.thickness[i] == 0.0f);
+        picture_free(&picture);
+        stage_free(&plain);
+        patina_device_destroy(device);
+    }
+}
+
 // Every pass is either timed or left out with a reason.
 static void test_statistics(void **state)
 {
@@ -601,6 +659,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_view_after_view),
         cmocka_unit_test(test_fewer_passes),
+        cmocka_unit_test(test_certainty_and_thickness),
         cmocka_unit_test(test_statistics),
         cmocka_unit_test(test_plan),
         cmocka_unit_test(test_callers_numbers),

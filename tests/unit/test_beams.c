@@ -67,6 +67,66 @@ static void test_interval(void **state)
     free(scan);
 }
 
+// From 60 degrees below the horizon to 60 above it: the steeper, the nearer together columns lie.
+static void test_steep(void **state)
+{
+    (void)state;
+    struct scan *scan = calloc(1, sizeof *scan);
+    for (int row = -240; row < 240; row++)
+        for (int column = 0; column < 120; column++) { // a twelfth of the turn
+            double *p = scan->position[scan->count++];
+            const double e = (row + 0.5) * step, a = (column + 0.5) * step;
+            p[0] = station[0] + 5.0 * cos(e) * cos(a);
+            p[1] = station[1] + 5.0 * cos(e) * sin(a);
+            p[2] = station[2] + 5.0 * sin(e);
+        }
+    patina_cloud *cloud = cloud_of(scan);
+    const patina_analysis_desc desc = {.struct_size = sizeof desc, .station_count = 1, .stations = station};
+    struct pt_beams beams;
+    assert_int_equal(pt_beams_create(cloud, &desc, &beams), PATINA_OK);
+    assert_true(fabs(beams.each[0].step / step - 1.0) < 0.04);
+    assert_int_equal(beams.each[0].even, 0);
+    pt_beams_destroy(&beams);
+    patina_cloud_destroy(cloud);
+    free(scan);
+}
+
+// A depth camera has an even grid, wherever it looks: along z its columns lie no nearer together. A wall before it is closed.
+static void test_camera(void **state)
+{
+    enum { WIDTH = 200, HEIGHT = 150 };
+    static const double focal = 180.0; // pixels
+    (void)state;
+    for (int axis = 0; axis < 3; axis++) {
+        struct scan *scan = calloc(1, sizeof *scan);
+        for (int row = 0; row < HEIGHT; row++)
+            for (int column = 0; column < WIDTH; column++) {
+                double *p = scan->position[scan->count++];
+                p[axis] = station[axis] + 3.0;
+                p[(axis + 1) % 3] = station[(axis + 1) % 3] + 3.0 * (column + 0.5 - WIDTH / 2) / focal;
+                p[(axis + 2) % 3] = station[(axis + 2) % 3] + 3.0 * (row + 0.5 - HEIGHT / 2) / focal;
+            }
+        patina_cloud *cloud = cloud_of(scan);
+        const patina_analysis_desc desc = {.struct_size = sizeof desc, .station_count = 1, .stations = station};
+        struct pt_beams beams;
+        assert_int_equal(pt_beams_create(cloud, &desc, &beams), PATINA_OK);
+        assert_true(beams.each[0].step * focal > 0.7 && beams.each[0].step * focal < 1.1);
+        pt_beams_destroy(&beams);
+        assert_int_equal(patina_cloud_analyse(cloud, &desc, NULL), PATINA_OK);
+        float *axes = calloc(scan->count, 2 * sizeof *axes);
+        const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .half_axes = axes};
+        assert_int_equal(patina_cloud_neighbourhoods(cloud, &wanted, NULL), PATINA_OK);
+        uint64_t closed = 0, inner = 0;
+        for (int row = 5; row < HEIGHT - 5; row++)
+            for (int column = 5; column < WIDTH - 5; column++, inner++)
+                closed += (double)axes[2 * (row * WIDTH + column) + 1] > 0.7 * 3.0 / focal; // reaches the cell's corners
+        assert_true(closed > 0.98 * (double)inner);
+        free(axes);
+        patina_cloud_destroy(cloud);
+        free(scan);
+    }
+}
+
 // No footprint is wider than its cell allows; bars stay narrow, and the wall is closed.
 static void test_footprints(void **state)
 {
@@ -147,6 +207,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_interval),
+        cmocka_unit_test(test_steep),
+        cmocka_unit_test(test_camera),
         cmocka_unit_test(test_footprints),
         cmocka_unit_test(test_unknown),
         cmocka_unit_test(test_strays),

@@ -608,7 +608,9 @@ PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimu
     X(NORMAL, 3, "world-space unit normal, 0 where nothing is")                                                \
     X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")   \
     X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")               \
-    X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")
+    X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")                    \
+    X(CERTAINTY, 1, "0..1, of the nearest point's kind, as analysed; 0 where nothing is known, or nothing is")   \
+    X(THICKNESS, 1, "sigma of the nearest point's surface, world units; 0 where nothing is known, or nothing is")
 
 enum patina_pass {
 #define PATINA_X(name, channels, text) PATINA_PASS_##name,

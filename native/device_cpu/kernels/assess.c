@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// assess: certainty and thickness of the points that pixels show, into the crop; twin of shaders/kernels/assess.comp
+#include "device_cpu/rows.h"
+
+static void assess_row(void *context, uint32_t y)
+{
+    const struct pt_cpu_call *call = context;
+    const struct assess_args *args = call->arguments;
+    const uint32_t *rect = args->view.rect, *shapes = pt_cpu_data(call, 1);
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + (size_t)y * args->view.width;
+    const size_t row = (size_t)(y - args->crop_y) * args->crop_width;
+    float *certainty = (float *)pt_cpu_data(call, 2) + row, *thickness = (float *)pt_cpu_data(call, 3) + row;
+    for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
+        const uint32_t lanes = pt_lanes_left(x, rect[2]), to = x - args->crop_x;
+        pt_fetch_ahead(keys, x + PT_LANES, rect[2], &args->instance, shapes, sizeof *shapes);
+        vi id;
+        const vm ours = pt_of_instance(keys + x, &args->instance, lanes, &id), written = args->first ? vm_first(lanes) : ours;
+        if (!vm_bits(written))
+            continue;
+        vf sure = vf_zero(), sigma = vf_zero();
+        if (vm_bits(ours)) {
+            const vi word = vi_gather(shapes, id, ours);
+            const vi class = vi_and(vi_shr(word, PT_SHAPE_SIGMA_SHIFT), vi_set(PT_SHAPE_CLASS_BITS));
+            const vf fifteenths = vi_convert(vi_and(vi_shr(word, PT_SHAPE_CERTAINTY_SHIFT), vi_set(15u)));
+            sure = vf_select(ours, fifteenths * vf_set(PT_CERTAINTY_STEP), sure);
+            const vm known = vm_and(ours, vm_not(vi_eq(class, vi_set(0))));
+            sigma = vf_select(known, vf_look_up(args->instance.spacing, PT_SPACINGS, class) * vf_set(args->sigma_scale), sigma);
+        }
+        if (args->certainty)
+            vf_store_where(certainty + to, sure, written);
+        if (args->thickness)
+            vf_store_where(thickness + to, sigma, written);
+    }
+}
+
+int PT_KERNEL_ENTRY(assess)(const struct pt_cpu_call *call)
+{
+    const struct assess_args *args = call->arguments;
+    return pt_rows(call, &args->view, assess_row);
+}

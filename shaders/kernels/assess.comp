@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// assess: certainty and thickness of the points that pixels show, into the crop; twin of native/device_cpu/kernels/assess.c
+#version 430 core
+#include "lib/math.glsl"
+#include "lib/planes.glsl"
+
+layout(local_size_x = 32, local_size_y = 8) in;
+
+layout(std430, binding = 0) readonly buffer arguments_block { assess_args args; };
+layout(std430, binding = 2) readonly buffer shapes_block { uint shapes[]; };
+layout(std430, binding = 3) writeonly buffer certainty_block { float certainty[]; };
+layout(std430, binding = 4) writeonly buffer thickness_block { float thickness[]; };
+
+void main()
+{
+    uint x = args.view.rect[0] + gl_GlobalInvocationID.x, y = args.view.rect[1] + gl_GlobalInvocationID.y;
+    if (x >= args.view.rect[2] || y >= args.view.rect[3])
+        return;
+    uvec2 key = read_key(y * args.view.width + x);
+    uint id = key.x - args.instance.id_base, to = (y - args.crop_y) * args.crop_width + x - args.crop_x;
+    bool ours = key.y != PT_KEY_EMPTY_Z && id < args.instance.id_count;
+    if (!ours && args.first == 0u)
+        return;
+    uint word = ours ? shapes[id] : 0u, sigma_class = word >> PT_SHAPE_SIGMA_SHIFT & PT_SHAPE_CLASS_BITS;
+    precise float sure = float(word >> PT_SHAPE_CERTAINTY_SHIFT & 15u) * PT_CERTAINTY_STEP;
+    precise float sigma = args.instance.spacing[sigma_class] * args.sigma_scale;
+    if (args.certainty != 0u)
+        certainty[to] = sure;
+    if (args.thickness != 0u)
+        thickness[to] = sigma_class != 0u ? sigma : 0.0;
+}
