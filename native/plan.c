@@ -97,10 +97,10 @@ static float least_distance(const struct pt_plan *plan)
     return 0.999f * least;
 }
 
-// How far an analysed cloud's points close holes beside them, in d_eff (two spacings); discs cover what is theirs already. On
-// four virtual scans with their stations false surface falls from 15.9 to 14 %, thin parts kept rise from 65 to 67 %.
+// How far an analysed cloud's points close holes beside them, in d_eff (two spacings); discs cover what is theirs already. With
+// discs as far as points, virtual scans show a tenth more of false surface, and a torus of 62,500 points 1 dB less.
 #define REACH 1.0f
-#define DISC_REACH 0.5f
+#define DISC_REACH 0.25f
 
 static void plan_fill_level(struct pt_builder *builder, uint32_t level)
 {

@@ -23,6 +23,7 @@ struct walk {
     struct pt_beams beams;
     patina_progress *progress;
     uint32_t k;
+    int rows;  // the cloud's samples lie in rows, far apart
     int given; // normals that the cloud has know their side
     struct tally {
         uint32_t kinds[6], estimated, unoriented;
@@ -106,9 +107,11 @@ void pt_describe_leaf(const struct pt_neighbours *tree, const struct pt_neighbou
         }
     }
     look_from_afar(tree, coarse, leaf, found, hoods);
-    for (uint32_t left = limit ? lanes : 0; left; left &= left - 1) {
+    for (uint32_t left = lanes; left; left &= left - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(left);
-        limit(context, leaf * PT_LEAF + lane, &samples[lane], &hoods[lane]);
+        hoods[lane].sampled = hoods[lane].spacing;
+        if (limit)
+            limit(context, leaf * PT_LEAF + lane, &samples[lane], &hoods[lane]);
     }
 }
 
@@ -140,8 +143,7 @@ static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_ch
     return walk->beams.count ? &walk->beams.each[pt_beam_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
 }
 
-// Half axes beyond this many of the cloud's median spacings are held against the neighbours' own distances.
-#define FAR_FROM_OTHERS 12.0
+#define ROWS 3.5 // unevenness: random points show less, nine in ten of them
 
 struct limited { // by a chunk's beams
     const struct walk *walk;
@@ -156,8 +158,28 @@ static void limit_point(void *context, uint32_t place, const struct pt_sample *s
         beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], limited->walk->tree.slots[place], p);
     if (beam)
         pt_beam_limit(beam, p, sample, hood);
-    else if (hood->major > FAR_FROM_OTHERS * limited->walk->cloud->info.spacing)
+    else if (!limited->walk->rows)
         pt_neighbourhood_bound(sample, hood);
+}
+
+// Whether the middling surface is uneven: then samples lie in rows wherever one looks. Else what looks like rows is what stands in
+// rows: bars, steps, louvres.
+static int lies_in_rows(const struct walk *walk)
+{
+    enum { LEAVES = 1024 };
+    const uint32_t leaves = walk->tree.leaf_count, step = leaves / LEAVES + 1;
+    struct pt_found found;
+    struct pt_neighbourhood hoods[PT_LEAF];
+    uint64_t flat = 0, uneven = 0;
+    for (uint32_t leaf = step / 2; leaf < leaves && !pt_progress_cancelled(walk->progress); leaf += step) {
+        pt_describe_leaf(&walk->tree, &walk->coarse, leaf, walk->k, &found, hoods, NULL, NULL);
+        for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
+            const struct pt_neighbourhood *hood = &hoods[__builtin_ctz(left)];
+            flat += hood->kind == PT_KIND_SURFACE;
+            uneven += hood->kind == PT_KIND_SURFACE && hood->uneven > ROWS;
+        }
+    }
+    return 2 * uneven > flat;
 }
 
 static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, struct pt_neighbourhood *hood)
@@ -222,8 +244,8 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
             for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
                 const uint32_t lane = (uint32_t)__builtin_ctz(left);
                 write_point(walk, c, walk->tree.slots[leaf * PT_LEAF + lane], &hoods[lane]);
-                if (hoods[lane].spacing > 0.0)
-                    spacings[known++] = (float)hoods[lane].spacing;
+                if (hoods[lane].sampled > 0.0)
+                    spacings[known++] = (float)hoods[lane].sampled;
             }
         }
         finish_chunk(walk, &walk->out->chunks[c], spacings, known);
@@ -343,6 +365,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         pt_neighbours_destroy(&walk->tree);
         return error;
     }
+    walk->rows = lies_in_rows(walk);
     pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
     pt_neighbours_destroy(&walk->coarse);
     error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : vote_sides(walk, pool);

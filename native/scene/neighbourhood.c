@@ -9,11 +9,11 @@
 
 // ---- the rule of footprints: what is tuned, in one place -------------------------------------------------------------------
 
-#define COVER 1.35          // half axes in spacings: of random points exp(-pi r^2) stay uncovered, 0.3 %
-#define COVER_BORDER 0.5    // across a border
+#define COVER 0.9           // half axes in spacings; what random points leave open beside them, filling closes
+#define COVER_BORDER 0.35   // across a border
 #define COVER_LINE 0.6      // of a line's points, in spacings along it
-#define COVER_DOT 0.4       // of volume and strays, in distances to the nearest neighbour
-#define COVER_ROUGH 0.8     // of what is hardly a volume (creases, ornaments), in spacings, so that no cracks show there
+#define COVER_DOT 0.2       // of volume and strays, in distances to the nearest neighbour
+#define COVER_ROUGH 0.2     // of what is hardly a volume (creases, ornaments), in spacings, so that no cracks show there
 #define ROUGH 0.35          // thickness over width, squared: between FLATTEST and this the one turns into the other
 #define UNEVEN 2.5          // spacings along and across differ less than this by chance: of random points two in three
 #define UNEVEN_DOUBT 4.0    // 16 neighbours on rows 1 : 5 hold too few of the rows beside: they overrate them
@@ -31,7 +31,7 @@
 #define STRAY_DISTANCE 3.5  // to the second nearest neighbour, in distances of neighbours among each other
 #define ON_PLANE 0.25       // spacings: how near to a plane its points lie
 
-#define MOST_MUTUAL 3.0      // half axes of what lies far from others, in neighbours' distances from each other: 1.8 of even points
+#define MOST_MUTUAL 1.6 // half axes at most, in neighbours' distances from each other; of even random points 0.9 spacings are 1.9
 
 // Half axes from the spacings along the two directions of the plane.
 static void cover(double along, double across, struct pt_neighbourhood *out)

@@ -24,6 +24,7 @@ struct pt_neighbourhood {
     double normal[3], axis[3]; // axis: of the greater half axis, on the plane
     double major, minor;       // half axes of the footprint; 0: none
     double spacing, sigma;     // 0: unknown
+    double sampled;            // the spacing before bounds: what a picture's levels are counted with
     double certainty;          // 0..1
     double uneven;             // spacing along the greater axis in those across, as measured; 1: not told
 };
@@ -47,8 +48,8 @@ double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *pla
 int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_plane *plane, double thinning,
                                struct pt_neighbourhood *out);
 
-// Bounds the footprint of a point that lies much farther from others than most of its cloud: by how far its neighbours lie from
-// each other. What is left of a surface there closes, a few strays beside it stay small.
+// Bounds the footprint of a point by how far its neighbours lie from each other: strays, leaves, bars of a railing and wires lie
+// farther from others than these do.
 void pt_neighbourhood_bound(const struct pt_sample *sample, struct pt_neighbourhood *hood);
 void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *plane, struct pt_neighbourhood *out);
 
