@@ -416,10 +416,13 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
             seen.extent.rect[k] -= AROUND;
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered;
-        double footprint = most(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : seen.extent.z_middle);
+        const double pixel = most(camera->xs, camera->ys), middle = seen.extent.z_middle;
+        double footprint = pixel * (camera->orthographic ? 1.0 : middle);
+        // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
+        double nearest = plan->map && !camera->orthographic ? pixel * most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle) : footprint;
         uint32_t count = drawn_points(scene, chunk);
         double thinned = sqrt((double)chunk->count / count);
-        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / footprint *
+        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / nearest *
                           sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
@@ -707,6 +710,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         return error;
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
+    plan->view.perspective = !scene->camera.orthographic;
     pt_choose_filling(&scene->settings, plan);
     pt_choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);
