@@ -143,6 +143,18 @@ static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_ch
 // Half axes beyond this many of the cloud's median spacings are held against the neighbours' own distances.
 #define FAR_FROM_OTHERS 12.0
 
+// A dot is no wider than points lie apart anywhere; a surface, whose rows may lie farther apart, four times that.
+static void limit_stray(const struct walk *walk, struct pt_neighbourhood *hood)
+{
+    const int dot = hood->kind == PT_KIND_VOLUME || hood->kind == PT_KIND_STRAY;
+    const double most = (dot ? 1.0 : 4.0) * walk->cloud->info.spacing_max;
+    if (!(most > 0.0) || !(hood->major > most))
+        return;
+    hood->major = most;
+    hood->minor = fmin(hood->minor, most);
+    hood->spacing = fmin(hood->spacing, most);
+}
+
 struct limited { // by a chunk's beams
     const struct walk *walk;
     uint32_t chunk;
@@ -158,6 +170,8 @@ static void limit_point(void *context, uint32_t place, const struct pt_sample *s
         pt_beam_limit(beam, p, sample, hood);
     else if (hood->major > FAR_FROM_OTHERS * limited->walk->cloud->info.spacing)
         pt_neighbourhood_bound(sample, hood);
+    if (!beam)
+        limit_stray(limited->walk, hood);
 }
 
 static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, struct pt_neighbourhood *hood)
