@@ -44,7 +44,7 @@ void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan)
     for (; s > widest || (plan->levels && s > 1.0); s *= 0.5)
         if (plan->levels++ == (plan->discs_count ? LEVELS_BESIDE_DISCS - 1 : PT_LEVELS - 2))
             break;
-    plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : s < 1.1 ? 4 : s < 1.35 ? 5 : MOST_ITERATIONS;
+    plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : plan->levels || s < 1.1 ? 4 : s < 1.35 ? 5 : MOST_ITERATIONS;
 }
 
 // An opaque scene has one layer, unless all are asked for as passes.
