@@ -375,7 +375,10 @@ static int is_transparent(const struct pt_instance *instance)
     return instance->style.transparency > 0.0f || instance->cloud->info.has_opacities;
 }
 
-// How much wider the view draws outward what it sees away from its middle, 1 / cosine of the angle to it, at the place of the
+// Of views up to 90 degrees: they are as they were measured, a million points on a torus are filled and not discs.
+#define USUAL_STRETCH 1.5
+
+// How much wider than usual the view draws outward what it sees away from its middle, 1 / cosine of the angle to it, at the place of the
 // box that is farthest out and in the picture; depth: the z there, of a place as far from the eye as the box's middle.
 static double stretch_of(const struct camera *camera, const struct extent *extent, double *depth)
 {
@@ -388,8 +391,8 @@ static double stretch_of(const struct camera *camera, const struct extent *exten
         middle += 0.25 * (low + high) * (low + high);
         out += farther * farther;
     }
-    *depth = camera->orthographic ? 1.0 : extent->z_middle * sqrt(middle / out);
-    return camera->orthographic ? 1.0 : sqrt(out);
+    *depth = camera->orthographic ? 1.0 : extent->z_middle * least(USUAL_STRETCH * sqrt(middle / out), 1.0);
+    return camera->orthographic ? 1.0 : most(sqrt(out) / USUAL_STRETCH, 1.0);
 }
 
 // Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
