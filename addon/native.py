@@ -215,7 +215,8 @@ class _Read(Structure):
 
 
 class _ExpectedError(Structure):
-    _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float)]
+    _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float),
+                ("doubt", c_float)]
 
 
 class _FrameStats(_Descriptor):

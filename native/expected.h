@@ -13,8 +13,10 @@ enum pt_means pt_means_of(uint32_t quality, uint32_t fill);
 void pt_means_settings(enum pt_means means, uint32_t *quality, uint32_t *fill);
 const char *pt_means_name(enum pt_means means);
 
-// At a spacing on screen as struct pt_plan has it, pixels; all zero where it is not above 0. Between measured spacings on
-// straight lines over its logarithm, beyond them as at the last.
+// At a spacing on screen as struct pt_plan has it, pixels. Between measured spacings on straight lines over its logarithm; below
+// them as at the first; beyond them by the power of the last two, at least the root. Infinite beyond PT_SPACING_KNOWN and where the
+// spacing is not above 0.
+#define PT_SPACING_KNOWN 64.0
 patina_expected_error pt_expected_error(enum pt_means means, double spacing_px);
 
 // The cheapest means whose colour error is not above the target, else those with the least.

@@ -608,7 +608,7 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
 int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behind)
 {
     struct pt_builder builder = {.scene = scene, .plan = plan, .behind = behind};
-    *plan = (struct pt_plan){0};
+    *plan = (struct pt_plan){.map = 1};
     int error = pt_plan_view(scene, plan);
     if (plan->iterations > MAP_ITERATIONS)
         plan->iterations = MAP_ITERATIONS;

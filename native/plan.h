@@ -167,6 +167,7 @@ struct pt_plan {
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
     uint32_t quality, fill; // as set, or as the error target chose them
+    int map;                // of a light
     enum pt_means means;    // that `expected` is of
     patina_expected_error expected;
     uint32_t layers;        // at most so many are peeled; 1: no peeling

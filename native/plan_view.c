@@ -374,6 +374,26 @@ static int is_transparent(const struct pt_instance *instance)
     return instance->style.transparency > 0.0f || instance->cloud->info.has_opacities;
 }
 
+// Of views up to 90 degrees: they are as they were measured, a million points on a torus are filled and not discs.
+#define USUAL_STRETCH 1.5
+
+// How much wider than usual the view draws outward what it sees away from its middle, 1 / cosine of the angle to it, at the place of the
+// box that is farthest out and in the picture; depth: the z there, of a place as far from the eye as the box's middle.
+static double stretch_of(const struct camera *camera, const struct extent *extent, double *depth)
+{
+    double middle = 1.0, out = 1.0;
+    for (int k = 0; k < 2; k++) {
+        const double size = k ? camera->height : camera->width, start = k ? camera->bottom : camera->left, step = k ? camera->ys : camera->xs;
+        const double low = start + step * least(most(extent->rect[k], 0.0), size);
+        const double high = start + step * least(most(extent->rect[2 + k], 0.0), size);
+        const double farther = most(fabs(low), fabs(high));
+        middle += 0.25 * (low + high) * (low + high);
+        out += farther * farther;
+    }
+    *depth = camera->orthographic ? 1.0 : extent->z_middle * least(USUAL_STRETCH * sqrt(middle / out), 1.0);
+    return camera->orthographic ? 1.0 : most(sqrt(out) / USUAL_STRETCH, 1.0);
+}
+
 // Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
 enum { AROUND = 160 };
 
@@ -411,19 +431,24 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         chunk_translation(camera, object, chunk, translation);
         if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), &seen.extent))
             continue;
+        double rim;
+        const double stretch = stretch_of(camera, &seen.extent, &rim);
         for (int k = 0; k < 4; k++)
             seen.extent.rect[k] -= AROUND;
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered;
-        double footprint = most(camera->xs, camera->ys) * (camera->orthographic ? 1.0 : seen.extent.z_middle);
+        const double pixel = most(camera->xs, camera->ys), middle = seen.extent.z_middle;
+        double footprint = pixel * (camera->orthographic ? 1.0 : middle);
+        // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
+        double nearest = plan->map && !camera->orthographic ? pixel * most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle) : footprint;
         uint32_t count = drawn_points(scene, chunk);
         double thinned = sqrt((double)chunk->count / count);
-        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / footprint *
+        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / nearest *
                           sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         seen.wide = scene->settings.surface == PATINA_SURFACE_SPLATS ||
-                    disc_reach(scene, instance, object, chunk, apart, 0) > WIDE_FOOTPRINT * footprint;
+                    disc_reach(scene, instance, object, chunk, apart, 0) * stretch > WIDE_FOOTPRINT * pixel * rim;
         survey->points |= !seen.wide;
         survey->discs |= seen.wide;
         list[survey->seen_count[i]++] = seen;
@@ -716,6 +741,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     plan->reaches = knows_reach(scene);
+    plan->view.perspective = !scene->camera.orthographic;
     pt_choose_filling(&scene->settings, plan);
     pt_choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);

@@ -11,6 +11,12 @@ from ..engine import PatinaRenderEngine
 from ..sync.analyzing import ANALYSES
 
 
+def expected_text(expected: dict[str, float]) -> str:
+    """What is expected on even, smooth surfaces, and how much it may be on others."""
+    most = min(expected["color"] * expected["doubt"], 1.0)
+    return f"{expected['color']:.2%} of white, up to {most:.0%}" if expected["color"] <= 1.0 else "not known: points lie too far apart"
+
+
 class SidebarPanel:
     bl_space_type = 'VIEW_3D'
     bl_region_type = 'UI'
@@ -47,7 +53,7 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
                 ("Triangles", f"{stats['triangles']:,}"),
                 ("Chunks", f"{stats['chunks'] - stats['chunks_culled']:,} of {stats['chunks']:,}"),
                 ("Spacing", f"{stats['spacing_px']:.2f} pixels"),
-                ("Expected Error", f"{stats['expected']['color']:.2%} of white"),
+                ("Expected Error", expected_text(stats["expected"])),
                 ("Picture", f"{stats['width']} x {stats['height']}"), ("Time", f"{stats['ms']:.1f} ms"),
                 ("Planes", f"{stats['plane_bytes'] / 1e6:,.0f} MB"),
                 ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]

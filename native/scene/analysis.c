@@ -145,6 +145,18 @@ static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_ch
 
 #define ROWS 3.5 // unevenness: random points show less, nine in ten of them
 
+// A dot is no wider than points lie apart anywhere; a surface, whose rows may lie farther apart, four times that.
+static void limit_stray(const struct walk *walk, struct pt_neighbourhood *hood)
+{
+    const int dot = hood->kind == PT_KIND_VOLUME || hood->kind == PT_KIND_STRAY;
+    const double most = (dot ? 1.0 : 4.0) * walk->cloud->info.spacing_max;
+    if (!(most > 0.0) || !(hood->major > most))
+        return;
+    hood->major = most;
+    hood->minor = fmin(hood->minor, most);
+    hood->spacing = fmin(hood->spacing, most);
+}
+
 struct limited { // by a chunk's beams
     const struct walk *walk;
     uint32_t chunk;
@@ -160,6 +172,8 @@ static void limit_point(void *context, uint32_t place, const struct pt_sample *s
         pt_beam_limit(beam, p, sample, hood);
     else if (!limited->walk->rows)
         pt_neighbourhood_bound(sample, hood);
+    if (!beam)
+        limit_stray(limited->walk, hood);
 }
 
 // Whether the middling surface is uneven: then samples lie in rows wherever one looks. Else what looks like rows is what stands in

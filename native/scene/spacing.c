@@ -56,10 +56,50 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+struct counted {
+    double spacing;
+    uint64_t points;
+};
+
+static int compare_counted(const void *a, const void *b)
+{
+    const double x = ((const struct counted *)a)->spacing, y = ((const struct counted *)b)->spacing;
+    return (x > y) - (x < y);
+}
+
+// Chunks of a few points that lie much farther apart than all others are strays, and what lies between them is nothing: they get
+// the spacing that all but one in STRAYS of the points stay below. Without it 0.1% of strays, 90 to 130 spacings apart, decide the
+// picture's levels: 160 pixels in place of 1.4.
+#define STRAY_SPACINGS 8.0
+enum { STRAYS = 200 };
+
+static int tame_strays(struct patina_cloud *cloud)
+{
+    struct counted *list = malloc((cloud->chunk_count + 1) * sizeof *list);
+    uint64_t points = 0, below = 0;
+    uint32_t count = 0, at = 0;
+    if (!list)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        if (cloud->chunks[c].count > 1) {
+            list[count++] = (struct counted){ (double)cloud->chunks[c].spacing, cloud->chunks[c].count };
+            points += cloud->chunks[c].count;
+        }
+    qsort(list, count, sizeof *list, compare_counted);
+    while (at < count && (below += list[at].points) < points - points / STRAYS)
+        at++;
+    const double usual = at < count ? list[at].spacing : 0.0;
+    free(list);
+    for (uint32_t c = 0; c < cloud->chunk_count && usual > 0.0; c++)
+        if ((double)cloud->chunks[c].spacing > STRAY_SPACINGS * usual)
+            cloud->chunks[c].spacing = (float)usual;
+    return PATINA_OK;
+}
+
 // The median goes into the info, and stands in for chunks too small to have a spacing of their own.
 int pt_cloud_settle_spacing(struct patina_cloud *cloud)
 {
-    double *known = malloc(cloud->chunk_count * sizeof *known);
+    double *known = tame_strays(cloud) ? NULL : malloc((cloud->chunk_count + 1) * sizeof *known);
     if (!known)
         return PATINA_ERROR_MEMORY;
     uint32_t count = 0;

@@ -2,6 +2,7 @@
 // Times of frames and passes, medians, and the JSON object that `--stats json` prints.
 #include "tool.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -195,9 +196,13 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     }
     printf("}, \"layers\": %u, \"skipped\": %s, \"peak_mb\": %.1f", stats->layers,
            times->skipped ? times->skipped : "{}", peak_megabytes());
-    printf(", \"spacing_px\": %.4f, \"expected_error\": {\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f}",
-           (double)stats->spacing_px, (double)stats->expected.color, (double)stats->expected.coverage,
-           (double)stats->expected.depth, (double)stats->expected.normal);
+    const patina_expected_error *expected = &stats->expected;
+    printf(", \"spacing_px\": %.4f, \"expected_error\": ", (double)stats->spacing_px);
+    if (isfinite(expected->color))
+        printf("{\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f, \"doubt\": %.1f}", (double)expected->color,
+               (double)expected->coverage, (double)expected->depth, (double)expected->normal, (double)expected->doubt);
+    else
+        printf("null"); // not known
     printf(", \"analysis_ms\": %.1f", analysis_ms);
     printf(", \"shadow_samples\": %u, \"shadow_error\": %.6f}\n", stats->shadow_samples, (double)stats->shadow_error);
 }

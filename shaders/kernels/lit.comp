@@ -23,14 +23,14 @@ layout(location = 1) uniform uint first_slot;  // where the bound part of positi
 
 bool on_map(view_args view, int x, int y) { return x >= 0 && y >= 0 && x < int(view.width) && y < int(view.height); }
 
-// The greatest depth of the 3 x 3 texels: a surface of unknown slope may be as far as its neighbours.
-float farthest(view_args view, int column, int row)
+// The greatest depth of the 3 x 3 texels that is not beyond `last`: a surface of unknown slope may be as far as its neighbours.
+float farthest(view_args view, int column, int row, float last)
 {
     float most = 0.0;
     for (int y = row - 1; y <= row + 1; y++)
         for (int x = column - 1; x <= column + 1; x++) {
             float z = on_map(view, x, y) ? read_z(uint(y) * view.width + uint(x)) : pt_float(PT_KEY_EMPTY_Z);
-            most = z < pt_float(PT_KEY_EMPTY_Z) ? pt_max(most, z) : most;
+            most = z < pt_float(PT_KEY_EMPTY_Z) && z <= last ? pt_max(most, z) : most;
         }
     return most;
 }
@@ -107,9 +107,10 @@ bool in_shadow(view_args view, chunk_view chunk, uint at, uint id, out uint pixe
     if (!(until < z))
         return false;
     if (none) {
-        precise float steep = d * PT_SHADOW_STEEP;
-        d = pt_max(beside_nothing(view, column, row) ? steep : d, read_deff(read_from(pixel)));
-        until = farthest(view, column, row) + d;
+        float shown = read_deff(read_from(pixel));
+        precise float steep = d * PT_SHADOW_STEEP, last = map + PT_SHADOW_APART * shown;
+        d = pt_max(beside_nothing(view, column, row) ? steep : d, shown);
+        until = farthest(view, column, row, view.perspective != 0u ? last : pt_float(PT_KEY_EMPTY_Z)) + d;
     }
     return until < z && supported(view, column, row, d, z);
 }

@@ -25,11 +25,26 @@ float depth_at(view_args view, int x, int y)
     return inside ? read_z(uint(y) * view.width + uint(x)) : pt_float(PT_KEY_EMPTY_Z);
 }
 
-// What z changes by from a pixel's neighbour `before` to the one `after` it, as far as both sides agree.
-float step_along(float before, float z, float after)
+// What z changes by a pixel to the next one that shows something, towards `way`; known: there is one.
+float change_towards(view_args view, int reach, ivec2 p, float z, ivec2 way, out bool known)
 {
-    bool known_before = before < pt_float(PT_KEY_EMPTY_Z), known_after = after < pt_float(PT_KEY_EMPTY_Z);
-    precise float a = z - before, b = after - z;
+    const float shares[PT_STEP_REACH] = float[PT_STEP_REACH](1.0, 0.5, 0.333333343);
+    precise float change = 0.0;
+    known = false;
+    for (int k = 1; k <= reach && !known; k++) {
+        float q = depth_at(view, p.x + k * way.x, p.y + k * way.y);
+        known = q < pt_float(PT_KEY_EMPTY_Z);
+        change = known ? (q - z) * shares[k - 1] : 0.0;
+    }
+    return change;
+}
+
+// What z changes by a pixel along an axis, as far as both sides agree.
+float step_along(view_args view, int reach, ivec2 p, float z, ivec2 axis)
+{
+    bool known_before, known_after;
+    precise float a = 0.0 - change_towards(view, reach, p, z, -axis, known_before);
+    float b = change_towards(view, reach, p, z, axis, known_after);
     float first = known_before ? a : b, second = known_after ? b : a;
     bool alike = (0.0 < first && 0.0 < second) || (first < 0.0 && second < 0.0);
     return (known_before || known_after) && alike ? (pt_abs(first) < pt_abs(second) ? first : second) : 0.0;
@@ -127,8 +142,8 @@ void normal_pixel(view_args view, int radius, bool steep, uint id_base, uint id_
     int column = int(x), row = int(y);
     vec2 steps = vec2(0.0);
     if (steep) {
-        steps.x = step_along(depth_at(view, column - 1, row), z, depth_at(view, column + 1, row));
-        steps.y = step_along(depth_at(view, column, row - 1), z, depth_at(view, column, row + 1));
+        steps.x = step_along(view, min(radius, PT_STEP_REACH), ivec2(column, row), z, ivec2(1, 0));
+        steps.y = step_along(view, min(radius, PT_STEP_REACH), ivec2(column, row), z, ivec2(0, 1));
     }
     int reach = reach_of(view, radius, distance_limit, z);
     window_sums s = gather(view, reach, column, row, z, w, distance_limit, slope, steps);

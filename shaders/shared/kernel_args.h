@@ -143,6 +143,11 @@
 #define PT_SHADOW_SUPPORT 2
 #define PT_SHADOW_STEEP 20.0f // 1 / C
 #define PT_STEEP 0.5f // normals
+// normals: pixels on each side that are asked what depth changes by. With one, a sparse plate before a floor takes the floor
+// between its points for its own slope: 3% of its umbra under a sun was lit, 0 with three.
+#define PT_STEP_REACH 3
+// lit: a texel this many times its d_eff behind the one beside it shows another surface, under lights that look in perspective.
+#define PT_SHADOW_APART 4.0f
 
 // A window of pixels of the full picture, at a level of the pyramid (a pixel of level l is 2^l wide).
 // Ray of the pixel (x, y): u = ray_x0 + ray_xs * X with X = (((origin_x >> level) + x) + 0.5) * 2^level, v likewise.
@@ -278,9 +283,9 @@ struct blend_args {
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Its radius is d /
 // footprint(z), two spacings there in pixels, rounded up, from PT_ESTIMATE_LEAST to `radius`. Taken are pixels with
 // |z_q - (z + step)| <= max(d, 4 footprint(z) max(|dx|, |dy|)), d = d_eff facing the viewer; 4: 76 degrees. step = 0, or with
-// `steep` s_x dx + s_y dy, and what is taken may be off by PT_STEEP (|s_x dx| + |s_y dy|) too. s is what z changes by to the
-// next pixel of the row or column: of the changes on both sides the lesser where they go the same way, else 0; where one side
-// shows nothing, that on the other.
+// `steep` s_x dx + s_y dy, and what is taken may be off by PT_STEEP (|s_x dx| + |s_y dy|) too. s is what z changes by a pixel
+// to the next of the row or column that shows something, at most PT_STEP_REACH off and `radius`: of the changes on both sides the
+// lesser where they go the same way, else 0; where one side shows nothing, that on the other.
 struct normals_args {
     struct view_args view;
     struct instance_args instance;
@@ -387,7 +392,8 @@ struct mark_args {
 
 // lit: points against the filled map of a light [D 6], SPEC 4. A point is in shadow if z > z_map + d_eff, d_eff of the point in
 // this view with a texel PT_TEXEL_SLACK wider. Without a normal, d_eff is at least that of the surface that the map shows there,
-// and z_map the greatest of the 3 x 3 texels around: no slope gives acne, and shadows end a texel early. Where one of these
+// and z_map the greatest of the 3 x 3 texels around, in perspective of those within PT_SHADOW_APART times that surface's d_eff
+// behind it: no slope gives acne, and shadows of suns, which see the ground at 2 degrees, end a texel early. Where one of these
 // shows nothing, the surface ends within them, and no neighbour tells how far away its last points are: d_eff is then at least
 // PT_SHADOW_STEEP times the point's own, that of the steepest slope. z > z_map + d_eff must hold at PT_SHADOW_SUPPORT of the 8
 // texels around, too.

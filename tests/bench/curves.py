@@ -28,9 +28,10 @@ HEAD = """// SPDX-License-Identifier: GPL-3.0-or-later
 """
 
 
-def rendered(frame: native.Frame, shape: str, density: float, **settings: Any) -> tuple[dict[str, Any], dict[str, float]]:
-    """Statistics of a picture and its errors, in the units of patina_expected_error."""
-    shown = stages.stage_of({"surface": shape, "points": stages.density_count(shape, density, SIZE)})
+def rendered(frame: native.Frame, name: str, density: float, shape: dict[str, Any] | None = None, **settings: Any
+             ) -> tuple[dict[str, Any], dict[str, float]]:
+    """Statistics of a picture and its errors, in the units of patina_expected_error. shape: what more stage_of takes."""
+    shown = stages.stage_of({"surface": name, "points": stages.density_count(name, density, SIZE), **(shape or {})})
     scene = native.Scene()
     cloud = native.Cloud(shown.position, shown.normal, shown.color)
     cases.fill_scene(scene, cloud, shown, cases.MODES["surface"], 0.0)

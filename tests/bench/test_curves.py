@@ -30,6 +30,16 @@ class Expected(unittest.TestCase):
                       f"{found['normal']:.2f} ({expected['normal']:.2f})")
                 self.assertLess(found["color"], FACTOR * expected["color"], (surface, density))
 
+    def test_doubt_is_honest(self) -> None:
+        """Shapes, patterns and noise that nothing was measured on stay within the doubt."""
+        for surface, more in (("astroid", {}), ("sphere", {"noise": 1.0}), ("sphere", {"pattern": "rows"}), ("sphere", {"strays": 0.001})):
+            for settings in ({"surface": 2}, {"surface": 1}):
+                stats, found = curves.rendered(self.frame, surface, 1.0, shape=more, **settings)
+                expected = stats["expected"]
+                print(f"  {surface:7} {more or ''} {'discs' if settings['surface'] == 1 else 'filling'}: colour {found['color']:.4f}, "
+                      f"{found['color'] / expected['color']:.1f} times what is expected, doubt {expected['doubt']:.0f}")
+                self.assertLess(found["color"], expected["doubt"] * expected["color"], (surface, more))
+
     def test_targets_are_met(self) -> None:
         costs = []
         for target in (0.1, 0.02):

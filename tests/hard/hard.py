@@ -387,6 +387,37 @@ def inside(device: native.Device) -> tuple[str, bool]:
     return same("depth", float(off.max()), 0.01, shown)  # half a pixel's slope
 
 
+@hard("camera inside a sphere, 170°")
+def inside_wide(device: native.Device) -> tuple[str, bool]:
+    """Towards its rim such a view draws everything some ten times as long as in its middle."""
+    position, normal = Sphere().sample(100_000, np.random.default_rng(8))
+    camera = Camera(**{**vars(look(np.array([0.05, 0.02, 0.0]), np.array([0.05, 1.02, 0.0]), 170.0)), "near": 1e-3})
+    cloud = cloud_of(position, -normal)
+    cloud.analyse()
+    open_ = 100.0 * float(np.isinf(draw(device, [cloud], camera, 256, 256).depth).mean())
+    return f"{open_:.3f} % of the picture open, at most 0.1", open_ <= 0.1
+
+
+@hard("0.1 % of strays")
+def strays(device: native.Device) -> tuple[str, bool]:
+    """A stray is a dot; it closes nothing around it, analysed or not. Before, they closed two thirds as much again as the sphere covers."""
+    random, worst, text = np.random.default_rng(9), 0.0, []
+    position, _ = Sphere().sample(200_000, random)
+    box = random.uniform(-1.3, 1.3, (200, 3))
+    for analysed in (False, True):
+        shown = []
+        for points in (position, np.concatenate([position, box])):
+            cloud = cloud_of(points.astype(np.float32))
+            if analysed:
+                cloud.analyse()
+            shown.append(draw(device, [cloud], orbit(), 256, 256, smooth=3, antialias=2))
+        before, after = (np.minimum(one.depth, 9.0) for one in shown)
+        share = 100.0 * float((np.abs(after - before) > 0.05).mean())
+        text.append(f"{share:.2f}")
+        worst = max(worst, share)
+    return f"{' and '.join(text)} % of the pixels changed, at most 0.6", worst <= 0.6
+
+
 @hard("density from 30 to 0.1 points a pixel in one cloud")
 def falling(device: native.Device) -> tuple[str, bool]:
     random = np.random.default_rng(9)

@@ -259,6 +259,15 @@ static void sanity(struct harness *h)
     HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     keys[3] = keys[5] = keys[4];
     HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
+    for (uint32_t i = 0; i < 9; i++)
+        keys[i] = ref_key(i == 4 ? 1.5f : i == 0 ? 3.6f : 1.5f, i); // in perspective: beyond 1.5 + 4 * 0.5 lies another surface
+    args.view.perspective = 1;
+    args.instance.has_normals = 0;
+    chunk = (struct chunk_view){.count = 1, .padded = 16};
+    set_chunk(&args.view, &chunk);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_YES);
+    keys[0] = ref_key(3.4f, 0);
+    HARNESS_CHECK(h, ref_lit(&args, &planes, &chunk, positions, 0) == REF_NO);
     args.loss = 128;
     HARNESS_CHECK(h, ref_shadow_word(&args, 255, 1) == 255 + 128 && ref_shadow_word(&args, 255, 0) == 255);
 }

@@ -38,14 +38,15 @@ static struct ref_range layer_distance(const struct lit_args *args, const struct
     return (struct ref_range){d * (1.0 - share), d * (1.0 + share)};
 }
 
-static double farthest_around(const struct view_args *view, const uint64_t *keys, int px, int py)
+// Of what is not beyond `last`, a float as the kernel has it: which depths count is decided exactly.
+static double farthest_around(const struct view_args *view, const uint64_t *keys, int px, int py, float last)
 {
     double farthest = 0.0;
     for (int y = py - 1; y <= py + 1; y++)
         for (int x = px - 1; x <= px + 1; x++)
             if (x >= 0 && y >= 0 && x < (int)view->width && y < (int)view->height) {
                 double z = ref_key_z(keys[(size_t)y * view->width + (size_t)x]);
-                farthest = isfinite(z) ? fmax(farthest, z) : farthest;
+                farthest = isfinite(z) && z <= (double)last ? fmax(farthest, z) : farthest;
             }
     return farthest;
 }
@@ -102,11 +103,12 @@ enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *pla
             struct ref_range d = own;
             enum ref_truth before = ref_less_equal(place.z, ref_exactly(map));
             if (!has_normal && isfinite(map)) { // what the map shows there may be steeper, and as far as its neighbours
-                double shown = planes->deff[planes->from[pixel] & ~PT_FROM_MIXED];
+                float shown = planes->deff[planes->from[pixel] & ~PT_FROM_MIXED], apart = PT_SHADOW_APART * shown;
+                float last = view->perspective ? (float)map + apart : INFINITY;
                 if (beside_nothing(view, planes->keys, (int)px - view->origin_x, (int)py - view->origin_y))
                     d = (struct ref_range){d.lo / (double)PT_COSINE_FLOOR, d.hi / (double)PT_COSINE_FLOOR};
-                d = (struct ref_range){fmax(d.lo, shown), fmax(d.hi, shown)};
-                map = farthest_around(view, planes->keys, (int)px - view->origin_x, (int)py - view->origin_y);
+                d = (struct ref_range){fmax(d.lo, (double)shown), fmax(d.hi, (double)shown)};
+                map = farthest_around(view, planes->keys, (int)px - view->origin_x, (int)py - view->origin_y, last);
             }
             struct ref_range far = {(map + d.lo) * (1.0 - TOL_SUM), (map + d.hi) * (1.0 + TOL_SUM)};
             enum ref_truth behind = isfinite(map) && before != REF_YES ? ref_less(far, place.z) : REF_NO;

@@ -28,11 +28,25 @@ static double depth_at(const struct view_args *view, const struct ref_planes *pl
     return inside ? ref_key_z(planes->keys[(size_t)y * view->width + (size_t)x]) : INFINITY;
 }
 
-// What depth changes by to the next pixel, where both sides rise or both fall: the gentler side's.
-static double step_along(double before, double z, double after)
+// What depth changes by a pixel towards the next of (dx, dy) that is not empty; NaN where all are.
+static double change_towards(const struct normals_args *args, const struct ref_planes *planes, int x, int y, int dx, int dy)
 {
-    double into = isfinite(before) ? z - before : after - z, out = isfinite(after) ? after - z : z - before;
-    if ((!isfinite(before) && !isfinite(after)) || into * out <= 0.0)
+    double z = depth_at(&args->view, planes, x, y);
+    for (int k = 1; k <= PT_STEP_REACH && k <= (int)args->radius; k++) {
+        double q = depth_at(&args->view, planes, x + k * dx, y + k * dy);
+        if (isfinite(q))
+            return (q - z) / k;
+    }
+    return NAN;
+}
+
+// What depth changes by along an axis, where both sides rise or both fall: the gentler side's.
+static double step_along(const struct normals_args *args, const struct ref_planes *planes, int x, int y, int dx, int dy)
+{
+    double into = -change_towards(args, planes, x, y, -dx, -dy), out = change_towards(args, planes, x, y, dx, dy);
+    into = isnan(into) ? out : into;
+    out = isnan(out) ? into : out;
+    if (isnan(into) || !((into > 0.0 && out > 0.0) || (into < 0.0 && out < 0.0)))
         return 0.0;
     return fabs(into) < fabs(out) ? into : out;
 }
@@ -56,8 +70,8 @@ static enum ref_truth gather(const struct normals_args *args, const struct ref_p
     int radius = window_radius(spacings, args->radius);
     double steps[2] = {0.0, 0.0};
     if (args->steep) {
-        steps[0] = step_along(depth_at(view, planes, x - 1, y), z, depth_at(view, planes, x + 1, y));
-        steps[1] = step_along(depth_at(view, planes, x, y - 1), z, depth_at(view, planes, x, y + 1));
+        steps[0] = step_along(args, planes, x, y, 1, 0);
+        steps[1] = step_along(args, planes, x, y, 0, 1);
     }
     if (window_radius(spacings - off, args->radius) != window_radius(spacings + off, args->radius))
         return REF_UNSURE;

@@ -336,12 +336,76 @@ static void test_near_lights(void **state)
     patina_device_destroy(device);
 }
 
+// A plate of random points, 1 x 1, half way from a lamp to a floor 1.2 below it, both as far apart: how much of the umbra is lit, away
+// from its border, and over all of it where normals are known. A chunk holds parts of both: it is not seen as dense as the floor alone.
+static void test_umbra(void **state)
+{
+    (void)state;
+    enum { BARE, NORMALS, ANALYSED };
+    static const char *const ways[] = {"without normals", "with normals", "analysed"};
+    static const uint32_t types[] = {PATINA_LIGHT_POINT, PATINA_LIGHT_AREA, PATINA_LIGHT_SUN};
+    static const char *const names[] = {"lamp", "panel", "sun"};
+    patina_device *device = support_device_first();
+    for (int fine = 0; fine < 2; fine++)
+        for (int way = BARE; way <= ANALYSED; way++) {
+            const double apart = fine ? 0.01 : 0.02, height = 1.2, side = 4.0;
+            const uint64_t floor = (uint64_t)(side * side / (apart * apart) + 0.5), plate = (uint64_t)(1.0 / (apart * apart) + 0.5);
+            const unsigned columns = way == NORMALS ? POINTS_NORMALS : 0;
+            struct points points = points_create(floor + plate, columns);
+            struct points below = points_rectangle(floor, side, side, columns, 21), above = points_rectangle(plate, 1.0, 1.0, columns, 22);
+            static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, up[3] = {0, 0, 0.6};
+            points_transform(&above, unit, up);
+            memcpy(points.position, below.position, floor * 12);
+            memcpy(points.position + 3 * floor, above.position, plate * 12);
+            if (columns) {
+                memcpy(points.normal, below.normal, floor * 12);
+                memcpy(points.normal + 3 * floor, above.normal, plate * 12);
+            }
+            points_free(&below);
+            points_free(&above);
+            patina_cloud *cloud = points_upload(&points);
+            if (way == ANALYSED)
+                CHECK(patina_cloud_analyse(cloud, NULL, NULL), NULL);
+            for (size_t l = 0; l < sizeof types / sizeof *types; l++) {
+                patina_light_desc light = {.struct_size = sizeof light, .type = types[l], .power = 10, .shadows = 1, .size = {0.3f, 0.3f}};
+                light.position[2] = height;
+                light.direction[2] = -1.0;
+                light.side[0] = 1.0;
+                const double umbra = types[l] == PATINA_LIGHT_SUN ? 0.5 : types[l] == PATINA_LIGHT_AREA ? 0.85 : 1.0;
+                const double margin = 4.0 * apart; // the plate's last two spacings, and as its shadow is twice as wide
+                patina_scene *scene = scene_of(cloud, NULL);
+                float *values = bake(device, scene, &light, types[l] == PATINA_LIGHT_AREA ? 16 : 1, points.count, NULL);
+                double all = 0, lit = 0, inner = 0, leaks = 0, open = 0, dark = 0;
+                for (uint64_t i = 0; i < floor; i++) {
+                    const double off = fmax(fabs((double)points.position[3 * i]), fabs((double)points.position[3 * i + 1]));
+                    all += off < umbra;
+                    lit += off < umbra ? (double)values[i] : 0.0;
+                    inner += off < umbra - margin;
+                    leaks += off < umbra - margin ? (double)values[i] : 0.0;
+                    open += off > 1.5;
+                    dark += off > 1.5 ? 1.0 - (double)values[i] : 0.0;
+                }
+                printf("  spacing %.2f, %-5s %-15s: %.2f%% of the umbra lit, %.2f%% inside of it; %.2f%% of the light outside lost\n", apart, names[l],
+                       ways[way], 100.0 * lit / all, 100.0 * leaks / inner, 100.0 * dark / open);
+                assert_true(leaks <= 0.01 * inner);
+                assert_true(way == BARE || lit <= 0.02 * all); // the border itself, where the plate has its last random points
+                assert_true(dark <= 0.001 * open);
+                free(values);
+                patina_scene_destroy(scene);
+            }
+            patina_cloud_destroy(cloud);
+            points_free(&points);
+        }
+    patina_device_destroy(device);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sun_heights),
         cmocka_unit_test(test_near_lights),
+        cmocka_unit_test(test_umbra),
         cmocka_unit_test(test_soft_converges),
         cmocka_unit_test(test_error_target),
     };

@@ -16,14 +16,34 @@ static void test_every_means_is_measured(void **state)
     (void)state;
     for (int means = 0; means < PT_MEANS_COUNT; means++) {
         uint32_t quality, fill;
-        patina_expected_error dense = pt_expected_error(means, 0.01), sparse = pt_expected_error(means, 100.0);
+        patina_expected_error dense = pt_expected_error(means, 0.01), sparse = pt_expected_error(means, 50.0);
         assert_true(dense.color > 0.0f && dense.coverage > 0.0f && dense.depth > 0.0f && dense.normal > 0.0f);
         assert_true(sparse.color > dense.color && sparse.coverage > dense.coverage);
         pt_means_settings(means, &quality, &fill);
         assert_int_equal(pt_means_of(quality, fill), means);
-        patina_expected_error none = pt_expected_error(means, 0.0);
-        assert_true(none.color == 0.0f && none.coverage == 0.0f && none.depth == 0.0f && none.normal == 0.0f);
+        assert_true(dense.doubt >= 1.0f && sparse.doubt == dense.doubt);
     }
+}
+
+// Wider apart than was measured errors grow on; where nothing is known they are infinite, and a target still gets the best means.
+static void test_beyond_the_curve(void **state)
+{
+    (void)state;
+    for (int means = 0; means <= PT_MEANS_SPLATS; means++) {
+        for (double s = 4.6; s < 32.0; s *= 1.1) {
+            const patina_expected_error a = pt_expected_error(means, s), b = pt_expected_error(means, 2.0 * s);
+            assert_true(b.color > a.color && b.color <= 1.0f && b.coverage <= 1.0f && b.depth > a.depth && b.normal <= 90.0f);
+            assert_true(b.color >= fminf(1.4f * a.color, 1.0f));
+        }
+        static const double unknown[] = { 65.0, 120.0, 1e30, 0.0, -1.0, NAN, INFINITY };
+        for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
+            const patina_expected_error none = pt_expected_error(means, unknown[i]);
+            assert_true(isinf(none.color) && isinf(none.coverage) && isinf(none.depth) && isinf(none.normal) && none.doubt >= 1.0f);
+        }
+    }
+    assert_true(pt_expected_error(PT_MEANS_REFINED, 60.0).color > 0.1f);
+    assert_int_equal(pt_means_for(0.01, 120.0), PT_MEANS_REFINED);
+    assert_int_equal(pt_means_for(0.01, 0.0), PT_MEANS_UNFILLED);
 }
 
 // The curve has no jumps: a step of a hundredth in spacing changes little.
@@ -116,7 +136,8 @@ static void test_plan(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = { cmocka_unit_test(test_every_means_is_measured), cmocka_unit_test(test_between_points),
+    const struct CMUnitTest tests[] = { cmocka_unit_test(test_every_means_is_measured),
+                                        cmocka_unit_test(test_beyond_the_curve), cmocka_unit_test(test_between_points),
                                         cmocka_unit_test(test_cheapest_that_meets), cmocka_unit_test(test_plan) };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

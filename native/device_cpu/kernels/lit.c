@@ -77,13 +77,13 @@ static void look_around(const struct view_args *view, const uint64_t *keys, vi c
     }
 }
 
-// The greatest depth of the 3 x 3 texels: a surface of unknown slope may be as far as its neighbours.
-static vf farthest(const struct around *around, vf map)
+// The greatest depth of the 3 x 3 texels that is not beyond `last`: a surface of unknown slope may be as far as its neighbours.
+static vf farthest(const struct around *around, vf map, vf last)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     vf z = map;
     for (uint32_t i = 0; i < 8; i++)
-        z = vf_select(vm_and(around->known[i], vf_lt(around->z[i], empty)), vf_max(z, around->z[i]), z);
+        z = vf_select(vm_and(around->known[i], vm_and(vf_lt(around->z[i], empty), vf_le(around->z[i], last))), vf_max(z, around->z[i]), z);
     return z;
 }
 
@@ -140,9 +140,12 @@ static uint32_t in_shadow(const struct lit *lit, const struct fall *f, vi id)
     none = vm_and(none, dark);
     if (vm_bits(none)) {
         vi source = pt_source_gather(pt_cpu_data(lit->call, 1), f->texel, none);
+        vf shown = vf_gather(pt_cpu_data(lit->call, 2), source, none), last = vf_set(pt_float(PT_KEY_EMPTY_Z));
         vf steep = vf_select(beside_nothing(&around, none), d * vf_set(PT_SHADOW_STEEP), d);
-        d = vf_select(none, vf_max(steep, vf_gather(pt_cpu_data(lit->call, 2), source, none)), d);
-        dark = vm_and(dark, vf_lt(vf_select(none, farthest(&around, f->map), f->map) + d, f->z));
+        if (lit->args.view.perspective)
+            last = f->map + vf_set(PT_SHADOW_APART) * shown;
+        d = vf_select(none, vf_max(steep, shown), d);
+        dark = vm_and(dark, vf_lt(vf_select(none, farthest(&around, f->map, last), f->map) + d, f->z));
     }
     return vm_bits(supported(&around, d, f->z, dark));
 }

@@ -58,12 +58,34 @@ static inline void load_columns(const float *row, const struct center *c, int32_
         out[k] = vf_load(row + c->at[0] + k);
 }
 
-// What z changes by from what lies before a pixel to what lies after it, as far as both sides agree.
-static vf step_along(const struct center *c, vf before, vf after)
+// Depths at the pixels' columns, or beside them.
+static vf depths_at(const struct depth_row *row, vi at, vm ours) { return vf_gather(row->z - PT_ROW_PAD, at, ours); }
+
+// What z changes by a pixel to the next one that shows something, in steps of `across` columns and `up` rows; known: there is
+// one. around: rows from the radius below on.
+static vf change_towards(const struct normals_args *args, const struct depth_row *const *around, const struct center *c, vi at,
+                         int across, int up, vm *known)
 {
-    const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    vm known_before = vm_and(c->ours, vf_lt(before, empty)), known_after = vm_and(c->ours, vf_lt(after, empty));
-    vf a = c->z - before, b = after - c->z;
+    static const float shares[PT_STEP_REACH] = { 1.0f, 0.5f, 0.333333343f };
+    const int radius = (int)args->radius, reach = radius < PT_STEP_REACH ? radius : PT_STEP_REACH;
+    vf change = vf_zero();
+    *known = vm_and(c->ours, vm_not(c->ours));
+    for (int k = reach; k > 0; k--) {
+        vf z = depths_at(around[radius + k * up], vi_add(at, vi_set((uint32_t)(k * across))), c->ours);
+        vm some = vm_and(c->ours, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
+        change = vf_select(some, (z - c->z) * vf_set(shares[k - 1]), change);
+        *known = vm_or(*known, some);
+    }
+    return change;
+}
+
+// What z changes by a pixel along an axis, as far as both sides agree.
+static vf step_along(const struct normals_args *args, const struct depth_row *const *around, const struct center *c, vi at,
+                     int across, int up)
+{
+    vm known_before, known_after;
+    vf a = vf_zero() - change_towards(args, around, c, at, -across, -up, &known_before);
+    vf b = change_towards(args, around, c, at, across, up, &known_after);
     a = vf_select(known_before, a, b);
     b = vf_select(known_after, b, a);
     vm alike = vm_or(vm_and(vf_lt(vf_zero(), a), vf_lt(vf_zero(), b)), vm_and(vf_lt(a, vf_zero()), vf_lt(b, vf_zero())));
@@ -154,9 +176,6 @@ struct job {
     size_t stride; // floats of a row's z, and of its w
 };
 
-// Depths at the pixels' columns, or beside them.
-static vf depths_at(const struct depth_row *row, vi at, vm ours) { return vf_gather(row->z - PT_ROW_PAD, at, ours); }
-
 // Normals of PT_LANES pixels of row y, `ours` of them: columns, as in center, and the numbers of their points in the instance.
 static inline __attribute__((always_inline)) void normal_pixels(const struct job *job, const struct depth_row *const *around,
                                                                 uint32_t y, vi at, vi id, vm ours, int packed)
@@ -164,7 +183,7 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     const struct normals_args *args = job->args;
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
-    const struct depth_row *own = around[args->radius], *below = around[args->radius - 1], *above = around[args->radius + 1];
+    const struct depth_row *own = around[args->radius];
     struct center c = { .ours = ours };
     vi_store(c.at, vi_select(ours, at, packed ? vi_set(PT_ROW_PAD) : at));
     c.z = vf_select(c.ours, depths_at(own, at, ours), vf_set(1.0f));
@@ -176,9 +195,8 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     find_reach(args, &c);
     struct sums sums;
     if (args->steep) {
-        const vi one = vi_set(1);
-        c.step[0] = step_along(&c, depths_at(own, vi_sub(at, one), ours), depths_at(own, vi_add(at, one), ours));
-        c.step[1] = step_along(&c, depths_at(below, at, ours), depths_at(above, at, ours));
+        c.step[0] = step_along(args, around, &c, at, 1, 0);
+        c.step[1] = step_along(args, around, &c, at, 0, 1);
         sums = sum_window(args, around, &c, packed, 1);
     } else {
         sums = sum_window(args, around, &c, packed, 0);

@@ -620,13 +620,15 @@ enum patina_pass {
 };
 
 // What a picture of scattered points is expected to be off by, as measured on known shapes at the same spacing on screen
-// (build/curves): a sphere and a torus. Sheets close behind each other make it more, a gyroid 3.6 times; points off their
-// surface, by noise or registration, come on top.
+// (build/curves): a sphere and a torus, smooth and evenly sampled. Edges, thin parts, sheets close behind each other, noise and scan
+// rows make it more: by `doubt` at most on the shapes that were tried. Wider apart than measured it grows as it did last; all are
+// +inf where points lie more than 64 pixels apart or no spacing is known.
 typedef struct patina_expected_error {
     float color;    // root mean square over the pixels that are or should be covered, sRGB over grey, shares of white
     float coverage; // 1 - shared pixels / pixels covered by either
     float depth;    // root mean square, spacings of the points
     float normal;   // mean angle, degrees
+    float doubt;    // how many times `color` other shapes were off at most; >= 1
 } patina_expected_error;
 
 typedef struct patina_frame_stats {
