@@ -5,17 +5,21 @@
 #include "expected.h"
 #include "plan_lines.h"
 
+#include <math.h>
+
 enum { DEFAULT_LAYERS = 8 };
 // Coarse levels at most where points that lie wide apart are discs: these have closed what is wider. On four virtual scans more
 // fill sky (34.6 % in place of 22.2) and show nothing truer; one loses 0.5 dB.
-enum { LEVELS_BESIDE_DISCS = 2 };
+enum { LEVELS_BESIDE_DISCS = 2 }; // of the caller's pixels
 
 // How many levels and iterations the spacing asks for. With s = spacing in pixels a pixel stays empty with probability
 // exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.65 (0.37 points a pixel) n alone leaves holes open
 // (2.7% of a disc at 0.3 points a pixel), so coarser levels halve s down to 1 first: 0.14% open. Starting them earlier,
 // at 1.35, closes 0.5 points a pixel better (0.04% for 0.32%) but lets steep planes grow by up to 0.5% at 1 point a pixel.
-void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan)
+void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
 {
+    const patina_settings *settings = &scene->settings;
+    const int most = plan->discs_count ? LEVELS_BESIDE_DISCS + ilogb((double)pt_finer(scene)) : PT_LEVELS - 1;
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
     plan->quality = settings->quality;
@@ -35,7 +39,7 @@ void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan)
     if (plan->fill != PATINA_FILL_CLOSED)
         return;
     for (; s > 1.65 || (plan->levels && s > 1.0); s *= 0.5)
-        if (plan->levels++ == (plan->discs_count ? LEVELS_BESIDE_DISCS - 1 : PT_LEVELS - 2))
+        if (++plan->levels >= (uint32_t)(most < PT_LEVELS ? most : PT_LEVELS - 1))
             break;
     plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : 4;
 }

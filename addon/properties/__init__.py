@@ -131,8 +131,8 @@ class PatinaSceneProperties(PropertyGroup):
         description="How many points are spread over each mesh")
     samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
-        description="Pictures, each shifted by a part of a pixel, that a final render takes the mean of. More than one stand "
-                    "in for anti-aliasing; data passes come from the first")
+        description="Of each pixel: a final render takes the mean of about so many finer or shifted ones, each anti-aliased as "
+                    "set. Data passes are those of one sample")
     motion_steps: IntProperty(
         name="Steps", override=_OVERRIDE, default=8, min=1, soft_max=64, max=1024,
         description="Moments while the shutter is open that a final render takes the mean of. Samples for anti-aliasing are "

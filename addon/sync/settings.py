@@ -47,6 +47,7 @@ class Settings:
     own_background: int = 0
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     shadow_uncut: int = 0
+    pixel_samples: int = 1  # of a final picture
 
 
 def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:

@@ -63,9 +63,7 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         row.active = patina.fill != 'OFF'
         row.prop(patina, "fill_iterations")
         layout.prop(patina, "smooth")
-        row = layout.row()
-        row.active = patina.samples == 1
-        row.prop(patina, "antialias")
+        layout.prop(patina, "antialias")
         layout.prop(patina, "samples")
         layout.prop(patina, "meshes")
         if patina.meshes == 'POINTS':
