@@ -22,6 +22,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(ARRIVED, 4, 0)        \
     X(ALBEDO, 16, 0)        \
     X(AWAY, 4, 0)           \
+    X(OFFSET, 4, 0)         \
     X(OBSCURED, 4, 0)       \
     X(UNLIT, 16, 0)         \
     X(COLOR_A, 16, 0)       \

@@ -65,6 +65,7 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         layout.prop(patina, "smooth")
         layout.prop(patina, "antialias")
         layout.prop(patina, "samples")
+        layout.prop(patina, "depth")
         layout.prop(patina, "meshes")
         if patina.meshes == 'POINTS':
             layout.prop(patina, "mesh_points")
