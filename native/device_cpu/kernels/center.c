@@ -1,115 +1,169 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// center: measured point -> how far behind it its tangent plane lies in the middle of its pixel; twin of
-// shaders/kernels/center.comp
+// center: measured pixel -> how far behind its point the tangent plane lies in its middle; twin of shaders/kernels/center.comp
 //
-// Points are projected anew, as scatter does: those whose key their pixel holds are few, and lie side by side.
+// Pixel by pixel, for there may be many more points: each is looked up by its number, and projected as scatter does it. Of 16
+// points a pixel in a fourth of the time that all of them take.
 #include "device_cpu/cpu.h"
+#include "device_cpu/rows.h"
 #include "device_cpu/vector_math.h"
+
+enum { BLOCK = 256 }; // pixels of a row
+
+struct start { // of a chunk
+    uint32_t id, chunk;
+};
 
 struct center {
     const struct pt_cpu_call *call;
     const struct center_args *args;
-    const uint64_t *keys;
-    const float *normals, *deff, *positions;
-    float *offsets;
+    const struct start *starts; // by id
+    uint32_t count, first, span; // of ids: all lie in [first, first + span)
 };
 
-struct seen { // of PT_LANES points
-    vf x, y, z;
-    vi column, row, pixel;
+struct measured { // pixels of a row, packed, and where their points lie on screen (perspective: times z)
+    uint32_t count, column[BLOCK + PT_LANES], z[BLOCK + PT_LANES], id[BLOCK + PT_LANES];
+    float x[BLOCK + PT_LANES], y[BLOCK + PT_LANES];
 };
 
-// Those of the points that may be what their pixels hold.
-static inline vm look(const struct center *center, const struct chunk_view *chunk, const float *positions, uint32_t i, vm lanes,
-                      struct seen *out)
+static int by_id(const void *a, const void *b)
 {
-    const struct view_args *view = &center->args->view;
-    const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                      vf_load(positions + 2 * (size_t)chunk->padded + i) };
-    out->z = vf_transform(chunk, 2, p[0], p[1], p[2]);
-    out->x = vf_transform(chunk, 0, p[0], p[1], p[2]);
-    out->y = vf_transform(chunk, 1, p[0], p[1], p[2]);
-    if (view->perspective) {
-        const vf r = vf_rcp(out->z);
-        out->x = out->x * r;
-        out->y = out->y * r;
-    }
-    const float left = (float)view->origin_x, right = (float)(view->origin_x + (int32_t)view->width);
-    const float bottom = (float)view->origin_y, top = (float)(view->origin_y + (int32_t)view->height);
-    vm inside = vm_and(vm_and(vf_le(vf_set(view->z_near), out->z), vf_le(out->z, vf_set(view->z_far))),
-                       vm_and(vm_and(vf_le(vf_set(left), out->x), vf_lt(out->x, vf_set(right))),
-                              vm_and(vf_le(vf_set(bottom), out->y), vf_lt(out->y, vf_set(top)))));
-    inside = vm_and(inside, lanes);
-    if (!vm_bits(inside))
-        return inside;
-    out->column = vi_sub(vf_int(vf_floor(out->x)), vi_set((uint32_t)view->origin_x));
-    out->row = vi_sub(vf_int(vf_floor(out->y)), vi_set((uint32_t)view->origin_y));
-    out->pixel = vi_select(inside, vi_add(vi_mul(out->row, vi_set(view->width)), out->column), vi_set(0));
-    const vi z = vi_and(vf_bits(out->z), vi_set(0x7FFFFFFFu));
-    return vm_and(inside, vi_eq(vi_gather_z(center->keys, out->pixel, inside), z));
+    const struct start *x = a, *y = b;
+    return (x->id > y->id) - (x->id < y->id);
 }
 
-static inline void save(const struct center *center, const struct seen *seen, uint32_t first_id, vm some)
+// The last that starts at the id or before it.
+static uint32_t find_start(const struct center *center, uint32_t id, uint32_t near)
+{
+    const struct start *starts = center->starts;
+    if (starts[near].id <= id && (near + 1 == center->count || id < starts[near + 1].id))
+        return near; // neighbours show points of a chunk
+    uint32_t low = 0, high = center->count;
+    while (high - low > 1) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (starts[middle].id <= id)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static inline float transform(const struct chunk_view *chunk, int row, float x, float y, float z)
+{
+    const float *r = chunk->row + 3 * row;
+    return (((chunk->lo[row] + r[0] * x) + r[1] * y) + r[2] * z) + chunk->hi[row];
+}
+
+// Projects the points; those of no chunk leave.
+static void project(const struct center *center, struct measured *measured)
+{
+    const struct chunk_view *chunks = pt_cpu_data(center->call, 4);
+    const float *positions = pt_cpu_data(center->call, 5);
+    uint32_t near = 0, kept = 0;
+    for (uint32_t i = 0; i < measured->count; i++) {
+        near = find_start(center, measured->id[i], near);
+        const struct chunk_view *chunk = &chunks[center->starts[near].chunk];
+        const uint32_t slot = measured->id[i] - center->starts[near].id;
+        if (slot >= chunk->count)
+            continue;
+        const float *p = positions + 3 * (size_t)chunk->first + slot;
+        const float x = p[0], y = p[chunk->padded], z = p[2 * (size_t)chunk->padded];
+        measured->column[kept] = measured->column[i];
+        measured->z[kept] = measured->z[i];
+        measured->x[kept] = transform(chunk, 0, x, y, z);
+        measured->y[kept++] = transform(chunk, 1, x, y, z);
+    }
+    measured->count = kept;
+}
+
+static void save(const struct center *center, uint32_t row, const struct measured *measured, uint32_t i, uint32_t count)
 {
     const struct view_args *view = &center->args->view;
-    const vf zero = vf_zero(), half = vf_set(0.5f);
-    vf n[4], ray[2];
-    vf_gather4(center->normals, seen->pixel, some, n);
-    vf_ray_of(view, seen->column, seen->row, ray);
+    const size_t at = (size_t)row * view->width;
+    const vf zero = vf_zero(), half = vf_set(0.5f), z = vi_float(vi_load(measured->z + i));
+    const vi column = vi_load(measured->column + i), place_y = vi_set((uint32_t)view->origin_y + row);
+    const vm some = vm_first(count);
+    vf x = vf_load(measured->x + i), y = vf_load(measured->y + i), n[4], ray[2];
+    if (view->perspective) {
+        const vf r = vf_rcp(z);
+        x = x * r;
+        y = y * r;
+    }
+    vf_gather4((const float *)pt_cpu_data(center->call, 1) + 4 * at, column, some, n);
+    vf_ray_of(view, column, vi_set(row), ray);
     // 1. to the middle of the pixel, in the view's units (perspective: at z = 1), and how n leans that way
-    const vf dx = (vi_convert(vi_add(vi_set((uint32_t)view->origin_x), seen->column)) + half) - seen->x;
-    const vf dy = (vi_convert(vi_add(vi_set((uint32_t)view->origin_y), seen->row)) + half) - seen->y;
+    const vf dx = (vi_convert(vi_add(vi_set((uint32_t)view->origin_x), column)) + half) - x;
+    const vf dy = (vi_convert(place_y) + half) - y;
     vf rise = n[0] * (vf_set(view->ray_xs) * dx) + n[1] * (vf_set(view->ray_ys) * dy), facing = zero - n[2];
     if (view->perspective) {
-        rise = rise * seen->z;
+        rise = rise * z;
         facing = (n[0] * ray[0] + n[1] * ray[1]) - n[2];
     }
     // 2. the plane's step, no farther than the surface is known to go on
     const vf size = vf_abs(facing);
     const vm good = vf_lt(vf_set(1e-6f), size);
     const vf step = rise * vf_rcp(vf_select(good, size, vf_set(1.0f)));
-    const vf most = vf_gather(center->deff, seen->pixel, some);
+    const vf most = vf_gather((const float *)pt_cpu_data(center->call, 2) + at, column, some);
     vf offset = vf_select(vf_lt(facing, zero), step, zero - step);
-    offset = vf_min(vf_max(offset, zero - vf_min(most, half * seen->z)), most);
-    offset = vf_select(good, offset, zero);
-    float offsets[PT_LANES];
-    uint32_t pixels[PT_LANES];
-    vf_store(offsets, offset);
-    vi_store(pixels, seen->pixel);
-    for (uint32_t bits = vm_bits(some); bits; bits &= bits - 1) {
-        const uint32_t k = (uint32_t)__builtin_ctz(bits);
-        if ((uint32_t)center->keys[pixels[k]] == first_id + k)
-            center->offsets[pixels[k]] = offsets[k];
+    offset = vf_min(vf_max(offset, zero - vf_min(most, half * z)), most);
+    float offsets[PT_LANES], *out = (float *)pt_cpu_data(center->call, 3) + at;
+    vf_store(offsets, vf_select(good, offset, zero));
+    for (uint32_t k = 0; k < count; k++)
+        out[measured->column[i + k]] = offsets[k];
+}
+
+static void center_row(const struct center *center, uint32_t y)
+{
+    const struct view_args *view = &center->args->view;
+    const uint64_t *keys = (const uint64_t *)pt_cpu_data(center->call, 0) + (size_t)y * view->width;
+    struct measured measured;
+    for (uint32_t first = view->rect[0]; first < view->rect[2]; first += BLOCK) {
+        const uint32_t end = view->rect[2] - first < BLOCK ? view->rect[2] : first + BLOCK;
+        measured.count = 0;
+        for (uint32_t x = first; x < end; x += PT_LANES) {
+            const vi z = vi_load_z(keys + x), id = vi_load_id(keys + x);
+            const vm some = vm_and(vm_first(pt_lanes_left(x, end)), vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z))));
+            const uint32_t lanes = vm_bits(vm_and(some, vi_lt_unsigned(vi_sub(id, vi_set(center->first)), vi_set(center->span))));
+            vi_pack(measured.column + measured.count, vi_add(vi_set(x), vi_lanes()), lanes);
+            vi_pack(measured.z + measured.count, z, lanes);
+            vi_pack(measured.id + measured.count, id, lanes);
+            measured.count += (uint32_t)__builtin_popcount(lanes);
+        }
+        project(center, &measured);
+        for (uint32_t i = 0; i < measured.count; i += PT_LANES)
+            save(center, y, &measured, i, pt_lanes_left(i, measured.count));
     }
 }
 
-static void center_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
+static void center_rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct center *center = context;
-    const struct chunk_view *chunks = pt_cpu_data(center->call, 4);
     (void)thread;
-    for (uint32_t c = begin; c < end && !pt_cpu_cancelled(center->call); c++) {
-        const struct chunk_view *chunk = &chunks[c];
-        const float *positions = center->positions + 3 * (size_t)chunk->first;
-        for (uint32_t i = 0; i < chunk->count; i += PT_LANES) {
-            struct seen seen;
-            const uint32_t left = chunk->count - i;
-            const vm some = look(center, chunk, positions, i, vm_first(left < PT_LANES ? left : PT_LANES), &seen);
-            if (vm_bits(some))
-                save(center, &seen, chunk->id_base + chunk->first + i, some);
-        }
-    }
+    for (uint32_t y = begin; y < end && !pt_cpu_cancelled(center->call); y++)
+        center_row(center, center->args->view.rect[1] + y);
 }
 
 int PT_KERNEL_ENTRY(center)(const struct pt_cpu_call *call)
 {
-    const struct center center = { .call = call,
-                                   .args = call->arguments,
-                                   .keys = pt_cpu_data(call, 0),
-                                   .normals = pt_cpu_data(call, 1),
-                                   .deff = pt_cpu_data(call, 2),
-                                   .offsets = pt_cpu_data(call, 3),
-                                   .positions = pt_cpu_data(call, 5) };
-    pt_parallel(call->pool, (uint32_t)(call->buffers[4]->size / sizeof(struct chunk_view)), 4, center_chunks, (void *)&center);
+    const struct chunk_view *chunks = pt_cpu_data(call, 4);
+    struct center center = { .call = call, .args = call->arguments };
+    const uint32_t *rect = center.args->view.rect;
+    center.count = (uint32_t)(call->buffers[4]->size / sizeof *chunks);
+    struct start *starts = pt_cpu_scratch(call, 0, (center.count + 1) * sizeof *starts);
+    if (!starts)
+        return PATINA_ERROR_MEMORY;
+    int sorted = 1;
+    for (uint32_t c = 0; c < center.count; c++) {
+        starts[c] = (struct start){ chunks[c].id_base + chunks[c].first, c };
+        sorted &= !c || starts[c - 1].id < starts[c].id;
+    }
+    if (!sorted)
+        qsort(starts, center.count, sizeof *starts, by_id);
+    if (!center.count || rect[0] >= rect[2] || rect[1] >= rect[3])
+        return PATINA_OK;
+    center.starts = starts;
+    center.first = starts[0].id;
+    center.span = starts[center.count - 1].id + chunks[starts[center.count - 1].chunk].count - center.first;
+    pt_parallel(call->pool, rect[3] - rect[1], 8, center_rows, &center);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }
