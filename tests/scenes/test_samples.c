@@ -153,6 +153,42 @@ static void test_outline(void **state)
     patina_device_destroy(device);
 }
 
+static double mean_light(const struct picture *picture)
+{
+    double sum = 0.0;
+    for (size_t k = 0; k < 4 * (size_t)picture->width * picture->height; k++)
+        sum += (double)picture->combined[k];
+    return sum / ((double)picture->width * picture->height);
+}
+
+// What is measured in pixels is as wide and as dark in finer ones.
+static void test_looks(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    for (int look = 0; look < 3; look++) {
+        struct stage stage = sphere(128, 12 * 128 * 128);
+        patina_effects effects = {.struct_size = sizeof effects};
+        patina_lines lines = {.struct_size = sizeof lines, .width = 4.0f, .color = {1.0f, 0.0f, 0.0f}};
+        effects.edl_strength = look == 0 ? 2.0f : 0.0f;
+        effects.edl_radius = 3.0f;
+        effects.hatch_levels = look == 1 ? 2 : 0;
+        CHECK(patina_scene_set_effects(stage.scene, &effects), stage.scene);
+        CHECK(patina_scene_set_lines(stage.scene, look == 2 ? &lines : NULL), stage.scene);
+        double light[2];
+        for (uint32_t i = 0; i < 2; i++) {
+            stage.settings.pixel_samples = i ? 9 : 1;
+            struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+            light[i] = mean_light(&picture);
+            picture_free(&picture);
+        }
+        print_message("  look %d: light %.4f with one sample, %.4f with nine\n", look, light[0], light[1]);
+        assert_true(fabs(light[1] / light[0] - 1.0) < 0.02);
+        stage_free(&stage);
+    }
+    patina_device_destroy(device);
+}
+
 static void test_failures(void **state)
 {
     (void)state;
@@ -187,7 +223,7 @@ int main(int argc, char **argv)
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_regions), cmocka_unit_test(test_bands),    cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_outline), cmocka_unit_test(test_failures),
+        cmocka_unit_test(test_outline), cmocka_unit_test(test_looks),    cmocka_unit_test(test_failures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
