@@ -101,9 +101,9 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
             self.active_view_set(eye)
             place = (self.camera_model_matrix(camera), self.camera_shift_x(camera))
         view = sync.final_view(camera, depsgraph, place)
-        description = replace(sync.describe(depsgraph, view, self._poll_reading, frame), samples=moment.samples)
-        if self._moments * len(moment.samples) > 1:
-            description = render.without_antialiasing(description)
+        description = sync.describe(depsgraph, view, self._poll_reading, frame)
+        description = render.shifted(description, moment.shift)
+        description = replace(description, settings=replace(description.settings, pixel_samples=moment.samples))
         self._status("Rendering", BUILDING)
         picture = render.draw(description, {item.plane for item in passes.enabled(depsgraph.view_layer_eval)},
                               self._poll_drawing, depsgraph.scene_eval.patina.tile_size)

@@ -191,7 +191,8 @@ class _Settings(_Descriptor):
                 ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
                 ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
                 ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("shadow_error", c_float),
-                ("own_background", c_uint32), ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32)]
+                ("own_background", c_uint32), ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32),
+                ("pixel_samples", c_uint32), ("depth", c_uint32)]
 
 
 class _Effects(_Descriptor):

@@ -15,8 +15,6 @@ from .sync import Camera, DeviceChoice, SceneDescription
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
 
-ANTIALIAS_OFF = 2  # PATINA_ANTIALIAS_OFF
-
 # Planes take some 130 bytes a pixel: 2 GB for a picture of that size. Larger ones are made in tiles.
 LARGE_PICTURE = 1 << 24  # pixels
 LARGE_TILE = 4096  # pixels a side
@@ -48,11 +46,6 @@ def forget_device() -> None:
     global _device
     with _device_lock:
         _device = None
-
-
-def without_antialiasing(description: SceneDescription) -> SceneDescription:
-    """For pictures that several samples make: their mean is smooth by itself."""
-    return replace(description, settings=replace(description.settings, antialias=ANTIALIAS_OFF))
 
 
 def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool],
@@ -112,12 +105,12 @@ def _open(choice: DeviceChoice, poll: Callable[[float], bool]) -> native.Device:
 
 def _draw_on(device: native.Device, description: SceneDescription, wanted: list[str], poll: Callable[[float], bool],
              tile_size: int) -> Picture:
-    """Tile by tile, each the mean of its samples: a tile's pixels are those of the whole picture (the library keeps a
-    guard band around it), so tiles only save memory."""
+    """Tile by tile: a tile's pixels are those of the whole picture (the library keeps a guard band around it), so tiles only
+    save memory."""
     if description.panorama:
         return _draw_panorama(device, description, wanted, poll, tile_size)
     regions = tiles(description.settings.region, tile_size)
-    if len(regions) > 1 or len(description.samples) > 1:  # all of them take from whole shadow textures
+    if len(regions) > 1:  # all of them take from whole shadow textures
         description = replace(description, settings=replace(description.settings, shadow_lazy=0))
     x0, y0, x1, y1 = description.settings.region
     picture: dict[str, np.ndarray] = {}
@@ -163,21 +156,13 @@ def _draw_panorama(device: native.Device, description: SceneDescription, wanted:
 def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[str],
                stats: dict[str, Any]) -> dict[str, np.ndarray]:
     """Planes of one region. stats: milliseconds add up, the rest is of the last picture."""
-    planes: dict[str, np.ndarray] = {}
-    for sample in description.samples:
-        with native.Scene() as scene:
-            describe(scene, replace(description, camera=shifted(description, sample)), wanted)
-            frame.render(scene)
-        before = stats.get("ms", 0.0)
-        stats.update(frame.stats())
-        stats["ms"] += before
-        if not planes:
-            planes = {name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted}
-        else:
-            planes["COMBINED"] += frame.read("COMBINED")
-    if len(description.samples) > 1:
-        planes["COMBINED"] /= np.float32(len(description.samples))
-    return planes
+    with native.Scene() as scene:
+        describe(scene, description, wanted)
+        frame.render(scene)
+    before = stats.get("ms", 0.0)
+    stats.update(frame.stats())
+    stats["ms"] += before
+    return {name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted}
 
 
 def tiles(region: tuple[int, int, int, int], size: int) -> list[tuple[int, int, int, int]]:
@@ -188,21 +173,13 @@ def tiles(region: tuple[int, int, int, int], size: int) -> list[tuple[int, int, 
     return [(x, y, min(x + size, x1), min(y + size, y1)) for y in range(y0, y1, size) for x in range(x0, x1, size)]
 
 
-def shifted(description: SceneDescription, sample: int) -> Camera:
-    """The camera of a sample: the first looks straight, the others are up to half a pixel aside (Halton's points)."""
+def shifted(description: SceneDescription, shift: tuple[float, float]) -> SceneDescription:
+    """What the camera sees aside, in pixels to the right and up."""
     camera, settings = description.camera, description.settings
-    x = ((_halton(sample, 2) + 0.5) % 1.0 - 0.5) * (camera.right - camera.left) / settings.width
-    y = ((_halton(sample, 3) + 0.5) % 1.0 - 0.5) * (camera.top - camera.bottom) / settings.height
-    return replace(camera, left=camera.left + x, right=camera.right + x, bottom=camera.bottom + y, top=camera.top + y)
-
-
-def _halton(index: int, base: int) -> float:
-    value, share = 0.0, 1.0 / base
-    while index:
-        value += share * (index % base)
-        index //= base
-        share /= base
-    return value
+    x = shift[0] * (camera.right - camera.left) / settings.width
+    y = shift[1] * (camera.top - camera.bottom) / settings.height
+    return replace(description, camera=replace(camera, left=camera.left + x, right=camera.right + x, bottom=camera.bottom + y,
+                                               top=camera.top + y))
 
 
 def _bits(planes: Iterable[str]) -> int:

@@ -2,6 +2,7 @@
 // A frame walks its plan: planes and buffers are bound, kernels run, the picture is kept for reading.
 #include "frame.h"
 
+#include "frame_samples.h"
 #include "layers.h"
 #include "residency.h"
 
@@ -417,7 +418,8 @@ static int run_plan(struct render *render)
         pt_frame_note_time(frame, last > pass ? "finish" : pass->name, now - before);
         before = now;
         i = (uint32_t)(last - plan->passes);
-        atomic_store(&frame->progress, (float)(i + 1) / (float)plan->pass_count);
+        atomic_store(&frame->progress,
+                     frame->progress_done + frame->progress_share * (float)(i + 1) / (float)plan->pass_count);
     }
     return error;
 }
@@ -468,21 +470,16 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     frame->picture_valid = 1;
 }
 
-int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene)
+int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
 {
     struct pt_plan plan;
     struct render render = { .frame = frame, .scene = scene, .plan = &plan };
     double start = pt_milliseconds();
-    atomic_store(&frame->progress, 0.0f);
-    frame->timing_count = 0;
-    frame->shadow_maps = frame->shadow_size[0] = frame->shadow_size[1] = 0;
     int error = pt_plan_create(scene, &plan);
     if (!error && (error = pt_frame_number(frame, scene)))
         pt_plan_destroy(&plan);
-    if (error) {
-        atomic_store(&frame->cancel, 0);
+    if (error)
         return pt_fail_again(&frame->handle, error);
-    }
     pt_frame_note_time(frame, "plan", pt_milliseconds() - start);
     error = upload(&render);
     if (!error)
@@ -502,10 +499,25 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     free(render.behind);
     free(render.tiles);
     pt_plan_destroy(&plan);
-    atomic_store(&frame->cancel, 0);
     if (error == PATINA_ERROR_CANCELLED)
         return pt_fail(&frame->handle, error, "rendering was cancelled");
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene)
+{
+    double start = pt_milliseconds();
+    atomic_store(&frame->progress, 0.0f);
+    frame->progress_done = 0.0f;
+    frame->progress_share = 1.0f;
+    frame->timing_count = 0;
+    frame->shadow_maps = frame->shadow_size[0] = frame->shadow_size[1] = 0;
+    frame->sampling[0] = frame->sampling[1] = 1;
+    int error = scene->settings.pixel_samples > 1 ? pt_frame_sample(frame, scene) : pt_frame_draw(frame, scene);
+    if (!error)
+        frame->stats.ms = pt_milliseconds() - start;
+    atomic_store(&frame->cancel, 0);
+    return error;
 }
 
 // ---- reading -------------------------------------------------------------------------------------------------------------
@@ -622,7 +634,7 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         unsigned long long parts = (unsigned long long)((double)light->error * 1e6 + 0.5);
         PUT("%s{\"samples\":%u,\"error\":%llu.%06llu}", i ? "," : "", light->samples, parts / 1000000, parts % 1000000);
     }
-    PUT("]}");
+    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u}}", frame->sampling[0], frame->sampling[1]);
 #undef PUT
     return length;
 }

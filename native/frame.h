@@ -35,6 +35,8 @@ struct patina_frame {
     uint32_t shadow_maps, shadow_size[2]; // of this render
     atomic_int cancel;
     _Atomic float progress;
+    float progress_done, progress_share; // of the render: before the picture at hand, and by it
+    uint32_t sampling[2];                // of the last picture: grid and shifts of its samples
     patina_frame_stats stats; // of the last finished render
     struct pt_timing timings[PT_TIMINGS];
     uint32_t timing_count;
@@ -54,6 +56,8 @@ struct patina_frame {
 };
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene);
+// One picture, whatever the scene says of samples: what rendering does over and over.
+int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene);
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);

@@ -391,6 +391,13 @@ static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
                       extract.depth ? PT_PLANE_LAYER_DEPTH : PT_PLANE_COUNT);
 }
 
+// Where the depth pass tells of surfaces, and not of points.
+static int tells_surfaces(const struct pt_builder *builder)
+{
+    const patina_settings *settings = &builder->scene->settings;
+    return settings->depth == PATINA_DEPTH_SURFACE && (settings->passes >> PATINA_PASS_DEPTH & 1u) && builder->plan->filled;
+}
+
 // ---- the picture -------------------------------------------------------------------------------------------------------
 
 static void set_background(const patina_settings *settings, float background[4])
@@ -413,6 +420,7 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
                         : settings->own_background ? "over its own background" : "over the world colour");
 
     struct extract_args extract = extract_args(builder, settings->passes);
+    extract.centered = tells_surfaces(builder) ? (uint32_t)builder->scene->points : 0;
     if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {
         pt_skip(builder, "extract", "no pass beside the combined one is asked for");
         return;
@@ -421,7 +429,8 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
                      {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_SHADING, 0),
                       pt_plane_at(PT_PLANE_DEPTH, 0), pt_plane_at(PT_PLANE_NORMALS, 0), pt_plane_at(PT_PLANE_SOURCE, 0),
                       pt_plane_at(PT_PLANE_ARRIVED, 0), pt_plane_at(PT_PLANE_SHADOW, 0),
-                      pt_plane_at(extract.discs_count ? PT_PLANE_AWAY : PT_PLANE_SHADING, 0)}),
+                      pt_plane_at(extract.discs_count ? PT_PLANE_AWAY : PT_PLANE_SHADING, 0),
+                      pt_plane_at(extract.centered ? PT_PLANE_OFFSET : PT_PLANE_SHADING, 0)}),
               "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
               extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
@@ -471,7 +480,16 @@ static void plan_marks(struct pt_builder *builder)
     }
 }
 
-static const char *const of_points[] = {"sift", "scatter", "splat", "normals", "surface", "blend", "pull", "fill", "push"};
+static void plan_center(struct pt_builder *builder, uint32_t i)
+{
+    const struct center_args args = {.view = builder->plan->view};
+    PT_REASON(PT_ADD(builder, center, args,
+                     {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                      pt_plane_at(PT_PLANE_OFFSET, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i)}),
+              "depth of instance %u's surface in the middle of each pixel", i);
+}
+
+static const char *const of_points[] = {"sift", "scatter", "splat", "normals", "surface", "center", "blend", "pull", "fill", "push"};
 
 static void skip_all(struct pt_builder *builder, const char *reason, const char *const *names, size_t count)
 {
@@ -511,8 +529,12 @@ static void plan_surfaces(struct pt_builder *builder)
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count) {
             pt_plan_surface(builder, i);
+            if (builder->layer == 1 && tells_surfaces(builder) && !plan->instances[i].discs)
+                plan_center(builder, i);
             estimate |= !plan->instances[i].args.has_normals;
         }
+    if (!tells_surfaces(builder))
+        pt_skip(builder, "center", !plan->filled ? "discs have the depth of their surface" : "the depth asked for is the points'");
     if (!estimate)
         pt_skip(builder, "normals", "every cloud in view has normals");
     if (discs)

@@ -22,6 +22,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(ARRIVED, 4, 0)        \
     X(ALBEDO, 16, 0)        \
     X(AWAY, 4, 0)           \
+    X(OFFSET, 4, 0)         \
     X(OBSCURED, 4, 0)       \
     X(UNLIT, 16, 0)         \
     X(COLOR_A, 16, 0)       \
@@ -166,6 +167,7 @@ struct pt_plan {
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
+    int filled;             // some points around the picture are pixels, not discs
     uint32_t quality, fill; // as set, or as the error target chose them
     int map;                // of a light
     enum pt_means means;    // that `expected` is of
@@ -207,7 +209,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
 // plan_window.c, once the spacings are known: how holes are closed; how many layers; which pixels the planes hold, with a picture
 // that is `guard` pixels wider on each side.
-void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan);
+void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan);
 void pt_choose_layers(const patina_settings *settings, struct pt_plan *plan);
 void pt_choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard);
 static inline uint32_t pt_round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }

@@ -26,7 +26,7 @@ static void plan_edl(struct pt_builder *builder, enum pt_plane color)
         args.offsets[2 * i + 1] = (int32_t)lround(radius * sin(angle));
     }
     args.reach = (uint32_t)lround((double)effects->edl_radius);
-    args.scale = (float)fmin(fmax(view->perspective ? EDL_LOG : EDL_PIXEL / (double)view->footprint, 1e-30), 1e30);
+    args.scale = (float)fmin(fmax(view->perspective ? EDL_LOG : EDL_PIXEL / ((double)view->footprint * pt_finer(builder->scene)), 1e-30), 1e30);
     args.gain = (float)(1.4427 * (double)effects->edl_strength / PT_EDL_NEIGHBOURS);
     PT_REASON(PT_ADD(builder, edl, args, {pt_keys_of(builder, 0), pt_plane_at(color, 0)}),
               "eye-dome lighting, strength %.2f, %u pixels around", (double)effects->edl_strength, args.reach);

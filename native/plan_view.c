@@ -412,7 +412,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, clips);
-    const double apart = pt_thinning(scene);
+    const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
     product_rows(camera, object, rows);
     for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f; c++) {
@@ -448,7 +448,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         seen.wide = scene->settings.surface == PATINA_SURFACE_SPLATS ||
-                    disc_reach(scene, instance, object, chunk, apart, 0) * stretch > WIDE_FOOTPRINT * pixel * rim;
+                    disc_reach(scene, instance, object, chunk, apart, 0) * stretch > wide * pixel * rim;
         survey->points |= !seen.wide;
         survey->discs |= seen.wide;
         list[survey->seen_count[i]++] = seen;
@@ -740,9 +740,10 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         return error;
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
+    plan->filled = survey.points;
     plan->reaches = knows_reach(scene);
     plan->view.perspective = !scene->camera.orthographic;
-    pt_choose_filling(&scene->settings, plan);
+    pt_choose_filling(scene, plan);
     pt_choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;

@@ -5,10 +5,12 @@
 #include "expected.h"
 #include "plan_lines.h"
 
+#include <math.h>
+
 enum { DEFAULT_LAYERS = 8 };
 // Coarse levels at most where points that lie wide apart are discs: these have closed what is wider. On four virtual scans more
 // fill sky (34.6 % in place of 22.2) and show nothing truer; one loses 0.5 dB.
-enum { LEVELS_BESIDE_DISCS = 2 };
+enum { LEVELS_BESIDE_DISCS = 2 }; // of the caller's pixels
 enum { MOST_ITERATIONS = 6 };
 
 // Spacing on screen, pixels, from which on coarser levels help to fill. In maps of lights in perspective, which take two
@@ -21,8 +23,10 @@ static const double WIDEST = 1.65, WIDEST_OF_LAMPS = 1.2;
 // at 1.35, lets steep planes grow by up to 0.5% at 1 point a pixel. From 1.5 on n is 6: 4 leave 0.13% of a sphere open, and
 // 0.32% of a disc of 0.5 points a pixel. Below it stays at 4: at 6 the fourth layer of three tori loses 0.14% of its pixels in
 // place of 0.06%.
-void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan)
+void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
 {
+    const patina_settings *settings = &scene->settings;
+    const int most = plan->discs_count ? LEVELS_BESIDE_DISCS + ilogb((double)pt_finer(scene)) : PT_LEVELS - 1;
     uint32_t asked = settings->error_target > 0.0f ? 0 : settings->fill_iterations;
     double s = plan->spacing_px;
     plan->quality = settings->quality;
@@ -43,7 +47,7 @@ void pt_choose_filling(const patina_settings *settings, struct pt_plan *plan)
         return;
     const double widest = plan->map && plan->view.perspective ? WIDEST_OF_LAMPS : WIDEST;
     for (; s > widest || (plan->levels && s > 1.0); s *= 0.5)
-        if (plan->levels++ == (plan->discs_count ? LEVELS_BESIDE_DISCS - 1 : PT_LEVELS - 2))
+        if (++plan->levels >= (uint32_t)(most < PT_LEVELS ? most : PT_LEVELS - 1))
             break;
     plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : plan->levels || s < 1.5 ? 4 : 6;
 }

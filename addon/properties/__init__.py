@@ -129,10 +129,17 @@ class PatinaSceneProperties(PropertyGroup):
     mesh_points: IntProperty(
         name="Points per Mesh", override=_OVERRIDE, default=500000, min=100, soft_max=5000000,
         description="How many points are spread over each mesh")
+    depth: EnumProperty(
+        name="Depth", override=_OVERRIDE, default='POINT',
+        description="What the Depth pass tells of points that are filled",
+        items=(
+            ('POINT', "Of Points", "That of the nearest point in the pixel, as it was measured", 0),
+            ('SURFACE', "Of the Surface", "That of the surface in the middle of the pixel: no nearer than it is where points lie "
+                                          "dense or slopes are steep", 1)))
     samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
-        description="Pictures, each shifted by a part of a pixel, that a final render takes the mean of. More than one stand "
-                    "in for anti-aliasing; data passes come from the first")
+        description="Of each pixel: a final render takes the mean of about so many finer or shifted ones, each anti-aliased as "
+                    "set. Data passes are those of one sample")
     motion_steps: IntProperty(
         name="Steps", override=_OVERRIDE, default=8, min=1, soft_max=64, max=1024,
         description="Moments while the shutter is open that a final render takes the mean of. Samples for anti-aliasing are "

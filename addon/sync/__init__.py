@@ -43,7 +43,6 @@ class SceneDescription:
     settings: Settings
     effects: Effects
     device: DeviceChoice
-    samples: tuple[int, ...]  # of a final picture: the numbers of those to take the mean of
     mist: Mist | None
     shadow_file: str  # baked shadow textures; empty: none
     notices: list[str]  # what the artist should know about things left out, a sentence each
@@ -91,7 +90,6 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
         settings=settings.read(scene, view, background),
         effects=effects.read(scene, view.focus, notices),
         device=settings.device(scene),
-        samples=tuple(range(settings.samples(scene))),
         mist=world.mist(scene.world),
         shadow_file=settings.shadow_file(scene),
         notices=notices,

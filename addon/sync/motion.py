@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motion blur of a final picture: at which moments it is taken, and which of its samples fall to each."""
+"""Motion blur of a final picture: at which moments it is taken, and how many of its samples fall to each."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ import bpy
 from . import settings
 
 
+_GOLDEN = 0.6180339887498949
+
+
 @dataclass(frozen=True)
 class Moment:
     """One state of the scene in a picture."""
 
     offset: float  # frames from the picture's own
-    samples: tuple[int, ...]  # of the jitter: numbers below that of all samples, each falls to one moment
+    samples: int  # of each pixel
+    shift: tuple[float, float]  # of the picture, pixels: moments of one sample each share out a pixel; (0, 0) with the data
     gives_data: bool  # whether depth and other data come from it: the moment nearest to the frame
 
 
@@ -25,18 +29,17 @@ def moments(scene: bpy.types.Scene) -> list[Moment]:
     samples = settings.samples(scene)
     render = scene.render
     if not render.use_motion_blur or render.motion_blur_shutter <= 0.0:
-        return [Moment(0.0, tuple(range(samples)), True)]
+        return [Moment(0.0, samples, (0.0, 0.0), True)]
     steps = scene.patina.motion_steps
     share = -(-samples // steps)
     begin = {'START': 0.0, 'CENTER': -0.5, 'END': -1.0}[position(scene)]
     offsets = [(begin + (step + 0.5) / steps) * render.motion_blur_shutter for step in range(steps)]
     nearest = min(range(steps), key=lambda step: abs(offsets[step]))
+    def shift(step: int) -> tuple[float, float]:
+        turn = (step - nearest) % steps if share == 1 else 0
+        return (turn / steps + 0.5) % 1.0 - 0.5, (turn * _GOLDEN + 0.5) % 1.0 - 0.5
 
-    def numbers(step: int) -> tuple[int, ...]:  # the frame's own moment begins with the sample that looks straight
-        first = (step - nearest) % steps * share
-        return tuple(range(first, first + share))
-
-    return [Moment(offset, numbers(step), step == nearest) for step, offset in enumerate(offsets)]
+    return [Moment(offset, share, shift(step), step == nearest) for step, offset in enumerate(offsets)]
 
 
 def position(scene: bpy.types.Scene) -> str:

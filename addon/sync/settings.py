@@ -47,6 +47,8 @@ class Settings:
     own_background: int = 0
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     shadow_uncut: int = 0
+    pixel_samples: int = 1  # of a final picture
+    depth: int = 0
 
 
 def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:
@@ -71,6 +73,7 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         shadow_samples=0 if patina.shadow_error else patina.shadow_samples,
         shadow_error=0.01 * patina.shadow_error,
         shadow_resolution=patina.shadow_resolution,
+        depth=enum_number(patina, "depth"),
         shadow_lazy=1)  # a final picture
 
 

@@ -63,10 +63,9 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         row.active = patina.fill != 'OFF'
         row.prop(patina, "fill_iterations")
         layout.prop(patina, "smooth")
-        row = layout.row()
-        row.active = patina.samples == 1
-        row.prop(patina, "antialias")
+        layout.prop(patina, "antialias")
         layout.prop(patina, "samples")
+        layout.prop(patina, "depth")
         layout.prop(patina, "meshes")
         if patina.meshes == 'POINTS':
             layout.prop(patina, "mesh_points")

@@ -417,7 +417,7 @@ static uint32_t op_finishes(const struct pt_bound_pass *passes, uint32_t count)
         return 0;
     for (uint32_t i = shades + TAIL; i < count; i++) {
         const struct extract_args *extract = passes[i].arguments;
-        if (passes[i].kernel != PT_KERNEL_extract || extract->normal || extract->source || extract->shadow)
+        if (passes[i].kernel != PT_KERNEL_extract || extract->normal || extract->source || extract->shadow || extract->centered)
             return 0;
     }
     return shades + TAIL;

@@ -141,6 +141,8 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
                 const atomic_int *cancel);
 int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
               const atomic_int *cancel);
+int pt_gl_center(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
+                 const atomic_int *cancel);
 int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
                const atomic_int *cancel);
 int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers, uint32_t count,

@@ -289,6 +289,8 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
         return pt_gl_blend(d, arguments, buffers, cancel);
     if (kernel == PT_KERNEL_lit)
         return pt_gl_lit(d, argument_size, buffers, count, cancel);
+    if (kernel == PT_KERNEL_center)
+        return pt_gl_center(d, argument_size, buffers, count, cancel);
     if (kernel == PT_KERNEL_sift)
         return pt_gl_sift(d, argument_size, buffers, count, cancel);
     int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_focus || kernel == PT_KERNEL_paper ||

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
-// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend: a pass a band of rows; lit, sift: one
+// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend: a pass a band of rows; lit, sift, center: one
 // instance.
 #include "device_gl.h"
 
@@ -310,5 +310,17 @@ int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *c
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, PT_KERNEL_sift, argument_size, rest, count);
     struct instance_buffers b = {PT_KERNEL_sift, 1, buffers[0], buffers[1], NULL, 0, 0};
+    return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
+}
+
+int pt_gl_center(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
+                 const atomic_int *cancel)
+{
+    static struct pt_buffer none;
+    struct pt_buffer *rest[] = {buffers[0], buffers[1], buffers[2], buffers[3], buffers[4], &none};
+    int result = pt_gl_kernel_program(d, PT_KERNEL_center, 0, "");
+    if (result == PATINA_OK)
+        result = pt_gl_bind_buffers(d, PT_KERNEL_center, argument_size, rest, count);
+    struct instance_buffers b = {PT_KERNEL_center, 5, buffers[4], buffers[5], NULL, 0, 0};
     return result == PATINA_OK ? run_instance(d, &b, 0, cancel) : result;
 }

@@ -362,6 +362,10 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
                            "shadow_uncut are 0 or 1");
     if (!(s.shadow_error >= 0.0f) || !isfinite(s.shadow_error))
         return fail(scene, "settings: shadow_error is negative or not finite");
+    if (s.depth > PATINA_DEPTH_SURFACE)
+        return fail(scene, "settings: no such depth");
+    if (s.pixel_samples > 4096)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u samples a pixel; the most is 4096", s.pixel_samples);
     s.shadow_samples = s.shadow_samples ? s.shadow_samples : s.shadow_error > 0.0f ? 256 : 1;
     s.shadow_resolution = s.shadow_resolution ? s.shadow_resolution : 4096;
     if (!s.passes)

@@ -36,7 +36,10 @@ struct patina_scene {
     patina_effects effects;   // likewise
     patina_lines lines;       // defaults made explicit
     int has_lines;
+    uint32_t finer; // pixels on each side of one that the caller asked for: of its samples. 0 or 1: it is one
 };
+
+static inline uint32_t pt_finer(const struct patina_scene *scene) { return scene->finer > 1 ? scene->finer : 1; }
 
 // Small 3 x 3 algebra in float64, row-major.
 double pt_determinant(const double m[9]);

@@ -60,6 +60,8 @@ static const char usage[] =
     "  --headlight                        one light from the camera in place of the two, without shadows\n"
     "  --shadows                          the brighter light casts shadows\n"
     "  --sun AZIMUTH,HEIGHT[,DIAMETER]    where from and how wide, degrees (default: over the left shoulder, sharp)\n"
+    "  --depth point|surface              of a pixel: its nearest point's, or its surface's in the middle (for --dump-planes)\n"
+    "  --pixel-samples N                  the mean of about so many samples a pixel, 1 to 4096 (1)\n"
     "  --samples N                        of a sun with a diameter, 1 to 4096 (16)\n"
     "  --shadow-error E                   as many as it takes to be off by E of its light at most (at most 256, or N)\n"
     "  --save-shadows FILE                computes the shadows of all points and keeps them\n"

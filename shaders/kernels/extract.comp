@@ -13,6 +13,7 @@ layout(std430, binding = 5) writeonly buffer normal_block { float normal[]; }; /
 layout(std430, binding = 6) writeonly buffer source_block { float source[]; };
 layout(std430, binding = 7) readonly buffer arrived_block { float arrived[]; };
 layout(std430, binding = 8) writeonly buffer shadow_block { float shadow[]; };
+layout(std430, binding = 10) readonly buffer offset_block { float offset[]; }; // to the middle of a measured pixel
 layout(std430, binding = 9) readonly buffer away_block { float away[]; }; // how far off a disc's point fell
 
 float source_value(uint width, uint origin, uint x, uint y)
@@ -41,7 +42,10 @@ void main()
     uint z_bits = read_z_bits(at);
     bool some = z_bits != PT_KEY_EMPTY_Z;
 #if PLANE == 0
-    depth[to] = pt_float(z_bits);
+    precise float z = pt_float(z_bits);
+    if (some && read_key(at).x < args.centered)
+        z = z + offset[texelFetch(from_plane, int(at)).x & ~PT_FROM_MIXED];
+    depth[to] = z;
 #elif PLANE == 1
     vec3 v = read_float4(at).xyz;
     vec3 n = some ? vec3(pt_dot(row_x, v), pt_dot(row_y, v), pt_dot(row_z, v)) : vec3(0.0);

@@ -413,6 +413,13 @@ struct lit_args {
     uint32_t faint, caster; // caster: first id of the only cloud that casts
 };
 
+// center: the tangent plane n . (p - q) = 0 of a measured point q, d pixels before the middle of its pixel, met by the ray r there:
+// z_middle - z = -z (n.x xs d.x + n.y ys d.y) / (n . r) (orthographic: without z), within -min(d_eff, z / 2) to d_eff; 0 where the
+// plane lies along the ray.
+struct center_args {
+    struct view_args view;
+};
+
 // limit: what a map's next layer sees lies beyond z + deff[from]; +inf (nothing does) where the map is empty, or the point that it
 // shows takes all light: opacity and loss are 255.
 struct limit_args {
@@ -613,6 +620,7 @@ struct extract_args {
     uint32_t crop_x, crop_y, crop_width, crop_height;
     uint32_t depth, normal, source, shadow;
     uint32_t discs_first, discs_count; // of ids: how far a measured pixel lies from such a point is in the away plane
+    uint32_t centered; // ids below it: their depth has the offset of the measured pixel that it comes from added
     float world_from_view[9];
 };
 

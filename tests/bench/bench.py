@@ -136,10 +136,10 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
 
 
 def independent(device: str, quick: bool) -> list[dict[str, Any]]:
-    """The shapes that no rule was made on: by density, analysed, as filling and as discs; then noise, strays and scan rows of
+    """The shapes that no rule was made on: by density, analysed, with 16 samples, as filling and as discs; then noise, strays and scan rows of
     1 : 10."""
     cases = []
-    for quality in ("analysed", "refined", "splats"):
+    for quality in ("analysed", "final", "refined", "splats"):
         for surface in list(stage.scenes.SHAPES)[: 2 if quick else None]:
             cases += [case_of("independent", surface, device, 512, density=density, quality=quality, frames=5)
                       for density in ([1.0] if quick else [0.2, 1.0, 4.0] + [16.0] * (surface == "knot"))]

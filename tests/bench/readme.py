@@ -14,7 +14,7 @@ from report import Row, count, joined, name_of, table
 NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2",
          "cpu-scalar": "processor, plain", "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
 QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs",
-             "analysed": "analysed"}
+             "analysed": "analysed", "final": "analysed, 16 samples"}
 
 
 def _line(row: Row) -> list[str]:

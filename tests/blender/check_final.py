@@ -117,7 +117,7 @@ def test_samples():
     edges = (alpha > 0.01) & (alpha < 0.99)
     check(40 < edges.sum() < 400, f"{edges.sum()} soft pixels")
     check(set(np.unique(one["Combined"][..., 3])) == {0, 1}, "one sample without anti-aliasing is hard")
-    check_close(alpha * 16, np.rint(alpha * 16), 1e-4, "a mean of sixteen hard pictures")
+    check_close(alpha * 16, np.rint(alpha * 16), 1e-4, "a mean of sixteen hard pixels")
     areas = [float(picture["Combined"][..., 3].sum()) for picture in (one, many)]
     check(abs(areas[1] / areas[0] - 1) < 0.01, f"areas {areas}")
 

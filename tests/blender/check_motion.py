@@ -85,7 +85,7 @@ def test_shutter_and_steps():
     check_smear(scene, [-6, -2, 2, 6], "a whole frame in four")
     scene.patina.samples = 8
     check_smear(scene, [-6, -2, 2, 6], "with samples for edges")
-    check([moment.samples for moment in motion.moments(scene)] == [(6, 7), (0, 1), (2, 3), (4, 5)], "two samples a moment")
+    check([moment.samples for moment in motion.moments(scene)] == [2] * 4, "two samples a moment")
     scene.render.use_motion_blur = False
     scene.patina.samples = 1
     check_smear(scene, [0], "off")

@@ -43,6 +43,18 @@ def test_depth():
         check(np.sort(depth.ravel())[1] == np.float32(1e10), "depth where nothing is")
 
 
+def test_depth_of_surfaces():
+    """Not nearer than the surface is, where several points fall into a pixel."""
+    scene = dense_scene(24, 18)
+    points = render()["Depth"][..., 0]
+    scene.patina.depth = 'SURFACE'
+    surface = render()["Depth"][..., 0]
+    seen = points < 100
+    check((seen == (surface < 100)).all(), "the same pixels")
+    farther = (surface - points)[seen]
+    check(farther.mean() > 0 and (farther > 0).mean() > 0.8, f"{farther.mean()}, {(farther > 0).mean():.2f} of the pixels")
+
+
 def test_normal():
     scene = new_scene()
     normal = np.array((0.48, -0.36, 0.8))

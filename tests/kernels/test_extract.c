@@ -12,7 +12,7 @@ static void compare(struct harness *h, const char *label, int x, int y, double g
 }
 
 static void check(struct harness *h, const struct picture *picture, const float *shading, const uint32_t crop[4],
-                  uint32_t wanted, const float matrix[9], const uint32_t discs[2])
+                  uint32_t wanted, const float matrix[9], const uint32_t discs[2], uint32_t centered)
 {
     struct extract_args args = {.view = picture->view,
                                 .crop_x = crop[0],
@@ -24,7 +24,8 @@ static void check(struct harness *h, const struct picture *picture, const float 
                                 .source = wanted >> 2 & 1,
                                 .shadow = wanted >> 3 & 1,
                                 .discs_first = discs[0],
-                                .discs_count = discs[1]};
+                                .discs_count = discs[1],
+                                .centered = centered};
     memcpy(args.world_from_view, matrix, 9 * sizeof *matrix);
     size_t count = picture->count, inside = (size_t)crop[2] * crop[3];
     float *unset = harness_alloc(h, inside * 12);
@@ -44,13 +45,18 @@ static void check(struct harness *h, const struct picture *picture, const float 
     for (size_t i = 0; i < count; i++)
         off[i] = (float)(i % 41) * 0.5f;
     struct pt_buffer *away = harness_buffer(h, off, count * 4);
-    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source, arrived, shadow, away);
+    float *steps = harness_alloc(h, count * 4);
+    for (size_t i = 0; i < count; i++)
+        steps[i] = ((float)(i % 53) - 26.0f) * 0.03125f;
+    struct pt_buffer *offset = harness_buffer(h, steps, count * 4);
+    HARNESS_RUN(h, extract, &args, keys, from, lit, depth, normal, source, arrived, shadow, away, offset);
     const float *got_depth = harness_read(h, depth), *got_normal = harness_read(h, normal);
     const float *got_source = harness_read(h, source), *got_shadow = harness_read(h, shadow);
     struct ref_planes planes = picture_planes(picture);
     planes.shading = shading;
     planes.arrived = shares;
     planes.away = off;
+    planes.offset = steps;
     for (size_t i = 0; i < inside; i++) {
         int x = (int)(i % crop[2]), y = (int)(i / crop[2]);
         struct ref_extract expected = ref_extract(&args, &planes, x, y);
@@ -89,7 +95,8 @@ static void passes(struct harness *h)
                 if (rng_below(&rng, 3) == 0)
                     picture.from[i] |= PT_FROM_MIXED;
             }
-            check(h, &picture, shading, crops[wanted % 3], wanted, matrix, discs[(wanted / 4 + (uint32_t)kind) % 3]);
+            check(h, &picture, shading, crops[wanted % 3], wanted, matrix, discs[(wanted / 4 + (uint32_t)kind) % 3],
+                  (uint32_t[]){0, 0xFFFFFFFFu, picture.id_base + 700}[(wanted / 2) % 3]);
         }
 }
 
@@ -104,7 +111,7 @@ static void shapes(struct harness *h)
         for (size_t i = 0; i < picture.count; i++) // as far away as the plane allows
             picture.from[i] = rng_below(&rng, (uint32_t)picture.count);
         const uint32_t crop[4] = {0, 0, sizes[s][0], sizes[s][1]};
-        check(h, &picture, picture.normal, crop, 15, identity, no_discs);
+        check(h, &picture, picture.normal, crop, 15, identity, no_discs, s == 1 ? 0xFFFFFFFFu : 0);
     }
 }
 

@@ -13,6 +13,8 @@ struct ref_extract ref_extract(const struct extract_args *args, const struct ref
     if (planes->keys[pixel] == REF_EMPTY_KEY)
         return out;
     out.depth = ref_key_z(planes->keys[pixel]);
+    if (ref_key_id(planes->keys[pixel]) < args->centered) // one sum of two float32
+        out.depth = (float)(out.depth + (double)planes->offset[planes->from[pixel] & ~PT_FROM_MIXED]);
     struct ref_vec n = ref_vec_of(planes->shading + 4 * pixel);
     const float *m = args->world_from_view;
     out.normal = ref_vec(m[0] * n.x + m[1] * n.y + m[2] * n.z, m[3] * n.x + m[4] * n.y + m[5] * n.z,

@@ -89,6 +89,13 @@ struct ref_place {
 struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
                            uint32_t slot);
 
+// What a measured point's offset to the middle of its pixel may be.
+struct ref_center {
+    double low, high;
+};
+struct ref_center ref_center(const struct view_args *view, const float normal[3], double deff, const struct ref_place *place,
+                             int x, int y);
+
 // Row k of (lo + R p) + hi of a clip, with a bound of what float32 adds.
 double ref_clip_row(const struct clip_view *clip, int k, const double p[3], double *error);
 // Is the point of this slot drawn? positions: of the instance; classes, shapes: by slot.
@@ -157,6 +164,7 @@ struct ref_planes {
     const uint8_t *opacities; // by id - id_base
     const float *through;    // light that earlier layers let through
     const float *arrived, *away;
+    const float *offset; // of measured pixels
     const float *obscured;
     const float *albedo; // colours without light
     const uint32_t *shadows; // words, by light and id - id_base

@@ -269,6 +269,19 @@ def test_convert_keeps_a_survey_origin():
 
 # ---- pictures ------------------------------------------------------------------------------------------------------
 
+def test_pixel_samples():
+    """The mean of several samples has soft outlines; what the tool says it took, and what it refuses."""
+    ball("soft.ply")
+    run("render", "soft.ply", "-o", "one.png", "--size", "64x64", "--transparent")
+    told = json.loads(run("render", "soft.ply", "-o", "many.png", "--size", "64x64", "--transparent", "--pixel-samples", "16",
+                          "--stats", "json").stdout)
+    assert told["points"], told
+    one, many = ({pixel[3] for row in read_png(name)[3] for pixel in row} for name in ("one.png", "many.png"))
+    assert len(many) > 2 * len(one), (one, many)
+    for bad in ("0", "4097", "x"):
+        assert run("render", "soft.ply", "-o", "no.png", "--pixel-samples", bad, code=2)
+
+
 def test_default_picture():
     ball("default.ply")
     assert "default.png" in run("render", "default.ply", "-o", "default.png").stderr

@@ -112,8 +112,12 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
     const struct extract_args *args = finish->extract;
     const uint32_t width = finish->planes.view->width, px = args->crop_x + x, py = args->crop_y + y;
     size_t out = (size_t)y * args->crop_width + x;
-    if (args->depth)
+    if (args->depth && args->centered) {
+        const size_t at = (size_t)py * width + px;
+        vf_put(finish->depth + out, pt_centered_depth(args, finish->planes.keys + at, finish->offsets, pt_source_of(finish->planes.from, at), some), count);
+    } else if (args->depth) {
         vf_put(finish->depth + out, z, count);
+    }
     if (args->normal) {
         vf normal[3], world[3] = { vf_zero(), vf_zero(), vf_zero() };
         if (vm_bits(some)) {
@@ -281,6 +285,7 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.source = pt_cpu_data(call, 5);
             finish.shadow = pt_cpu_data(call, 7);
             finish.away = pt_cpu_data(call, 8);
+            finish.offsets = pt_cpu_data(call, 9);
         }
     }
     if (finish.shade_count)

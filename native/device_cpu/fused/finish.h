@@ -22,6 +22,7 @@ struct finish {
     const struct compose_args *compose;
     const struct extract_args *extract;       // NULL: nothing beside the colour
     float *combined, *depth, *normals, *source, *shadow;
+    const float *offsets;                     // to the middles of measured pixels, where the depth asks for them
     const float *away;                        // of discs' points, where the source asks for it
     const struct peel_args *peel;             // NULL: the picture is composed
     const float *through;                     // of the layers before; NULL before the first

@@ -57,8 +57,13 @@ static void extract_row(void *context, uint32_t y)
     size_t row = (size_t)(args->crop_y + y) * args->view.width + args->crop_x, out = (size_t)y * args->crop_width;
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
     float *depth = (float *)pt_cpu_data(call, 3) + out;
-    for (uint32_t x = 0; args->depth && x < args->crop_width; x += PT_LANES)
-        vf_store_where(depth + x, vi_float(vi_load_z(keys + x)), vm_first(pt_lanes_left(x, args->crop_width)));
+    for (uint32_t x = 0; args->depth && x < args->crop_width; x += PT_LANES) {
+        const vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
+        vf z = vi_float(vi_load_z(keys + x));
+        if (args->centered)
+            z = pt_centered_depth(args, keys + x, pt_cpu_data(call, 9), pt_source_of(pt_cpu_data(call, 1), row + x), lanes);
+        vf_store_where(depth + x, z, lanes);
+    }
     if (args->normal)
         extract_normal(args, keys, (const float *)pt_cpu_data(call, 2) + 4 * row,
                        (float *)pt_cpu_data(call, 4) + 3 * out);

@@ -473,6 +473,9 @@ enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OF
 // normal (without one: across the view), discs within a layer distance of the nearest one are blended; quality, fill, their
 // iterations and error_target say nothing then. Light maps of shadows are filled either way.
 enum patina_surface { PATINA_SURFACE_AUTO = 0, PATINA_SURFACE_SPLATS = 1, PATINA_SURFACE_FILL = 2 };
+// What the depth pass tells of a pixel with points. POINT: z of the nearest point in it, wherever in the pixel that lies: as the
+// keys. SURFACE: z of that point's surface in the middle of the pixel. Discs and meshes are exact either way.
+enum patina_depth { PATINA_DEPTH_POINT = 0, PATINA_DEPTH_SURFACE = 1 };
 enum patina_smooth { PATINA_SMOOTH_ALLEVIATED = 0, PATINA_SMOOTH_GAUSSIAN = 1, PATINA_SMOOTH_BOX = 2, PATINA_SMOOTH_OFF = 3 };
 enum patina_antialias { PATINA_ANTIALIAS_LAYERS = 0, PATINA_ANTIALIAS_BACKGROUND = 1, PATINA_ANTIALIAS_OFF = 2 };
 
@@ -512,6 +515,11 @@ typedef struct patina_settings {
     float background[3];       // linear, with own_background; not where the film is transparent
     uint32_t surface;            // patina_surface
     uint32_t shadow_uncut;       // 1 = what clips cut away still casts shadows
+    uint32_t pixel_samples;      // of a final picture, 1..4096; 0 = 1: the colour is the mean of about so many samples a pixel, of
+                                 // finer pixels where that is truer, shifted pictures for the rest, each smoothed and anti-aliased
+                                 // as is set (truest with antialias on). Other passes and keys are those of one sample. More than
+                                 // one: whole shadow textures, in spite of shadow_lazy and _progressive
+    uint32_t depth;              // patina_depth
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -688,7 +696,8 @@ PATINA_API int patina_frame_load_shadows(patina_frame *frame, const patina_scene
 PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats);
 // Milliseconds by pass, why each other pass was left out, and of each layer the points in chunks that were scattered and
 // the pixels that it covers, as JSON: {"passes":{..},"skipped":{..},"layers":[{"points":..,"pixels":..},..]}; one layer
-// that was not peeled has no pixel count. "lights":[{"samples":..,"error":..},..] of the casting lights' shadows.
+// that was not peeled has no pixel count. "lights":[{"samples":..,"error":..},..] of the casting lights' shadows;
+// "samples":{"grid":..,"shifts":..}: how pixel_samples were taken, pixels on each side of one, times shifted.
 // Returns the full length; truncates to size.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
 // The plan as text, a line a pass, without rendering. Returns the full length.
