@@ -15,9 +15,9 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import engine, migrate, operators, properties, render, ui, viewport
-from .sync import clouds, meshes
+from .sync import clouds, files, meshes
 
-_MODULES = (properties, migrate, engine, operators, ui)
+_MODULES = (properties, files, migrate, engine, operators, ui)
 _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 
 

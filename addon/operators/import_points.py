@@ -12,7 +12,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, styles
 from ..importers import PointFile, origin
-from ..sync import linked, sequence
+from ..sync import files, linked, sequence
 from ..sync.analysis import SCANNERS
 from .steps import Stepped
 
@@ -140,7 +140,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
             if item.scanners:
                 obj.data[SCANNERS] = item.scanners
-            obj.patina.linked_file = str(path)
+            files.assign(obj, files.as_preferred(path))
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, shared)
         self.report({'INFO'}, f"Linked {sum(item.cloud.count for item in found.values()):,} points. In the sidebar, Patina > "

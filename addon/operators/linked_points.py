@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from .. import exporters, importers, jobs, native
 from ..importers import origin
-from ..sync import linked
+from ..sync import files, linked
 from . import export_points
 
 
@@ -44,7 +44,7 @@ class PATINA_OT_linked_to_mesh(Operator):
             return {'CANCELLED'}
         box = obj.data
         obj.data = importers.to_mesh(points)
-        obj.patina.linked_file = ""
+        files.assign(obj, "")
         if not box.users:
             bpy.data.meshes.remove(box)
         return {'FINISHED'}
@@ -80,7 +80,7 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
         obj.data = linked.box_mesh(obj.name, found.box)
         # the file's own origin may differ from the object's by what float32 holds
         obj[origin.PROPERTY] = [float(value) for value in found.origin]
-        obj.patina.linked_file = str(path)
+        files.assign(obj, files.as_preferred(path))
         return {'FINISHED'}
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 from bpy.props import PointerProperty, StringProperty
-from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
+from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume
 
 from .. import styles
 from ..native import MOST_LAYERS
@@ -22,6 +22,7 @@ from .studio import PatinaStudioProperties
 from .style import PatinaStyleProperties
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
+_PATH = {'ANIMATABLE', *({'PATH_SUPPORTS_BLEND_RELATIVE'} if bpy.app.version >= (4, 5, 0) else ())}  # which warns without
 
 
 def enum_number(group: PropertyGroup, name: str) -> int:
@@ -103,7 +104,7 @@ class PatinaSceneProperties(PropertyGroup):
         name="Cut Parts Cast Shadows", override=_OVERRIDE, default=False,
         description="What clip boxes and planes cut away still casts shadows")
     shadow_file: StringProperty(
-        name="Baked", override=_OVERRIDE, subtype='FILE_PATH',
+        name="Baked", override=_OVERRIDE, subtype='FILE_PATH', options=_PATH,
         description="Shadow textures to take from a file instead of computing them; empty: none")
     device: EnumProperty(
         name="Device", override=_OVERRIDE, default='AUTO',
@@ -145,6 +146,11 @@ class PatinaSceneProperties(PropertyGroup):
         name="Navigation", override=_OVERRIDE, default=60, min=5, soft_max=200, max=1000,
         description="Milliseconds until a picture of the viewport is seen while the view moves, with what Blender takes for "
                     "its window; fewer points and pixels are drawn until it fits. At rest the whole picture follows")
+
+
+def _follow_file(group: PropertyGroup, _context: Context) -> None:
+    from ..sync import files  # which needs these properties
+    files.follow(group.id_data)
 
 
 class PatinaObjectProperties(PropertyGroup):
@@ -216,8 +222,10 @@ class PatinaObjectProperties(PropertyGroup):
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
         description="Colour of points that have none")
+    linked_data: PointerProperty(  # where the file's path is kept: sync/files.py
+        type=Volume, name="Linked Data", override=_OVERRIDE, options={'HIDDEN'})
     linked_file: StringProperty(
-        name="Linked File", override=_OVERRIDE, subtype='FILE_PATH',
+        name="Linked File", override=_OVERRIDE, subtype='FILE_PATH', options=_PATH, update=_follow_file,
         description="Point file that is drawn in place of the object's own vertices; its points never become Blender's. "
                     "Number signs in its name stand for digits: scan_####.ply shows a file a frame")
     sequence: PointerProperty(type=PatinaSequenceProperties, override=_OVERRIDE)

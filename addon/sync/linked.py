@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import importers, jobs, native
 from ..importers.origin import PROPERTY
-from . import analysis, analyzing, attributes, sequence
+from . import analysis, analyzing, attributes, cache, files, sequence
 from .colors import scalar_name
 
 Corner = tuple[float, float, float]
@@ -51,7 +51,7 @@ class Linked:
 def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
     """Of an object with a linked file, evaluated or not; None where there is nothing to show. The files of a sequence are
     all relative to the object's origin, so that they lie to one another as they were scanned."""
-    path = Path(bpy.path.abspath(obj.patina.linked_file, library=obj.original.library))
+    path = files.path_of(obj)
     origin = None
     if sequence.is_pattern(path):
         settings = obj.patina.sequence
@@ -63,7 +63,7 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
     found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
     if found is None:
-        notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
+        notices.append(f"'{obj.name}': the file {files.told(path)} is missing")
     return found
 
 
@@ -77,8 +77,7 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
     place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
     made_of = f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}"
     state = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
-    folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
+    return Source(path, cache.folder() / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
