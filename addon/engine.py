@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from . import native, passes, render, sync, viewport
+from .importers import told
 from .sync import motion
 
 BUILDING = 0.5  # share of the progress bar for reading the scene; the rest is the picture
@@ -136,12 +137,12 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         self._progress(progress)
 
     def _tell(self, kind: str, text: str) -> None:
-        self.report({kind}, f"Patina: {text}")
+        self.report({kind}, told(f"Patina: {text}"))
 
     def _fail(self, text: str) -> None:
         self._tell('ERROR', text)
         if bpy.app.version < (4, 5, 0):  # later ones report it once more
-            self.error_set(f"Patina: {text}")
+            self.error_set(told(f"Patina: {text}"))
 
 
 def _text(error: Exception) -> str:

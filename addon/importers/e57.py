@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from .. import jobs, native
-from .reading import Filter, PointFile, Progress, colors_of, grid_normals, origin_of, scanners_of
+from .crs import units
+from .reading import Filter, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
 MISSING = ("E57 files need the Python package pye57: Patina's extension for Blender 4.2 and later brings it; elsewhere "
            "run \"{python}\" -m pip install --user pye57")
@@ -87,7 +88,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         raise native.PatinaError(f"{path.name}: scan {index}: {_first_line(error)}", -4) from None
     finally:
         file.close()
-    points = merge(path.stem, parts, {"crs": crs} if crs else {})
+    points = merge(path.stem, parts, {"crs": crs, **crs_notes(units(crs))} if crs else {})
     points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
     if wanted.every == 1:  # a thinned grid is none
         yield from grid_normals(points, stations, progress)

@@ -13,7 +13,8 @@ from typing import BinaryIO
 import numpy as np
 
 from .. import jobs, native
-from .reading import Filter, PointFile, Progress, colors_of, origin_of
+from . import crs
+from .reading import Filter, PointFile, Progress, colors_of, crs_notes, origin_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
@@ -87,6 +88,7 @@ class Header:
     upper: np.ndarray
     crs: str
     extras: tuple[Extra, ...] = ()
+    units: crs.Units | None = None
 
 
 def _fail(path: Path, what: str) -> native.PatinaError:
@@ -102,23 +104,40 @@ def read_header(path: Path) -> Header:
         box = struct.unpack_from("<12d", head, 131)
         if head[24:26] >= b"\x01\x04" and len(head) >= 255:
             count = struct.unpack_from("<Q", head, 247)[0] or count
-        crs, extras = _records(file, head, header_size, min(records, 4096), data_offset)
+        words, extras, keys = _records(file, head, header_size, min(records, 4096), data_offset)
     return Header(f"{head[24]}.{head[25]}", count, form & 0x3F, bool(form & 0xC0), record_size, data_offset,
-                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), crs, extras)
+                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), words, extras,
+                  crs.units(words, keys))
 
 
-def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int) -> tuple[str, tuple[Extra, ...]]:
+def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int
+             ) -> tuple[str, tuple[Extra, ...], dict[int, float]]:
     """Of the variable records, before the points and behind them: the text of the coordinate system (WKT, else what the
-    GeoTIFF keys say in words), and the extra dimensions."""
+    GeoTIFF keys say in words), the extra dimensions, and the GeoTIFF keys that are numbers."""
     wkt = words = ""
+    directory, doubles = b"", b""
     extras: tuple[Extra, ...] = ()
     for user, number, data in itertools.chain(_before(file, at, records, end), _behind(file, head)):
         if user == b"LASF_Projection" and number in {2112, 34737}:
             text = data.rstrip(b"\0").decode("utf-8", "replace")
             wkt, words = (wkt or text, words) if number == 2112 else (wkt, words or text)
+        elif user == b"LASF_Projection" and number == 34735:
+            directory = directory or data
+        elif user == b"LASF_Projection" and number == 34736:
+            doubles = doubles or data
         elif user == b"LASF_Spec" and number == 4:
             extras = extras or tuple(_extra(data[i:i + 192]) for i in range(0, len(data) - 191, 192))
-    return wkt or words, extras
+    return wkt or words, extras, _geo_keys(directory, doubles)
+
+
+def _geo_keys(directory: bytes, doubles: bytes) -> dict[int, float]:
+    """The keys of a GeoTIFF directory whose values are numbers."""
+    entries = [struct.unpack_from("<4H", directory, at) for at in range(8, len(directory) - 7, 8)]
+    found: dict[int, float] = {key: value for key, place, _, value in entries if place == 0}
+    for key, place, _, index in entries:
+        if place == 34736 and 8 * index + 8 <= len(doubles):
+            found[key] = struct.unpack_from("<d", doubles, 8 * index)[0]
+    return found
 
 
 def _before(file: BinaryIO, at: int, records: int, end: int) -> Iterator[tuple[bytes, int, bytes]]:
@@ -164,7 +183,7 @@ def preview(path: Path) -> list[str]:
             f"{header.points:,} points", f"{size[0]:,.1f} x {size[1]:,.1f} x {size[2]:,.1f}",
             *(["colours"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
             *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
-            *([header.crs[:60]] * bool(header.crs))]
+            *([f"units: {header.units}"] * bool(header.units)), *([header.crs[:60]] * bool(header.crs))]
 
 
 def _record(path: Path, header: Header) -> np.dtype:
@@ -319,6 +338,7 @@ def _assemble(path: Path, header: Header, origin: tuple[float, float, float], co
     if positions is None:
         return PointFile(path.stem, np.empty((0, 3), np.float32), None, None, {}, origin, 0)
     notes: dict[str, str | float] = {"crs": header.crs} if header.crs else {}
+    notes |= crs_notes(header.units)
     rgb = columns.take("rgb")
     colors = None if rgb is None else colors_of(rgb)
     del rgb  # before more is made
@@ -336,4 +356,6 @@ def _assemble(path: Path, header: Header, origin: tuple[float, float, float], co
     for name in columns:
         values = columns.take(name)
         scalars[name] = values if values.dtype.itemsize == 1 else values.astype(np.float32)
-    return PointFile(path.stem, positions, normals, colors, scalars, origin, 0, notes)
+    degrees = header.units is not None and header.units.degrees
+    warnings = [f"{path.name}: its coordinates are longitude and latitude in degrees; project them to see right shapes"] * degrees
+    return PointFile(path.stem, positions, normals, colors, scalars, origin, 0, notes, warnings)

@@ -40,7 +40,7 @@ class PATINA_OT_linked_to_mesh(Operator):
             points = jobs.run(lambda: module.read(source.path, importers.Filter(), importers.Progress()), lambda: None,
                               lambda: False)
         except native.PatinaError as error:
-            self.report({'ERROR'}, f"Patina: {error}")
+            self.report({'ERROR'}, importers.told(f"Patina: {error}"))
             return {'CANCELLED'}
         box = obj.data
         obj.data = importers.to_mesh(points)
@@ -75,7 +75,7 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
             exporters.write_ply(path, points)
             found = jobs.run(lambda: linked.load(linked.source(path)), lambda: None, lambda: False)
         except (native.PatinaError, OSError) as error:
-            self.report({'ERROR'}, f"Patina: {path.name}: {error}")
+            self.report({'ERROR'}, importers.told(f"Patina: {path.name}: {error}"))
             return {'CANCELLED'}
         obj.data = linked.box_mesh(obj.name, found.box)
         # the file's own origin may differ from the object's by what float32 holds

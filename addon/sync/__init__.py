@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import bpy
 
 from .. import migrate
-from . import clips, clouds, effects, lights, lines, settings, world
+from . import clipping, clips, clouds, effects, lights, lines, settings, world
 from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
 from .clips import Clip, of_view as view_clips
 from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
@@ -75,12 +75,13 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
                    items: list[CloudItem | MeshItem]) -> SceneDescription:
     """Lights, world and settings of a scene around clouds and meshes that the caller has."""
     scene = depsgraph.scene_eval
-    notices += filter(None, [migrate.notice(scene)])
+    points = [item for item in items if isinstance(item, CloudItem)]
+    notices += filter(None, [migrate.notice(scene), clipping.notice(points, view)])
     studio = scene.patina.studio
     replaced = studio.use_light and studio.use_background  # then nothing of the world is drawn
     background = world.background(None if replaced else scene.world, notices)
     return SceneDescription(
-        clouds=[item for item in items if isinstance(item, CloudItem)],
+        clouds=points,
         meshes=[item for item in items if isinstance(item, MeshItem)],
         clips=clips.collect(depsgraph),
         lights=lights.collect(depsgraph, notices),

@@ -13,7 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from .. import jobs, native
-from ..importers import Progress
+from ..importers import Progress, told
 from ..jobs import Steps
 from ..properties import enum_number
 from . import analysis, attributes, clips, colors, estimates, linked, meshes
@@ -106,7 +106,7 @@ class PendingLink(Pending):
     """A linked cloud that waits to be opened."""
 
     def __init__(self, source: linked.Source) -> None:
-        super().__init__(source.path.name, source.identity(), None)
+        super().__init__(told(source.path.name), source.identity(), None)
         self._source = source
 
     def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:

@@ -16,14 +16,10 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
+from ..importers.reading import told
 from . import cache, sequence
 
 _unpacked: dict[tuple[int, int], Path] = {}  # of packed files, by place in memory and size
-
-
-def told(path: Path | str) -> str:
-    """A path or name as Blender's texts and names take it: bytes that are no UTF-8 as replacement characters."""
-    return str(path).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def assign(obj: bpy.types.Object, path: str) -> None:

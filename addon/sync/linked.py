@@ -46,6 +46,7 @@ class Linked:
     origin: Corner  # float64; the cloud is relative to it
     box: tuple[Corner, Corner]
     scanners: list[float]  # x, y, z of each, relative to origin
+    units: tuple[float, float] = (1.0, 1.0)  # metres of the file's, across and up
 
 
 def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
@@ -57,13 +58,13 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         settings = obj.patina.sequence
         path, notice = sequence.file_at(path, frame, settings.start, settings.step, settings.outside)
         if notice:
-            notices.append(f"'{obj.name}': {notice}")
+            notices.append(f"'{obj.name}': {importers.told(notice)}")
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
     found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
     if found is None:
-        notices.append(f"'{obj.name}': the file {files.told(path)} is missing")
+        notices.append(f"'{obj.name}': the file {importers.told(path)} is missing")
     return found
 
 
@@ -90,7 +91,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     notes = source.kept.with_suffix(".json")
     try:
         kept = json.loads(notes.read_text("utf-8"))
-        found = _linked(native.Cloud.open(source.kept), tuple(kept["origin"]), kept.get("scanners"))
+        found = _linked(native.Cloud.open(source.kept), tuple(kept["origin"]), kept.get("scanners"), kept.get("units"))
         os.utime(source.kept)  # used just now
         return found
     except (native.PatinaError, OSError, ValueError, KeyError):
@@ -102,6 +103,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
+    units = points.notes.get("units")
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
     shown = attributes.without_uncolored(None, points.colors) if source.hide_uncolored else None
     with progress.part(1, parts).inner() as inner:
@@ -122,12 +124,12 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         task = cloud.start_save(source.kept)
         yield task
         task.result()
-        notes.write_text(json.dumps({"origin": origin, "scanners": scanners}), "utf-8")
+        notes.write_text(json.dumps({"origin": origin, "scanners": scanners, "units": units}), "utf-8")
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
-    return _linked(cloud, origin, scanners)
+    return _linked(cloud, origin, scanners, units)
 
 
 def _tidy(newest: Path) -> None:
@@ -152,8 +154,8 @@ def _classes(points: importers.PointFile) -> np.ndarray | None:
     return None if values is None else attributes.as_classes(values)
 
 
-def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None) -> Linked:
-    return Linked(cloud, origin, cloud.box, scanners or [])
+def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, units: list[float] | None) -> Linked:
+    return Linked(cloud, origin, cloud.box, scanners or [], tuple(units or (1.0, 1.0)))
 
 
 def box_mesh(name: str, box: tuple[Corner, Corner]) -> bpy.types.Mesh:

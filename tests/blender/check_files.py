@@ -24,13 +24,19 @@ def places(name):
     return base, scan
 
 
+def far_scene():
+    """Whose camera sees a scan that lies at zero."""
+    scene = new_scene()
+    scene.camera.location.z = 5.0
+
+
 def save(path):
     bpy.ops.wm.save_as_mainfile(filepath=str(path), relative_remap=True)
 
 
 def test_linked_path_is_made_relative_and_absolute():
     base, scan = places("relative")
-    new_scene()
+    far_scene()
     obj, = import_ply(scan, link=True)
     check(files.path_of(obj) == scan, f"{files.path_of(obj)}")
     save(base / "first/scene.blend")
@@ -53,7 +59,7 @@ def drawn_points():
 def test_a_moved_project_finds_its_scan():
     """File and scan go to another folder together, as to a farm or a colleague."""
     base, scan = places("moved")
-    new_scene()
+    far_scene()
     import_ply(scan, link=True)
     save(base / "first/scene.blend")
     bpy.ops.file.make_paths_relative()
@@ -69,7 +75,7 @@ def test_a_moved_project_finds_its_scan():
 def test_save_as_elsewhere_maps_it_anew():
     base, scan = places("save_as")
     save(base / "first/scene.blend")
-    new_scene()
+    far_scene()
     obj, = import_ply(scan, link=True)
     check(obj.patina.linked_file == "//scans/scan.ply", f"new ones are as the preferences say: {obj.patina.linked_file}")
     save(base / "second/scene.blend")
@@ -81,7 +87,7 @@ def test_save_as_elsewhere_maps_it_anew():
 
 def test_missing_scan_is_found():
     base, scan = places("found")
-    new_scene()
+    far_scene()
     obj, = import_ply(scan, link=True)
     save(base / "first/scene.blend")
     (base / "second/deep").mkdir()
@@ -95,7 +101,7 @@ def test_missing_scan_is_found():
 
 def test_packed_scan_needs_no_file():
     base, scan = places("packed")
-    new_scene()
+    far_scene()
     obj, = import_ply(scan, link=True)
     whole = render()
     save(base / "first/scene.blend")
@@ -119,7 +125,7 @@ def test_objects_share_a_file_and_part():
     base, scan = places("shared")
     other = base / "second/other.ply"
     shutil.copyfile(scan, other)
-    new_scene()
+    far_scene()
     first, = import_ply(scan, link=True)
     second, = import_ply(scan, link=True)
     check(first.patina.linked_data == second.patina.linked_data, "one file is packed twice")
@@ -133,7 +139,7 @@ def test_sequence_keeps_its_pattern():
     base, scan = places("sequence")
     for number in (3, 4):
         shutil.copyfile(scan, base / f"first/scans/step_{number:03}.ply")
-    new_scene()
+    far_scene()
     bpy.ops.import_scene.patina_points(filepath=str(base / "first/scans/step_003.ply"), link=True, sequence=True)
     obj = bpy.context.view_layer.objects.active
     save(base / "first/scene.blend")
@@ -147,7 +153,7 @@ def test_sequence_keeps_its_pattern():
 def test_files_of_older_versions():
     """Those have the path as text alone."""
     base, scan = places("older")
-    new_scene()
+    far_scene()
     obj, = import_ply(scan, link=True)
     save(base / "first/scene.blend")
     obj.patina.linked_file = "//scans/scan.ply"
@@ -168,13 +174,13 @@ def test_files_of_older_versions():
 def test_linked_from_a_library():
     """The path is relative to the library that holds the object."""
     base, scan = places("library")
-    new_scene()
+    far_scene()
     import_ply(scan, link=True)
     save(base / "first/library.blend")
     bpy.ops.file.make_paths_relative()
     save(base / "first/library.blend")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    new_scene()
+    far_scene()
     save(base / "second/user.blend")
     with bpy.data.libraries.load(str(base / "first/library.blend"), link=True) as (_, wanted):
         wanted.objects = ["scan"]
