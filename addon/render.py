@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
@@ -10,16 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from . import jobs, native
+from . import jobs, memory, native
 from .sync import Camera, DeviceChoice, SceneDescription
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
 
 ANTIALIAS_OFF = 2  # PATINA_ANTIALIAS_OFF
 
-# Planes take some 130 bytes a pixel: 2 GB for a picture of that size. Larger ones are made in tiles.
+# Planes take some 130 bytes a pixel: 2 GB for a picture of that size. Larger ones are made in tiles, and smaller ones too
+# where memory is short; the smaller the tiles, the more of the time goes into the band around each.
+PIXEL_BYTES = 130
 LARGE_PICTURE = 1 << 24  # pixels
-LARGE_TILE = 4096  # pixels a side
+LEAST_TILE, TILE_STEP = 512, 256  # pixels a side
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
     guard band around it), so tiles only save memory."""
     if description.panorama:
         return _draw_panorama(device, description, wanted, poll, tile_size)
-    regions = tiles(description.settings.region, tile_size)
+    regions = tiles(description.settings.region, tile_size, memory.for_planes())
     if len(regions) > 1 or len(description.samples) > 1:  # all of them take from whole shadow textures
         description = replace(description, settings=replace(description.settings, shadow_lazy=0))
     x0, y0, x1, y1 = description.settings.region
@@ -180,12 +183,16 @@ def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[
     return planes
 
 
-def tiles(region: tuple[int, int, int, int], size: int) -> list[tuple[int, int, int, int]]:
-    """Regions that make up a region, rows from the bottom. size 0: one, unless the picture is large."""
+def tiles(region: tuple[int, int, int, int], size: int, budget: int | None = None) -> list[tuple[int, int, int, int]]:
+    """Regions that make up a region, rows from the bottom. size 0: one, unless the picture is large; budget: bytes for planes,
+    None: as many as a large picture takes."""
     x0, y0, x1, y1 = region
-    if not size:
-        size = LARGE_TILE if (x1 - x0) * (y1 - y0) > LARGE_PICTURE else max(x1 - x0, y1 - y0)
-    return [(x, y, min(x + size, x1), min(y + size, y1)) for y in range(y0, y1, size) for x in range(x0, x1, size)]
+    across, along = size or x1 - x0, size or y1 - y0
+    most = LARGE_PICTURE if budget is None else min(LARGE_PICTURE, budget // PIXEL_BYTES)
+    if not size and across * along > most:
+        side = max(math.isqrt(most) // TILE_STEP * TILE_STEP, LEAST_TILE)
+        across, along = (math.ceil(length / math.ceil(length / side)) for length in (across, along))  # none much smaller
+    return [(x, y, min(x + across, x1), min(y + along, y1)) for y in range(y0, y1, along) for x in range(x0, x1, across)]
 
 
 def shifted(description: SceneDescription, sample: int) -> Camera:

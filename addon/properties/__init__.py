@@ -140,8 +140,8 @@ class PatinaSceneProperties(PropertyGroup):
                     "spread over them, at least one each")
     tile_size: IntProperty(
         name="Tile Size", override=_OVERRIDE, default=0, min=0, max=16384, subtype='PIXEL',
-        description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: tiles of 4096 "
-                    "pixels for pictures of more than 16 million")
+        description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: as large "
+                    "as the memory that is free allows, at most 4096")
     navigation_ms: IntProperty(
         name="Navigation", override=_OVERRIDE, default=60, min=5, soft_max=200, max=1000,
         description="Milliseconds until a picture of the viewport is seen while the view moves, with what Blender takes for "

@@ -54,8 +54,9 @@ def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, fl
     """Reads the scene of a final render. poll(what, progress of it) is called during long steps and returns True to
     cancel. frame: whose files sequences show, where the scene stands at a moment beside it."""
     notices: list[str] = []
+    taking = clouds.TakingNow(poll, notices)
     return describe_items(depsgraph, view, notices,
-                          clouds.collect(depsgraph, clouds.taking_now(poll, notices), notices, frame=frame))
+                          clouds.collect(depsgraph, taking, notices, frame=frame, settle=taking.settle))
 
 
 def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trusted,

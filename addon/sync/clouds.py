@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import bpy
@@ -25,6 +27,10 @@ from .camera import row_major
 IDLE_BYTES = 1 << 30
 
 LIT = 2  # PATINA_LIGHTING_LIT
+
+SMALL = 1 << 14  # points: fewer are worked on by one thread each, in the library too
+AT_ONCE = 16  # small clouds
+MOST_WAITING = 1 << 22  # points of small clouds that are held beside Blender's own
 
 NOTHING = 1e-20  # stands for zero where zero would mean "default" to the library
 
@@ -212,14 +218,14 @@ Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud
 
 def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             visible: Callable[[bpy.types.DepsgraphObjectInstance], bool] = lambda instance: True,
-            frame: int | None = None) -> list[CloudItem | meshes.MeshItem]:
+            frame: int | None = None, settle: Callable[[], None] = lambda: None) -> list[CloudItem | meshes.MeshItem]:
     """Every visible cloud and mesh, instances too. Iterates the depsgraph only; keeps no reference into it. frame: whose
-    files sequences show; None: of the scene's."""
+    files sequences show; None: of the scene's. settle: builds what take left for later."""
     items: list[CloudItem | meshes.MeshItem] = []
     taken: dict[tuple, native.Cloud | Pending | native.Mesh | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
-    distances: dict[str, float] = {}
+    scales: list[tuple[str, float, native.Cloud | Pending]] = []
     for instance in depsgraph.object_instances:
         obj = instance.object
         if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera or clips.cuts(obj):
@@ -250,13 +256,13 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
             items.append(CloudItem(cloud, style, obj.pass_index))
-            built = cloud.built if isinstance(cloud, Pending) else cloud
-            if built:
-                scale = max(map(abs, instance.matrix_world.to_scale()))
-                distances[obj.original.name_full] = built.layer_distance * scale
+            scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
+    settle()
+    items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item for item in items]
     CACHE.trim(used)
     meshes.CACHE.trim(used)
-    estimates.keep(distances)
+    estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
+                    if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
     if not items:
         notices.append("no visible object has points to draw")
     if faces:
@@ -265,15 +271,23 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     return items
 
 
-def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
-    """Builds each cloud at once, polling; content decides whether it is built anew."""
+class TakingNow:
+    """Of a final picture: builds each cloud, polling; content decides whether it is built anew. Large ones are built at once, each
+    by all cores; small ones wait for settle(), where several are built beside each other: starting all cores for one takes
+    longer than its work."""
 
-    def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> native.Cloud | native.Mesh | None:
+    def __init__(self, poll: Callable[[str, float], bool], notices: list[str]) -> None:
+        self._poll = poll
+        self._notices = notices
+        self._waiting: list[_Soon] = []
+
+    def __call__(self, obj: bpy.types.Object, identity: tuple, link: linked.Source | None
+                 ) -> native.Cloud | Pending | native.Mesh | None:
         name = obj.name
         progress = Progress()
 
         def stopped() -> bool:
-            return poll(f"{progress.doing} of '{name}'", progress.value())
+            return self._poll(f"{progress.doing} of '{name}'", progress.value())
 
         def pause() -> None:
             if stopped():
@@ -282,28 +296,75 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
         if identity[-1] == TRIANGLES:
             pause()
             return meshes.CACHE.obtain(identity, obj)
-        arrays = None if link else _read(obj, notices, identity[-1], pause)
+        arrays = None if link else _read(obj, self._notices, identity[-1], pause)
         if arrays is None and link is None:
             return None
+        if arrays and len(arrays.positions) < SMALL:
+            soon = _Soon(name, identity, arrays, progress)
+            self._waiting.append(soon)
+            if sum(other.count for other in self._waiting) >= MOST_WAITING:
+                self.settle()
+            return soon
 
         def work() -> native.Cloud:
-            if link:
-                return jobs.finish(CACHE.obtain_linked(link, progress))
-            with progress.inner() as inner:
-                cloud = jobs.finish(CACHE.obtain(identity, arrays, inner))
-            if arrays.analyzed and not cloud.has_shapes:
-                progress.doing = analysis.label(cloud)
-                ANALYSES.finish(cloud, arrays.stations, progress.follow)
-            return cloud
+            return jobs.finish(CACHE.obtain_linked(link, progress)) if link else _finished(identity, arrays, progress)
 
         cloud = jobs.run(work, progress.cancel, stopped)
-        if cloud.invalid_positions:
-            notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
+        self._notice(name, cloud)
         if link and link.scalar and not cloud.has_scalars:
-            notices.append(f"'{name}': its file has no attribute '{link.scalar}' to take as scalar")
+            self._notices.append(f"'{name}': its file has no attribute '{link.scalar}' to take as scalar")
         return cloud
 
-    return take
+    def settle(self) -> None:
+        """Builds what waits."""
+        waiting, self._waiting = self._waiting, []
+        if not waiting:
+            return
+        what = f"Building '{waiting[0].name}'" if len(waiting) == 1 else f"Building {len(waiting)} small clouds"
+
+        def cancel() -> None:
+            for soon in waiting:
+                soon.progress.cancel()
+
+        def stopped() -> bool:
+            return self._poll(what, sum(soon.built is not None for soon in waiting) / len(waiting))
+
+        def work() -> None:
+            with ThreadPoolExecutor(min(os.cpu_count() or 1, AT_ONCE)) as pool:
+                for _ in pool.map(_Soon.build, waiting):
+                    pass
+
+        jobs.run(work, cancel, stopped)
+        for soon in waiting:
+            self._notice(soon.name, soon.built)
+
+    def _notice(self, name: str, cloud: native.Cloud) -> None:
+        if cloud.invalid_positions:
+            self._notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
+
+
+class _Soon(Pending):
+    """A small cloud that waits for TakingNow.settle."""
+
+    def __init__(self, name: str, identity: tuple, arrays: PointArrays, progress: Progress) -> None:
+        super().__init__(name, identity, arrays)
+        self.progress = progress
+        self.count = len(arrays.positions)
+
+    def build(self) -> None:
+        """Any thread."""
+        self._cloud = _finished(self._identity, self._arrays, self.progress)
+        self._arrays = None
+
+
+def _finished(identity: tuple, arrays: PointArrays, progress: Progress) -> native.Cloud:
+    """The cloud of these points, analyzed where that is wanted."""
+    with progress.inner() as inner:
+        cloud = jobs.finish(CACHE.obtain(identity, arrays, inner))
+    if arrays.analyzed and not cloud.has_shapes:
+        progress.doing = analysis.label(cloud)
+        ANALYSES.finish(cloud, arrays.stations, progress.follow)
+    return cloud
 
 
 class Trusted:
