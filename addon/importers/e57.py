@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,8 @@ from .. import jobs, native
 from .crs import units
 from .reading import Filter, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
-MISSING = ("E57 files need the Python package pye57: Patina's extension for Blender 4.2 and later brings it; elsewhere "
-           "run \"{python}\" -m pip install --user pye57")
-
+MISSING = ("E57 files need the Python package pye57: Install Readers in the add-on's preferences fetches it (Patina's extension for "
+           "Blender 4.2 and later brings it)")
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
@@ -35,7 +33,7 @@ def _open(path: Path) -> Any:
     try:
         import pye57
     except ImportError:
-        raise native.PatinaError(MISSING.format(python=sys.executable), -5) from None
+        raise native.PatinaError(MISSING, -5) from None
     try:
         return pye57.E57(str(path))
     except Exception as error:  # libE57 throws its own kinds

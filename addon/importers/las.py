@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import jobs, native
 from . import crs
+from ..readers import lacks
 from .reading import Filter, PointFile, Progress, colors_of, crs_notes, origin_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
@@ -42,8 +43,8 @@ _SCALARS = {"intensity": "intensity", "user_data": "user_data", "point_source_id
             "scan_angle": "scan_angle", "scan_angle_rank": "scan_angle_rank", "nir": "nir"}
 _OURS = {*_SCALARS, "positions", "rgb", "class", "gps_time", "return_number", "number_of_returns"}
 
-MISSING = ("LAZ and COPC files need the Python packages laspy and lazrs: Patina's extension for Blender 4.2 and later "
-           "brings them; elsewhere run \"{python}\" -m pip install --user laspy lazrs, or unpack the file to LAS")
+MISSING = ("LAZ and COPC files need the Python packages laspy and lazrs: Install Readers in the add-on's preferences fetches "
+           "them (Patina's extension for Blender 4.2 and later brings them); or unpack the file to LAS")
 
 
 @dataclass(frozen=True)
@@ -181,6 +182,7 @@ def preview(path: Path) -> list[str]:
     names = {name for name, _ in _FORMATS.get(header.form, [])}
     return [f"LAS {header.version}, point format {header.form}{', compressed' * header.compressed}",
             f"{header.points:,} points", f"{size[0]:,.1f} x {size[1]:,.1f} x {size[2]:,.1f}",
+            *(["cannot be read yet: Install Readers in the add-on's preferences"] * (header.compressed and lacks("laspy", "lazrs"))),
             *(["colours"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
             *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
             *([f"units: {header.units}"] * bool(header.units)), *([header.crs[:60]] * bool(header.crs))]
@@ -211,8 +213,7 @@ def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray]:
             import laspy
             import lazrs  # noqa: F401  laspy finds it by itself
         except ImportError:
-            import sys
-            raise native.PatinaError(MISSING.format(python=sys.executable), -5) from None
+            raise native.PatinaError(MISSING, -5) from None
         try:
             with laspy.open(str(path)) as file:
                 for points in file.chunk_iterator(size):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -71,7 +72,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
     box_max: FloatVectorProperty(name="To", subtype='XYZ', precision=3, default=(1.0, 1.0, 1.0),
                                  description="Upper corner, in the file's own coordinates")
 
-    def draw(self, _context: Context) -> None:
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -93,8 +94,10 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         lines = _preview(self._paths()[0])
         if lines:
             column = layout.box().column(align=True)
+            width = max(int(context.region.width / (7.5 * context.preferences.system.ui_scale)) - 4, 20)  # letters
             for line in lines:
-                column.label(text=line)
+                for part in textwrap.wrap(line, width) or [""]:
+                    column.label(text=part)
 
     def execute(self, context: Context) -> set[str]:
         self._progress = importers.Progress()

@@ -3,11 +3,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 
+from .. import preferences
+
+_KEPT = ("*.cloud", "*.json", "*-packed.*")
+
 
 def folder() -> Path:
-    """Made where it is not there yet."""
+    """The artist's own, else Blender's; made where it is not there yet."""
+    known = preferences.get()
+    if known and known.cache_folder:
+        place = Path(bpy.path.abspath(known.cache_folder))
+        place.mkdir(parents=True, exist_ok=True)
+        return place
     return Path(bpy.utils.user_resource('DATAFILES', path="patina", create=True))
+
+
+def held() -> tuple[int, int]:
+    """Clouds and packed files in it, and the bytes of all."""
+    return sum(path.suffix != ".json" for path in _files()), sum(path.stat().st_size for path in _files())
+
+
+def clear() -> tuple[int, int]:
+    """Deletes them; how many files, and bytes, are gone."""
+    count = size = 0
+    for path in _files():
+        try:
+            held_bytes = path.stat().st_size
+            path.unlink()
+        except OSError:  # another Blender's, which Windows holds fast
+            continue
+        count, size = count + 1, size + held_bytes
+    return count, size
+
+
+def _files() -> Iterator[Path]:
+    place = folder()
+    return (path for pattern in _KEPT for path in place.glob(pattern) if path.is_file())

@@ -15,14 +15,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .. import importers, jobs, native
+from .. import importers, jobs, native, preferences
 from ..importers.origin import PROPERTY
 from . import analysis, analyzing, attributes, cache, files, sequence
 from .colors import scalar_name
 
 Corner = tuple[float, float, float]
-
-KEPT_BYTES = 32 << 30  # of clouds on the disk, 23 a point: a sequence has many
 
 
 @dataclass(frozen=True)
@@ -138,7 +136,7 @@ def _tidy(newest: Path) -> None:
     total = 0
     for _, size, path in clouds:
         total += size
-        if total > KEPT_BYTES and path != newest:
+        if total > preferences.cache_bytes() and path != newest:
             path.unlink()
             path.with_suffix(".json").unlink(missing_ok=True)
 
