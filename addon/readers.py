@@ -43,6 +43,20 @@ def lacks(*names: str) -> bool:
     return any(name in names for name in missing())
 
 
+def load(*names: str) -> None:
+    """Imports packages, which then can be imported as ever. ImportError when one is missing.
+
+    Python's multiprocessing, which laspy wants, keeps the script that runs under a second name; Blender 3.4 frees that script
+    when it ends and crashes when it quits, for it looks at all names then."""
+    known = "__mp_main__" in sys.modules
+    try:
+        for name in names:
+            importlib.import_module(name)
+    finally:
+        if not known:
+            sys.modules.pop("__mp_main__", None)
+
+
 def wanted() -> list[str]:
     """Names with versions, as pip takes them."""
     return (Path(__file__).parent / "readers.txt").read_text("utf-8").split()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import jobs, native
+from .. import jobs, native, readers
 from .crs import units
 from .reading import Filter, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
@@ -31,6 +31,7 @@ _NAMES = {"rowIndex": "row", "columnIndex": "column", "returnIndex": "return_num
 
 def _open(path: Path) -> Any:
     try:
+        readers.load("pye57")
         import pye57
     except ImportError:
         raise native.PatinaError(MISSING, -5) from None

@@ -12,9 +12,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .. import jobs, native
+from .. import jobs, native, readers
 from . import crs
-from ..readers import lacks
 from .reading import Filter, PointFile, Progress, colors_of, crs_notes, origin_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
@@ -182,7 +181,7 @@ def preview(path: Path) -> list[str]:
     names = {name for name, _ in _FORMATS.get(header.form, [])}
     return [f"LAS {header.version}, point format {header.form}{', compressed' * header.compressed}",
             f"{header.points:,} points", f"{size[0]:,.1f} x {size[1]:,.1f} x {size[2]:,.1f}",
-            *(["cannot be read yet: Install Readers in the add-on's preferences"] * (header.compressed and lacks("laspy", "lazrs"))),
+            *(["cannot be read yet: Install Readers in the add-on's preferences"] * (header.compressed and readers.lacks("laspy", "lazrs"))),
             *(["colours"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
             *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
             *([f"units: {header.units}"] * bool(header.units)), *([header.crs[:60]] * bool(header.crs))]
@@ -210,8 +209,9 @@ def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray]:
     kind = _record(path, header)
     if header.compressed:
         try:
+            readers.load("laspy", "lazrs")
             import laspy
-            import lazrs  # noqa: F401  laspy finds it by itself
+            import lazrs
         except ImportError:
             raise native.PatinaError(MISSING, -5) from None
         try:

@@ -108,6 +108,19 @@ def test_real_readers_from_files():
     check(f"READY {FOLDER}" in done.stdout, done.stderr[-400:])
 
 
+def test_readers_leave_no_second_name_of_a_script():
+    """What multiprocessing keeps makes Blender 3.4 crash when it quits."""
+    text = "import sys\nsys.modules['__mp_main__'] = sys.modules['__main__']\n"
+    with without_readers("patina_try_g"):
+        path = wheel("patina_try_g", holds={"patina_try_g/__init__.py": text})
+        bpy.ops.patina.install_reader_files(filepath=str(path))
+        kept = sys.modules.pop("__mp_main__", None)
+        readers.load("patina_try_g")
+        check("__mp_main__" not in sys.modules, "it stays")
+        if kept:
+            sys.modules["__mp_main__"] = kept
+
+
 def test_readers_that_do_not_fit():
     with without_readers("patina_try_c"):
         for path, part in ((wheel("patina_try_c", tag="cp27-cp27m-linux_x86_64"), "another Python"),
