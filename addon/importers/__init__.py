@@ -12,9 +12,9 @@ import numpy as np
 from ..jobs import Steps
 from ..native import PatinaError
 from . import conf, e57, las, library, pcd
-from .reading import Filter, PointFile, Progress, told
+from .reading import Filter, PointFile, Progress, name_of, told
 
-__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "preview", "reader", "steps", "to_mesh", "told"]
+__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "name_of", "preview", "reader", "steps", "to_mesh", "told"]
 
 # One colour and one normal attribute, under names that every Blender from 3.4 on allows ("normal" is reserved
 # before 4.0) and that sync.attributes looks for.

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import jobs, native, readers
 from . import crs
-from .reading import Filter, PointFile, Progress, colors_of, crs_notes, origin_of
+from .reading import Filter, PointFile, Progress, colors_of, crs_notes, name_of, origin_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
@@ -337,7 +337,7 @@ def _normals_of(header: Header, columns: _Columns) -> np.ndarray | None:
 def _assemble(path: Path, header: Header, origin: tuple[float, float, float], columns: _Columns) -> PointFile:
     positions = columns.take("positions")
     if positions is None:
-        return PointFile(path.stem, np.empty((0, 3), np.float32), None, None, {}, origin, 0)
+        return PointFile(name_of(path), np.empty((0, 3), np.float32), None, None, {}, origin, 0)
     notes: dict[str, str | float] = {"crs": header.crs} if header.crs else {}
     notes |= crs_notes(header.units)
     rgb = columns.take("rgb")
@@ -359,4 +359,4 @@ def _assemble(path: Path, header: Header, origin: tuple[float, float, float], co
         scalars[name] = values if values.dtype.itemsize == 1 else values.astype(np.float32)
     degrees = header.units is not None and header.units.degrees
     warnings = [f"{path.name}: its coordinates are longitude and latitude in degrees; project them to see right shapes"] * degrees
-    return PointFile(path.stem, positions, normals, colors, scalars, origin, 0, notes, warnings)
+    return PointFile(name_of(path), positions, normals, colors, scalars, origin, 0, notes, warnings)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -153,6 +154,11 @@ def _opaque(rgb: np.ndarray, pieces: list[slice], kind: type, one: float,
 def told(text: object) -> str:
     """As Blender's texts and names take it: bytes of a file's name that are no UTF-8 become replacement characters."""
     return str(text).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
+def name_of(path: Path) -> str:
+    """A file's name without its ending, which may be double."""
+    return path.stem.removesuffix(".copc")
 
 
 def crs_notes(units: Units | None) -> dict[str, list[float]]:

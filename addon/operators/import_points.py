@@ -14,9 +14,10 @@ from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, styles
-from ..importers import PointFile, origin, told
+from ..importers import PointFile, name_of, origin, told
 from ..sync import files, linked, sequence
 from ..sync.analysis import SCANNERS
+from . import set_up
 from .steps import Stepped
 
 METERS = (1.0, 1.0)  # of a file's units, across and up
@@ -55,6 +56,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         items=(
             ('Z', "Z", "As in Blender, and in surveys", 0), ('Y', "Y", "As in many scans of objects", 1),
             ('NEGATIVE_Y', "-Y", "As in photogrammetry that begins with a camera", 2)))
+    frame: BoolProperty(name="Frame Points", default=False,
+                        description="Aim the scene's camera at the points afterwards; strays do not count")
     link: BoolProperty(
         name="Link", default=False,
         description="Keep the points out of Blender: the object is a box, Patina reads the file itself. For scans too large "
@@ -80,6 +83,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         layout.prop(self, "unit")
         layout.prop(self, "scale")
         layout.prop(self, "up_axis")
+        layout.prop(self, "frame")
         layout.prop(self, "link")
         row = layout.row()
         row.active = self.link
@@ -118,6 +122,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         bpy.ops.object.select_all(action='DESELECT') if bpy.ops.object.select_all.poll() else None
         for mesh, own, units in found:
             self._add(context, bpy.data.objects.new(mesh.name, mesh), own, units)
+        self._finish(context)
         count = sum(len(mesh.vertices) for mesh, _, _ in found)
         self.report({'INFO'}, f"Imported {count:,} points from {len(found)} file{'s' * (len(found) > 1)}. In the sidebar, Patina > "
                               "Frame Points aims the camera")
@@ -150,6 +155,13 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         obj.select_set(True)
         context.view_layer.objects.active = obj
 
+    def _finish(self, context: Context) -> None:
+        """Once the points are there, and selected."""
+        if self.frame and bpy.ops.object.patina_frame_points.poll():
+            bpy.ops.object.patina_frame_points()
+        if self._invoked and set_up.untouched(context.scene):
+            set_up.offer(context)
+
     def _tell(self, kind: str, text: str) -> None:
         self.report({kind}, told(f"Patina: {text}"))
 
@@ -171,13 +183,14 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             except native.PatinaError as error:
                 self._tell('ERROR', f"{first.name}: {error}")
         for path, item in found.items():
-            name = told(path.stem.replace("#", "").rstrip("_-. ") or path.stem if self.sequence else path.stem)
+            name = told(name_of(path).replace("#", "").rstrip("_-. ") or path.stem if self.sequence else name_of(path))
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
             if item.scanners:
                 obj.data[SCANNERS] = item.scanners
             files.assign(obj, files.as_preferred(path))
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, item.units)
+        self._finish(context)
         self.report({'INFO'}, f"Linked {sum(item.cloud.count for item in found.values()):,} points. In the sidebar, Patina > "
                               "Frame Points aims the camera")
         return {'FINISHED'} if found else {'CANCELLED'}
