@@ -182,7 +182,7 @@ def preview(path: Path) -> list[str]:
     return [f"LAS {header.version}, point format {header.form}{', compressed' * header.compressed}",
             f"{header.points:,} points", f"{size[0]:,.1f} x {size[1]:,.1f} x {size[2]:,.1f}",
             *(["cannot be read yet: Install Readers in the add-on's preferences"] * (header.compressed and readers.lacks("laspy", "lazrs"))),
-            *(["colours"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
+            *(["colors"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
             *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
             *([f"units: {header.units}"] * bool(header.units)), *([header.crs[:60]] * bool(header.crs))]
 

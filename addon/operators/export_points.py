@@ -17,7 +17,7 @@ from ..sync import attributes
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):
-    """Export the points of mesh and point cloud objects with colours, normals and scalars, the origin added back"""
+    """Export the points of mesh and point cloud objects with colors, normals and scalars, the origin added back"""
 
     bl_idname = "export_scene.patina_points"
     bl_label = "Export Points"

@@ -26,7 +26,7 @@ _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked
 
 
 class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
-    """Import point files with colours, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf"""
+    """Import point files with colors, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf"""
 
     bl_idname = "import_scene.patina_points"
     bl_label = "Import Points"
@@ -43,9 +43,9 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             ('OWN', "Own", "Each file goes near zero and remembers its own origin", 1)))
     unit: EnumProperty(
         name="Unit", default='FILE',
-        description="How long a unit of the file is. One metre becomes one unit of Blender",
+        description="How long a unit of the file is. One meter becomes one unit of Blender",
         items=(
-            ('FILE', "From File", "What the file's coordinate system says; metres where it says nothing", 0),
+            ('FILE', "From File", "What the file's coordinate system says; meters where it says nothing", 0),
             ('METERS', "Meters", "", 1), ('CENTIMETERS', "Centimeters", "", 2), ('MILLIMETERS', "Millimeters", "", 3),
             ('FEET', "Feet", "International feet, 0.3048 m", 4), ('US_FEET', "US Survey Feet", "1200/3937 m", 5),
             ('INCHES', "Inches", "", 6)))

@@ -31,7 +31,7 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
     filter_glob: StringProperty(default="*.png;*.tif;*.tiff", options={'HIDDEN'})
     check_extension = None  # PNG or TIFF, as the name says
     scale: FloatProperty(name="Scale 1 :", default=100.0, min=1e-3, soft_max=10000.0, precision=1,
-                         description="Metres in the scene for each metre on paper")
+                         description="Meters in the scene for each meter on paper")
     dpi: FloatProperty(name="Dots per Inch", default=300.0, min=1.0, soft_max=1200.0, precision=0,
                        description="Of the printer: together with the scale it decides how large a pixel is")
     margin: FloatProperty(name="Margin", default=0.02, min=0.0, max=1.0, subtype='FACTOR',

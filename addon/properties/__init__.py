@@ -41,7 +41,7 @@ class PatinaSceneProperties(PropertyGroup):
         name="Surface", override=_OVERRIDE, default='AUTO',
         description="How points become a surface",
         items=(
-            ('AUTO', "Automatic", "Points that lie wide apart on screen are discs as wide as their neighbourhood says, the others "
+            ('AUTO', "Automatic", "Points that lie wide apart on screen are discs as wide as their neighborhood says, the others "
                                   "are filled", 0),
             ('FILL', "Filled", "Gaps between the points are filled in the picture: fast, whatever the spacing", 2),
             ('SPLATS', "Discs", "Every point is a small disc across its normal, discs that overlap are blended: smoother, "
@@ -49,7 +49,7 @@ class PatinaSceneProperties(PropertyGroup):
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
-        description="Expected error of colours, in percent of white, that the picture may have: the cheapest quality and "
+        description="Expected error of colors, in percent of white, that the picture may have: the cheapest quality and "
                     "hole filling that keep to it are chosen. 0: as they are set below")
     quality: EnumProperty(
         name="Quality", override=_OVERRIDE, default='REFINED',
@@ -69,12 +69,12 @@ class PatinaSceneProperties(PropertyGroup):
         description="Rounds of hole filling; 0 follows the spacing of the points on screen")
     smooth: EnumProperty(
         name="Smoothing", override=_OVERRIDE, default='ALLEVIATED',
-        description="Smooths colours between neighbouring pixels of one surface",
+        description="Smooths colors between neighboring pixels of one surface",
         items=(
             ('ALLEVIATED', "Alleviated Gaussian", "Weights 16, 2 and 1: takes the noise, keeps the detail", 0),
             ('GAUSSIAN', "Gaussian", "3 × 3 Gaussian", 1),
             ('BOX', "Box", "Mean of 3 × 3 pixels", 2),
-            ('OFF', "Off", "Colours as they are", 3)))
+            ('OFF', "Off", "Colors as they are", 3)))
     antialias: EnumProperty(
         name="Anti-Aliasing", override=_OVERRIDE, default='LAYERS',
         description="Which edges are blended",
@@ -160,9 +160,9 @@ class PatinaObjectProperties(PropertyGroup):
         name="Lighting", override=_OVERRIDE, default='AUTO',
         description="Whether the scene's lights shade the points",
         items=(
-            ('AUTO', "Automatic", "Points with colours are unlit (a scan's colours hold the light of its day), "
+            ('AUTO', "Automatic", "Points with colors are unlit (a scan's colors hold the light of its day), "
                                   "others lit", 0),
-            ('UNLIT', "Unlit", "Colours as they are", 1),
+            ('UNLIT', "Unlit", "Colors as they are", 1),
             ('LIT', "Lit", "Shaded by lights and world", 2)))
     cull_back: BoolProperty(
         name="Backface Culling", override=_OVERRIDE, default=False,
@@ -218,10 +218,10 @@ class PatinaObjectProperties(PropertyGroup):
     opacity_attribute: StringProperty(
         name="Opacities", override=_OVERRIDE,
         description="Point attribute that opacity is multiplied by: numbers from 0 to 1, yes or no, or the alpha of a "
-                    "colour attribute; empty: none")
+                    "color attribute; empty: none")
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
-        description="Colour of points that have none")
+        description="Color of points that have none")
     linked_data: PointerProperty(  # where the file's path is kept: sync/files.py
         type=Volume, name="Linked Data", override=_OVERRIDE, options={'HIDDEN'})
     linked_file: StringProperty(
@@ -237,7 +237,7 @@ class PatinaObjectProperties(PropertyGroup):
         name="On Itself", override=_OVERRIDE, default=True, description="These points' shadows fall on themselves")
     color_attribute: StringProperty(
         name="Colors", override=_OVERRIDE,
-        description="Point attribute to take colours from; empty: the active colour attribute, or a usual name")
+        description="Point attribute to take colors from; empty: the active color attribute, or a usual name")
     normal_attribute: StringProperty(
         name="Normals", override=_OVERRIDE,
         description="Point attribute to take normals from; empty: the first of normal, Normal, nor, N")
@@ -266,13 +266,13 @@ class PatinaViewLayerProperties(PropertyGroup):
     use_pass_source: BoolProperty(
         name="Source", default=False, update=_update_passes, override=_OVERRIDE,
         description="What is scan and what is invention: 0 nothing, 1 measured, 1 + distance filled from a "
-                    "neighbour that many pixels away, negative where anti-aliasing mixed")
+                    "neighbor that many pixels away, negative where anti-aliasing mixed")
     use_pass_line: BoolProperty(
         name="Line", default=False, update=_update_passes, override=_OVERRIDE,
         description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
-        description="Colour, depth and normal of so many layers of surface, the nearest first, as passes of their own; "
+        description="Color, depth and normal of so many layers of surface, the nearest first, as passes of their own; "
                     "layers behind opaque surfaces too")
 
 

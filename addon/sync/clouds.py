@@ -467,7 +467,7 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
     pause()
     opacities = attributes.opacities(data, count, obj.patina.opacity_attribute)
     radii = attributes.scalars(data, count, obj.patina.radius_attribute)
-    for kind, name, found in (("colour", obj.patina.color_attribute, rgb),
+    for kind, name, found in (("color", obj.patina.color_attribute, rgb),
                               ("normal", obj.patina.normal_attribute, normals),
                               ("opacity", obj.patina.opacity_attribute, opacities),
                               ("radius", obj.patina.radius_attribute, radii),
