@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from check_viewport import area, invoke_import, screenshot, shown, window_region
+from window import area, invoke_import, screenshot, shown, window_region
 from harness import REPOSITORY, SCRATCH, check, saved
 
 POINTS = int(os.environ.get("PATINA_NEWCOMER_POINTS", "20000"))
