@@ -226,6 +226,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             continue
         if not visible(instance):
             continue
+        attributes.finish_edits(obj)
         solid = obj.type == 'MESH' and len(obj.data.polygons) > 0 and not obj.patina.linked_file
         if solid and depsgraph.scene_eval.patina.meshes == 'OFF':
             faces.add(obj.name)
@@ -384,10 +385,15 @@ def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
 def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
           pause: Callable[[], None] = lambda: None) -> PointArrays | None:
     """The object's points; mesh_points > 0: so many on its faces. pause() is called between steps and may raise."""
-    data = obj.data
     pause()
+    with attributes.readable(obj) as data:
+        return _read_data(obj, data, notices, mesh_points, pause)
+
+
+def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], mesh_points: int,
+               pause: Callable[[], None]) -> PointArrays | None:
     if mesh_points:
-        found = meshes.sample(obj, mesh_points)
+        found = meshes.sample(obj, data, mesh_points)
         return PointArrays(*found, None) if found else None
     count = len(data.vertices if obj.type == 'MESH' else data.points)
     if count == 0:
@@ -416,7 +422,7 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
     if obj.patina.hide_uncolored:
         opacities = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
-    stations = analysis.stations(obj, count) if analyzed else None
+    stations = analysis.stations(obj, data, count) if analyzed else None
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations)
 
 

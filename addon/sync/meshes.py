@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from .. import native
+from . import attributes
 
 WHITE = (0.8, 0.8, 0.8, 1.0)
 
@@ -44,7 +45,8 @@ class MeshCache:
 
     def obtain(self, identity: tuple, obj: bpy.types.Object) -> native.Mesh | None:
         """Of an evaluated object; None without faces. Content decides whether it is made anew."""
-        arrays = triangles(obj)
+        with attributes.readable(obj) as mesh:
+            arrays = triangles(obj, mesh)
         if arrays is None:
             return None
         digest = hashlib.blake2b(digest_size=16)
@@ -66,10 +68,9 @@ class MeshCache:
 CACHE = MeshCache()
 
 
-def triangles(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray | None] | None:
+def triangles(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray | None] | None:
     """Positions (3 n, 3), normals (3 n, 3) and linear colours (3 n, 4) of the corners of an evaluated object's n triangles,
-    float32; colours only where materials differ. None without faces."""
-    mesh = obj.data
+    float32; colours only where materials differ. None without faces. mesh: its readable data."""
     mesh.calc_loop_triangles()
     if not len(mesh.loop_triangles):
         return None
@@ -97,9 +98,9 @@ def _palette(obj: bpy.types.Object) -> np.ndarray:
     return np.array([base_color(slot.material) for slot in obj.material_slots] or [WHITE], np.float32)
 
 
-def sample(obj: bpy.types.Object, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Positions (n, 3), normals (n, 3) and linear colours (n, 4) of an evaluated object, float32; None without area."""
-    mesh = obj.data
+def sample(obj: bpy.types.Object, mesh: bpy.types.Mesh, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Positions (n, 3), normals (n, 3) and linear colours (n, 4) of an evaluated object, float32; None without area. mesh: its
+    readable data."""
     mesh.calc_loop_triangles()
     corners = _get(mesh.loop_triangles, "vertices", 3, np.int32)
     places = _get(mesh.vertices, "co", 3, np.float32)

@@ -433,3 +433,37 @@ def test_rest_is_rest():
     viewport.Viewport.draw = draw
     check(len(calls) <= 1 and found.pictures == pictures, f"{len(calls)} draws, {found.pictures - pictures} pictures")
     check(not bpy.app.timers.is_registered(viewport._tick), "the timer still runs")
+
+
+def test_edit_mode():
+    """Points stay in view while they are edited, follow each step, and are read no more often than they change."""
+    setup()
+    points = add_points(*sphere(20000, 1.0, (0, 0, 0)))
+    bpy.context.view_layer.objects.active = points
+    yield lambda: settled(20000)
+
+    def middle():
+        columns = np.nonzero(np.isfinite(shown().shown.depth[..., 0]).any(axis=0))[0]
+        return columns.mean() / shown().shown.depth.shape[1]
+
+    window, before = bpy.context.window_manager.windows[0], middle()
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+        bpy.ops.object.mode_set(mode='EDIT')
+        bpy.ops.mesh.select_all(action='SELECT')
+    try:
+        area().tag_redraw()
+        start = time.perf_counter()
+        yield lambda: time.perf_counter() - start > 0.5 and settled(20000)
+        check(abs(middle() - before) < 0.002, "entering moved the points")
+        with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+            bpy.ops.transform.translate(value=(1.0, 0, 0))
+        yield lambda: settled(20000) and middle() > before + 0.1
+        reads = shown().trusted.reads
+        pictures = shown().pictures
+        view().view_rotation = Quaternion((0, 1, 0), 0.2)
+        yield lambda: newer(pictures)() and settled(20000)
+        check(shown().trusted.reads == reads, "moving the view read points")
+    finally:
+        with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+            bpy.ops.object.mode_set(mode='OBJECT')
+    yield lambda: settled(20000)
