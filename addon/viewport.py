@@ -76,6 +76,7 @@ class Viewport:
     def __init__(self, engine: bpy.types.RenderEngine) -> None:
         self.engine = weakref.ref(engine, lambda _: _wake())  # anywhere in Python's work: the timer closes
         self.area = 0  # where it is, to find its statistics
+        self._region = 0  # of the area
         self.message = ""  # what went wrong last
         self.notices: list[str] = []
         self._lost: tuple[sync.DeviceChoice, str] | None = None  # a device that failed, and what to say of it
@@ -118,6 +119,7 @@ class Viewport:
     def draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> str:
         """Draws the last picture, asks for another one if the view moved. Returns a line of status."""
         self.area = context.area.as_pointer() if context.area else 0
+        self._region = context.region.as_pointer()
         if self._scene and self._local != (context.space_data.local_view is not None):  # Blender says nothing of it
             self.update(context, depsgraph)
         view = self._read_view(context)
@@ -143,12 +145,12 @@ class Viewport:
             self._ask(pace.FULL)
         if news:
             try:
-                engine.tag_redraw()
-            except ReferenceError:  # Blender has freed it
+                engine.is_preview  # noqa: B018  Blender may have freed it
+                if not _redraw(self.area, self._region, panels=not due):
+                    engine.tag_redraw()
+            except ReferenceError:
                 self.close()
                 return False
-            if not due:
-                _redraw_panels(self.area)
         return not idle or due or news
 
     def close(self) -> None:
@@ -383,13 +385,19 @@ def _wake() -> None:
         bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
 
 
-def _redraw_panels(area_pointer: int) -> None:
+def _redraw(area_pointer: int, region_pointer: int, panels: bool) -> bool:
+    """Has a view drawn wholly, and panels beside it. Whether it is there. An engine's own tag_redraw does not do: Blender then
+    puts back the depths of its last whole redraw after the engine has drawn, and shows overlays by them."""
+    found = False
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.as_pointer() == area_pointer:
                 for region in area.regions:
-                    if region.type == 'UI':
+                    own = region.as_pointer() == region_pointer
+                    found |= own
+                    if own or panels and region.type == 'UI':
                         region.tag_redraw()
+    return found
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:
