@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from . import native, passes, render, sync, viewport
-from .sync import motion
+from .sync import losses, motion
 
 BUILDING = 0.5  # share of the progress bar for reading the scene; the rest is the picture
 
@@ -102,6 +102,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
             place = (self.camera_model_matrix(camera), self.camera_shift_x(camera))
         view = sync.final_view(camera, depsgraph, place)
         description = replace(sync.describe(depsgraph, view, self._poll_reading, frame), samples=moment.samples)
+        losses.check(description.notices)
         if self._moments * len(moment.samples) > 1:
             description = render.without_antialiasing(description)
         self._status("Rendering", BUILDING)

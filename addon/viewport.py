@@ -108,7 +108,8 @@ class Viewport:
         self.trusted.forget(sync.changed_owners(depsgraph) if self._scene else None)
         view = self._read_view(context)
         scene = sync.describe_viewport(depsgraph, view, self.trusted, context.space_data)
-        self.notices = scene.notices + ([self._lost[1]] if self._lost and self._lost[0] == scene.device else [])
+        lost = {item.cloud.lost: None for item in scene.clouds if item.cloud.lost}  # each once
+        self.notices = [*scene.notices, *lost, *([self._lost[1]] if self._lost and self._lost[0] == scene.device else [])]
         self.pace.budget = depsgraph.scene.patina.navigation_ms / 1000.0
         self._scene = scene
         self._view, self._clips = view, sync.view_clips(context.region_data)
@@ -190,7 +191,7 @@ class Viewport:
         if self.message:
             return self.message
         working = self._working
-        if working and any(isinstance(item.cloud, sync.Pending) and not item.cloud.built for item in
+        if working and any(isinstance(item.cloud, sync.Pending) and not (item.cloud.built or item.cloud.lost) for item in
                            working.scene.clouds):
             return "Reading points"
         if not self.shown:
@@ -280,7 +281,11 @@ class Viewport:
             try:
                 clouds = []
                 for item in wish.scene.clouds:
-                    clouds.append(replace(item, cloud=(yield from item.cloud.resolve(self._progress))))
+                    cloud = yield from item.cloud.resolve(self._progress)
+                    if cloud:
+                        clouds.append(replace(item, cloud=cloud))
+                    elif item.cloud.lost not in self.notices:
+                        self.notices = [*self.notices, item.cloud.lost]
             finally:
                 self._progress = None
         if self._wanted and wish.level == pace.FULL:

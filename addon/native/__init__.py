@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from . import abi
-from .abi import (CANCELLED, INTERNAL, KINDS, MOST_LAYERS, MOST_RAMP, NEIGHBOURHOODS, PLANES, PatinaCancelled, PatinaError,
+from .abi import (CANCELLED, INTERNAL, KINDS, MEMORY, MOST_LAYERS, MOST_RAMP, NEIGHBOURHOODS, PLANES, PatinaCancelled, PatinaError,
                   check, forget_library, library, library_path, log_lines, split_plane)
 
-__all__ = ["CANCELLED", "INTERNAL", "KINDS", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
+__all__ = ["CANCELLED", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
            "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "forget_library",
            "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
 

@@ -19,6 +19,7 @@ import numpy as np
 
 VERSION = (0, 1)  # of the header that this file follows; the patch number may differ
 
+MEMORY = -2  # PATINA_ERROR_MEMORY
 CANCELLED = -7  # PATINA_ERROR_CANCELLED
 INTERNAL = -10  # PATINA_ERROR_INTERNAL
 

@@ -16,7 +16,7 @@ from .. import jobs, native
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, linked, meshes
+from . import analysis, attributes, clips, colors, estimates, linked, losses, meshes
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -90,12 +90,14 @@ class Pending:
         self.analyzed = arrays is not None and arrays.analyzed  # in time; a linked one is before it is seen
         self.stations = arrays.stations if arrays else None
 
+        self.lost = ""  # why there will be no cloud
+
     @property
     def built(self) -> native.Cloud | None:
         return self._cloud
 
-    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
-        """The cloud; built at the first call. No viewport may draw meanwhile."""
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
+        """The cloud; built at the first call. No viewport may draw meanwhile. None where it is lost."""
         if self._cloud is None:
             self._cloud = yield from CACHE.obtain(self._identity, self._arrays, progress, recolor=True)
             self._arrays = None
@@ -105,13 +107,16 @@ class Pending:
 class PendingLink(Pending):
     """A linked cloud that waits to be opened."""
 
-    def __init__(self, source: linked.Source) -> None:
-        super().__init__(source.path.name, source.identity(), None)
+    def __init__(self, name: str, source: linked.Source) -> None:
+        super().__init__(name, source.identity(), None)
         self._source = source
 
-    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
-        if self._cloud is None:
-            self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
+        if self._cloud is None and not self.lost:
+            try:
+                self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
+            except (native.PatinaError, OSError) as error:
+                self.lost = linked.loss(self.name, self._source, error)
         return self._cloud
 
 
@@ -259,7 +264,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     meshes.CACHE.trim(used)
     estimates.keep(distances)
     if not items:
-        notices.append("no visible object has points to draw")
+        notices.append(losses.Loss("no visible object has points to draw"))
     if faces:
         notices.append(f"{len(faces)} mesh object{'s' * (len(faces) > 1)} with faces not drawn: "
                        "Render Properties > Surface > Meshes draws them")
@@ -297,7 +302,13 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
                 ANALYSES.finish(cloud, arrays.stations, progress.follow)
             return cloud
 
-        cloud = jobs.run(work, progress.cancel, stopped)
+        try:
+            cloud = jobs.run(work, progress.cancel, stopped)
+        except (native.PatinaError, OSError) as error:
+            if not link:
+                raise
+            notices.append(linked.loss(name, link, error))
+            return None
         if cloud.invalid_positions:
             notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
         if link and link.scalar and not cloud.has_scalars:
@@ -331,7 +342,7 @@ class Trusted:
             if key not in self._known:
                 said: list[str] = []
                 if link:
-                    self._known[key] = (PendingLink(link), said)
+                    self._known[key] = (PendingLink(obj.name, link), said)
                 elif identity[-1] == TRIANGLES:
                     self.reads += 1
                     self._known[key] = (meshes.CACHE.obtain(identity, obj), said)

@@ -19,6 +19,7 @@ from .. import importers, jobs, native
 from ..importers.origin import PROPERTY
 from . import analysis, analyzing, attributes, sequence
 from .colors import scalar_name
+from .losses import Loss
 
 Corner = tuple[float, float, float]
 
@@ -57,13 +58,13 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         settings = obj.patina.sequence
         path, notice = sequence.file_at(path, frame, settings.start, settings.step, settings.outside)
         if notice:
-            notices.append(f"'{obj.name}': {notice}")
+            notices.append(Loss(f"'{obj.name}': {notice}"))
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
     found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
     if found is None:
-        notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
+        notices.append(Loss(f"'{obj.name}': the file {path} is missing"))
     return found
 
 
@@ -79,6 +80,13 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
     state = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
     folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
     return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
+
+
+def loss(name: str, source: Source, error: Exception) -> Loss:
+    """What to say where an object's file cannot be read. Raises what is not the file's fault: a cancel, memory."""
+    if isinstance(error, native.PatinaCancelled) or getattr(error, "code", 0) == native.MEMORY:
+        raise error
+    return Loss(f"'{name}' is left out: {source.path} cannot be read: {error}")
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:

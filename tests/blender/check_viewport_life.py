@@ -467,3 +467,20 @@ def test_edit_mode():
         with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
             bpy.ops.object.mode_set(mode='OBJECT')
     yield lambda: settled(20000)
+
+
+def test_a_spoilt_link_is_left_out():
+    """The rest is drawn, the sidebar says why one is not, and a file that is whole again is seen."""
+    path = dense("spoilt_in_view.ply", 20000, (0, 0, 0))
+    whole = path.read_bytes()
+    setup()
+    import_points(path, link=True)
+    path.write_bytes(whole[:-200])
+    add_points(*sphere(5000, 1.0, (0, 0, 0)))
+    yield lambda: settled(5000)
+    found = shown()
+    check(not found.message and any(str(path) in notice for notice in found.notices), f"{found.message} {found.notices}")
+    path.write_bytes(whole)
+    bpy.context.scene.update_tag()
+    yield lambda: settled(25000)
+    check(not found.notices, f"{found.notices}")
