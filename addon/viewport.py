@@ -20,7 +20,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import native, pace, render, sync
+from . import mattes, native, pace, render, sync
 from .jobs import Pause, Steps
 from .sync import analysis
 from .sync.analyzing import ANALYSES
@@ -95,11 +95,12 @@ class Viewport:
         self._steps: Steps[Shown] | None = None  # of the work
         self._task: native.Task | Pause | None = None  # the step under way
         self._progress: native.Progress | None = None  # while clouds are made
-        self._rendering = False  # while the frame is drawn
+        self._rendering: native.Frame | None = None  # that is drawn
         self._spare: list[np.ndarray] = []  # planes of the picture before the one that is shown
         self._closed = False
         self._news = False
         self._frame: tuple[native.Device, native.Frame] | None = None
+        self._others: list[tuple[native.Device, native.Frame]] = []  # for mattes
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
         _VIEWPORTS.add(self)
 
@@ -158,13 +159,14 @@ class Viewport:
         """Ends the work soon and for good."""
         self._closed, self._wanted, self._working = True, None, None
         if self._rendering:
-            self._frame[1].cancel()
+            self._rendering.cancel()
         if self._progress:
             self._progress.cancel()
         if self._task:
             ANALYSES.end_frame(self._task, close=True)  # before what it uses
         if self._steps:
             self._steps.close()
+        self._others = []
         self._drawn = self._frame = self._steps = self._task = None  # here, for textures go on Blender's thread
         ANALYSES.wish(self, [])
         _VIEWPORTS.discard(self)
@@ -181,7 +183,7 @@ class Viewport:
         self._wanted = self._last = Wish(scene, self._view, level, time.monotonic())
         # a quick picture of the moment before is worth its end, a whole one is not
         if self._rendering and self._working.level == pace.FULL:
-            self._frame[1].cancel()
+            self._rendering.cancel()
         if self not in _TURNS:
             _TURNS.append(self)
         _work(0.0)  # so that it goes on while Blender draws
@@ -307,30 +309,26 @@ class Viewport:
         """From now on the processor draws, until another device is asked for."""
         self._lost = (choice, f"{self._frame[0].name} failed, the processor draws: {reason}")
         self.notices = [*self.notices, self._lost[1]]
-        self._frame = None
+        self._frame, self._others = None, []
         render.forget_device()
 
     def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription) -> Steps[Shown]:
         if self._frame is None or self._frame[0] is not device:
             self._frame = (device, native.Frame(device))
-        frame = self._frame[1]
-        with native.Scene() as scene:
-            render.describe(scene, description, ["DEPTH"])
-            settings = description.settings
-            x0, y0, x1, y1 = settings.region
-            def start() -> native.Task:
-                return frame.start(scene, ("COMBINED", "DEPTH"), y1 - y0, x1 - x0, self._spare)
-
-            while (task := ANALYSES.begin_frame(start)) is None:
-                yield Pause()
-            self._rendering = True
-            try:
-                yield task
-                ANALYSES.end_frame(task)
-                planes = task.result()
-            finally:
-                self._rendering = False
-                ANALYSES.end_frame(task)
+        frame, settings = self._frame[1], description.settings
+        x0, y0, x1, y1 = settings.region
+        if mattes.are_needed(description):
+            others, shown = mattes.needed(description), mattes.picture(description)
+            self._others = self._others if len(self._others) == len(others) and self._others[0][0] is device else [
+                (device, native.Frame(device)) for _ in others]
+            planes = yield from self._draw_frame(frame, shown, ("COMBINED", "DEPTH"), [])
+            found = []
+            for (_, beside), other in zip(self._others, others, strict=True):
+                found += yield from self._draw_frame(beside, other, ("COMBINED",), [])
+            planes[0] = mattes.finish(planes[0], description, found)
+        else:
+            self._others = []
+            planes = yield from self._draw_frame(frame, description, ("COMBINED", "DEPTH"), self._spare)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
@@ -338,6 +336,27 @@ class Viewport:
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.name)
+
+
+    def _draw_frame(self, frame: native.Frame, description: sync.SceneDescription, planes: tuple[str, ...],
+                    spare: list[np.ndarray]) -> Steps[list[np.ndarray]]:
+        x0, y0, x1, y1 = description.settings.region
+        with native.Scene() as scene:
+            render.describe(scene, description, planes)
+
+            def start() -> native.Task:
+                return frame.start(scene, planes, y1 - y0, x1 - x0, spare)
+
+            while (task := ANALYSES.begin_frame(start)) is None:
+                yield Pause()
+            self._rendering = frame
+            try:
+                yield task
+                ANALYSES.end_frame(task)
+                return task.result()
+            finally:
+                self._rendering = None
+                ANALYSES.end_frame(task)
 
 
 _VIEWPORTS: set[Viewport] = set()

@@ -289,6 +289,7 @@ class Mesh(_Handle):
                                          normal=_view(normals, corners), color=_view(colors, corners),
                                          triangle_count=corners // 3)))
         self.count = corners // 3
+        self.bare: Mesh | None = None  # the same without colors, where somebody asked for it
 
 
 class File(_Handle):

@@ -16,7 +16,7 @@ from .. import jobs, native
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, linked, losses, meshes
+from . import analysis, attributes, clips, colors, estimates, linked, losses, meshes, roles
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -125,6 +125,7 @@ class CloudItem:
     cloud: native.Cloud | Pending
     style: CloudStyle
     pass_index: int  # of the object
+    role: str = roles.SEEN
 
 
 class CloudCache:
@@ -209,8 +210,6 @@ class CloudCache:
 CACHE = CloudCache()
 
 
-TRIANGLES = "triangles"  # at the end of an identity: the object's faces are drawn
-
 # What collect() asks for each object with points or faces: (object, identity, linked file) → its cloud or mesh, or None without.
 Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | native.Mesh | None"]
 
@@ -224,6 +223,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     taken: dict[tuple, native.Cloud | Pending | native.Mesh | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
+    triangles = meshes.BARE if roles.are_used(depsgraph) else meshes.TRIANGLES
+    unknown = roles.Unknown(depsgraph.view_layer_eval)
     distances: dict[str, float] = {}
     for instance in depsgraph.object_instances:
         obj = instance.object
@@ -242,20 +243,24 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             if link is None:
                 continue
         patina = depsgraph.scene_eval.patina
-        faces_as = 0 if not solid else TRIANGLES if patina.meshes == 'TRIANGLES' else patina.mesh_points
+        role = roles.role_of(instance, depsgraph.view_layer_eval)
+        # the library's triangles receive no shadows, its points do
+        as_triangles = patina.meshes == 'TRIANGLES' and role != roles.CATCHER
+        faces_as = 0 if not solid else triangles if as_triangles else patina.mesh_points
         place = link.identity() if link else (obj.data.as_pointer(), faces_as, *_attribute_names(obj), analysis.wanted(obj))
         if place not in taken:
             identity = place if link else (*_identity(obj, used), faces_as)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
+        unknown.look(instance)
         if isinstance(cloud, native.Mesh):
-            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index))
+            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index, role))
         elif cloud:
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
-            items.append(CloudItem(cloud, style, obj.pass_index))
+            items.append(CloudItem(cloud, style, obj.pass_index, role))
             built = cloud.built if isinstance(cloud, Pending) else cloud
             if built:
                 scale = max(map(abs, instance.matrix_world.to_scale()))
@@ -263,6 +268,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     CACHE.trim(used)
     meshes.CACHE.trim(used)
     estimates.keep(distances)
+    notices += unknown.notices()
     if not items:
         notices.append(losses.Loss("no visible object has points to draw"))
     if faces:
@@ -285,7 +291,7 @@ def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
             if stopped():
                 raise native.PatinaCancelled("cancelled", native.CANCELLED)
 
-        if identity[-1] == TRIANGLES:
+        if identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
             pause()
             return meshes.CACHE.obtain(identity, obj)
         arrays = None if link else _read(obj, notices, identity[-1], pause)
@@ -343,7 +349,7 @@ class Trusted:
                 said: list[str] = []
                 if link:
                     self._known[key] = (PendingLink(obj.name, link), said)
-                elif identity[-1] == TRIANGLES:
+                elif identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
                     self.reads += 1
                     self._known[key] = (meshes.CACHE.obtain(identity, obj), said)
                 else:

@@ -13,9 +13,12 @@ import bpy
 import numpy as np
 
 from .. import native
-from . import attributes
+from . import attributes, roles
 
 WHITE = (0.8, 0.8, 0.8, 1.0)
+
+# At the end of an identity: the object's faces are drawn; and may be painted in one color too.
+TRIANGLES, BARE = "triangles", "triangles, bare too"
 
 # The additive recurrence of the plastic number: each next point falls into the largest gap of those before it.
 _STEP = np.array([0.7548776662466927, 0.5698402909980532])
@@ -35,6 +38,7 @@ class MeshItem:
     mesh: native.Mesh
     style: MeshStyle
     pass_index: int  # of the object
+    role: str = roles.SEEN
 
 
 class MeshCache:
@@ -55,6 +59,8 @@ class MeshCache:
         known, mesh = self._entries.get(identity, (b"", None))
         if known != digest.digest():
             mesh = native.Mesh(*arrays)
+            if identity[-1] == BARE and arrays[2] is not None:
+                mesh.bare = native.Mesh(*arrays[:2], None)
             self._entries[identity] = (digest.digest(), mesh)
         return mesh
 

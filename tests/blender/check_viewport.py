@@ -345,3 +345,38 @@ def test_clips_and_ramps_follow():
     yield lambda: newer(pictures)() and np.median(shown().shown.color[half], axis=0)[2] > 0.999  # each stop is a change
     check_close(np.median(shown().shown.color[half], axis=0), (0, 0, 1, 1), 1e-4, "painted blue")
     check(shown().trusted.reads == reads, "the points were not read again")
+
+
+def test_holdouts_and_catchers():
+    """A hole and a shadow, as in the final picture; and back when they are ordinary objects again."""
+    scene = setup()
+    scene.patina.use_shadows = scene.render.film_transparent = True
+    scene.patina.fill = 'CLOSED'
+    u, v = np.meshgrid(np.linspace(-1.5, 1.5, 300), np.linspace(-1.5, 1.5, 300))
+    floor = add_points(np.stack([u.ravel(), v.ravel(), np.zeros(u.size)], 1), None, np.tile((0.0, 0.0, 1.0), (u.size, 1)), "floor")
+    hole = add_points(np.stack([u.ravel() / 5 + 0.5, v.ravel() / 5, np.full(u.size, 1.0)], 1), None, None, "hole")
+    add_light('SUN', 3.0, direction=(-1.0, 0, -1))
+    yield lambda: settled(180000)
+    before = shown().pictures
+    hole.is_holdout = floor.is_shadow_catcher = True
+    for obj in (hole, floor):
+        obj.update_tag()
+    yield lambda: newer(before)() and settled(180000)
+    yield lambda: not shown().shown.stats["shadow_pending"]
+    color = shown().shown.color
+    height, width = color.shape[:2]
+    pixel = view().window_matrix[0][0] * width / 2  # a unit, at distance 1
+
+    def at(x, z):
+        return color[height // 2, round(width / 2 + x * pixel / (6.0 - z))]
+
+    check(not at(0.5, 1.0).any(), f"the hole {at(0.5, 1.0)}")
+    check_close(at(-0.5, 0.0), (0, 0, 0, 1), 0.1, "the shadow")
+    check(at(-1.2, 0.0)[3] < 0.05, f"the catcher itself {at(-1.2, 0.0)}")
+    hole.is_holdout = floor.is_shadow_catcher = False
+    before = shown().pictures
+    for obj in (hole, floor):
+        obj.update_tag()
+    yield lambda: newer(before)() and settled(180000)
+    color = shown().shown.color
+    check(at(0.5, 1.0)[3] == 1.0 and at(-1.2, 0.0)[3] == 1.0, "seen again")
