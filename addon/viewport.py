@@ -25,6 +25,7 @@ from .jobs import Pause, Steps
 from .sync import analysis
 from .sync.analyzing import ANALYSES
 from .sync.clouds import CACHE
+from .sync.kept import CHECKS
 
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
@@ -275,6 +276,12 @@ class Viewport:
         if self._last and self.shown and any(item.cloud in clouds for item in self.shown.clouds):
             self._ask(self._last.level)
 
+    def rebuild(self, identities: list[tuple]) -> None:
+        """Of linked clouds whose kept files were damaged."""
+        links = [item.cloud for item in (self._scene.clouds if self._scene else ()) if isinstance(item.cloud, sync.PendingLink)]
+        if any([link.forget(identities) for link in links]):
+            self._ask(self._last.level)
+
     def wants(self) -> bool:
         return self._wanted is not None
 
@@ -382,6 +389,7 @@ def close_all() -> None:
     for viewport in list(_VIEWPORTS):
         viewport.close()
     ANALYSES.clear()
+    CHECKS.clear()
     _compiled.clear()
 
 
@@ -396,10 +404,14 @@ def _work(until: float) -> None:
 def _tick() -> float | None:
     _work(time.monotonic() + STAY)
     changed = ANALYSES.advance(CACHE.final())
-    again = ANALYSES.busy()
+    damaged = CHECKS.take_damaged() if _VIEWPORTS and not CACHE.final() else []  # a final picture looks itself
+    CACHE.drop(damaged)
+    again = ANALYSES.busy() or CHECKS.busy()
     for viewport in list(_VIEWPORTS):
         if changed:
             viewport.analyzed(changed)
+        if damaged:
+            viewport.rebuild(damaged)
         again |= viewport.tick()
     return TICK if again else None
 

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from . import abi
-from .abi import (CANCELLED, INTERNAL, KINDS, MEMORY, MOST_LAYERS, MOST_RAMP, NEIGHBOURHOODS, PLANES, PatinaCancelled, PatinaError,
-                  check, forget_library, library, library_path, log_lines, split_plane)
+from .abi import (CANCELLED, FORMAT, INTERNAL, KINDS, MEMORY, MOST_LAYERS, MOST_RAMP, NEIGHBOURHOODS, PLANES, PatinaCancelled,
+                  PatinaError, check, forget_library, library, library_path, log_lines, split_plane)
 
-__all__ = ["CANCELLED", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
+__all__ = ["CANCELLED", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
            "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "forget_library",
            "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
 
@@ -190,6 +190,11 @@ class Cloud(_Handle):
         _Handle.__init__(cloud, os.fsencode(path), create="patina_cloud_open")
         cloud._learn()
         return cloud
+
+    @staticmethod
+    def start_verifying(path: Path, progress: Progress | None = None) -> Task:
+        """A task that reads a saved cloud whole; its result() raises PatinaError where it is damaged."""
+        return Task("verify", os.fsencode(path), _handle_of(progress), keep=(progress,))
 
     def start_save(self, path: Path) -> Task:
         """A task that writes the cloud."""

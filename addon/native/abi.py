@@ -20,6 +20,7 @@ import numpy as np
 VERSION = (0, 1)  # of the header that this file follows; the patch number may differ
 
 MEMORY = -2  # PATINA_ERROR_MEMORY
+FORMAT = -4  # PATINA_ERROR_FORMAT
 CANCELLED = -7  # PATINA_ERROR_CANCELLED
 INTERNAL = -10  # PATINA_ERROR_INTERNAL
 
@@ -296,6 +297,7 @@ _CALLS = {
     "patina_task_fingerprint": (POINTER(CloudDesc), POINTER(c_uint64), _OUT),
     "patina_task_open_file": (c_char_p, c_void_p, _OUT),
     "patina_task_save": (c_void_p, c_char_p, _OUT),
+    "patina_task_verify": (c_char_p, c_void_p, _OUT),
     "patina_task_take_file": (c_void_p, _OUT),
     "patina_task_done": (c_void_p,),
     "patina_task_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p, _OUT),

@@ -111,6 +111,12 @@ class PendingLink(Pending):
         super().__init__(name, source.identity(), None)
         self._source = source
 
+    def forget(self, identities: list[tuple]) -> bool:
+        """Lets its cloud go, where it is one of these."""
+        if self._identity in identities:
+            self._cloud = None
+        return self._identity in identities
+
     def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
         if self._cloud is None and not self.lost:
             try:
@@ -184,6 +190,12 @@ class CloudCache:
         cloud = (yield from linked.steps(source, progress)).cloud
         self._keep(source.identity(), (), cloud)
         return cloud
+
+    def drop(self, identities: list[tuple]) -> None:
+        """Clouds that are no longer what they were built from."""
+        with self._lock:
+            for identity in identities:
+                self._entries.pop(identity, None)
 
     def _keep(self, identity: tuple, fingerprint: tuple, cloud: native.Cloud) -> None:
         with self._lock:

@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import importers, jobs, native
 from ..importers.origin import PROPERTY
-from . import analysis, analyzing, attributes, sequence
+from . import analysis, analyzing, attributes, kept, sequence
 from .colors import scalar_name
 from .losses import Loss
 
@@ -74,12 +74,14 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
         status = path.stat()
     except OSError:
         return None
-    name = f"{path.resolve()}{origin or ''}"
-    place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
-    made_of = f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}"
-    state = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
-    folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
+    place = _hash(f"{path.resolve()}{origin or ''}", 12)
+    state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
+    variant = _hash(f"{scalar} {analyzed} {hide_uncolored}", 4)  # several objects may link one file
+    return Source(path, kept.folder() / f"{place}-{state}-{variant}.cloud", origin, scalar, analyzed, hide_uncolored)
+
+
+def _hash(text: str, size: int) -> str:
+    return hashlib.blake2b(text.encode("utf-8", "surrogateescape"), digest_size=size).hexdigest()
 
 
 def loss(name: str, source: Source, error: Exception) -> Loss:
@@ -98,11 +100,11 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
     notes = source.kept.with_suffix(".json")
     try:
-        kept = json.loads(notes.read_text("utf-8"))
-        found = _linked(native.Cloud.open(source.kept), tuple(kept["origin"]), kept.get("scanners"))
+        found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes))
         os.utime(source.kept)  # used just now
+        kept.CHECKS.start(source.identity(), source.kept)
         return found
-    except (native.PatinaError, OSError, ValueError, KeyError):
+    except (native.PatinaError, OSError, ValueError):
         pass  # not there yet, of another version, or damaged: it is made anew
     parts = 3 if source.analyzed else 2
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
@@ -126,8 +128,10 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         yield task
         task.result()
     try:
-        for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
-            old.unlink()
+        place, state, _ = source.kept.stem.split("-")
+        for old in source.kept.parent.glob(f"{place}-*"):
+            if not old.name.startswith(f"{place}-{state}-"):  # of the file as it was
+                old.unlink()
         task = cloud.start_save(source.kept)
         yield task
         task.result()

@@ -484,3 +484,30 @@ def test_a_spoilt_link_is_left_out():
     bpy.context.scene.update_tag()
     yield lambda: settled(25000)
     check(not found.notices, f"{found.notices}")
+
+
+def test_a_damaged_cache_is_mended():
+    """What is kept of a link is shown at once; where it turns out to be damaged, the file itself is read beside."""
+    from patina.sync import kept, linked
+    path = dense("mended_in_view.ply", 60000, (0, 0, 0))
+    source = linked.source(path)
+    linked.load(source)
+    whole = source.kept.read_bytes()
+    source.kept.unlink()
+    source.kept.write_bytes(whole[:1 << 17] + bytes(1 << 18) + whole[(1 << 17) + (1 << 18):])
+    kept.CHECKS._seen.clear()
+    setup()
+    import_points(path, link=True)
+    yield lambda: settled(60000) and not kept.CHECKS.busy()
+    yield lambda: settled(60000) and source.kept.exists()
+    viewport.native.Cloud.start_verifying(source.kept).result()
+    found = shown()
+    check(found.shown.clouds[0].cloud.count == 60000 and not found.message, found.message)
+    mended = found.shown.color.copy()
+    pictures = found.pictures
+    viewport.sync.clouds.CACHE.clear()
+    bpy.context.scene.update_tag()
+    found.trusted.forget()
+    bpy.context.view_layer.objects.active.update_tag()
+    yield lambda: newer(pictures)() and settled(60000)
+    check((found.shown.color == mended).all(), "the picture is that of the whole file")
