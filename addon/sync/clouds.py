@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .. import jobs, native
+from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
@@ -283,7 +283,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     notices += unknown.notices()
     if not items:
         notices.append(losses.Loss("no visible object has points to draw"))
-    if faces:
+    if faces and not pairs.first_of(depsgraph.scene):  # else they are drawn by the other scene
         notices.append(f"{len(faces)} mesh object{'s' * (len(faces) > 1)} with faces not drawn: "
                        "Render Properties > Surface > Meshes draws them")
     return items
