@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from . import jobs, memory, native
+from . import jobs, mattes, memory, native
 from .sync import Camera, DeviceChoice, SceneDescription
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
@@ -60,8 +60,23 @@ def without_antialiasing(description: SceneDescription) -> SceneDescription:
 
 def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool],
          tile_size: int = 0) -> Picture:
-    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel.
-    Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
+    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel."""
+    if not mattes.are_needed(description):
+        return _draw(description, planes, poll, tile_size)
+    others = mattes.needed(description)
+    count = 1 + len(others)
+
+    def part(number: int) -> Callable[[float], bool]:
+        return lambda progress: poll((number + progress) / count)
+
+    picture = _draw(mattes.picture(description), planes, part(0), tile_size)
+    found = [_draw(other, ["COMBINED"], part(number), tile_size).planes["COMBINED"] for number, other in enumerate(others, 1)]
+    return replace(picture, planes=picture.planes | {
+        "COMBINED": mattes.finish(picture.planes["COMBINED"], description, found)})
+
+
+def _draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool], tile_size: int) -> Picture:
+    """Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
     wanted = list(planes)
     device = _open(description.device, poll)
     try:

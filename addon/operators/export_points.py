@@ -44,7 +44,11 @@ class PATINA_OT_export_points(Operator, ExportHelper):
         objects = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
                    if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and
                    (obj.select_get() or not self.selected)]
-        points = _join([item for obj in objects if (item := _read(obj, context.scene))])
+        parts = []
+        for obj in objects:
+            with attributes.readable(obj) as data:
+                parts.append(_read(obj, data, context.scene))
+        points = _join(list(filter(None, parts)))
         if points is None:
             self.report({'ERROR'}, "Patina: no selected object has points" if self.selected
                         else "Patina: no visible object has points")
@@ -63,8 +67,8 @@ class PATINA_OT_export_points(Operator, ExportHelper):
 
 
 def _gps_start(objects: list[bpy.types.Object]) -> float:
-    return next((obj.data.original["patina_gps_time_start"] for obj in objects
-                 if "patina_gps_time_start" in obj.data.original), 0.0)
+    return next((obj.original.data["patina_gps_time_start"] for obj in objects
+                 if "patina_gps_time_start" in obj.original.data), 0.0)
 
 
 def read_local(obj: bpy.types.Object) -> exporters.Points | None:
@@ -87,8 +91,7 @@ def _bytes(colors: np.ndarray | None) -> np.ndarray | None:
     return np.rint(np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055) * 255).astype(np.uint8)
 
 
-def _read(obj: bpy.types.Object, scene: bpy.types.Scene) -> exporters.Points | None:
-    data = obj.data
+def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> exporters.Points | None:
     count = len(data.vertices if obj.type == 'MESH' else data.points)
     local = attributes.positions(data, count) if count else None
     if local is None:
@@ -111,7 +114,7 @@ def _read(obj: bpy.types.Object, scene: bpy.types.Scene) -> exporters.Points | N
     if normals is not None:
         normals = normals @ np.linalg.inv(turn) if np.linalg.det(turn) else normals
     return exporters.Points(positions, normals, _bytes(colors), _scalars(data, count),
-                            str(data.original.get("patina_crs", "")))
+                            str(obj.original.data.get("patina_crs", "")))
 
 
 def _scalars(data: bpy.types.ID, count: int) -> dict[str, np.ndarray]:

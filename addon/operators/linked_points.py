@@ -26,7 +26,8 @@ class PATINA_OT_linked_to_mesh(Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return context.object is not None and bool(context.object.patina.linked_file)
+        obj = context.object
+        return obj is not None and obj.mode == 'OBJECT' and bool(obj.patina.linked_file)
 
     def execute(self, context: Context) -> set[str]:
         obj, notices = context.object, []
@@ -63,7 +64,8 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
     @classmethod
     def poll(cls, context: Context) -> bool:
         obj = context.object
-        return obj is not None and obj.type == 'MESH' and not obj.patina.linked_file and not len(obj.data.polygons)
+        return (obj is not None and obj.type == 'MESH' and obj.mode == 'OBJECT' and not obj.patina.linked_file
+                and not len(obj.data.polygons))
 
     def execute(self, context: Context) -> set[str]:
         obj, path = context.object, Path(bpy.path.abspath(self.filepath))

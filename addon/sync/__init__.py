@@ -16,7 +16,7 @@ from .. import migrate
 from . import clipping, clips, clouds, effects, lights, lines, settings, world
 from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
 from .clips import Clip, of_view as view_clips
-from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
+from .clouds import CloudItem, CloudStyle, Pending, PendingLink, Trusted, changed_owners, style_of
 from .effects import Effects
 from .lights import Headlight, Light
 from .lines import Lines
@@ -25,7 +25,7 @@ from .settings import DeviceChoice, Settings
 from .world import Mist
 
 __all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Lines", "MeshItem", "Mist",
-           "Panorama", "Pending", "Effects", "Focus",
+           "Panorama", "Pending", "PendingLink", "Effects", "Focus",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "view_clips", "viewport_view"]
 

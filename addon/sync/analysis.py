@@ -41,9 +41,10 @@ def wanted(obj: bpy.types.Object) -> bool:
     return obj.patina.analysis == 'ALWAYS' or obj.patina.analysis == 'AUTO' and not _moves(obj.original)
 
 
-def stations(obj: bpy.types.Object, count: int) -> Stations | None:
+def stations(obj: bpy.types.Object, data: bpy.types.ID, count: int) -> Stations | None:
+    """data: the object's, to read attributes from."""
     known = obj.original.data.get(SCANNERS)
-    return of_columns(known, *(attributes.scalars(obj.data, count, name) for name in (SCAN, ROW, COLUMN))) if known else None
+    return of_columns(known, *(attributes.scalars(data, count, name) for name in (SCAN, ROW, COLUMN))) if known else None
 
 
 def of_columns(places: Iterable[float], scan: np.ndarray | None = None, row: np.ndarray | None = None,

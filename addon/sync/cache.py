@@ -1,26 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The folder of caches: clouds of linked files, and packed files put down to be read. All in it can be made anew."""
+"""What is in the folder of caches: clouds of linked files, and packed files put down to be read. All can be made anew."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
 
-import bpy
-
-from .. import preferences
+from . import kept
 
 _KEPT = ("*.cloud", "*.json", "*-packed.*")
-
-
-def folder() -> Path:
-    """The artist's own, else Blender's; made where it is not there yet."""
-    known = preferences.get()
-    if known and known.cache_folder:
-        place = Path(bpy.path.abspath(known.cache_folder))
-        place.mkdir(parents=True, exist_ok=True)
-        return place
-    return Path(bpy.utils.user_resource('DATAFILES', path="patina", create=True))
 
 
 def held() -> tuple[int, int]:
@@ -42,5 +30,5 @@ def clear() -> tuple[int, int]:
 
 
 def _files() -> Iterator[Path]:
-    place = folder()
+    place = kept.folder()
     return (path for pattern in _KEPT for path in place.glob(pattern) if path.is_file())

@@ -14,11 +14,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .. import jobs, native
-from ..importers import Progress, told
+from .. import jobs, native, pairs
+from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, linked, meshes
+from . import analysis, attributes, clips, colors, estimates, linked, losses, meshes, roles
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -96,12 +96,14 @@ class Pending:
         self.analyzed = arrays is not None and arrays.analyzed  # in time; a linked one is before it is seen
         self.stations = arrays.stations if arrays else None
 
+        self.lost = ""  # why there will be no cloud
+
     @property
     def built(self) -> native.Cloud | None:
         return self._cloud
 
-    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
-        """The cloud; built at the first call. No viewport may draw meanwhile."""
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
+        """The cloud; built at the first call. No viewport may draw meanwhile. None where it is lost."""
         if self._cloud is None:
             self._cloud = yield from CACHE.obtain(self._identity, self._arrays, progress, recolor=True)
             self._arrays = None
@@ -111,13 +113,22 @@ class Pending:
 class PendingLink(Pending):
     """A linked cloud that waits to be opened."""
 
-    def __init__(self, source: linked.Source) -> None:
-        super().__init__(told(source.path.name), source.identity(), None)
+    def __init__(self, name: str, source: linked.Source) -> None:
+        super().__init__(name, source.identity(), None)
         self._source = source
 
-    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
-        if self._cloud is None:
-            self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
+    def forget(self, identities: list[tuple]) -> bool:
+        """Lets its cloud go, where it is one of these."""
+        if self._identity in identities:
+            self._cloud = None
+        return self._identity in identities
+
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
+        if self._cloud is None and not self.lost:
+            try:
+                self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
+            except (native.PatinaError, OSError) as error:
+                self.lost = linked.loss(self.name, self._source, error)
         return self._cloud
 
 
@@ -126,6 +137,7 @@ class CloudItem:
     cloud: native.Cloud | Pending
     style: CloudStyle
     pass_index: int  # of the object
+    role: str = roles.SEEN
 
 
 class CloudCache:
@@ -185,6 +197,12 @@ class CloudCache:
         self._keep(source.identity(), (), cloud)
         return cloud
 
+    def drop(self, identities: list[tuple]) -> None:
+        """Clouds that are no longer what they were built from."""
+        with self._lock:
+            for identity in identities:
+                self._entries.pop(identity, None)
+
     def _keep(self, identity: tuple, fingerprint: tuple, cloud: native.Cloud) -> None:
         with self._lock:
             self._entries[identity] = (fingerprint, cloud)
@@ -210,8 +228,6 @@ class CloudCache:
 CACHE = CloudCache()
 
 
-TRIANGLES = "triangles"  # at the end of an identity: the object's faces are drawn
-
 # What collect() asks for each object with points or faces: (object, identity, linked file) → its cloud or mesh, or None without.
 Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | native.Mesh | None"]
 
@@ -225,6 +241,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     taken: dict[tuple, native.Cloud | Pending | native.Mesh | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
+    triangles = meshes.BARE if roles.are_used(depsgraph) else meshes.TRIANGLES
+    unknown = roles.Unknown(depsgraph.view_layer_eval)
     scales: list[tuple[str, float, native.Cloud | Pending]] = []
     for instance in depsgraph.object_instances:
         obj = instance.object
@@ -232,6 +250,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             continue
         if not visible(instance):
             continue
+        attributes.finish_edits(obj)
         solid = obj.type == 'MESH' and len(obj.data.polygons) > 0 and not obj.patina.linked_file
         if solid and depsgraph.scene_eval.patina.meshes == 'OFF':
             faces.add(obj.name)
@@ -242,30 +261,36 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             if link is None:
                 continue
         patina = depsgraph.scene_eval.patina
-        faces_as = 0 if not solid else TRIANGLES if patina.meshes == 'TRIANGLES' else patina.mesh_points
+        role = roles.role_of(instance, depsgraph.view_layer_eval)
+        # the library's triangles receive no shadows, its points do
+        as_triangles = patina.meshes == 'TRIANGLES' and role != roles.CATCHER
+        faces_as = 0 if not solid else triangles if as_triangles else patina.mesh_points
         place = link.identity() if link else (obj.data.as_pointer(), faces_as, *_attribute_names(obj), analysis.wanted(obj))
         if place not in taken:
             identity = place if link else (*_identity(obj, used), faces_as)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
+        unknown.look(instance)
         if isinstance(cloud, native.Mesh):
-            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index))
+            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index, role))
         elif cloud:
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
-            items.append(CloudItem(cloud, style, obj.pass_index))
+            items.append(CloudItem(cloud, style, obj.pass_index, role))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
-    items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item for item in items]
+    items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
+             for item in items]
     CACHE.trim(used)
     meshes.CACHE.trim(used)
     estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
                     if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
+    notices += unknown.notices()
     if not items:
-        notices.append("no visible object has points to draw")
-    if faces:
+        notices.append(losses.Loss("no visible object has points to draw"))
+    if faces and not pairs.first_of(depsgraph.scene):  # else they are drawn by the other scene
         notices.append(f"{len(faces)} mesh object{'s' * (len(faces) > 1)} with faces not drawn: "
                        "Render Properties > Surface > Meshes draws them")
     return items
@@ -293,7 +318,7 @@ class TakingNow:
             if stopped():
                 raise native.PatinaCancelled("cancelled", native.CANCELLED)
 
-        if identity[-1] == TRIANGLES:
+        if identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
             pause()
             return meshes.CACHE.obtain(identity, obj)
         arrays = None if link else _read(obj, self._notices, identity[-1], pause)
@@ -309,7 +334,13 @@ class TakingNow:
         def work() -> native.Cloud:
             return jobs.finish(CACHE.obtain_linked(link, progress)) if link else _finished(identity, arrays, progress)
 
-        cloud = jobs.run(work, progress.cancel, stopped)
+        try:
+            cloud = jobs.run(work, progress.cancel, stopped)
+        except (native.PatinaError, OSError) as error:
+            if not link:
+                raise
+            self._notices.append(linked.loss(name, link, error))
+            return None
         self._notice(name, cloud)
         if link and link.scalar and not cloud.has_scalars:
             self._notices.append(f"'{name}': its file has no attribute '{link.scalar}' to take as scalar")
@@ -391,8 +422,8 @@ class Trusted:
             if key not in self._known:
                 said: list[str] = []
                 if link:
-                    self._known[key] = (PendingLink(link), said)
-                elif identity[-1] == TRIANGLES:
+                    self._known[key] = (PendingLink(obj.name, link), said)
+                elif identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
                     self.reads += 1
                     self._known[key] = (meshes.CACHE.obtain(identity, obj), said)
                 else:
@@ -445,10 +476,15 @@ def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
 def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
           pause: Callable[[], None] = lambda: None) -> PointArrays | None:
     """The object's points; mesh_points > 0: so many on its faces. pause() is called between steps and may raise."""
-    data = obj.data
     pause()
+    with attributes.readable(obj) as data:
+        return _read_data(obj, data, notices, mesh_points, pause)
+
+
+def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], mesh_points: int,
+               pause: Callable[[], None]) -> PointArrays | None:
     if mesh_points:
-        found = meshes.sample(obj, mesh_points)
+        found = meshes.sample(obj, data, mesh_points)
         return PointArrays(*found, None) if found else None
     count = len(data.vertices if obj.type == 'MESH' else data.points)
     if count == 0:
@@ -477,7 +513,7 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
     if obj.patina.hide_uncolored:
         opacities = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
-    stations = analysis.stations(obj, count) if analyzed else None
+    stations = analysis.stations(obj, data, count) if analyzed else None
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations)
 
 

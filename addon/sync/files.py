@@ -17,7 +17,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..importers.reading import told
-from . import cache, sequence
+from . import kept, sequence
 
 _unpacked: dict[tuple[int, int], Path] = {}  # of packed files, by place in memory and size
 
@@ -75,7 +75,7 @@ def _put_down(packed: bpy.types.PackedFile, path: Path) -> Path:
     if known is None or not known.is_file():
         data = packed.data
         name = hashlib.blake2b(data, digest_size=12).hexdigest()
-        known = cache.folder() / f"{name}-packed{path.suffix}"
+        known = kept.folder() / f"{name}-packed{path.suffix}"
         if not known.is_file():
             known.write_bytes(data)
             os.utime(known, (0, 0))  # what is made of it is good for every copy

@@ -17,8 +17,9 @@ import numpy as np
 
 from .. import importers, jobs, native, preferences
 from ..importers.origin import PROPERTY
-from . import analysis, analyzing, attributes, cache, files, sequence
+from . import analysis, analyzing, attributes, files, kept, sequence
 from .colors import scalar_name
+from .losses import Loss
 
 Corner = tuple[float, float, float]
 
@@ -56,13 +57,13 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         settings = obj.patina.sequence
         path, notice = sequence.file_at(path, frame, settings.start, settings.step, settings.outside)
         if notice:
-            notices.append(f"'{obj.name}': {importers.told(notice)}")
+            notices.append(Loss(f"'{obj.name}': {importers.told(notice)}"))
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
     found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
     if found is None:
-        notices.append(f"'{obj.name}': the file {importers.told(path)} is missing")
+        notices.append(Loss(f"'{obj.name}': the file {importers.told(path)} is missing"))
     return found
 
 
@@ -72,11 +73,21 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
         status = path.stat()
     except OSError:
         return None
-    name = f"{path.resolve()}{origin or ''}"
-    place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
-    made_of = f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}"
-    state = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
-    return Source(path, cache.folder() / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
+    place = _hash(f"{path.resolve()}{origin or ''}", 12)
+    state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
+    variant = _hash(f"{scalar} {analyzed} {hide_uncolored}", 4)  # several objects may link one file
+    return Source(path, kept.folder() / f"{place}-{state}-{variant}.cloud", origin, scalar, analyzed, hide_uncolored)
+
+
+def _hash(text: str, size: int) -> str:
+    return hashlib.blake2b(text.encode("utf-8", "surrogateescape"), digest_size=size).hexdigest()
+
+
+def loss(name: str, source: Source, error: Exception) -> Loss:
+    """What to say where an object's file cannot be read. Raises what is not the file's fault: a cancel, memory."""
+    if isinstance(error, native.PatinaCancelled) or getattr(error, "code", 0) == native.MEMORY:
+        raise error
+    return Loss(importers.told(f"'{name}' is left out: {source.path} cannot be read: {error}"))
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
@@ -88,11 +99,11 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
     notes = source.kept.with_suffix(".json")
     try:
-        kept = json.loads(notes.read_text("utf-8"))
-        found = _linked(native.Cloud.open(source.kept), tuple(kept["origin"]), kept.get("scanners"), kept.get("units"))
+        found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes))
         os.utime(source.kept)  # used just now
+        kept.CHECKS.start(source.identity(), source.kept)
         return found
-    except (native.PatinaError, OSError, ValueError, KeyError):
+    except (native.PatinaError, OSError, ValueError):
         pass  # not there yet, of another version, or damaged: it is made anew
     parts = 3 if source.analyzed else 2
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
@@ -117,8 +128,10 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         yield task
         task.result()
     try:
-        for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
-            old.unlink()
+        place, state, _ = source.kept.stem.split("-")
+        for old in source.kept.parent.glob(f"{place}-*"):
+            if not old.name.startswith(f"{place}-{state}-"):  # of the file as it was
+                old.unlink()
         task = cloud.start_save(source.kept)
         yield task
         task.result()

@@ -198,8 +198,10 @@ def test_options():
     check(read(["blender", "-b"]) == {}, "no options")
     check(read(["blender", "--", "--other", "1", "--patina-device", "cpu", "--patina-samples=4"]) ==
           {"device": 'CPU', "samples": 4}, "two options")
+    check(read(["--", "--patina-strict", "--patina-threads", "2"]) == {"strict": 1, "threads": 2}, "a switch")
     for words, part in ((["--patina-device", "abacus"], "auto, cpu"), (["--patina-colour"], "only device"),
-                        (["--patina-threads", "many"], "a number")):
+                        (["--patina-threads", "many"], "a number"),
+                        (["--patina-strict=no"], "no value")):
         try:
             read(["--", *words])
         except native.PatinaError as error:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from check_viewport import area, invoke_import, screenshot, shown, window_region
+from window import area, invoke_import, screenshot, shown, window_region
 from harness import REPOSITORY, SCRATCH, check, saved
 
 from patina.operators import set_up

@@ -16,7 +16,7 @@ from harness import REPOSITORY, SCRATCH, Skip, check, new_scene, render
 
 from patina import importers, memory, preferences, readers
 from patina.operators import preferences as operators
-from patina.sync import cache, linked, settings
+from patina.sync import cache, kept, linked, settings
 
 FOLDER = SCRATCH / "readers" / readers.TAG
 
@@ -199,7 +199,7 @@ def test_cache_folder_size_and_clear():
         check((mine / "mine.txt").is_file(), "somebody else's file is gone")
         chosen.cache_limit = 1
         check(preferences.cache_bytes() == 1 << 30, "the limit")
-    check(cache.folder() != mine and preferences.cache_bytes() == 32 << 30, "defaults hold without")
+    check(kept.folder() != mine and preferences.cache_bytes() == 32 << 30, "defaults hold without")
     check(linked.source(SCRATCH / "kept.ply").kept.parent != mine, "linked clouds follow")
 
 
