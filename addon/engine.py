@@ -13,7 +13,9 @@ import bpy
 import numpy as np
 
 from . import native, passes, render, sync, viewport
-from .sync import motion
+from .importers import told
+from .sync import losses, motion
+from .sync.kept import CHECKS
 
 BUILDING = 0.5  # share of the progress bar for reading the scene; the rest is the picture
 
@@ -96,22 +98,31 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     def _render_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment, frame: int,
                        told: set[str]) -> tuple[sync.SceneDescription, render.Picture]:
         """The scene as it stands now. told: notices so far, each is reported once."""
+        description, picture = self._draw_moment(depsgraph, eye, moment, frame)
+        damaged = CHECKS.finish(self._stopped)  # beside the picture, as a rule
+        if damaged:
+            sync.clouds.CACHE.drop(damaged)
+            description, picture = self._draw_moment(depsgraph, eye, moment, frame)
+        for notice in filter(None, (*description.notices, picture.notice)):
+            if notice not in told:
+                self._tell('WARNING', notice)
+                told.add(notice)
+        return description, picture
+
+    def _draw_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment,
+                     frame: int) -> tuple[sync.SceneDescription, render.Picture]:
         camera, place = self.camera_override or depsgraph.scene_eval.camera, None
         if eye and camera:
             self.active_view_set(eye)
             place = (self.camera_model_matrix(camera), self.camera_shift_x(camera))
         view = sync.final_view(camera, depsgraph, place)
         description = sync.describe(depsgraph, view, self._poll_reading, frame)
+        losses.check(description.notices)
         description = render.shifted(description, moment.shift)
         description = replace(description, settings=replace(description.settings, pixel_samples=moment.samples))
         self._status("Rendering", BUILDING)
-        picture = render.draw(description, {item.plane for item in passes.enabled(depsgraph.view_layer_eval)},
-                              self._poll_drawing, depsgraph.scene_eval.patina.tile_size)
-        for notice in filter(None, (*description.notices, picture.notice)):
-            if notice not in told:
-                self._tell('WARNING', notice)
-                told.add(notice)
-        return description, picture
+        return description, render.draw(description, {item.plane for item in passes.enabled(depsgraph.view_layer_eval)},
+                                        self._poll_drawing, depsgraph.scene_eval.patina.tile_size)
 
     def _go_to(self, frame: float) -> None:
         self.frame_set(math.floor(frame), frame - math.floor(frame))
@@ -136,12 +147,12 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         self._progress(progress)
 
     def _tell(self, kind: str, text: str) -> None:
-        self.report({kind}, f"Patina: {text}")
+        self.report({kind}, told(f"Patina: {text}"))
 
     def _fail(self, text: str) -> None:
         self._tell('ERROR', text)
         if bpy.app.version < (4, 5, 0):  # later ones report it once more
-            self.error_set(f"Patina: {text}")
+            self.error_set(told(f"Patina: {text}"))
 
 
 def _text(error: Exception) -> str:

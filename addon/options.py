@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a command line sets for one run:
 
-    blender -b scene.blend -E PATINA -a -- --patina-device cpu --patina-threads 4 --patina-quality paper --patina-samples 8
+    blender -b scene.blend -E PATINA -a -- --patina-device cpu --patina-threads 4 --patina-quality paper --patina-samples 8 \
+        --patina-strict
 
-Words of other add-ons behind the `--` are left alone.
+--patina-strict: a frame that lacks what it was to show (a file that is missing or cannot be read, any points at all) fails, where
+it else is rendered without and warns. Words of other add-ons behind the `--` are left alone.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from .native import PatinaError
 
 DEVICES = {"auto": 'AUTO', "cpu": 'CPU', "cpu-scalar": 'CPU_SCALAR', "gl-egl": 'GL', "gl-osmesa": 'GL_SOFTWARE'}
 QUALITIES = {"refined": 'REFINED', "paper": 'PAPER'}
+SWITCHES = {"strict"}  # without a value
 _PREFIX = "--patina-"
 
 
@@ -26,13 +29,17 @@ def read(arguments: Sequence[str] | None = None) -> dict[str, str | int]:
     for index, word in enumerate(words):
         if word.startswith(_PREFIX):
             name, sign, value = word[len(_PREFIX):].partition("=")
-            if not sign:
+            if not sign and name not in SWITCHES:
                 value = words[index + 1] if index + 1 < len(words) else ""
             found[name] = _value(name, value)
     return found
 
 
 def _value(name: str, value: str) -> str | int:
+    if name in SWITCHES:
+        if value:
+            raise PatinaError(f"{_PREFIX}{name} '{value}': it takes no value", -1)
+        return 1
     choices = {"device": DEVICES, "quality": QUALITIES}.get(name)
     if choices:
         if value not in choices:
@@ -42,4 +49,4 @@ def _value(name: str, value: str) -> str | int:
         if not value.isdigit() or int(value) > 1024:
             raise PatinaError(f"{_PREFIX}{name} '{value}': a number up to 1024 was expected", -1)
         return int(value)
-    raise PatinaError(f"there is no option {_PREFIX}{name}: only device, threads, quality and samples", -1)
+    raise PatinaError(f"there is no option {_PREFIX}{name}: only device, threads, quality, samples and strict", -1)

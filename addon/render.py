@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
@@ -10,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from . import jobs, native
+from . import jobs, mattes, memory, native
 from .sync import Camera, DeviceChoice, SceneDescription
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
 
-# Planes take some 130 bytes a pixel: 2 GB for a picture of that size. Larger ones are made in tiles.
+# Planes take some 130 bytes a pixel: 2 GB for a picture of that size. Larger ones are made in tiles, and smaller ones too
+# where memory is short; the smaller the tiles, the more of the time goes into the band around each.
+PIXEL_BYTES = 130
 LARGE_PICTURE = 1 << 24  # pixels
-LARGE_TILE = 4096  # pixels a side
+LEAST_TILE, TILE_STEP = 512, 256  # pixels a side
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,23 @@ def forget_device() -> None:
 
 def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool],
          tile_size: int = 0) -> Picture:
-    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel.
-    Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
+    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel."""
+    if not mattes.are_needed(description):
+        return _draw(description, planes, poll, tile_size)
+    others = mattes.needed(description)
+    count = 1 + len(others)
+
+    def part(number: int) -> Callable[[float], bool]:
+        return lambda progress: poll((number + progress) / count)
+
+    picture = _draw(mattes.picture(description), planes, part(0), tile_size)
+    found = [_draw(other, ["COMBINED"], part(number), tile_size).planes["COMBINED"] for number, other in enumerate(others, 1)]
+    return replace(picture, planes=picture.planes | {
+        "COMBINED": mattes.finish(picture.planes["COMBINED"], description, found)})
+
+
+def _draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool], tile_size: int) -> Picture:
+    """Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
     wanted = list(planes)
     device = _open(description.device, poll)
     try:
@@ -109,7 +127,7 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
     save memory."""
     if description.panorama:
         return _draw_panorama(device, description, wanted, poll, tile_size)
-    regions = tiles(description.settings.region, tile_size)
+    regions = tiles(description.settings.region, tile_size, memory.for_planes())
     if len(regions) > 1:  # all of them take from whole shadow textures
         description = replace(description, settings=replace(description.settings, shadow_lazy=0))
     x0, y0, x1, y1 = description.settings.region
@@ -165,12 +183,16 @@ def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[
     return {name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted}
 
 
-def tiles(region: tuple[int, int, int, int], size: int) -> list[tuple[int, int, int, int]]:
-    """Regions that make up a region, rows from the bottom. size 0: one, unless the picture is large."""
+def tiles(region: tuple[int, int, int, int], size: int, budget: int | None = None) -> list[tuple[int, int, int, int]]:
+    """Regions that make up a region, rows from the bottom. size 0: one, unless the picture is large; budget: bytes for planes,
+    None: as many as a large picture takes."""
     x0, y0, x1, y1 = region
-    if not size:
-        size = LARGE_TILE if (x1 - x0) * (y1 - y0) > LARGE_PICTURE else max(x1 - x0, y1 - y0)
-    return [(x, y, min(x + size, x1), min(y + size, y1)) for y in range(y0, y1, size) for x in range(x0, x1, size)]
+    across, along = size or x1 - x0, size or y1 - y0
+    most = LARGE_PICTURE if budget is None else min(LARGE_PICTURE, budget // PIXEL_BYTES)
+    if not size and across * along > most:
+        side = max(math.isqrt(most) // TILE_STEP * TILE_STEP, LEAST_TILE)
+        across, along = (math.ceil(length / math.ceil(length / side)) for length in (across, along))  # none much smaller
+    return [(x, y, min(x + across, x1), min(y + along, y1)) for y in range(y0, y1, along) for x in range(x0, x1, across)]
 
 
 def shifted(description: SceneDescription, shift: tuple[float, float]) -> SceneDescription:

@@ -20,11 +20,12 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import native, pace, render, sync
+from . import mattes, native, pace, render, sync
 from .jobs import Pause, Steps
 from .sync import analysis
 from .sync.analyzing import ANALYSES
 from .sync.clouds import CACHE
+from .sync.kept import CHECKS
 
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
@@ -76,6 +77,7 @@ class Viewport:
     def __init__(self, engine: bpy.types.RenderEngine) -> None:
         self.engine = weakref.ref(engine, lambda _: _wake())  # anywhere in Python's work: the timer closes
         self.area = 0  # where it is, to find its statistics
+        self._region = 0  # of the area
         self.message = ""  # what went wrong last
         self.notices: list[str] = []
         self._lost: tuple[sync.DeviceChoice, str] | None = None  # a device that failed, and what to say of it
@@ -94,11 +96,12 @@ class Viewport:
         self._steps: Steps[Shown] | None = None  # of the work
         self._task: native.Task | Pause | None = None  # the step under way
         self._progress: native.Progress | None = None  # while clouds are made
-        self._rendering = False  # while the frame is drawn
+        self._rendering: native.Frame | None = None  # that is drawn
         self._spare: list[np.ndarray] = []  # planes of the picture before the one that is shown
         self._closed = False
         self._news = False
         self._frame: tuple[native.Device, native.Frame] | None = None
+        self._others: list[tuple[native.Device, native.Frame]] = []  # for mattes
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
         _VIEWPORTS.add(self)
 
@@ -107,7 +110,8 @@ class Viewport:
         self.trusted.forget(sync.changed_owners(depsgraph) if self._scene else None)
         view = self._read_view(context)
         scene = sync.describe_viewport(depsgraph, view, self.trusted, context.space_data)
-        self.notices = scene.notices + ([self._lost[1]] if self._lost and self._lost[0] == scene.device else [])
+        lost = {item.cloud.lost: None for item in scene.clouds if item.cloud.lost}  # each once
+        self.notices = [*scene.notices, *lost, *([self._lost[1]] if self._lost and self._lost[0] == scene.device else [])]
         self.pace.budget = depsgraph.scene.patina.navigation_ms / 1000.0
         self._scene = scene
         self._view, self._clips = view, sync.view_clips(context.region_data)
@@ -118,6 +122,7 @@ class Viewport:
     def draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> str:
         """Draws the last picture, asks for another one if the view moved. Returns a line of status."""
         self.area = context.area.as_pointer() if context.area else 0
+        self._region = context.region.as_pointer()
         if self._scene and self._local != (context.space_data.local_view is not None):  # Blender says nothing of it
             self.update(context, depsgraph)
         view = self._read_view(context)
@@ -143,25 +148,26 @@ class Viewport:
             self._ask(pace.FULL)
         if news:
             try:
-                engine.tag_redraw()
-            except ReferenceError:  # Blender has freed it
+                engine.is_preview  # noqa: B018  Blender may have freed it
+                if not _redraw(self.area, self._region, panels=not due):
+                    engine.tag_redraw()
+            except ReferenceError:
                 self.close()
                 return False
-            if not due:
-                _redraw_panels(self.area)
         return not idle or due or news
 
     def close(self) -> None:
         """Ends the work soon and for good."""
         self._closed, self._wanted, self._working = True, None, None
         if self._rendering:
-            self._frame[1].cancel()
+            self._rendering.cancel()
         if self._progress:
             self._progress.cancel()
         if self._task:
             ANALYSES.end_frame(self._task, close=True)  # before what it uses
         if self._steps:
             self._steps.close()
+        self._others = []
         self._drawn = self._frame = self._steps = self._task = None  # here, for textures go on Blender's thread
         ANALYSES.wish(self, [])
         _VIEWPORTS.discard(self)
@@ -178,7 +184,7 @@ class Viewport:
         self._wanted = self._last = Wish(scene, self._view, level, time.monotonic())
         # a quick picture of the moment before is worth its end, a whole one is not
         if self._rendering and self._working.level == pace.FULL:
-            self._frame[1].cancel()
+            self._rendering.cancel()
         if self not in _TURNS:
             _TURNS.append(self)
         _work(0.0)  # so that it goes on while Blender draws
@@ -188,7 +194,7 @@ class Viewport:
         if self.message:
             return self.message
         working = self._working
-        if working and any(isinstance(item.cloud, sync.Pending) and not item.cloud.built for item in
+        if working and any(isinstance(item.cloud, sync.Pending) and not (item.cloud.built or item.cloud.lost) for item in
                            working.scene.clouds):
             return "Reading points"
         if not self.shown:
@@ -270,6 +276,12 @@ class Viewport:
         if self._last and self.shown and any(item.cloud in clouds for item in self.shown.clouds):
             self._ask(self._last.level)
 
+    def rebuild(self, identities: list[tuple]) -> None:
+        """Of linked clouds whose kept files were damaged."""
+        links = [item.cloud for item in (self._scene.clouds if self._scene else ()) if isinstance(item.cloud, sync.PendingLink)]
+        if any([link.forget(identities) for link in links]):
+            self._ask(self._last.level)
+
     def wants(self) -> bool:
         return self._wanted is not None
 
@@ -278,7 +290,11 @@ class Viewport:
             try:
                 clouds = []
                 for item in wish.scene.clouds:
-                    clouds.append(replace(item, cloud=(yield from item.cloud.resolve(self._progress))))
+                    cloud = yield from item.cloud.resolve(self._progress)
+                    if cloud:
+                        clouds.append(replace(item, cloud=cloud))
+                    elif item.cloud.lost not in self.notices:
+                        self.notices = [*self.notices, item.cloud.lost]
             finally:
                 self._progress = None
         if self._wanted and wish.level == pace.FULL:
@@ -300,30 +316,26 @@ class Viewport:
         """From now on the processor draws, until another device is asked for."""
         self._lost = (choice, f"{self._frame[0].name} failed, the processor draws: {reason}")
         self.notices = [*self.notices, self._lost[1]]
-        self._frame = None
+        self._frame, self._others = None, []
         render.forget_device()
 
     def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription) -> Steps[Shown]:
         if self._frame is None or self._frame[0] is not device:
             self._frame = (device, native.Frame(device))
-        frame = self._frame[1]
-        with native.Scene() as scene:
-            render.describe(scene, description, ["DEPTH"])
-            settings = description.settings
-            x0, y0, x1, y1 = settings.region
-            def start() -> native.Task:
-                return frame.start(scene, ("COMBINED", "DEPTH"), y1 - y0, x1 - x0, self._spare)
-
-            while (task := ANALYSES.begin_frame(start)) is None:
-                yield Pause()
-            self._rendering = True
-            try:
-                yield task
-                ANALYSES.end_frame(task)
-                planes = task.result()
-            finally:
-                self._rendering = False
-                ANALYSES.end_frame(task)
+        frame, settings = self._frame[1], description.settings
+        x0, y0, x1, y1 = settings.region
+        if mattes.are_needed(description):
+            others, shown = mattes.needed(description), mattes.picture(description)
+            self._others = self._others if len(self._others) == len(others) and self._others[0][0] is device else [
+                (device, native.Frame(device)) for _ in others]
+            planes = yield from self._draw_frame(frame, shown, ("COMBINED", "DEPTH"), [])
+            found = []
+            for (_, beside), other in zip(self._others, others, strict=True):
+                found += yield from self._draw_frame(beside, other, ("COMBINED",), [])
+            planes[0] = mattes.finish(planes[0], description, found)
+        else:
+            self._others = []
+            planes = yield from self._draw_frame(frame, description, ("COMBINED", "DEPTH"), self._spare)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
@@ -331,6 +343,27 @@ class Viewport:
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.name)
+
+
+    def _draw_frame(self, frame: native.Frame, description: sync.SceneDescription, planes: tuple[str, ...],
+                    spare: list[np.ndarray]) -> Steps[list[np.ndarray]]:
+        x0, y0, x1, y1 = description.settings.region
+        with native.Scene() as scene:
+            render.describe(scene, description, planes)
+
+            def start() -> native.Task:
+                return frame.start(scene, planes, y1 - y0, x1 - x0, spare)
+
+            while (task := ANALYSES.begin_frame(start)) is None:
+                yield Pause()
+            self._rendering = frame
+            try:
+                yield task
+                ANALYSES.end_frame(task)
+                return task.result()
+            finally:
+                self._rendering = None
+                ANALYSES.end_frame(task)
 
 
 _VIEWPORTS: set[Viewport] = set()
@@ -356,6 +389,7 @@ def close_all() -> None:
     for viewport in list(_VIEWPORTS):
         viewport.close()
     ANALYSES.clear()
+    CHECKS.clear()
     _compiled.clear()
 
 
@@ -370,10 +404,14 @@ def _work(until: float) -> None:
 def _tick() -> float | None:
     _work(time.monotonic() + STAY)
     changed = ANALYSES.advance(CACHE.final())
-    again = ANALYSES.busy()
+    damaged = CHECKS.take_damaged() if _VIEWPORTS and not CACHE.final() else []  # a final picture looks itself
+    CACHE.drop(damaged)
+    again = ANALYSES.busy() or CHECKS.busy()
     for viewport in list(_VIEWPORTS):
         if changed:
             viewport.analyzed(changed)
+        if damaged:
+            viewport.rebuild(damaged)
         again |= viewport.tick()
     return TICK if again else None
 
@@ -383,13 +421,19 @@ def _wake() -> None:
         bpy.app.timers.register(_tick, first_interval=TICK, persistent=True)
 
 
-def _redraw_panels(area_pointer: int) -> None:
+def _redraw(area_pointer: int, region_pointer: int, panels: bool) -> bool:
+    """Has a view drawn wholly, and panels beside it. Whether it is there. An engine's own tag_redraw does not do: Blender then
+    puts back the depths of its last whole redraw after the engine has drawn, and shows overlays by them."""
+    found = False
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.as_pointer() == area_pointer:
                 for region in area.regions:
-                    if region.type == 'UI':
+                    own = region.as_pointer() == region_pointer
+                    found |= own
+                    if own or panels and region.type == 'UI':
                         region.tag_redraw()
+    return found
 
 
 def _upload(shown: Shown) -> gpu.types.GPUTexture:

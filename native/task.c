@@ -85,6 +85,8 @@ static int open_file(struct patina_task *task) { return patina_file_open(task->p
 
 static int save(struct patina_task *task) { return patina_cloud_save(task->saved, task->path); }
 
+static int verify(struct patina_task *task) { return patina_cloud_verify(task->path, task->progress); }
+
 static int analyse(struct patina_task *task)
 {
     return pt_analysis_compute(task->painted, &task->analyse, task->progress, &task->analysis);
@@ -174,6 +176,11 @@ int patina_task_open_file(const char *path, patina_progress *progress, patina_ta
 int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out)
 {
     return start_at(&(struct patina_task){ .work = save, .saved = cloud }, path, out);
+}
+
+int patina_task_verify(const char *path, patina_progress *progress, patina_task **out)
+{
+    return start_at(&(struct patina_task){ .work = verify, .progress = progress }, path, out);
 }
 
 int patina_task_take_file(patina_task *task, patina_file **out)

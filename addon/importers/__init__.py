@@ -12,9 +12,9 @@ import numpy as np
 from ..jobs import Steps
 from ..native import PatinaError
 from . import conf, e57, las, library, pcd
-from .reading import Filter, PointFile, Progress
+from .reading import Filter, PointFile, Progress, name_of, told
 
-__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "preview", "reader", "steps", "to_mesh"]
+__all__ = ["FORMATS", "Filter", "PointFile", "Progress", "name_of", "preview", "reader", "steps", "to_mesh", "told"]
 
 # One colour and one normal attribute, under names that every Blender from 3.4 on allows ("normal" is reserved
 # before 4.0) and that sync.attributes looks for.
@@ -46,15 +46,15 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> Steps[PointFile]:
 def preview(path: Path) -> list[str]:
     """What is inside, a few lines, without reading the points. Never raises."""
     try:
-        return reader(path).preview(path)
+        return [told(line) for line in reader(path).preview(path)]
     except (PatinaError, OSError, ValueError) as error:
-        return [str(error)]
+        return [told(error)]
 
 
 def to_mesh(points: PointFile) -> bpy.types.Mesh:
     """A mesh of vertices alone. Byte colours stay bytes, and so do scalars from -128 to 127 that come as such; everything else
     is float. Takes the arrays out of `points` one by one: a large cloud needs little more memory than the mesh."""
-    mesh = bpy.data.meshes.new(points.name)
+    mesh = bpy.data.meshes.new(told(points.name))
     mesh.vertices.add(len(points.positions))
     mesh.vertices.foreach_set("co", points.positions.reshape(-1))
     points.positions = points.positions[:0].copy()

@@ -3,19 +3,18 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import jobs, native
-from .reading import Filter, PointFile, Progress, colors_of, grid_normals, origin_of, scanners_of
+from .. import jobs, native, readers
+from .crs import units
+from .reading import Filter, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
-MISSING = ("E57 files need the Python package pye57: Patina's extension for Blender 4.2 and later brings it; elsewhere "
-           "run \"{python}\" -m pip install --user pye57")
-
+MISSING = ("E57 files need the Python package pye57: Install Readers in the add-on's preferences fetches it (Patina's extension for "
+           "Blender 4.2 and later brings it)")
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
@@ -32,9 +31,10 @@ _NAMES = {"rowIndex": "row", "columnIndex": "column", "returnIndex": "return_num
 
 def _open(path: Path) -> Any:
     try:
+        readers.load("pye57")
         import pye57
     except ImportError:
-        raise native.PatinaError(MISSING.format(python=sys.executable), -5) from None
+        raise native.PatinaError(MISSING, -5) from None
     try:
         return pye57.E57(str(path))
     except Exception as error:  # libE57 throws its own kinds
@@ -87,7 +87,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         raise native.PatinaError(f"{path.name}: scan {index}: {_first_line(error)}", -4) from None
     finally:
         file.close()
-    points = merge(path.stem, parts, {"crs": crs} if crs else {})
+    points = merge(path.stem, parts, {"crs": crs, **crs_notes(units(crs))} if crs else {})
     points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
     if wanted.every == 1:  # a thinned grid is none
         yield from grid_normals(points, stations, progress)

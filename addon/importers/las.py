@@ -12,8 +12,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .. import jobs, native
-from .reading import Filter, PointFile, Progress, colors_of, origin_of
+from .. import jobs, native, readers
+from . import crs
+from .reading import Filter, PointFile, Progress, colors_of, crs_notes, name_of, origin_of
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
 
@@ -41,8 +42,8 @@ _SCALARS = {"intensity": "intensity", "user_data": "user_data", "point_source_id
             "scan_angle": "scan_angle", "scan_angle_rank": "scan_angle_rank", "nir": "nir"}
 _OURS = {*_SCALARS, "positions", "rgb", "class", "gps_time", "return_number", "number_of_returns"}
 
-MISSING = ("LAZ and COPC files need the Python packages laspy and lazrs: Patina's extension for Blender 4.2 and later "
-           "brings them; elsewhere run \"{python}\" -m pip install --user laspy lazrs, or unpack the file to LAS")
+MISSING = ("LAZ and COPC files need the Python packages laspy and lazrs: Install Readers in the add-on's preferences fetches "
+           "them (Patina's extension for Blender 4.2 and later brings them); or unpack the file to LAS")
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ class Header:
     upper: np.ndarray
     crs: str
     extras: tuple[Extra, ...] = ()
+    units: crs.Units | None = None
 
 
 def _fail(path: Path, what: str) -> native.PatinaError:
@@ -102,23 +104,40 @@ def read_header(path: Path) -> Header:
         box = struct.unpack_from("<12d", head, 131)
         if head[24:26] >= b"\x01\x04" and len(head) >= 255:
             count = struct.unpack_from("<Q", head, 247)[0] or count
-        crs, extras = _records(file, head, header_size, min(records, 4096), data_offset)
+        words, extras, keys = _records(file, head, header_size, min(records, 4096), data_offset)
     return Header(f"{head[24]}.{head[25]}", count, form & 0x3F, bool(form & 0xC0), record_size, data_offset,
-                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), crs, extras)
+                  np.array(box[0:3]), np.array(box[3:6]), np.array(box[7:12:2]), np.array(box[6:12:2]), words, extras,
+                  crs.units(words, keys))
 
 
-def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int) -> tuple[str, tuple[Extra, ...]]:
+def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int
+             ) -> tuple[str, tuple[Extra, ...], dict[int, float]]:
     """Of the variable records, before the points and behind them: the text of the coordinate system (WKT, else what the
-    GeoTIFF keys say in words), and the extra dimensions."""
+    GeoTIFF keys say in words), the extra dimensions, and the GeoTIFF keys that are numbers."""
     wkt = words = ""
+    directory, doubles = b"", b""
     extras: tuple[Extra, ...] = ()
     for user, number, data in itertools.chain(_before(file, at, records, end), _behind(file, head)):
         if user == b"LASF_Projection" and number in {2112, 34737}:
             text = data.rstrip(b"\0").decode("utf-8", "replace")
             wkt, words = (wkt or text, words) if number == 2112 else (wkt, words or text)
+        elif user == b"LASF_Projection" and number == 34735:
+            directory = directory or data
+        elif user == b"LASF_Projection" and number == 34736:
+            doubles = doubles or data
         elif user == b"LASF_Spec" and number == 4:
             extras = extras or tuple(_extra(data[i:i + 192]) for i in range(0, len(data) - 191, 192))
-    return wkt or words, extras
+    return wkt or words, extras, _geo_keys(directory, doubles)
+
+
+def _geo_keys(directory: bytes, doubles: bytes) -> dict[int, float]:
+    """The keys of a GeoTIFF directory whose values are numbers."""
+    entries = [struct.unpack_from("<4H", directory, at) for at in range(8, len(directory) - 7, 8)]
+    found: dict[int, float] = {key: value for key, place, _, value in entries if place == 0}
+    for key, place, _, index in entries:
+        if place == 34736 and 8 * index + 8 <= len(doubles):
+            found[key] = struct.unpack_from("<d", doubles, 8 * index)[0]
+    return found
 
 
 def _before(file: BinaryIO, at: int, records: int, end: int) -> Iterator[tuple[bytes, int, bytes]]:
@@ -162,9 +181,10 @@ def preview(path: Path) -> list[str]:
     names = {name for name, _ in _FORMATS.get(header.form, [])}
     return [f"LAS {header.version}, point format {header.form}{', compressed' * header.compressed}",
             f"{header.points:,} points", f"{size[0]:,.1f} x {size[1]:,.1f} x {size[2]:,.1f}",
-            *(["colours"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
+            *(["cannot be read yet: Install Readers in the add-on's preferences"] * (header.compressed and readers.lacks("laspy", "lazrs"))),
+            *(["colors"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
             *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
-            *([header.crs[:60]] * bool(header.crs))]
+            *([f"units: {header.units}"] * bool(header.units)), *([header.crs[:60]] * bool(header.crs))]
 
 
 def _record(path: Path, header: Header) -> np.dtype:
@@ -189,11 +209,11 @@ def _pieces(path: Path, header: Header, size: int) -> Iterator[np.ndarray]:
     kind = _record(path, header)
     if header.compressed:
         try:
+            readers.load("laspy", "lazrs")
             import laspy
-            import lazrs  # noqa: F401  laspy finds it by itself
+            import lazrs
         except ImportError:
-            import sys
-            raise native.PatinaError(MISSING.format(python=sys.executable), -5) from None
+            raise native.PatinaError(MISSING, -5) from None
         try:
             with laspy.open(str(path)) as file:
                 for points in file.chunk_iterator(size):
@@ -317,8 +337,9 @@ def _normals_of(header: Header, columns: _Columns) -> np.ndarray | None:
 def _assemble(path: Path, header: Header, origin: tuple[float, float, float], columns: _Columns) -> PointFile:
     positions = columns.take("positions")
     if positions is None:
-        return PointFile(path.stem, np.empty((0, 3), np.float32), None, None, {}, origin, 0)
+        return PointFile(name_of(path), np.empty((0, 3), np.float32), None, None, {}, origin, 0)
     notes: dict[str, str | float] = {"crs": header.crs} if header.crs else {}
+    notes |= crs_notes(header.units)
     rgb = columns.take("rgb")
     colors = None if rgb is None else colors_of(rgb)
     del rgb  # before more is made
@@ -336,4 +357,6 @@ def _assemble(path: Path, header: Header, origin: tuple[float, float, float], co
     for name in columns:
         values = columns.take(name)
         scalars[name] = values if values.dtype.itemsize == 1 else values.astype(np.float32)
-    return PointFile(path.stem, positions, normals, colors, scalars, origin, 0, notes)
+    degrees = header.units is not None and header.units.degrees
+    warnings = [f"{path.name}: its coordinates are longitude and latitude in degrees; project them to see right shapes"] * degrees
+    return PointFile(name_of(path), positions, normals, colors, scalars, origin, 0, notes, warnings)

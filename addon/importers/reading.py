@@ -6,10 +6,12 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 from .. import jobs, native
+from .crs import Units
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -47,7 +49,8 @@ class PointFile:
     scalars: dict[str, np.ndarray]  # (n,) float32, or bytes with a sign or without, by name
     origin: tuple[float, float, float]  # float64
     invalid: int  # positions that are not finite
-    # kept with the mesh: "crs", "gps_time_start", "scanners" (x, y, z of each, relative to origin)
+    # kept with the mesh: "crs", "units" (metres of a unit across and up), "gps_time_start", "scanners" (x, y, z of each,
+    # relative to origin)
     notes: dict[str, str | float | list[float]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)  # sentences on what the file lacks or has too much
 
@@ -146,6 +149,23 @@ def _opaque(rgb: np.ndarray, pieces: list[slice], kind: type, one: float,
     for piece in pieces:
         rgba[piece, :3] = convert(rgb[piece])
     return rgba
+
+
+def told(text: object) -> str:
+    """As Blender's texts and names take it: bytes of a file's name that are no UTF-8 become replacement characters."""
+    return str(text).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
+def name_of(path: Path) -> str:
+    """A file's name without its ending, which may be double."""
+    return path.stem.removesuffix(".copc")
+
+
+def crs_notes(units: Units | None) -> dict[str, list[float]]:
+    """The note of a coordinate system's units; none where they are metres, or angles."""
+    if units is None or units.degrees or (units.across, units.up) == (1.0, 1.0):
+        return {}
+    return {"units": [units.across, units.up]}
 
 
 def scanners_of(places: Sequence[Sequence[float]], origin: tuple[float, float, float]) -> dict[str, list[float]]:

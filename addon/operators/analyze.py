@@ -56,7 +56,7 @@ radius, thickness, kind (1 surface, 2 border, 3 line, 4 foliage, 5 stray) and ce
             part = self._progress.part(1, 2)
             part.doing = analysis.label(cloud)
             with part.inner() as inner:
-                task = analyzing.start(cloud, analysis.stations(obj, count), inner)
+                task = analyzing.start(cloud, analysis.stations(obj, obj.data, count), inner)
             yield task
             task.result()
         except native.PatinaCancelled:
@@ -141,8 +141,9 @@ def _corners(obj: bpy.types.Object, frame: int) -> list[Vector]:
             return []
         cloud = jobs.run(lambda: linked.load(source), lambda: None, lambda: False).cloud
     else:
-        count = len(obj.data.vertices if obj.type == 'MESH' else obj.data.points)
-        positions = attributes.positions(obj.data, count) if count else None
+        with attributes.readable(obj) as data:
+            count = len(data.vertices if obj.type == 'MESH' else data.points)
+            positions = attributes.positions(data, count) if count else None
         if positions is None:
             return []
         if obj.type == 'MESH' and len(obj.data.polygons):

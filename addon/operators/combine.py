@@ -7,14 +7,16 @@ import bpy
 from bpy.props import EnumProperty
 from bpy.types import Context, Node, NodeSocket, NodeTree, Operator, Scene, TOPBAR_MT_render
 
-MARK = "patina_points_of"  # on the points' scene: the name of the one that shows them
+from .. import pairs
+from ..pairs import MARK
+
 NODE = "Patina Combine"
 _BELOW = 1 if bpy.app.version < (5, 0, 0) else 0  # input of Alpha Over; before it was the factor, 1
 
 
 class PATINA_OT_combine(Operator):
     """Let Cycles or EEVEE render this scene, and put Patina's points into its picture: a second scene with the same objects \
-draws them, the compositor takes what is nearer. Run it again after changing the camera's or the picture's settings"""
+draws them, and the compositor takes what is nearer. That scene follows this one's camera, size, border and frames"""
 
     bl_idname = "scene.patina_combine"
     bl_label = "Combine with Points by Depth"
@@ -26,7 +28,7 @@ draws them, the compositor takes what is nearer. Run it again after changing the
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return context.scene is not None and MARK not in context.scene
+        return context.scene is not None and pairs.first_of(context.scene) is None
 
     def execute(self, context: Context) -> set[str]:
         scene, layer = context.scene, context.view_layer.name
@@ -49,14 +51,15 @@ draws them, the compositor takes what is nearer. Run it again after changing the
 
 def _points_scene(scene: Scene) -> Scene:
     """A scene of the same objects that Patina draws, without faces and without background. The one from last time goes."""
-    old = next((other for other in bpy.data.scenes if other.get(MARK) == scene.name), None)
+    old = pairs.points_of(scene)
     points = scene.copy()  # collections and objects are the same
     if old:  # what was set there stays
         for name in old.patina.keys():
             points.patina[name] = old.patina[name]
         bpy.data.scenes.remove(old)
     points.name = f"{scene.name} Points"
-    points[MARK] = scene.name
+    points[MARK] = scene
+    pairs.follow(points, scene)
     points.render.engine = 'PATINA'
     points.render.film_transparent = True
     points.patina.meshes = 'OFF'

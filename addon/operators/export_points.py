@@ -17,7 +17,7 @@ from ..sync import attributes
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):
-    """Export the points of mesh and point cloud objects with colours, normals and scalars, the origin added back"""
+    """Export the points of mesh and point cloud objects with colors, normals and scalars, the origin added back"""
 
     bl_idname = "export_scene.patina_points"
     bl_label = "Export Points"
@@ -44,8 +44,11 @@ class PATINA_OT_export_points(Operator, ExportHelper):
         objects = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
                    if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and
                    (obj.select_get() or not self.selected)]
-        scene_origin = np.array(context.scene.get(origin.PROPERTY, origin.ZERO))
-        points = _join([item for obj in objects if (item := _read(obj, scene_origin))])
+        parts = []
+        for obj in objects:
+            with attributes.readable(obj) as data:
+                parts.append(_read(obj, data, context.scene))
+        points = _join(list(filter(None, parts)))
         if points is None:
             self.report({'ERROR'}, "Patina: no selected object has points" if self.selected
                         else "Patina: no visible object has points")
@@ -64,8 +67,8 @@ class PATINA_OT_export_points(Operator, ExportHelper):
 
 
 def _gps_start(objects: list[bpy.types.Object]) -> float:
-    return next((obj.data.original["patina_gps_time_start"] for obj in objects
-                 if "patina_gps_time_start" in obj.data.original), 0.0)
+    return next((obj.original.data["patina_gps_time_start"] for obj in objects
+                 if "patina_gps_time_start" in obj.original.data), 0.0)
 
 
 def read_local(obj: bpy.types.Object) -> exporters.Points | None:
@@ -88,26 +91,30 @@ def _bytes(colors: np.ndarray | None) -> np.ndarray | None:
     return np.rint(np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055) * 255).astype(np.uint8)
 
 
-def _read(obj: bpy.types.Object, scene_origin: np.ndarray) -> exporters.Points | None:
-    data = obj.data
+def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> exporters.Points | None:
     count = len(data.vertices if obj.type == 'MESH' else data.points)
     local = attributes.positions(data, count) if count else None
     if local is None:
         return None
+    shared = origin.shared_of(obj.original, scene)
+    to_file = np.linalg.inv(origin.axes_of(obj.original))
+    own = np.array(obj.original.get(origin.PROPERTY, to_file @ shared), np.float64)
     matrix = np.array(obj.matrix_world, np.float64)
-    own = np.array(obj.original.get(origin.PROPERTY, scene_origin), np.float64)
+    turn, place = to_file @ matrix[:3, :3], matrix[:3, 3]
     # an object that still lies where its import put it goes back to its file's coordinates to the last bit
-    at_place = np.allclose(matrix[:3, 3], own - scene_origin, rtol=0, atol=1e-3 + 1e-6 * np.abs(own - scene_origin).max())
-    move = own if at_place or not any(scene_origin) else scene_origin + matrix[:3, 3]
-    positions = local.astype(np.float64) @ matrix[:3, :3].T + move
-    if not at_place and not any(scene_origin):
-        positions += matrix[:3, 3]
+    home = origin.axes_of(obj.original) @ own - shared
+    at_place = np.allclose(place, home, rtol=0, atol=1e-3 + 1e-6 * np.abs(home).max())
+    if at_place and np.allclose(turn, np.eye(3), rtol=0, atol=1e-6):
+        turn = np.eye(3)
+    together = any(shared) or origin.SHARED in obj.original
+    move = own if at_place else to_file @ (shared + place) if together else own + to_file @ place
+    positions = local.astype(np.float64) @ turn.T + move
     normals = attributes.normals(data, count, obj.patina.normal_attribute)
     colors = attributes.colors(data, count, obj.patina.color_attribute)
     if normals is not None:
-        normals = normals @ np.linalg.inv(matrix[:3, :3]) if np.linalg.det(matrix[:3, :3]) else normals
+        normals = normals @ np.linalg.inv(turn) if np.linalg.det(turn) else normals
     return exporters.Points(positions, normals, _bytes(colors), _scalars(data, count),
-                            str(data.original.get("patina_crs", "")))
+                            str(obj.original.data.get("patina_crs", "")))
 
 
 def _scalars(data: bpy.types.ID, count: int) -> dict[str, np.ndarray]:

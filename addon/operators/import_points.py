@@ -3,24 +3,30 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty,
+                       StringProperty)
 from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, styles
-from ..importers import PointFile, origin
-from ..sync import linked, sequence
+from ..importers import PointFile, name_of, origin, told
+from ..sync import files, linked, sequence
 from ..sync.analysis import SCANNERS
+from . import set_up
 from .steps import Stepped
+
+METERS = (1.0, 1.0)  # of a file's units, across and up
 
 _previews: dict[tuple[str, float], list[str]] = {}  # of the file that is looked at last
 
 
 class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
-    """Import point files with colours, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf"""
+    """Import point files with colors, normals and scalars: PLY, LAS, LAZ, COPC, E57, PTX, PTS, XYZ, CSV, PCD, conf"""
 
     bl_idname = "import_scene.patina_points"
     bl_label = "Import Points"
@@ -35,6 +41,23 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         items=(
             ('SHARED', "Shared", "All files of the scene share one origin and keep their places to each other", 0),
             ('OWN', "Own", "Each file goes near zero and remembers its own origin", 1)))
+    unit: EnumProperty(
+        name="Unit", default='FILE',
+        description="How long a unit of the file is. One meter becomes one unit of Blender",
+        items=(
+            ('FILE', "From File", "What the file's coordinate system says; meters where it says nothing", 0),
+            ('METERS', "Meters", "", 1), ('CENTIMETERS', "Centimeters", "", 2), ('MILLIMETERS', "Millimeters", "", 3),
+            ('FEET', "Feet", "International feet, 0.3048 m", 4), ('US_FEET', "US Survey Feet", "1200/3937 m", 5),
+            ('INCHES', "Inches", "", 6)))
+    scale: FloatProperty(name="Scale", default=1.0, min=1e-6, soft_min=0.001, soft_max=1000.0, max=1e6,
+                         description="Multiplied with the unit")
+    up_axis: EnumProperty(
+        name="Up Axis", default='Z', description="Which of the file's axes points up",
+        items=(
+            ('Z', "Z", "As in Blender, and in surveys", 0), ('Y', "Y", "As in many scans of objects", 1),
+            ('NEGATIVE_Y', "-Y", "As in photogrammetry that begins with a camera", 2)))
+    frame: BoolProperty(name="Frame Points", default=False,
+                        description="Aim the scene's camera at the points afterwards; strays do not count")
     link: BoolProperty(
         name="Link", default=False,
         description="Keep the points out of Blender: the object is a box, Patina reads the file itself. For scans too large "
@@ -52,11 +75,15 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
     box_max: FloatVectorProperty(name="To", subtype='XYZ', precision=3, default=(1.0, 1.0, 1.0),
                                  description="Upper corner, in the file's own coordinates")
 
-    def draw(self, _context: Context) -> None:
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(self, "origin")
+        layout.prop(self, "unit")
+        layout.prop(self, "scale")
+        layout.prop(self, "up_axis")
+        layout.prop(self, "frame")
         layout.prop(self, "link")
         row = layout.row()
         row.active = self.link
@@ -71,8 +98,10 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         lines = _preview(self._paths()[0])
         if lines:
             column = layout.box().column(align=True)
+            width = max(int(context.region.width / (7.5 * context.preferences.system.ui_scale)) - 4, 20)  # letters
             for line in lines:
-                column.label(text=line)
+                for part in textwrap.wrap(line, width) or [""]:
+                    column.label(text=part)
 
     def execute(self, context: Context) -> set[str]:
         self._progress = importers.Progress()
@@ -84,16 +113,17 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             try:
                 points = yield from self._read(path, self._progress.part(index, len(paths)))
             except native.PatinaCancelled:
-                return self._ended([mesh for mesh, _ in found])
+                return self._ended([mesh for mesh, _, _ in found])
             if points:
-                found.append((importers.to_mesh(points), points.origin))
+                units = points.notes.get("units", METERS)
+                found.append((importers.to_mesh(points), points.origin, units))
         if not found:
             return {'CANCELLED'}
         bpy.ops.object.select_all(action='DESELECT') if bpy.ops.object.select_all.poll() else None
-        shared = self._shared_origin(context, [own for _, own in found])
-        for mesh, own in found:
-            self._add(context, bpy.data.objects.new(mesh.name, mesh), own, shared)
-        count = sum(len(mesh.vertices) for mesh, _ in found)
+        for mesh, own, units in found:
+            self._add(context, bpy.data.objects.new(mesh.name, mesh), own, units)
+        self._finish(context)
+        count = sum(len(mesh.vertices) for mesh, _, _ in found)
         self.report({'INFO'}, f"Imported {count:,} points from {len(found)} file{'s' * (len(found) > 1)}. In the sidebar, Patina > "
                               "Frame Points aims the camera")
         return {'FINISHED'}
@@ -104,18 +134,36 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         self.report({'INFO'}, "Patina: nothing was imported, for it was ended before")
         return {'CANCELLED'}
 
-    def _shared_origin(self, context: Context, origins: list) -> origin.Origin | None:
-        return origin.shared(context.scene, origins) if self.origin == 'SHARED' else None
-
-    def _add(self, context: Context, obj: bpy.types.Object, own: origin.Origin, shared: origin.Origin | None) -> None:
-        """Places the object, selected, in the scene."""
-        warning = origin.place(obj, own, shared)
+    def _add(self, context: Context, obj: bpy.types.Object, own: origin.Origin, units: Sequence[float]) -> None:
+        """Places the object, selected, in the scene. units: metres of the file's, across and up."""
+        if self.unit != 'FILE':
+            units = (origin.UNITS[self.unit],) * 2
+        turn = None
+        if (self.up_axis, self.scale, *units) != ('Z', 1.0, 1.0, 1.0):
+            turn = origin.axes(self.up_axis, units[0] * self.scale, units[1] * self.scale)
+        shared, away = None, 0.0
+        if self.origin == 'SHARED':
+            shared = origin.shared(context.scene, own, turn)
+            away = origin.apart(context.scene, shared)
+        warning = origin.place(obj, own, shared, turn)
+        if away:
+            warning = f"'{obj.name}' lies {away:,.1f} km from the points that are there: both are near zero"
         if warning:
-            self.report({'WARNING'}, warning)
+            self._tell('WARNING', warning)
         context.collection.objects.link(obj)
         styles.dress(context.scene, obj)
         obj.select_set(True)
         context.view_layer.objects.active = obj
+
+    def _finish(self, context: Context) -> None:
+        """Once the points are there, and selected."""
+        if self.frame and bpy.ops.object.patina_frame_points.poll():
+            bpy.ops.object.patina_frame_points()
+        if self._invoked and set_up.untouched(context.scene):
+            set_up.offer(context)
+
+    def _tell(self, kind: str, text: str) -> None:
+        self.report({kind}, told(f"Patina: {text}"))
 
     def _link(self, context: Context) -> jobs.Steps[set[str]]:
         found: dict[Path, linked.Linked] = {}  # by the path or pattern that objects shall name
@@ -133,16 +181,16 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             except native.PatinaCancelled:
                 return self._ended([])
             except native.PatinaError as error:
-                self.report({'ERROR'}, f"Patina: {first.name}: {error}")
-        shared = self._shared_origin(context, [item.origin for item in found.values()])
+                self._tell('ERROR', f"{first.name}: {error}")
         for path, item in found.items():
-            name = path.stem.replace("#", "").rstrip("_-. ") or path.stem if self.sequence else path.stem
+            name = told(name_of(path).replace("#", "").rstrip("_-. ") or path.stem if self.sequence else name_of(path))
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
             if item.scanners:
                 obj.data[SCANNERS] = item.scanners
-            obj.patina.linked_file = str(path)
+            files.assign(obj, files.as_preferred(path))
             obj.patina.sequence.start = context.scene.frame_start
-            self._add(context, obj, item.origin, shared)
+            self._add(context, obj, item.origin, item.units)
+        self._finish(context)
         self.report({'INFO'}, f"Linked {sum(item.cloud.count for item in found.values()):,} points. In the sidebar, Patina > "
                               "Frame Points aims the camera")
         return {'FINISHED'} if found else {'CANCELLED'}
@@ -176,16 +224,15 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             raise
         except native.PatinaError as error:
             text = str(error)
-            self.report({'ERROR'}, f"Patina: {text}" if path.name in text else f"Patina: {path.name}: {text}")
+            self._tell('ERROR', text if path.name in text else f"{path.name}: {text}")
             return None
         for text in points.warnings:
-            self.report({'WARNING'}, f"Patina: {text}")
+            self._tell('WARNING', text)
         if points.invalid:
-            self.report({'WARNING'}, f"{path.name}: {points.invalid:,} points without a finite position are "
-                                     "kept, but never drawn")
+            self._tell('WARNING', f"{path.name}: {points.invalid:,} points without a finite position are kept, but never drawn")
         if not len(points.positions):
             left = "" if wanted.keeps_all() else " that the filters keep"
-            self.report({'ERROR'}, f"Patina: {path.name} holds no points{left}")
+            self._tell('ERROR', f"{path.name} holds no points{left}")
             return None
         return points
 

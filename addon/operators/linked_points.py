@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from .. import exporters, importers, jobs, native
 from ..importers import origin
-from ..sync import linked
+from ..sync import files, linked
 from . import export_points
 
 
@@ -26,7 +26,8 @@ class PATINA_OT_linked_to_mesh(Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return context.object is not None and bool(context.object.patina.linked_file)
+        obj = context.object
+        return obj is not None and obj.mode == 'OBJECT' and bool(obj.patina.linked_file)
 
     def execute(self, context: Context) -> set[str]:
         obj, notices = context.object, []
@@ -40,11 +41,11 @@ class PATINA_OT_linked_to_mesh(Operator):
             points = jobs.run(lambda: module.read(source.path, importers.Filter(), importers.Progress()), lambda: None,
                               lambda: False)
         except native.PatinaError as error:
-            self.report({'ERROR'}, f"Patina: {error}")
+            self.report({'ERROR'}, importers.told(f"Patina: {error}"))
             return {'CANCELLED'}
         box = obj.data
         obj.data = importers.to_mesh(points)
-        obj.patina.linked_file = ""
+        files.assign(obj, "")
         if not box.users:
             bpy.data.meshes.remove(box)
         return {'FINISHED'}
@@ -63,7 +64,8 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
     @classmethod
     def poll(cls, context: Context) -> bool:
         obj = context.object
-        return obj is not None and obj.type == 'MESH' and not obj.patina.linked_file and not len(obj.data.polygons)
+        return (obj is not None and obj.type == 'MESH' and obj.mode == 'OBJECT' and not obj.patina.linked_file
+                and not len(obj.data.polygons))
 
     def execute(self, context: Context) -> set[str]:
         obj, path = context.object, Path(bpy.path.abspath(self.filepath))
@@ -75,12 +77,12 @@ class PATINA_OT_mesh_to_linked(Operator, ExportHelper):
             exporters.write_ply(path, points)
             found = jobs.run(lambda: linked.load(linked.source(path)), lambda: None, lambda: False)
         except (native.PatinaError, OSError) as error:
-            self.report({'ERROR'}, f"Patina: {path.name}: {error}")
+            self.report({'ERROR'}, importers.told(f"Patina: {path.name}: {error}"))
             return {'CANCELLED'}
         obj.data = linked.box_mesh(obj.name, found.box)
         # the file's own origin may differ from the object's by what float32 holds
         obj[origin.PROPERTY] = [float(value) for value in found.origin]
-        obj.patina.linked_file = str(path)
+        files.assign(obj, files.as_preferred(path))
         return {'FINISHED'}
 
 

@@ -31,7 +31,7 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
     filter_glob: StringProperty(default="*.png;*.tif;*.tiff", options={'HIDDEN'})
     check_extension = None  # PNG or TIFF, as the name says
     scale: FloatProperty(name="Scale 1 :", default=100.0, min=1e-3, soft_max=10000.0, precision=1,
-                         description="Metres in the scene for each metre on paper")
+                         description="Meters in the scene for each meter on paper")
     dpi: FloatProperty(name="Dots per Inch", default=300.0, min=1.0, soft_max=1200.0, precision=0,
                        description="Of the printer: together with the scale it decides how large a pixel is")
     margin: FloatProperty(name="Margin", default=0.02, min=0.0, max=1.0, subtype='FACTOR',
@@ -70,16 +70,24 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
                     return {'CANCELLED'}
             finally:
                 render.filepath, render.use_file_extension, render.image_settings.file_format = kept
-        corner = np.array(scene.get(origin.PROPERTY, origin.ZERO)) + np.array(
-            (camera.location.x - 0.5 * width * pixel, camera.location.y + 0.5 * height * pixel, 0.0))
+        zero, unit = _survey(context)
+        corner = zero + (camera.location.x - 0.5 * width * pixel, camera.location.y + 0.5 * height * pixel, 0.0)
         target = path.with_suffix(WORLD_FILES[path.suffix.lower()])
         try:
-            target.write_text(world_file(corner[0], corner[1], pixel), encoding="ascii")
+            target.write_text(world_file(corner[0] / unit, corner[1] / unit, pixel / unit), encoding="ascii")
         except OSError as error:
             self.report({'ERROR'}, f"Patina: {target.name} cannot be written: {error.strerror}")
             return {'CANCELLED'}
         self.report({'INFO'}, f"{width:,} x {height:,} pixels of {pixel:.6g} units; world file {target.name}")
         return {'FINISHED'}
+
+
+def _survey(context: Context) -> tuple[np.ndarray, float]:
+    """Where in the world Blender's zero is to the selected points, in metres, and how many of them a unit of their survey is."""
+    scanned = next((obj for obj in context.selected_objects if origin.PROPERTY in obj), None)
+    if scanned is None:
+        return np.array(context.scene.get(origin.PROPERTY, origin.ZERO), np.float64), 1.0
+    return origin.shared_of(scanned, context.scene), float(np.linalg.norm(origin.axes_of(scanned)[:, 0]))
 
 
 def world_file(left: float, top: float, pixel: float) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 from bpy.props import PointerProperty, StringProperty
-from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer
+from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume
 
 from .. import styles
 from ..native import MOST_LAYERS
@@ -22,6 +22,7 @@ from .studio import PatinaStudioProperties
 from .style import PatinaStyleProperties
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
+_PATH = {'ANIMATABLE', *({'PATH_SUPPORTS_BLEND_RELATIVE'} if bpy.app.version >= (4, 5, 0) else ())}  # which warns without
 
 
 def enum_number(group: PropertyGroup, name: str) -> int:
@@ -40,7 +41,7 @@ class PatinaSceneProperties(PropertyGroup):
         name="Surface", override=_OVERRIDE, default='AUTO',
         description="How points become a surface",
         items=(
-            ('AUTO', "Automatic", "Points that lie wide apart on screen are discs as wide as their neighbourhood says, the others "
+            ('AUTO', "Automatic", "Points that lie wide apart on screen are discs as wide as their neighborhood says, the others "
                                   "are filled", 0),
             ('FILL', "Filled", "Gaps between the points are filled in the picture: fast, whatever the spacing", 2),
             ('SPLATS', "Discs", "Every point is a small disc across its normal, discs that overlap are blended: smoother, "
@@ -48,7 +49,7 @@ class PatinaSceneProperties(PropertyGroup):
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
-        description="Expected error of colours, in percent of white, that the picture may have: the cheapest quality and "
+        description="Expected error of colors, in percent of white, that the picture may have: the cheapest quality and "
                     "hole filling that keep to it are chosen. 0: as they are set below")
     quality: EnumProperty(
         name="Quality", override=_OVERRIDE, default='REFINED',
@@ -68,12 +69,12 @@ class PatinaSceneProperties(PropertyGroup):
         description="Rounds of hole filling; 0 follows the spacing of the points on screen")
     smooth: EnumProperty(
         name="Smoothing", override=_OVERRIDE, default='ALLEVIATED',
-        description="Smooths colours between neighbouring pixels of one surface",
+        description="Smooths colors between neighboring pixels of one surface",
         items=(
             ('ALLEVIATED', "Alleviated Gaussian", "Weights 16, 2 and 1: takes the noise, keeps the detail", 0),
             ('GAUSSIAN', "Gaussian", "3 × 3 Gaussian", 1),
             ('BOX', "Box", "Mean of 3 × 3 pixels", 2),
-            ('OFF', "Off", "Colours as they are", 3)))
+            ('OFF', "Off", "Colors as they are", 3)))
     antialias: EnumProperty(
         name="Anti-Aliasing", override=_OVERRIDE, default='LAYERS',
         description="Which edges are blended",
@@ -103,7 +104,7 @@ class PatinaSceneProperties(PropertyGroup):
         name="Cut Parts Cast Shadows", override=_OVERRIDE, default=False,
         description="What clip boxes and planes cut away still casts shadows")
     shadow_file: StringProperty(
-        name="Baked", override=_OVERRIDE, subtype='FILE_PATH',
+        name="Baked", override=_OVERRIDE, subtype='FILE_PATH', options=_PATH,
         description="Shadow textures to take from a file instead of computing them; empty: none")
     device: EnumProperty(
         name="Device", override=_OVERRIDE, default='AUTO',
@@ -146,12 +147,17 @@ class PatinaSceneProperties(PropertyGroup):
                     "spread over them, at least one each")
     tile_size: IntProperty(
         name="Tile Size", override=_OVERRIDE, default=0, min=0, max=16384, subtype='PIXEL',
-        description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: tiles of 4096 "
-                    "pixels for pictures of more than 16 million")
+        description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: as large "
+                    "as the memory that is free allows, at most 4096")
     navigation_ms: IntProperty(
         name="Navigation", override=_OVERRIDE, default=60, min=5, soft_max=200, max=1000,
         description="Milliseconds until a picture of the viewport is seen while the view moves, with what Blender takes for "
                     "its window; fewer points and pixels are drawn until it fits. At rest the whole picture follows")
+
+
+def _follow_file(group: PropertyGroup, _context: Context) -> None:
+    from ..sync import files  # which needs these properties
+    files.follow(group.id_data)
 
 
 class PatinaObjectProperties(PropertyGroup):
@@ -161,9 +167,9 @@ class PatinaObjectProperties(PropertyGroup):
         name="Lighting", override=_OVERRIDE, default='AUTO',
         description="Whether the scene's lights shade the points",
         items=(
-            ('AUTO', "Automatic", "Points with colours are unlit (a scan's colours hold the light of its day), "
+            ('AUTO', "Automatic", "Points with colors are unlit (a scan's colors hold the light of its day), "
                                   "others lit", 0),
-            ('UNLIT', "Unlit", "Colours as they are", 1),
+            ('UNLIT', "Unlit", "Colors as they are", 1),
             ('LIT', "Lit", "Shaded by lights and world", 2)))
     cull_back: BoolProperty(
         name="Backface Culling", override=_OVERRIDE, default=False,
@@ -219,12 +225,14 @@ class PatinaObjectProperties(PropertyGroup):
     opacity_attribute: StringProperty(
         name="Opacities", override=_OVERRIDE,
         description="Point attribute that opacity is multiplied by: numbers from 0 to 1, yes or no, or the alpha of a "
-                    "colour attribute; empty: none")
+                    "color attribute; empty: none")
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
-        description="Colour of points that have none")
+        description="Color of points that have none")
+    linked_data: PointerProperty(  # where the file's path is kept: sync/files.py
+        type=Volume, name="Linked Data", override=_OVERRIDE, options={'HIDDEN'})
     linked_file: StringProperty(
-        name="Linked File", override=_OVERRIDE, subtype='FILE_PATH',
+        name="Linked File", override=_OVERRIDE, subtype='FILE_PATH', options=_PATH, update=_follow_file,
         description="Point file that is drawn in place of the object's own vertices; its points never become Blender's. "
                     "Number signs in its name stand for digits: scan_####.ply shows a file a frame")
     sequence: PointerProperty(type=PatinaSequenceProperties, override=_OVERRIDE)
@@ -236,7 +244,7 @@ class PatinaObjectProperties(PropertyGroup):
         name="On Itself", override=_OVERRIDE, default=True, description="These points' shadows fall on themselves")
     color_attribute: StringProperty(
         name="Colors", override=_OVERRIDE,
-        description="Point attribute to take colours from; empty: the active colour attribute, or a usual name")
+        description="Point attribute to take colors from; empty: the active color attribute, or a usual name")
     normal_attribute: StringProperty(
         name="Normals", override=_OVERRIDE,
         description="Point attribute to take normals from; empty: the first of normal, Normal, nor, N")
@@ -265,7 +273,7 @@ class PatinaViewLayerProperties(PropertyGroup):
     use_pass_source: BoolProperty(
         name="Source", default=False, update=_update_passes, override=_OVERRIDE,
         description="What is scan and what is invention: 0 nothing, 1 measured, 1 + distance filled from a "
-                    "neighbour that many pixels away, negative where anti-aliasing mixed")
+                    "neighbor that many pixels away, negative where anti-aliasing mixed")
     use_pass_line: BoolProperty(
         name="Line", default=False, update=_update_passes, override=_OVERRIDE,
         description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
@@ -279,7 +287,7 @@ class PatinaViewLayerProperties(PropertyGroup):
                     "0 where nothing is, or nothing is known")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
-        description="Colour, depth and normal of so many layers of surface, the nearest first, as passes of their own; "
+        description="Color, depth and normal of so many layers of surface, the nearest first, as passes of their own; "
                     "layers behind opaque surfaces too")
 
 

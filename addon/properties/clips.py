@@ -22,7 +22,7 @@ class PatinaClipProperties(PropertyGroup):
         description="Box: cuts out what lies in it, else keeps only that. Plane: cuts off what lies below")
     tint: FloatVectorProperty(
         name="Tint", override=_OVERRIDE, default=(0.9, 0.06, 0.03), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour of the points beside the cut")
+        description="Color of the points beside the cut")
     tint_strength: FloatProperty(
         name="Strength", override=_OVERRIDE, default=0.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much of the tint there is; 0: none")

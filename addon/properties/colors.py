@@ -24,10 +24,10 @@ def class_name(number: int) -> str:
 class PatinaColorProperties(PropertyGroup):
     source: EnumProperty(
         name="Color", override=_OVERRIDE, default='OWN',
-        description="Where the colour of the points comes from",
+        description="Where the color of the points comes from",
         items=(
-            ('OWN', "Attribute", "The points' own colours", 0),
-            ('FIXED', "Fixed", "One colour for all points", 1),
+            ('OWN', "Attribute", "The points' own colors", 0),
+            ('FIXED', "Fixed", "One color for all points", 1),
             ('SCALAR', "Ramp over Attribute", "A ramp over numbers that the points have: intensity, class, scan number", 2),
             ('HEIGHT', "Ramp over Height", "A ramp over the world's Z", 3),
             ('OBJECT_HEIGHT', "Ramp over Local Height", "A ramp over the object's own Z", 4),
@@ -36,15 +36,15 @@ class PatinaColorProperties(PropertyGroup):
         name="Attribute", override=_OVERRIDE, description="Point attribute that the ramp is laid over")
     ramp: EnumProperty(
         name="Ramp", override=_OVERRIDE, default='VIRIDIS',
-        description="Colours from the least value to the greatest",
+        description="Colors from the least value to the greatest",
         items=(
-            ('VIRIDIS', "Viridis", "Violet, green, yellow: even steps of lightness, safe for colour-blind eyes", 0),
-            ('GREY', "Grey", "Black to white", 1),
+            ('VIRIDIS', "Viridis", "Violet, green, yellow: even steps of lightness, safe for color-blind eyes", 0),
+            ('GREY', "Gray", "Black to white", 1),
             ('HEAT', "Heat", "Black, red, yellow, white", 2),
             ('SPECTRUM', "Spectrum", "Blue, green, yellow, red", 3),
             ('RELIEF', "Relief", "Water, meadow, rock, snow", 4),
             ('DIVERGING', "Diverging", "Blue, white, red: for values around a middle", 5),
-            ('CLASSES', "LAS Classes", "A colour for each class", 6),
+            ('CLASSES', "LAS Classes", "A color for each class", 6),
             ('CUSTOM', "Custom", "A color ramp of your own", 7)))
     texture: PointerProperty(
         name="Custom Ramp", type=bpy.types.Texture, override=_OVERRIDE,
@@ -58,10 +58,10 @@ class PatinaColorProperties(PropertyGroup):
                              description="Value at the ramp's end")
     exposure: FloatProperty(
         name="Exposure", override=_OVERRIDE, default=0.0, soft_min=-5.0, soft_max=5.0, min=-32.0, max=32.0,
-        description="Brightness of the points' colours, in stops, before they are lit")
+        description="Brightness of the points' colors, in stops, before they are lit")
     contrast: FloatProperty(
         name="Contrast", override=_OVERRIDE, default=1.0, min=0.01, soft_min=0.2, soft_max=3.0, max=16.0,
-        description="Contrast of the points' colours around mid grey")
+        description="Contrast of the points' colors around mid gray")
     class_attribute: StringProperty(
         name="Classes", override=_OVERRIDE,
         description="Point attribute that holds the points' classes; empty: class or classification")

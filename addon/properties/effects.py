@@ -12,13 +12,13 @@ _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 class PatinaEffectsProperties(PropertyGroup):
     use_edl: BoolProperty(
         name="Eye-Dome Lighting", override=_OVERRIDE, default=False,
-        description="What lies behind its neighbours on screen is darker: shape shows without light and normals")
+        description="What lies behind its neighbors on screen is darker: shape shows without light and normals")
     edl_strength: FloatProperty(
         name="Strength", override=_OVERRIDE, default=1.0, min=0.0, max=10.0, soft_max=3.0,
         description="How dark edges and slopes become")
     edl_radius: FloatProperty(
         name="Radius", override=_OVERRIDE, default=1.4, min=1.0, max=16.0, subtype='PIXEL',
-        description="How far away the neighbours lie that are compared")
+        description="How far away the neighbors lie that are compared")
     use_obscurance: BoolProperty(
         name="Ambient Obscurance", override=_OVERRIDE, default=False,
         description="Folds and corners are darker, by what surrounds them")
@@ -42,13 +42,13 @@ class PatinaEffectsProperties(PropertyGroup):
         description="How much fog hides at its end and beyond")
     fog_use_color: BoolProperty(
         name="Own Color", override=_OVERRIDE, default=False,
-        description="A colour of its own; else points fade into the background")
+        description="A color of its own; else points fade into the background")
     fog_color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.7, 0.75, 0.8), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour of the fog")
+        description="Color of the fog")
     use_toon: BoolProperty(
         name="Toon", override=_OVERRIDE, default=False,
-        description="Light goes in bands, with obscurance and eye-dome lighting; the points' own colours stay")
+        description="Light goes in bands, with obscurance and eye-dome lighting; the points' own colors stay")
     toon_bands: IntProperty(
         name="Bands", override=_OVERRIDE, default=3, min=2, max=16, description="How many lights there are")
     toon_softness: FloatProperty(
@@ -68,16 +68,16 @@ class PatinaEffectsProperties(PropertyGroup):
         description="How much the ink hides")
     hatch_ground: FloatProperty(
         name="White Ground", override=_OVERRIDE, default=0.0, min=0.0, max=1.0, subtype='FACTOR',
-        description="How far the points' colours give way to white beneath the strokes")
+        description="How far the points' colors give way to white beneath the strokes")
     hatch_color: FloatVectorProperty(
         name="Ink", override=_OVERRIDE, default=(0.01, 0.01, 0.012), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour of the strokes")
+        description="Color of the strokes")
     use_paper: BoolProperty(
         name="Paper", override=_OVERRIDE, default=False,
         description="The whole picture is tinted and grained as if it were on paper")
     paper_color: FloatVectorProperty(
         name="Tint", override=_OVERRIDE, default=(0.93, 0.88, 0.78), min=0.0, max=1.0, subtype='COLOR', size=3,
-        description="Colour of the paper")
+        description="Color of the paper")
     paper_grain: FloatProperty(
         name="Grain", override=_OVERRIDE, default=0.15, min=0.0, max=1.0, subtype='FACTOR',
         description="How uneven the paper is")

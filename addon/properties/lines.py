@@ -44,10 +44,10 @@ class PatinaLinesProperties(PropertyGroup):
             ('DEPTH', "Depth", "From one color near to another far", 2)))
     color: FloatVectorProperty(
         name="Line Color", override=_OVERRIDE, default=(0.0, 0.0, 0.0), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour of lines; by depth, of the nearest")
+        description="Color of lines; by depth, of the nearest")
     far_color: FloatVectorProperty(
         name="Far Color", override=_OVERRIDE, default=(0.6, 0.6, 0.6), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour of the farthest lines")
+        description="Color of the farthest lines")
     tint: FloatProperty(
         name="Brightness", override=_OVERRIDE, default=0.25, min=0.0, soft_max=1.0, subtype='FACTOR',
         description="How bright lines are beside the points that they belong to")
@@ -66,4 +66,4 @@ class PatinaLinesProperties(PropertyGroup):
             ('NONE', "Nothing", "Lines alone; opaque points hide still what is behind them", 2)))
     paper: FloatVectorProperty(
         name="Paper", override=_OVERRIDE, default=(1.0, 1.0, 1.0), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour of the surface under the lines")
+        description="Color of the surface under the lines")

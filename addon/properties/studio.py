@@ -26,10 +26,10 @@ class PatinaStudioProperties(PropertyGroup):
         description="The light turns with the scene's camera; else azimuth 0 is the direction -Y")
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(1.0, 1.0, 1.0), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour of the light")
+        description="Color of the light")
     strength: FloatProperty(
         name="Strength", override=_OVERRIDE, default=3.0, min=0.0, soft_max=10.0,
-        description="Watts a square metre, as of Blender's suns: at 3.14 a surface that faces the light shows its own colour")
+        description="Watts a square meter, as of Blender's suns: at 3.14 a surface that faces the light shows its own color")
     angle: FloatProperty(
         name="Size", override=_OVERRIDE, default=radians(20), min=0.0, max=radians(90), subtype='ANGLE',
         description="Angle that the light spans: the larger, the softer its shadows")
@@ -48,7 +48,7 @@ class PatinaStudioProperties(PropertyGroup):
         description="Watts a square meter, as of Blender's suns: at 3.14 a surface that faces the camera shows its own color")
     use_background: BoolProperty(
         name="Background", override=_OVERRIDE, default=False,
-        description="A colour of its own lies behind the points, in place of the world's")
+        description="A color of its own lies behind the points, in place of the world's")
     background: FloatVectorProperty(
         name="Background Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, soft_max=1.0, subtype='COLOR', size=3,
-        description="Colour behind the points")
+        description="Color behind the points")

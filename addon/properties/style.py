@@ -40,12 +40,12 @@ def _apply(group: PatinaStyleProperties, _context: Context) -> None:
 class PatinaStyleProperties(PropertyGroup):
     chosen: EnumProperty(
         name="Style", items=_list, get=_chosen, set=_choose, update=_apply, options=set(),
-        description="How the points look: lines, light, colours and background at once")
+        description="How the points look: lines, light, colors and background at once")
     objects: EnumProperty(
         name="Apply To", default='ALL', options=set(),
         description="Which objects a chosen style changes, beside the scene",
         items=(
             ('ALL', "All Points", "Every object of the scene that Patina draws", 0),
-            ('SELECTED', "Selected Points", "Selected objects only: others keep their colours and lighting", 1)))
+            ('SELECTED', "Selected Points", "Selected objects only: others keep their colors and lighting", 1)))
     applied: StringProperty(options={'HIDDEN'})
     notice: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})

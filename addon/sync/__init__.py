@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import bpy
 
 from .. import migrate
-from . import clips, clouds, effects, lights, lines, settings, world
+from . import clipping, clips, clouds, effects, lights, lines, settings, world
 from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
 from .clips import Clip, of_view as view_clips
-from .clouds import CloudItem, CloudStyle, Pending, Trusted, changed_owners, style_of
+from .clouds import CloudItem, CloudStyle, Pending, PendingLink, Trusted, changed_owners, style_of
 from .effects import Effects
 from .lights import Headlight, Light
 from .lines import Lines
@@ -25,7 +25,7 @@ from .settings import DeviceChoice, Settings
 from .world import Mist
 
 __all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Lines", "MeshItem", "Mist",
-           "Panorama", "Pending", "Effects", "Focus",
+           "Panorama", "Pending", "PendingLink", "Effects", "Focus",
            "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "view_clips", "viewport_view"]
 
@@ -53,8 +53,9 @@ def describe(depsgraph: bpy.types.Depsgraph, view: View, poll: Callable[[str, fl
     """Reads the scene of a final render. poll(what, progress of it) is called during long steps and returns True to
     cancel. frame: whose files sequences show, where the scene stands at a moment beside it."""
     notices: list[str] = []
+    taking = clouds.TakingNow(poll, notices)
     return describe_items(depsgraph, view, notices,
-                          clouds.collect(depsgraph, clouds.taking_now(poll, notices), notices, frame=frame))
+                          clouds.collect(depsgraph, taking, notices, frame=frame, settle=taking.settle))
 
 
 def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trusted,
@@ -74,12 +75,13 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
                    items: list[CloudItem | MeshItem]) -> SceneDescription:
     """Lights, world and settings of a scene around clouds and meshes that the caller has."""
     scene = depsgraph.scene_eval
-    notices += filter(None, [migrate.notice(scene)])
+    points = [item for item in items if isinstance(item, CloudItem)]
+    notices += filter(None, [migrate.notice(scene), clipping.notice(points, view)])
     studio = scene.patina.studio
     replaced = studio.use_light and studio.use_background  # then nothing of the world is drawn
     background = world.background(None if replaced else scene.world, notices)
     return SceneDescription(
-        clouds=[item for item in items if isinstance(item, CloudItem)],
+        clouds=points,
         meshes=[item for item in items if isinstance(item, MeshItem)],
         clips=clips.collect(depsgraph),
         lights=lights.collect(depsgraph, notices),

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
 
 from .. import native, styles
-from . import attributes, sequence
+from . import attributes, files, sequence
 
 SCANNERS = "patina_scanners"  # of the data: x, y, z of each, as the points' own coordinates
 SCAN, ROW, COLUMN = "scan", "row", "column"  # point attributes: by which of them, and where in its grid
@@ -42,9 +41,10 @@ def wanted(obj: bpy.types.Object) -> bool:
     return obj.patina.analysis == 'ALWAYS' or obj.patina.analysis == 'AUTO' and not _moves(obj.original)
 
 
-def stations(obj: bpy.types.Object, count: int) -> Stations | None:
+def stations(obj: bpy.types.Object, data: bpy.types.ID, count: int) -> Stations | None:
+    """data: the object's, to read attributes from."""
     known = obj.original.data.get(SCANNERS)
-    return of_columns(known, *(attributes.scalars(obj.data, count, name) for name in (SCAN, ROW, COLUMN))) if known else None
+    return of_columns(known, *(attributes.scalars(data, count, name) for name in (SCAN, ROW, COLUMN))) if known else None
 
 
 def of_columns(places: Iterable[float], scan: np.ndarray | None = None, row: np.ndarray | None = None,
@@ -68,8 +68,9 @@ def _whole(values: np.ndarray | None, end: int, kind: type) -> np.ndarray | None
 
 def _moves(obj: bpy.types.Object) -> bool:
     """Whether its points are others in every frame."""
-    if obj.patina.linked_file:
-        return sequence.is_pattern(Path(obj.patina.linked_file))
+    path = files.path_of(obj)
+    if path:
+        return sequence.is_pattern(path)
     keys = getattr(obj.data, "shape_keys", None)
     return bool(styles.animated(obj.data) or keys and styles.animated(keys)
                 or any(path.startswith("modifiers") for path in styles.animated(obj))

@@ -168,8 +168,10 @@ class Analyses:
             job.claimed = True
         took(job.progress)
         try:
+            pause = 0.0005  # a small cloud takes no longer
             while not job.task.done():
-                time.sleep(jobs.INTERVAL)
+                time.sleep(pause)
+                pause = min(2.0 * pause, jobs.INTERVAL)
             with self._lock:
                 self._lock.wait_for(lambda: not self._changing)
                 self._changing = True

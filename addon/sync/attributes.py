@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 from collections.abc import Callable, Iterator
 
@@ -23,6 +24,31 @@ _NUMBERS = {'FLOAT', 'INT', 'INT8', 'BOOLEAN'}
 # data_type → element, components, what Blender shows of one
 _BYTES = {'BYTE_COLOR': (np.uint8, 4, lambda item: np.rint(np.float32(255) * np.array(item.color_srgb, np.float32))),
           'INT8': (np.int8, 1, lambda item: [item.value])}
+
+
+def finish_edits(obj: bpy.types.Object) -> None:
+    """Has an evaluated object's points and faces counted rightly: in Edit Mode Blender keeps a mesh in another structure, and
+    its arrays are empty until somebody asked for a copy."""
+    if _edited(obj) and not len(obj.data.vertices):
+        obj.to_mesh()
+        obj.to_mesh_clear()
+
+
+@contextlib.contextmanager
+def readable(obj: bpy.types.Object) -> Iterator[bpy.types.ID]:
+    """An evaluated object's data to read points, faces and attributes from: of one in Edit Mode a copy, for the attributes of
+    its own data are the edited ones, which cannot be read. Holds within the `with`."""
+    if not _edited(obj):
+        yield obj.data
+        return
+    try:
+        yield obj.to_mesh()
+    finally:
+        obj.to_mesh_clear()
+
+
+def _edited(obj: bpy.types.Object) -> bool:
+    return obj.type == 'MESH' and obj.data.is_editmode
 
 
 def positions(data: bpy.types.ID, count: int) -> np.ndarray | None:

@@ -71,6 +71,7 @@ def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
     if camera is None or camera.type != 'CAMERA':
         raise CameraError("the scene has no camera")
     render = depsgraph.scene_eval.render
+    _check(camera)
     if camera.data.type == 'PANO':
         return _panoramic(camera, render, eye[0] if eye else camera.matrix_world)
     width, height = picture_size(render)
@@ -90,6 +91,19 @@ def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
         world_from_camera=row_major(place),
         left=left + moved, right=right + moved, bottom=bottom, top=top,
         near_clip=data.clip_start, far_clip=data.clip_end), focus_of(camera))
+
+
+def _check(camera: bpy.types.Object) -> None:
+    """CameraError for one that animation or a script gave values by which nothing can be seen."""
+    data = camera.data
+    if data.type == 'ORTHO' and not data.ortho_scale > 0.0:
+        raise CameraError(f"'{camera.name}' sees nothing: its orthographic scale is {data.ortho_scale:g}")
+    if data.type == 'PERSP' and not (math.isfinite(data.lens) and data.sensor_width > 0.0 and data.sensor_height > 0.0):
+        raise CameraError(f"'{camera.name}' sees nothing: its field of view is 0")
+    if not data.clip_end > data.clip_start:
+        raise CameraError(f"'{camera.name}' sees nothing: Clip End, {data.clip_end:g}, is not beyond Clip Start, {data.clip_start:g}")
+    if not abs(camera.matrix_world.to_3x3().determinant()) > 0.0:
+        raise CameraError(f"'{camera.name}' sees nothing: its scale is 0")
 
 
 def _panoramic(camera: bpy.types.Object, render: bpy.types.RenderSettings, place: Matrix) -> View:
@@ -178,12 +192,14 @@ def window(projection: Sequence[Sequence[float]], orthographic: bool) -> tuple[f
     """left, right, bottom, top of a projection matrix, in float64; shift and pixel aspect are in them.
 
     A perspective matrix maps x/-z to (x P00 / -z) - P02, an orthographic one x to x P00 + P03; the window's edges
-    are where that is -1 and 1.
+    are where that is -1 and 1. CameraError where there is no such window.
     """
     edges = []
     for axis in (0, 1):
         scale = float(projection[axis][axis])
         offset = float(projection[axis][3] if orthographic else -projection[axis][2])
+        if not scale or not math.isfinite(scale):
+            raise CameraError("nothing can be seen: the field of view, or the orthographic scale, is 0")
         edges += [(-1.0 - offset) / scale, (1.0 - offset) / scale]
     return tuple(edges)
 

@@ -4,19 +4,21 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .. import jobs, native
+from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, linked, meshes
+from . import analysis, attributes, clips, colors, estimates, linked, losses, meshes, roles
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -25,6 +27,10 @@ from .camera import row_major
 IDLE_BYTES = 1 << 30
 
 LIT = 2  # PATINA_LIGHTING_LIT
+
+SMALL = 1 << 14  # points: fewer are worked on by one thread each, in the library too
+AT_ONCE = 16  # small clouds
+MOST_WAITING = 1 << 22  # points of small clouds that are held beside Blender's own
 
 NOTHING = 1e-20  # stands for zero where zero would mean "default" to the library
 
@@ -90,12 +96,14 @@ class Pending:
         self.analyzed = arrays is not None and arrays.analyzed  # in time; a linked one is before it is seen
         self.stations = arrays.stations if arrays else None
 
+        self.lost = ""  # why there will be no cloud
+
     @property
     def built(self) -> native.Cloud | None:
         return self._cloud
 
-    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
-        """The cloud; built at the first call. No viewport may draw meanwhile."""
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
+        """The cloud; built at the first call. No viewport may draw meanwhile. None where it is lost."""
         if self._cloud is None:
             self._cloud = yield from CACHE.obtain(self._identity, self._arrays, progress, recolor=True)
             self._arrays = None
@@ -105,13 +113,22 @@ class Pending:
 class PendingLink(Pending):
     """A linked cloud that waits to be opened."""
 
-    def __init__(self, source: linked.Source) -> None:
-        super().__init__(source.path.name, source.identity(), None)
+    def __init__(self, name: str, source: linked.Source) -> None:
+        super().__init__(name, source.identity(), None)
         self._source = source
 
-    def resolve(self, progress: native.Progress) -> Steps[native.Cloud]:
-        if self._cloud is None:
-            self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
+    def forget(self, identities: list[tuple]) -> bool:
+        """Lets its cloud go, where it is one of these."""
+        if self._identity in identities:
+            self._cloud = None
+        return self._identity in identities
+
+    def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
+        if self._cloud is None and not self.lost:
+            try:
+                self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
+            except (native.PatinaError, OSError) as error:
+                self.lost = linked.loss(self.name, self._source, error)
         return self._cloud
 
 
@@ -120,6 +137,7 @@ class CloudItem:
     cloud: native.Cloud | Pending
     style: CloudStyle
     pass_index: int  # of the object
+    role: str = roles.SEEN
 
 
 class CloudCache:
@@ -179,6 +197,12 @@ class CloudCache:
         self._keep(source.identity(), (), cloud)
         return cloud
 
+    def drop(self, identities: list[tuple]) -> None:
+        """Clouds that are no longer what they were built from."""
+        with self._lock:
+            for identity in identities:
+                self._entries.pop(identity, None)
+
     def _keep(self, identity: tuple, fingerprint: tuple, cloud: native.Cloud) -> None:
         with self._lock:
             self._entries[identity] = (fingerprint, cloud)
@@ -204,28 +228,29 @@ class CloudCache:
 CACHE = CloudCache()
 
 
-TRIANGLES = "triangles"  # at the end of an identity: the object's faces are drawn
-
 # What collect() asks for each object with points or faces: (object, identity, linked file) → its cloud or mesh, or None without.
 Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | native.Mesh | None"]
 
 
 def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             visible: Callable[[bpy.types.DepsgraphObjectInstance], bool] = lambda instance: True,
-            frame: int | None = None) -> list[CloudItem | meshes.MeshItem]:
+            frame: int | None = None, settle: Callable[[], None] = lambda: None) -> list[CloudItem | meshes.MeshItem]:
     """Every visible cloud and mesh, instances too. Iterates the depsgraph only; keeps no reference into it. frame: whose
-    files sequences show; None: of the scene's."""
+    files sequences show; None: of the scene's. settle: builds what take left for later."""
     items: list[CloudItem | meshes.MeshItem] = []
     taken: dict[tuple, native.Cloud | Pending | native.Mesh | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
-    distances: dict[str, float] = {}
+    triangles = meshes.BARE if roles.are_used(depsgraph) else meshes.TRIANGLES
+    unknown = roles.Unknown(depsgraph.view_layer_eval)
+    scales: list[tuple[str, float, native.Cloud | Pending]] = []
     for instance in depsgraph.object_instances:
         obj = instance.object
         if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera or clips.cuts(obj):
             continue
         if not visible(instance):
             continue
+        attributes.finish_edits(obj)
         solid = obj.type == 'MESH' and len(obj.data.polygons) > 0 and not obj.patina.linked_file
         if solid and depsgraph.scene_eval.patina.meshes == 'OFF':
             faces.add(obj.name)
@@ -236,74 +261,141 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             if link is None:
                 continue
         patina = depsgraph.scene_eval.patina
-        faces_as = 0 if not solid else TRIANGLES if patina.meshes == 'TRIANGLES' else patina.mesh_points
+        role = roles.role_of(instance, depsgraph.view_layer_eval)
+        # the library's triangles receive no shadows, its points do
+        as_triangles = patina.meshes == 'TRIANGLES' and role != roles.CATCHER
+        faces_as = 0 if not solid else triangles if as_triangles else patina.mesh_points
         place = link.identity() if link else (obj.data.as_pointer(), faces_as, *_attribute_names(obj), analysis.wanted(obj))
         if place not in taken:
             identity = place if link else (*_identity(obj, used), faces_as)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
+        unknown.look(instance)
         if isinstance(cloud, native.Mesh):
-            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index))
+            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index, role))
         elif cloud:
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
-            items.append(CloudItem(cloud, style, obj.pass_index))
-            built = cloud.built if isinstance(cloud, Pending) else cloud
-            if built:
-                scale = max(map(abs, instance.matrix_world.to_scale()))
-                distances[obj.original.name_full] = built.layer_distance * scale
+            items.append(CloudItem(cloud, style, obj.pass_index, role))
+            scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
+    settle()
+    items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
+             for item in items]
     CACHE.trim(used)
     meshes.CACHE.trim(used)
-    estimates.keep(distances)
+    estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
+                    if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
+    notices += unknown.notices()
     if not items:
-        notices.append("no visible object has points to draw")
-    if faces:
+        notices.append(losses.Loss("no visible object has points to draw"))
+    if faces and not pairs.first_of(depsgraph.scene):  # else they are drawn by the other scene
         notices.append(f"{len(faces)} mesh object{'s' * (len(faces) > 1)} with faces not drawn: "
                        "Render Properties > Surface > Meshes draws them")
     return items
 
 
-def taking_now(poll: Callable[[str, float], bool], notices: list[str]) -> Take:
-    """Builds each cloud at once, polling; content decides whether it is built anew."""
+class TakingNow:
+    """Of a final picture: builds each cloud, polling; content decides whether it is built anew. Large ones are built at once, each
+    by all cores; small ones wait for settle(), where several are built beside each other: starting all cores for one takes
+    longer than its work."""
 
-    def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> native.Cloud | native.Mesh | None:
+    def __init__(self, poll: Callable[[str, float], bool], notices: list[str]) -> None:
+        self._poll = poll
+        self._notices = notices
+        self._waiting: list[_Soon] = []
+
+    def __call__(self, obj: bpy.types.Object, identity: tuple, link: linked.Source | None
+                 ) -> native.Cloud | Pending | native.Mesh | None:
         name = obj.name
         progress = Progress()
 
         def stopped() -> bool:
-            return poll(f"{progress.doing} of '{name}'", progress.value())
+            return self._poll(f"{progress.doing} of '{name}'", progress.value())
 
         def pause() -> None:
             if stopped():
                 raise native.PatinaCancelled("cancelled", native.CANCELLED)
 
-        if identity[-1] == TRIANGLES:
+        if identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
             pause()
             return meshes.CACHE.obtain(identity, obj)
-        arrays = None if link else _read(obj, notices, identity[-1], pause)
+        arrays = None if link else _read(obj, self._notices, identity[-1], pause)
         if arrays is None and link is None:
             return None
+        if arrays and len(arrays.positions) < SMALL:
+            soon = _Soon(name, identity, arrays, progress)
+            self._waiting.append(soon)
+            if sum(other.count for other in self._waiting) >= MOST_WAITING:
+                self.settle()
+            return soon
 
         def work() -> native.Cloud:
-            if link:
-                return jobs.finish(CACHE.obtain_linked(link, progress))
-            with progress.inner() as inner:
-                cloud = jobs.finish(CACHE.obtain(identity, arrays, inner))
-            if arrays.analyzed and not cloud.has_shapes:
-                progress.doing = analysis.label(cloud)
-                ANALYSES.finish(cloud, arrays.stations, progress.follow)
-            return cloud
+            return jobs.finish(CACHE.obtain_linked(link, progress)) if link else _finished(identity, arrays, progress)
 
-        cloud = jobs.run(work, progress.cancel, stopped)
-        if cloud.invalid_positions:
-            notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
+        try:
+            cloud = jobs.run(work, progress.cancel, stopped)
+        except (native.PatinaError, OSError) as error:
+            if not link:
+                raise
+            self._notices.append(linked.loss(name, link, error))
+            return None
+        self._notice(name, cloud)
         if link and link.scalar and not cloud.has_scalars:
-            notices.append(f"'{name}': its file has no attribute '{link.scalar}' to take as scalar")
+            self._notices.append(f"'{name}': its file has no attribute '{link.scalar}' to take as scalar")
         return cloud
 
-    return take
+    def settle(self) -> None:
+        """Builds what waits."""
+        waiting, self._waiting = self._waiting, []
+        if not waiting:
+            return
+        what = f"Building '{waiting[0].name}'" if len(waiting) == 1 else f"Building {len(waiting)} small clouds"
+
+        def cancel() -> None:
+            for soon in waiting:
+                soon.progress.cancel()
+
+        def stopped() -> bool:
+            return self._poll(what, sum(soon.built is not None for soon in waiting) / len(waiting))
+
+        def work() -> None:
+            with ThreadPoolExecutor(min(os.cpu_count() or 1, AT_ONCE)) as pool:
+                for _ in pool.map(_Soon.build, waiting):
+                    pass
+
+        jobs.run(work, cancel, stopped)
+        for soon in waiting:
+            self._notice(soon.name, soon.built)
+
+    def _notice(self, name: str, cloud: native.Cloud) -> None:
+        if cloud.invalid_positions:
+            self._notices.append(f"'{name}': {cloud.invalid_positions:,} points without a finite position left out")
+
+
+class _Soon(Pending):
+    """A small cloud that waits for TakingNow.settle."""
+
+    def __init__(self, name: str, identity: tuple, arrays: PointArrays, progress: Progress) -> None:
+        super().__init__(name, identity, arrays)
+        self.progress = progress
+        self.count = len(arrays.positions)
+
+    def build(self) -> None:
+        """Any thread."""
+        self._cloud = _finished(self._identity, self._arrays, self.progress)
+        self._arrays = None
+
+
+def _finished(identity: tuple, arrays: PointArrays, progress: Progress) -> native.Cloud:
+    """The cloud of these points, analyzed where that is wanted."""
+    with progress.inner() as inner:
+        cloud = jobs.finish(CACHE.obtain(identity, arrays, inner))
+    if arrays.analyzed and not cloud.has_shapes:
+        progress.doing = analysis.label(cloud)
+        ANALYSES.finish(cloud, arrays.stations, progress.follow)
+    return cloud
 
 
 class Trusted:
@@ -330,8 +422,8 @@ class Trusted:
             if key not in self._known:
                 said: list[str] = []
                 if link:
-                    self._known[key] = (PendingLink(link), said)
-                elif identity[-1] == TRIANGLES:
+                    self._known[key] = (PendingLink(obj.name, link), said)
+                elif identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
                     self.reads += 1
                     self._known[key] = (meshes.CACHE.obtain(identity, obj), said)
                 else:
@@ -384,10 +476,15 @@ def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
 def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
           pause: Callable[[], None] = lambda: None) -> PointArrays | None:
     """The object's points; mesh_points > 0: so many on its faces. pause() is called between steps and may raise."""
-    data = obj.data
     pause()
+    with attributes.readable(obj) as data:
+        return _read_data(obj, data, notices, mesh_points, pause)
+
+
+def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], mesh_points: int,
+               pause: Callable[[], None]) -> PointArrays | None:
     if mesh_points:
-        found = meshes.sample(obj, mesh_points)
+        found = meshes.sample(obj, data, mesh_points)
         return PointArrays(*found, None) if found else None
     count = len(data.vertices if obj.type == 'MESH' else data.points)
     if count == 0:
@@ -406,7 +503,7 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
     pause()
     opacities = attributes.opacities(data, count, obj.patina.opacity_attribute)
     radii = attributes.scalars(data, count, obj.patina.radius_attribute)
-    for kind, name, found in (("colour", obj.patina.color_attribute, rgb),
+    for kind, name, found in (("color", obj.patina.color_attribute, rgb),
                               ("normal", obj.patina.normal_attribute, normals),
                               ("opacity", obj.patina.opacity_attribute, opacities),
                               ("radius", obj.patina.radius_attribute, radii),
@@ -416,7 +513,7 @@ def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
     if obj.patina.hide_uncolored:
         opacities = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
-    stations = analysis.stations(obj, count) if analyzed else None
+    stations = analysis.stations(obj, data, count) if analyzed else None
     return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations)
 
 

@@ -15,14 +15,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .. import importers, jobs, native
+from .. import importers, jobs, native, preferences
 from ..importers.origin import PROPERTY
-from . import analysis, analyzing, attributes, sequence
+from . import analysis, analyzing, attributes, files, kept, sequence
 from .colors import scalar_name
+from .losses import Loss
 
 Corner = tuple[float, float, float]
-
-KEPT_BYTES = 32 << 30  # of clouds on the disk, 23 a point: a sequence has many
 
 
 @dataclass(frozen=True)
@@ -46,24 +45,25 @@ class Linked:
     origin: Corner  # float64; the cloud is relative to it
     box: tuple[Corner, Corner]
     scanners: list[float]  # x, y, z of each, relative to origin
+    units: tuple[float, float] = (1.0, 1.0)  # metres of the file's, across and up
 
 
 def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
     """Of an object with a linked file, evaluated or not; None where there is nothing to show. The files of a sequence are
     all relative to the object's origin, so that they lie to one another as they were scanned."""
-    path = Path(bpy.path.abspath(obj.patina.linked_file, library=obj.original.library))
+    path = files.path_of(obj)
     origin = None
     if sequence.is_pattern(path):
         settings = obj.patina.sequence
         path, notice = sequence.file_at(path, frame, settings.start, settings.step, settings.outside)
         if notice:
-            notices.append(f"'{obj.name}': {notice}")
+            notices.append(Loss(f"'{obj.name}': {importers.told(notice)}"))
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
     found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
     if found is None:
-        notices.append(f"'{obj.name}': the file {obj.patina.linked_file} is missing")
+        notices.append(Loss(f"'{obj.name}': the file {importers.told(path)} is missing"))
     return found
 
 
@@ -73,12 +73,21 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
         status = path.stat()
     except OSError:
         return None
-    name = f"{path.resolve()}{origin or ''}"
-    place = hashlib.blake2b(name.encode("utf-8", "surrogateescape"), digest_size=12).hexdigest()
-    made_of = f"{status.st_size} {status.st_mtime_ns} {scalar} {analyzed} {hide_uncolored}"
-    state = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
-    folder = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    return Source(path, Path(folder) / f"{place}-{state}.cloud", origin, scalar, analyzed, hide_uncolored)
+    place = _hash(f"{path.resolve()}{origin or ''}", 12)
+    state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
+    variant = _hash(f"{scalar} {analyzed} {hide_uncolored}", 4)  # several objects may link one file
+    return Source(path, kept.folder() / f"{place}-{state}-{variant}.cloud", origin, scalar, analyzed, hide_uncolored)
+
+
+def _hash(text: str, size: int) -> str:
+    return hashlib.blake2b(text.encode("utf-8", "surrogateescape"), digest_size=size).hexdigest()
+
+
+def loss(name: str, source: Source, error: Exception) -> Loss:
+    """What to say where an object's file cannot be read. Raises what is not the file's fault: a cancel, memory."""
+    if isinstance(error, native.PatinaCancelled) or getattr(error, "code", 0) == native.MEMORY:
+        raise error
+    return Loss(importers.told(f"'{name}' is left out: {source.path} cannot be read: {error}"))
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:
@@ -90,11 +99,11 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
     notes = source.kept.with_suffix(".json")
     try:
-        kept = json.loads(notes.read_text("utf-8"))
-        found = _linked(native.Cloud.open(source.kept), tuple(kept["origin"]), kept.get("scanners"))
+        found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes))
         os.utime(source.kept)  # used just now
+        kept.CHECKS.start(source.identity(), source.kept)
         return found
-    except (native.PatinaError, OSError, ValueError, KeyError):
+    except (native.PatinaError, OSError, ValueError):
         pass  # not there yet, of another version, or damaged: it is made anew
     parts = 3 if source.analyzed else 2
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
@@ -103,6 +112,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
+    units = points.notes.get("units")
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
     shown = attributes.without_uncolored(None, points.colors) if source.hide_uncolored else None
     with progress.part(1, parts).inner() as inner:
@@ -118,17 +128,19 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         yield task
         task.result()
     try:
-        for old in source.kept.parent.glob(f"{source.kept.name.split('-')[0]}-*"):
-            old.unlink()
+        place, state, _ = source.kept.stem.split("-")
+        for old in source.kept.parent.glob(f"{place}-*"):
+            if not old.name.startswith(f"{place}-{state}-"):  # of the file as it was
+                old.unlink()
         task = cloud.start_save(source.kept)
         yield task
         task.result()
-        notes.write_text(json.dumps({"origin": origin, "scanners": scanners}), "utf-8")
+        notes.write_text(json.dumps({"origin": origin, "scanners": scanners, "units": units}), "utf-8")
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
-    return _linked(cloud, origin, scanners)
+    return _linked(cloud, origin, scanners, units)
 
 
 def _tidy(newest: Path) -> None:
@@ -137,7 +149,7 @@ def _tidy(newest: Path) -> None:
     total = 0
     for _, size, path in clouds:
         total += size
-        if total > KEPT_BYTES and path != newest:
+        if total > preferences.cache_bytes() and path != newest:
             path.unlink()
             path.with_suffix(".json").unlink(missing_ok=True)
 
@@ -153,8 +165,8 @@ def _classes(points: importers.PointFile) -> np.ndarray | None:
     return None if values is None else attributes.as_classes(values)
 
 
-def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None) -> Linked:
-    return Linked(cloud, origin, cloud.box, scanners or [])
+def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, units: list[float] | None) -> Linked:
+    return Linked(cloud, origin, cloud.box, scanners or [], tuple(units or (1.0, 1.0)))
 
 
 def box_mesh(name: str, box: tuple[Corner, Corner]) -> bpy.types.Mesh:

@@ -13,8 +13,12 @@ import bpy
 import numpy as np
 
 from .. import native
+from . import attributes, roles
 
 WHITE = (0.8, 0.8, 0.8, 1.0)
+
+# At the end of an identity: the object's faces are drawn; and may be painted in one color too.
+TRIANGLES, BARE = "triangles", "triangles, bare too"
 
 # The additive recurrence of the plastic number: each next point falls into the largest gap of those before it.
 _STEP = np.array([0.7548776662466927, 0.5698402909980532])
@@ -34,6 +38,7 @@ class MeshItem:
     mesh: native.Mesh
     style: MeshStyle
     pass_index: int  # of the object
+    role: str = roles.SEEN
 
 
 class MeshCache:
@@ -44,7 +49,8 @@ class MeshCache:
 
     def obtain(self, identity: tuple, obj: bpy.types.Object) -> native.Mesh | None:
         """Of an evaluated object; None without faces. Content decides whether it is made anew."""
-        arrays = triangles(obj)
+        with attributes.readable(obj) as mesh:
+            arrays = triangles(obj, mesh)
         if arrays is None:
             return None
         digest = hashlib.blake2b(digest_size=16)
@@ -53,6 +59,8 @@ class MeshCache:
         known, mesh = self._entries.get(identity, (b"", None))
         if known != digest.digest():
             mesh = native.Mesh(*arrays)
+            if identity[-1] == BARE and arrays[2] is not None:
+                mesh.bare = native.Mesh(*arrays[:2], None)
             self._entries[identity] = (digest.digest(), mesh)
         return mesh
 
@@ -66,10 +74,9 @@ class MeshCache:
 CACHE = MeshCache()
 
 
-def triangles(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray, np.ndarray | None] | None:
+def triangles(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray | None] | None:
     """Positions (3 n, 3), normals (3 n, 3) and linear colours (3 n, 4) of the corners of an evaluated object's n triangles,
-    float32; colours only where materials differ. None without faces."""
-    mesh = obj.data
+    float32; colours only where materials differ. None without faces. mesh: its readable data."""
     mesh.calc_loop_triangles()
     if not len(mesh.loop_triangles):
         return None
@@ -97,9 +104,9 @@ def _palette(obj: bpy.types.Object) -> np.ndarray:
     return np.array([base_color(slot.material) for slot in obj.material_slots] or [WHITE], np.float32)
 
 
-def sample(obj: bpy.types.Object, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Positions (n, 3), normals (n, 3) and linear colours (n, 4) of an evaluated object, float32; None without area."""
-    mesh = obj.data
+def sample(obj: bpy.types.Object, mesh: bpy.types.Mesh, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Positions (n, 3), normals (n, 3) and linear colours (n, 4) of an evaluated object, float32; None without area. mesh: its
+    readable data."""
     mesh.calc_loop_triangles()
     corners = _get(mesh.loop_triangles, "vertices", 3, np.int32)
     places = _get(mesh.vertices, "co", 3, np.float32)

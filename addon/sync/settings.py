@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from .. import options
+from .. import options, preferences
 from ..properties import enum_number
 from .camera import View
 
@@ -95,12 +95,16 @@ def _number(group: bpy.types.PropertyGroup, name: str, item: str) -> int:
 
 
 def device(scene: bpy.types.Scene) -> DeviceChoice:
-    forced = options.read()
-    return DeviceChoice(DEVICES[forced.get("device", scene.patina.device)], forced.get("threads") or _threads(scene))
+    """By the command line, else the scene, else the artist's preferences."""
+    forced, known = options.read(), preferences.get()
+    chosen = forced.get("device", scene.patina.device)
+    if chosen == 'AUTO' and known and "device" not in forced:
+        chosen = known.device
+    return DeviceChoice(DEVICES[chosen], forced.get("threads") or _threads(scene, known.threads if known else 0))
 
 
-def _threads(scene: bpy.types.Scene) -> int:
-    """Patina's own number, else Blender's fixed one (also `blender -t`), else 0: one per core."""
+def _threads(scene: bpy.types.Scene, preferred: int) -> int:
+    """The scene's own number, else Blender's fixed one (also `blender -t`), else the preferred one, else 0: one per core."""
     if scene.patina.threads:
         return scene.patina.threads
-    return scene.render.threads if scene.render.threads_mode == 'FIXED' else 0
+    return scene.render.threads if scene.render.threads_mode == 'FIXED' else preferred

@@ -26,7 +26,7 @@ def background(world: bpy.types.World | None, notices: list[str]) -> tuple[float
         return BLACK
     color, strength = node.inputs["Color"], node.inputs["Strength"]
     if color.is_linked or strength.is_linked:
-        notices.append("what is linked to the world's Background node is not drawn yet, only its own colour is")
+        notices.append("what is linked to the world's Background node is not drawn yet, only its own color is")
     return tuple(max(value * strength.default_value, 0.0) for value in color.default_value[:3])
 
 

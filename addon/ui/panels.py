@@ -194,7 +194,8 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         layout.prop(patina, "opacity")
         column = layout.column()
         if patina.linked_file:
-            column.prop(patina, "linked_file")
+            held = patina.linked_data  # whose path is what holds
+            column.prop(held or patina, "filepath" if held else "linked_file", text="Linked File")
             column.operator("object.patina_linked_to_mesh")
             column.prop(patina, "color")
             return

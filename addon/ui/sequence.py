@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 from bpy.types import Context, Panel
 
 from ..engine import PatinaRenderEngine
-from ..sync import sequence
+from ..sync import files, sequence
 
 
 class PATINA_PT_sequence(Panel):
@@ -23,7 +21,7 @@ class PATINA_PT_sequence(Panel):
     @classmethod
     def poll(cls, context: Context) -> bool:
         return (context.engine in cls.COMPAT_ENGINES and context.object is not None
-                and "#" in context.object.patina.linked_file)
+                and bool(context.object.patina.linked_file) and sequence.is_pattern(files.path_of(context.object)))
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -33,9 +31,8 @@ class PATINA_PT_sequence(Panel):
         layout.prop(settings, "start")
         layout.prop(settings, "step")
         layout.prop(settings, "outside")
-        pattern = Path(bpy.path.abspath(obj.patina.linked_file, library=obj.library))
-        files = sequence.files_of(pattern)
-        layout.label(text=f"{len(files)} files, {min(files)} to {max(files)}" if files else "no file fits", icon='INFO')
+        found = sequence.files_of(files.path_of(obj))
+        layout.label(text=f"{len(found)} files, {min(found)} to {max(found)}" if found else "no file fits", icon='INFO')
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_sequence,))

@@ -24,12 +24,20 @@ def _panels() -> list[type]:
             or panel.__name__ in BORROWED and hasattr(panel, "COMPAT_ENGINES")]
 
 
+def _catcher(self: bpy.types.Panel, context: bpy.types.Context) -> None:
+    """Below Blender's own switch of holdouts."""
+    if context.engine == ENGINE:
+        self.layout.prop(context.object, "is_shadow_catcher")
+
+
 def register() -> None:
     for panel in _panels():
         panel.COMPAT_ENGINES.add(ENGINE)
+    bpy.types.OBJECT_PT_visibility.append(_catcher)
 
 
 def unregister() -> None:
+    bpy.types.OBJECT_PT_visibility.remove(_catcher)
     for panel in bpy.types.Panel.__subclasses__():
         if ENGINE in getattr(panel, "COMPAT_ENGINES", ()):
             panel.COMPAT_ENGINES.discard(ENGINE)

@@ -415,7 +415,7 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
                          .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
                          .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED };
     *out = (struct pt_analysis){ .slots = cloud->slots };
-    struct pt_pool *pool = pt_pool_create(desc->threads, 0);
+    struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(desc->threads, cloud->info.count), 0);
     int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
     pt_beams_destroy(&walk.beams);

@@ -652,7 +652,7 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
 
     struct patina_cloud *cloud = calloc(1, sizeof *cloud);
     struct pt_alive *alive = calloc(1, sizeof *alive);
-    build.pool = pt_pool_create(desc->threads, 0);
+    build.pool = pt_pool_create(pt_pool_threads_for(desc->threads, desc->count), 0);
     error = PATINA_ERROR_MEMORY;
     if (cloud && alive && build.pool) {
         pt_handle_init(&cloud->handle);

@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTION = 1 << 16, VERSION = 6, SECTIONS = 10 };
+enum { SECTION = 1 << 16, VERSION = 7, SECTIONS = 10, PIECE = 1 << 22 };
 static const char magic[8] = "patina\n\x1a";
 
 struct header {
@@ -27,7 +27,8 @@ struct header {
     double spacing_base;
     uint64_t class_hash;
     patina_cloud_info info;
-    uint64_t check; // of all before it, and of the chunks
+    uint64_t sums[SECTIONS]; // of what each section holds, see sum_of
+    uint64_t check;          // of all before it, and of the chunks
 };
 
 struct section {
@@ -39,6 +40,17 @@ static uint64_t check_of(const struct header *header, const struct pt_chunk *chu
 {
     uint64_t hash = pt_fingerprint(VERSION, header, offsetof(struct header, check));
     return pt_fingerprint(hash, chunks, header->chunk_count * sizeof *chunks);
+}
+
+// Piece by piece, so that a file need not be in memory whole to be compared.
+static uint64_t add_piece(uint64_t sum, const void *data, size_t size) { return pt_fingerprint(sum, data, size); }
+
+static uint64_t sum_of(const struct section *section)
+{
+    uint64_t sum = VERSION;
+    for (uint64_t at = 0; at < section->size; at += PIECE)
+        sum = add_piece(sum, (const char *)*section->data + at, section->size - at < PIECE ? section->size - at : PIECE);
+    return sum;
 }
 
 static uint64_t round_section(uint64_t size)
@@ -110,6 +122,8 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
     list_sections(&copy, sections);
     memcpy(header.magic, magic, sizeof magic);
     header.size = file_size(sections);
+    for (int i = 0; i < SECTIONS; i++)
+        header.sums[i] = sum_of(&sections[i]);
     header.check = check_of(&header, cloud->chunks);
     size_t length = strlen(path);
     char *beside = malloc(length + 6); // written there first: a file that is mapped must not change, nor be half there
@@ -235,6 +249,74 @@ static int open_descriptor(const char *path, int descriptor, struct patina_cloud
     cloud->info.bytes = sections[0].size;
     return check_cloud(path, cloud);
 }
+
+// ---- verify ------------------------------------------------------------------------------------------------------------
+
+// Whether a section of the file, from byte `at` on, still has the sum that it was written with.
+static int verify_section(const char *path, int descriptor, uint64_t at, uint64_t size, uint64_t wanted, char *buffer,
+                          patina_progress *progress)
+{
+    uint64_t sum = VERSION;
+    for (uint64_t done = 0; done < size;) {
+        const size_t piece = size - done < PIECE ? size - done : PIECE;
+        for (size_t have = 0; have < piece;) {
+            const ssize_t got = pread(descriptor, buffer + have, piece - have, (off_t)(at + done + have));
+            if (got < 0 && errno == EINTR)
+                continue;
+            if (got <= 0)
+                return got ? fail_with(path, "read", errno) : refuse(path, "a saved cloud that was cut short");
+            have += (size_t)got;
+        }
+        if (pt_progress_cancelled(progress))
+            return pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: cancelled", path);
+        sum = add_piece(sum, buffer, piece);
+        done += piece;
+    }
+    return sum == wanted ? PATINA_OK : refuse(path, "a saved cloud whose points are damaged");
+}
+
+static int verify_descriptor(const char *path, int descriptor, char *buffer, patina_progress *progress)
+{
+    struct header header;
+    struct stat status;
+    if (fstat(descriptor, &status) || pread(descriptor, &header, sizeof header, 0) != (ssize_t)sizeof header)
+        return refuse(path, "not a saved cloud");
+    int code = check_header(path, &header, (uint64_t)status.st_size);
+    if (code)
+        return code;
+    struct patina_cloud cloud = {.info = header.info,
+                                 .slots = header.slots,
+                                 .chunk_count = header.chunk_count,
+                                 .color_format = header.color_format};
+    struct section sections[SECTIONS];
+    list_sections(&cloud, sections);
+    if (file_size(sections) != header.size)
+        return refuse(path, "its header is damaged");
+    uint64_t at = SECTION;
+    for (int i = 0; i < SECTIONS && !code; i++) {
+        code = verify_section(path, descriptor, at, sections[i].size, header.sums[i], buffer, progress);
+        at += round_section(sections[i].size);
+        pt_progress_set(progress, (double)at / (double)header.size);
+    }
+    return code;
+}
+
+int patina_cloud_verify(const char *path, patina_progress *progress)
+{
+    if (!path)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_verify: path is NULL");
+    int descriptor = open(path, O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0)
+        return fail_with(path, "read", errno);
+    char *buffer = malloc(PIECE);
+    int code = buffer ? verify_descriptor(path, descriptor, buffer, progress)
+                      : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
+    free(buffer);
+    close(descriptor);
+    return code;
+}
+
+// ---- open, all of it ---------------------------------------------------------------------------------------------------
 
 int patina_cloud_open(const char *path, patina_cloud **out)
 {

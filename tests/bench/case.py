@@ -50,9 +50,9 @@ class Mode:
 
     def missing(self) -> str:
         """The first field that the binding does not have yet, or ""."""
-        for wanted, known in ((self.settings, native._Settings), (self.style, native._CloudStyle),
-                              (self.light, native._LightDesc), (self.effects, native._Effects),
-                              (self.lines, native._Lines)):
+        for wanted, known in ((self.settings, native.abi.Settings), (self.style, native.abi.CloudStyle),
+                              (self.light, native.abi.LightDesc), (self.effects, native.abi.Effects),
+                              (self.lines, native.abi.Lines)):
             names = {name for name, *_ in known._fields_}
             for name in wanted:
                 if name not in names:

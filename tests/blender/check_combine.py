@@ -6,7 +6,7 @@ import tempfile
 
 import bpy
 import numpy as np
-from harness import add_points, check, check_close, new_scene
+from harness import add_points, check, check_close, new_scene, reports
 
 
 def crossing():
@@ -94,3 +94,77 @@ def test_needs_a_camera():
     else:
         check(done == {'CANCELLED'}, f"{done}")
     check(len(bpy.data.scenes) == before, "a scene was left behind")
+
+
+def change(scene):
+    """(what, step): each makes another picture; the last ones take back."""
+    render = scene.render
+    other = bpy.data.objects.new("other", scene.camera.data.copy())
+    scene.collection.objects.link(other)
+    other.location, other.rotation_euler = (0.3, 0.1, 0.5), (0.0, 0.05, 0.1)
+
+    def border(crop):
+        render.use_border, render.use_crop_to_border = True, crop
+        render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.8, 0.1, 0.75
+
+    def markers():
+        render.use_border = False
+        for frame, camera in ((1, scene.camera), (10, bpy.data.objects["camera"])):
+            scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+        scene.frame_set(10)
+
+    yield "size", lambda: (setattr(render, "resolution_x", 100), setattr(render, "resolution_y", 60))
+    yield "percentage", lambda: setattr(render, "resolution_percentage", 50)
+    yield "pixels' aspect", lambda: setattr(render, "pixel_aspect_x", 1.5)
+    yield "camera", lambda: setattr(scene, "camera", other)
+    yield "cropped border", lambda: border(True)
+    yield "border", lambda: border(False)
+    yield "markers", markers
+
+
+def test_points_follow_their_scene():
+    """Whatever changes after Combine, the picture is the one that combining then would have made; and nothing is warned of."""
+    scene = crossing()
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    for what, step in change(scene):
+        step()
+        bpy.context.view_layer.update()
+        reports.clear()
+        pixels = picture(scene)
+        check([text for kind, text in reports if kind != 'INFO'] == [], f"{what}: {reports}")
+        bpy.ops.scene.patina_combine(engine='CYCLES')
+        anew = picture(scene)
+        check(pixels.shape == anew.shape and (pixels[..., 1] > 0.5).sum() > 30, f"{what}: {pixels.shape}, an empty picture")
+        check(np.array_equal(pixels, anew), f"{what}: {(pixels != anew).any(axis=2).mean():.1%} of the pixels differ")
+
+
+def test_frames_follow():
+    scene = crossing()
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    points = bpy.data.scenes[f"{scene.name} Points"]
+    scene.frame_start, scene.frame_end, scene.frame_step, scene.render.fps = 3, 9, 2, 12
+    picture(scene)
+    check((points.frame_start, points.frame_end, points.frame_step, points.render.fps) == (3, 9, 2, 12), "the frames")
+
+
+def test_a_new_name():
+    """Renaming either scene leaves them a pair; files that know the pair by name are understood."""
+    scene = crossing()
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    count, points = len(bpy.data.scenes), bpy.data.scenes[f"{scene.name} Points"]
+    points["patina_points_of"] = scene.name  # as files of before have it
+    picture(scene)
+    points.patina.fill = 'OFF'
+    scene.name = "other name"
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    check(len(bpy.data.scenes) == count, f"{[one.name for one in bpy.data.scenes]}")
+    points = bpy.data.scenes["other name Points"]
+    check(points.patina.fill == 'OFF', "what was set for the points is lost")
+    points.name = "mine"
+    scene.render.resolution_x = 80
+    check(picture(scene).shape[:2] == (48, 80) and bpy.data.scenes["mine"].render.resolution_x == 80, "it follows by any name")
+    bpy.context.window.scene = points = bpy.data.scenes["mine"]
+    check(not bpy.ops.scene.patina_combine.poll(), "points of points")
+    bpy.context.window.scene = scene
+    bpy.data.scenes.remove(points)
+    picture(scene)

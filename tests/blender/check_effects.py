@@ -44,7 +44,7 @@ def test_off_is_nothing():
 
 def test_fields_are_the_library_s():
     described = list(sync.Effects.__dataclass_fields__)
-    check(described == [name for name, *_ in native._Effects._fields_[1:]], f"{described}")
+    check(described == [name for name, *_ in native.abi.Effects._fields_[1:]], f"{described}")
 
 
 def test_edl():

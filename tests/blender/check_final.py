@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 from check_passes import dense_scene
 from check_points import pixel
-from harness import add_points, check, check_close, new_scene, patina, render, set_world, sphere, written
+from harness import add_points, check, check_close, new_scene, patina, render, set_world, sphere, stats, written
 from mathutils import Matrix, Vector
 
-from patina import native, options
+from patina import engine, jobs, memory, native, options
 from patina import render as drawing
-from patina.sync import attributes
+from patina.sync import attributes, clouds
 
 
 def test_position():
@@ -104,6 +104,63 @@ def test_tiles_of_regions():
     check(sum((x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in odd) == 67 * 35, f"{odd}")
 
 
+def test_tiles_by_free_memory():
+    """Where memory is short a picture is made of tiles that fit, with the same pixels; they are about as large as each other."""
+    giga = 1 << 30
+    check(drawing.tiles((0, 0, 6000, 6000), 0, 16 * giga) == drawing.tiles((0, 0, 6000, 6000), 3000), "halves")
+    for budget in (giga // 4, giga, 4 * giga):
+        sides = [x1 - x0 for x0, _, x1, _ in drawing.tiles((0, 0, 6000, 6000), 0, budget)]
+        check(max(sides) ** 2 * drawing.PIXEL_BYTES <= budget and min(sides) > 0.9 * max(sides), f"{budget}: {sides[:4]}")
+    check(len(drawing.tiles((0, 0, 600, 600), 0, 0)) == 4, "the least are 512")
+    check(memory.free() is None or 1 << 26 < memory.free() < 1 << 50, f"{memory.free()} bytes are free")
+    scene = dense_scene(700, 600)
+    whole = render()
+    memory.limit = 1000
+    try:
+        tiled = render()
+    finally:
+        memory.limit = 0
+    for name, pixels in whole.items():
+        check((pixels == tiled[name]).all(), f"{name} differs")
+    check(scene.patina.tile_size == 0, "nobody chose tiles")
+
+
+def test_small_clouds_beside_each_other():
+    """Many small clouds are built together, not one after another: the same picture, and cancelled as readily."""
+    def fill():
+        new_scene(96, 72)
+        for index in range(40):
+            place = (index % 8 - 3.5, index // 8 - 2, -9)
+            obj = add_points(*sphere(400, 0.4, place), name=f"ball {index:02}")
+            obj.patina.analysis = 'ALWAYS' if index % 2 else 'OFF'
+        clouds.CACHE.clear()
+
+    fill()
+    small, clouds.SMALL = clouds.SMALL, 0
+    run, waits = jobs.run, []
+    jobs.run = lambda *arguments: (waits.append(1), run(*arguments))[1]
+    try:
+        alone = render()
+        one_by_one = len(waits)
+        clouds.SMALL = small
+        clouds.CACHE.clear()
+        waits.clear()
+        together = render()
+    finally:
+        jobs.run, clouds.SMALL = run, small
+    check(one_by_one >= 40 and len(waits) <= 4, f"{one_by_one} and {len(waits)} times the artist's Blender waited")
+    for name, pixels in alone.items():
+        check((pixels == together[name]).all(), f"{name} differs")
+    check(any("40 small clouds" in text for text in stats), f"{stats}")
+    clouds.CACHE.clear()
+    stopped, engine.PatinaRenderEngine._stopped = engine.PatinaRenderEngine._stopped, lambda self: True
+    try:
+        check(render() == {}, "a picture of a cancelled render")
+    finally:
+        engine.PatinaRenderEngine._stopped = stopped
+    check(render()["Combined"][..., 3].any(), "and the next one draws")
+
+
 def test_samples():
     """More samples come nearer to the share of a pixel that is covered; data passes do not change."""
     scene = dense_scene(64, 64)
@@ -141,8 +198,10 @@ def test_options():
     check(read(["blender", "-b"]) == {}, "no options")
     check(read(["blender", "--", "--other", "1", "--patina-device", "cpu", "--patina-samples=4"]) ==
           {"device": 'CPU', "samples": 4}, "two options")
+    check(read(["--", "--patina-strict", "--patina-threads", "2"]) == {"strict": 1, "threads": 2}, "a switch")
     for words, part in ((["--patina-device", "abacus"], "auto, cpu"), (["--patina-colour"], "only device"),
-                        (["--patina-threads", "many"], "a number")):
+                        (["--patina-threads", "many"], "a number"),
+                        (["--patina-strict=no"], "no value")):
         try:
             read(["--", *words])
         except native.PatinaError as error:

@@ -145,7 +145,7 @@ def test_even_spread():
     obj = plane(0.0, 1.0)
     bpy.context.view_layer.update()
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    positions, normals, colors = meshes.sample(evaluated, 10000)
+    positions, normals, colors = meshes.sample(evaluated, evaluated.data, 10000)
     counts = np.histogram2d(positions[:, 0], positions[:, 1], bins=10, range=[[-1, 1], [-1, 1]])[0]
     check(counts.min() > 80 and counts.max() < 120, f"{counts.min()} to {counts.max()} of 100")
     check((positions[:, 2] == 0).all() and (normals == (0, 0, 1)).all(), "off the plane")

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from check_viewport import area, invoke_import, screenshot, shown, window_region
+from window import area, invoke_import, screenshot, shown, window_region
 from harness import REPOSITORY, SCRATCH, check, saved
+
+from patina.operators import set_up
 
 POINTS = int(os.environ.get("PATINA_NEWCOMER_POINTS", "20000"))
 
@@ -18,6 +20,30 @@ def in_view(operator, **options):
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
         return operator(**options)
+
+
+def test_set_up_is_offered_after_the_first_import():
+    """To who imports into the start scene, and once they took it no more: from there F12 shows the points."""
+    path = SCRATCH / "offered.ply"
+    subprocess.run(["/usr/bin/python3", str(REPOSITORY / "build/relief"), str(path), "5000"], check=True)
+    in_view(bpy.ops.wm.read_homefile, use_factory_startup=True, use_empty=False, app_template="", load_ui=False)
+    yield lambda: "Cube" in bpy.data.objects
+    offers, asked = [], set_up.offer
+    set_up.offer = lambda context: (offers.append(context.scene.name), asked(context))
+    try:
+        invoke_import(path)
+        yield lambda: "offered" in bpy.data.objects and offers
+        screenshot("path_0_offered")
+        check(in_view(bpy.ops.scene.patina_set_up) == {'FINISHED'}, "set up")
+        check(bpy.context.scene.render.engine == 'PATINA' and "Cube" not in bpy.data.objects, "engine and cube")
+        invoke_import(path)
+        yield lambda: "offered.001" in bpy.data.objects
+        check(len(offers) == 1, f"{len(offers)} offers")
+    finally:
+        set_up.offer = asked
+    bpy.ops.render.render()
+    bright = saved('PNG')[..., :3].max(axis=2) > 0.2
+    check(bright.mean() > 0.1, f"F12 shows points on {bright.mean():.0%} of the picture")
 
 
 def test_newcomers_path():

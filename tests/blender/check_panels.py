@@ -117,3 +117,18 @@ def test_shipped_presets():
             check(found == wanted, f"{found} is not {wanted}")
         if path.stem == "Final":
             check(found["samples"] == 16 and found["quality"] == 'REFINED', f"{found}")
+
+
+def test_american_spelling():
+    """As Blender has it: names, tooltips, items of menus, labels of panels and operators."""
+    british = re.compile(r"colour|metres?\b|neighbour|\bgrey|centre|analyse|organis|favour", re.I)
+    found = []
+    kinds = (bpy.types.PropertyGroup, bpy.types.Operator, bpy.types.AddonPreferences, bpy.types.Panel)
+    for cls in (cls for kind in kinds for cls in kind.__subclasses__() if cls.__module__.startswith("patina.")):
+        texts = [getattr(cls, "bl_label", ""), cls.bl_rna.description]
+        for kind in cls.bl_rna.properties:
+            texts += [kind.name, kind.description]
+            if kind.type == 'ENUM':
+                texts += [text for item in kind.enum_items for text in (item.name, item.description)]
+        found += [f"{cls.__name__}: {text}" for text in texts if text and british.search(text)]
+    check(not found, f"{len(found)}: {found[:3]}")

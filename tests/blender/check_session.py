@@ -197,7 +197,7 @@ def test_wrong_attribute_names():
     obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute = "collor", "norm", "opaque"
     picture = render()
     text = " ".join(text for kind, text in reports if kind == 'WARNING')
-    for name, use in (("collor", "colour"), ("norm", "normal"), ("opaque", "opacity")):
+    for name, use in (("collor", "color"), ("norm", "normal"), ("opaque", "opacity")):
         check(f"no point attribute '{name}' to take as {use}" in text, text)
     check(drawn(picture), "nothing was drawn")
 

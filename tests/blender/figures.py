@@ -18,7 +18,7 @@ from statistics import median, mode
 
 import gpu
 import numpy as np
-from check_viewport import area, settled, setup, shown, view, window_region
+from window import area, settled, setup, shown, view, window_region
 from harness import add_points
 from mathutils import Quaternion
 

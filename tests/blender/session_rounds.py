@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from check_linked import dense
 from check_sequence import scans
-from check_viewport import area, settled, setup, view, window_region
+from window import area, settled, setup, view, window_region
 from harness import SCRATCH, check, render
 from mathutils import Matrix, Quaternion
 

@@ -22,7 +22,9 @@ PATIENCE = 30.0  # seconds for one thing to come
 
 def tests():
     import check_newcomer
+    import check_overlays
     import check_viewport
+    import check_viewport_life
     names = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     if names == ["long_session"]:
         import session_rounds
@@ -30,7 +32,7 @@ def tests():
     if names == ["figures"]:
         import figures
         yield "figures", figures.orbit_figures
-    for name, test in [*vars(check_viewport).items(), *vars(check_newcomer).items()]:
+    for name, test in [item for module in (check_viewport, check_viewport_life, check_overlays, check_newcomer) for item in vars(module).items()]:
         if name.startswith("test_") and (not names or any(part in name for part in names)):
             yield name.removeprefix("test_"), test
 

@@ -255,13 +255,72 @@ static void test_files(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// Whatever is written over what a section of a saved cloud holds is found, and nothing is where nothing was.
+static void test_damaged_clouds(void **state)
+{
+    (void)state;
+    enum { SECTION = 1 << 16, TRIES = 150 };
+    char path[] = "/tmp/patina-task-XXXXXX";
+    const int descriptor = mkstemp(path);
+    assert_true(descriptor >= 0);
+    const patina_cloud_desc desc = describe(400000);
+    patina_cloud *cloud = NULL;
+    patina_task *task = NULL;
+    assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
+    assert_int_equal(patina_cloud_save(cloud, path), PATINA_OK);
+    patina_cloud_destroy(cloud);
+    assert_int_equal(patina_cloud_verify(path, NULL), PATINA_OK);
+    FILE *file = fopen(path, "r+b");
+    assert_non_null(file);
+    assert_int_equal(fseeko(file, 0, SEEK_END), 0);
+    const uint64_t size = (uint64_t)ftello(file);
+    uint32_t random = 1;
+    int found = 0, changed = 0;
+    for (int i = 0; i < TRIES; i++) {
+        random = random * 1664525u + 1013904223u;
+        // not in the padding behind a section, which is zero and read by nobody
+        const off_t at = (off_t)(SECTION + ((uint64_t)random << 8) % (size - SECTION));
+        unsigned char old = 0, none[64] = { 0 }, around[64] = { 0 };
+        assert_int_equal(fseeko(file, at, SEEK_SET), 0);
+        const size_t got = fread(around, 1, sizeof around, file);
+        if (!memcmp(around, none, got))
+            continue;
+        old = around[0];
+        assert_int_equal(fseeko(file, at, SEEK_SET), 0);
+        assert_int_equal(fputc(old ^ 1 << random % 8, file), old ^ 1 << random % 8);
+        assert_int_equal(fflush(file), 0);
+        changed++;
+        assert_int_equal(patina_task_verify(path, NULL, &task), PATINA_OK);
+        found += patina_task_wait(task) == PATINA_ERROR_FORMAT;
+        patina_task_destroy(task);
+        assert_int_equal(fseeko(file, at, SEEK_SET), 0);
+        assert_int_equal(fputc(old, file), old);
+        assert_int_equal(fflush(file), 0);
+    }
+    fclose(file);
+    assert_true(changed > TRIES / 2);
+    assert_int_equal(found, changed);
+    assert_int_equal(patina_cloud_verify(path, NULL), PATINA_OK);
+    patina_progress *progress = NULL;
+    assert_int_equal(patina_progress_create(&progress), PATINA_OK);
+    patina_progress_cancel(progress);
+    assert_int_equal(patina_cloud_verify(path, progress), PATINA_ERROR_CANCELLED);
+    patina_progress_destroy(progress);
+    assert_int_equal(truncate(path, (off_t)(size - SECTION)), 0);
+    assert_int_equal(patina_cloud_verify(path, NULL), PATINA_ERROR_FORMAT);
+    unlink(path);
+    close(descriptor);
+    assert_int_equal(patina_cloud_verify(path, NULL), PATINA_ERROR_FILE);
+    assert_int_equal(patina_cloud_verify(NULL, NULL), PATINA_ERROR_ARGUMENT);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_builds_and_renders), cmocka_unit_test(test_errors_come_through),
         cmocka_unit_test(test_cancel),             cmocka_unit_test(test_destroy_waits),
         cmocka_unit_test(test_fingerprints),       cmocka_unit_test(test_colors),
-        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_files),              cmocka_unit_test(test_damaged_clouds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

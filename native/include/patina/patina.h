@@ -271,6 +271,9 @@ PATINA_API int patina_cloud_neighbourhoods(const patina_cloud *cloud, const pati
 // cloud is open its file may be replaced (patina_cloud_save does), not written into.
 PATINA_API int patina_cloud_save(const patina_cloud *cloud, const char *path);
 PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
+// Reads a saved cloud whole and compares the sum of each of its sections with that of the writing, which opening leaves out but
+// for the chunks: PATINA_ERROR_FORMAT where any differs. progress: may be NULL; stops it too. Any thread, open clouds or not.
+PATINA_API int patina_cloud_verify(const char *path, patina_progress *progress);
 PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
 
 // ---- mesh: triangles that stand among the points ----------------------------------------------------------------
@@ -770,6 +773,7 @@ PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_pro
                                         patina_task **out); // patina_grid_normals
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
+PATINA_API int patina_task_verify(const char *path, patina_progress *progress, patina_task **out);    // patina_cloud_verify
 PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
 // Waits for the end and returns what the call returned; its message is at the task.
 PATINA_API int patina_task_wait(patina_task *task);

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long the units of a coordinate reference system are: from its WKT (OGC 01-009, ISO 19162), else from GeoTIFF keys, else
+from the words beside those. Plain: no Blender, no library."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+FOOT, US_FOOT = 0.3048, 1200.0 / 3937.0  # metres
+NAMES = {FOOT: "feet", US_FOOT: "US survey feet"}
+
+# EPSG numbers of units
+_UNITS = {9001: 1.0, 9002: FOOT, 9003: US_FOOT, 9005: 0.3047972654, 9036: 1000.0, 9096: 0.9144}
+
+# GeoTIFF keys
+_MODEL, _LINEAR, _LINEAR_SIZE, _VERTICAL = 1024, 3076, 3077, 4099
+_GEOGRAPHIC = 2  # a model
+
+_HORIZONTAL = {"PROJCS", "PROJCRS", "PROJECTEDCRS", "LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "GEOCCS"}
+_ANGULAR = {"GEOGCS", "GEOGCRS", "GEOGRAPHICCRS"}
+_HEIGHTS = {"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"}
+_ROOTS = _HORIZONTAL | _ANGULAR | _HEIGHTS | {"COMPD_CS", "COMPOUNDCRS", "BOUNDCRS"}
+_LENGTHS = {"UNIT", "LENGTHUNIT"}
+
+_TOKENS = re.compile(r'"(?:[^"]|"")*"|[\[\](),]|[^\s"\[\](),]+')
+
+
+@dataclass(frozen=True)
+class Units:
+    across: float  # metres of a unit of x and y
+    up: float  # and of z
+    degrees: bool = False  # x and y are angles: across says nothing
+
+    def __str__(self) -> str:
+        return "degrees" if self.degrees else next(
+            (name for metres, name in NAMES.items() if abs(self.across / metres - 1.0) < 1e-7), f"{self.across:.9g} m")
+
+
+def units(text: str, keys: Mapping[int, float] | None = None) -> Units | None:
+    """Of a coordinate reference system in WKT, or in words with the numbers of its GeoTIFF keys; None where nothing says."""
+    keys = keys or {}
+    root = _parsed(text)
+    if root and root[0] in _ROOTS:
+        return _of_wkt(root)
+    words = [part.strip() for part in text.split("|")]
+    if keys.get(_MODEL) == _GEOGRAPHIC:
+        return Units(1.0, _UNITS.get(int(keys.get(_VERTICAL, 9001)), 1.0), True)
+    across = _UNITS.get(int(keys.get(_LINEAR, 0)), keys.get(_LINEAR_SIZE)) or _in_words(words[0])
+    up = _UNITS.get(int(keys.get(_VERTICAL, 0))) or next(filter(None, map(_in_words, words[1:])), None)
+    if across is None and up is None:
+        return None
+    return Units(across or 1.0, up or across or 1.0)
+
+
+def _in_words(text: str) -> float | None:
+    if re.search(r"us[ _-]*(survey)?[ _-]*(ft|foot|feet)\b|\bft[ _-]*us\b", text, re.I):
+        return US_FOOT
+    return FOOT if re.search(r"\b(ft|foot|feet)\b", text, re.I) else None
+
+
+Node = tuple[str, list]  # keyword, and what stands in its brackets: texts and nodes
+
+
+def _parsed(text: str) -> Node | None:
+    """The first element of a WKT."""
+    stack: list[list] = [[]]
+    for token in _TOKENS.findall(text):
+        if token in "[(":
+            if not stack[-1] or not isinstance(stack[-1][-1], str):
+                return None
+            node: Node = (stack[-1].pop().upper(), [])
+            stack[-1].append(node)
+            stack.append(node[1])
+        elif token in "])":
+            stack.pop()
+            if len(stack) == 1:
+                break
+        elif token != ",":
+            stack[-1].append(token)
+        if not stack or len(stack) > 64:
+            return None
+    return next((item for item in stack[0] if isinstance(item, tuple)), None)
+
+
+def _find(node: Node, names: set[str]) -> Node | None:
+    """The element itself, or the first below it, by such a name."""
+    if node[0] in names:
+        return node
+    return next(filter(None, (_find(item, names) for item in node[1] if isinstance(item, tuple))), None)
+
+
+def _length(node: Node) -> float | None:
+    """Metres of the unit of an element or of its axes, not of what it is based on."""
+    for keyword, inner in (item for item in node[1] if isinstance(item, tuple)):
+        if keyword in _LENGTHS and len(inner) > 1 and isinstance(inner[1], str):
+            try:
+                found = float(inner[1])
+            except ValueError:
+                continue
+            if 1e-6 < found < 1e6:
+                return found
+    axes = (item for item in node[1] if isinstance(item, tuple) and item[0] == "AXIS")
+    return next(filter(None, map(_length, axes)), None)
+
+
+def _of_wkt(root: Node) -> Units | None:
+    base = _find(root, {"SOURCECRS"}) or root  # of a bound one
+    level, height = _find(base, _HORIZONTAL), _find(base, _HEIGHTS)
+    across = _length(level) if level else None
+    up = _length(height) if height else None
+    if across is not None:
+        return Units(across, up or across)
+    if _find(base, _ANGULAR) and level is None:
+        return Units(1.0, up or 1.0, True)
+    return Units(up, up) if up else None

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Holdouts and shadow catchers, out of pictures more of the same scene: nothing here knows Blender.
+
+In the picture itself both are drawn black, so they hide what lies behind and give no light of their own. A second picture tells
+their share of each pixel, by the same filters: holdouts in red, catchers in green. Where there are catchers, two more show these
+alone in white, with shadows and without: what is missing of the light is how dark the shadow is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from .sync import CloudItem, Effects, MeshItem, SceneDescription
+from .sync.clouds import LIT, NOTHING
+from .sync.colors import FIXED
+from .sync.roles import CATCHER, HOLDOUT
+
+UNLIT = 1  # PATINA_LIGHTING_UNLIT
+NO_SELF = 4  # PATINA_SHADOW_NO_SELF
+BLACK, WHITE = (NOTHING,) * 3, (1.0,) * 3
+RED, GREEN = (1.0, NOTHING, NOTHING), (NOTHING, 1.0, NOTHING)
+
+Item = CloudItem | MeshItem
+
+
+def are_needed(description: SceneDescription) -> bool:
+    return any(item.role for item in (*description.clouds, *description.meshes))
+
+
+def picture(description: SceneDescription) -> SceneDescription:
+    """The scene with holdouts and catchers black."""
+    return _painted(description, lambda item: _flat(item, BLACK) if item.role else item)
+
+
+def needed(description: SceneDescription) -> list[SceneDescription]:
+    """The other pictures that a picture needs; finish() takes their planes COMBINED in this order."""
+    plain = replace(description, lines=None, effects=_focus_alone(description.effects), shadow_file="", clips=[
+        replace(clip, tint_strength=0.0) for clip in description.clips])
+    plain = replace(plain, settings=replace(plain.settings, film_transparent=1))
+    unlit = replace(plain, lights=[], headlight=None, settings=replace(plain.settings, world_color=(1.0,) * 3))
+    colors = {HOLDOUT: RED, CATCHER: GREEN}
+    found = [_painted(unlit, lambda item: _flat(item, colors.get(item.role, BLACK)))]
+    if any(item.role == CATCHER for item in (*description.clouds, *description.meshes)):
+        lit = _painted(plain, lambda item: _lit(item) if item.role == CATCHER else _flat(item, BLACK))
+        dark = [replace(light, shadows=0) for light in lit.lights]
+        found += [lit, replace(lit, lights=dark)]
+    return found
+
+
+def finish(color: np.ndarray, description: SceneDescription, planes: list[np.ndarray]) -> np.ndarray:
+    """color (height, width, 4), premultiplied, of picture(): without holdouts, catchers as their shadows. planes: of needed()."""
+    held, caught = planes[0][..., 0], planes[0][..., 1]
+    shadow = np.zeros_like(caught)
+    if len(planes) > 1:
+        lit, all_light = (plane[..., :3].sum(axis=2) for plane in planes[1:])
+        np.divide(lit, all_light, out=shadow, where=all_light > 0.0)
+        shadow = np.where(all_light > 0.0, caught * (1.0 - np.clip(shadow, 0.0, 1.0)), 0.0)
+    out = color.copy()
+    settings = description.settings
+    if settings.film_transparent:
+        out[..., 3] = np.clip(color[..., 3] - held - caught + shadow, 0.0, 1.0)
+        out[..., :3] *= (held + caught < color[..., 3] - 1e-4)[..., None]  # effects may have coloured what is held out
+    else:
+        background = settings.background if settings.own_background else settings.world_color
+        out[..., :3] += (caught - shadow)[..., None] * np.float32(background)
+        out[..., 3] = np.clip(color[..., 3] - held, 0.0, 1.0)
+        out[..., :3] *= (held < 1.0 - 1e-4)[..., None]
+    return out
+
+
+def _painted(description: SceneDescription, paint: Callable[[Item], Item]) -> SceneDescription:
+    return replace(description, clouds=[paint(item) for item in description.clouds],
+                   meshes=[paint(item) for item in description.meshes])
+
+
+def _flat(item: Item, color: tuple[float, float, float]) -> Item:
+    if isinstance(item, MeshItem):
+        return replace(item, mesh=item.mesh.bare or item.mesh, style=replace(item.style, color=color))
+    style = replace(item.style, lighting=UNLIT, color_source=FIXED, color=color, ramp=b"", exposure=0.0, contrast=1.0,
+                    free_space=item.style.free_space & 2)  # what is only marked gets the color too
+    return replace(item, style=style)
+
+
+def _lit(item: Item) -> Item:
+    white = _flat(item, WHITE)
+    if isinstance(item, MeshItem):
+        return white
+    style = white.style
+    return replace(white, style=replace(style, lighting=LIT, specular=0.0, shadow_off=style.shadow_off & ~2 | NO_SELF))
+
+
+def _focus_alone(effects: Effects) -> Effects:
+    return replace(effects, edl_strength=0.0, obscurance_strength=0.0, toon_bands=0, hatch_levels=0, fog_density=0.0,
+                   paper_color=WHITE, paper_grain=0.0)

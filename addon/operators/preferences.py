@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons of the preferences: readers of LAZ and E57, the caches, the manual."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+from bpy.props import CollectionProperty, StringProperty
+from bpy.types import Context, Event, Operator, OperatorFileListElement
+from bpy_extras.io_utils import ImportHelper
+
+from .. import importers, jobs, native, preferences, readers
+from ..sync import cache, clouds
+from .steps import Stepped
+
+PIP: list[str] | None = None  # in place of this Python's own
+
+
+class _Installing(Stepped):
+    def _install(self, what: Iterator[str]) -> jobs.Steps[set[str]]:
+        """Goes through what it does, and tells."""
+        try:
+            for doing in what:
+                self._progress.doing = doing
+                self._progress.step(self._progress.value())
+                yield jobs.Pause()
+        except readers.ReadersError as error:
+            self.report({'ERROR'}, importers.told(f"Patina: {error}"))
+            return {'CANCELLED'}
+        except native.PatinaCancelled:
+            self.report({'INFO'}, "Patina: nothing was installed, for it was ended before")
+            return {'CANCELLED'}
+        finally:
+            what.close()
+        lacking = readers.missing()
+        if lacking:
+            self.report({'WARNING'}, f"Patina: {', '.join(lacking)} still not there")
+        else:
+            self.report({'INFO'}, "LAZ, COPC and E57 can be read now")
+        return {'FINISHED'}
+
+    def execute(self, context: Context) -> set[str]:
+        self._progress = importers.Progress()
+        return self.begin(context, self._install(self._wheels()))
+
+
+class PATINA_OT_install_readers(_Installing, Operator):
+    """Fetch the packages that read LAZ, COPC and E57 from PyPI, into a folder of Patina's own"""
+
+    bl_idname = "patina.install_readers"
+    bl_label = "Install Readers"
+    bl_options = {'REGISTER', 'INTERNAL'}
+
+    @classmethod
+    def poll(cls, _context: Context) -> bool:
+        if getattr(bpy.app, "online_access", True):
+            return True
+        cls.poll_message_set("Preferences > System > Network does not allow online access: install from files")  # Blender 4.2
+        return False
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        self._invoked = True
+        return self.execute(context)
+
+    def _wheels(self) -> Iterator[str]:
+        with tempfile.TemporaryDirectory(prefix="patina-wheels-") as place:
+            yield from readers.download(Path(place), PIP)
+            yield from readers.install(Path(place).glob("*.whl"), preferences.readers_folder())
+
+
+class PATINA_OT_install_reader_files(_Installing, Operator, ImportHelper):
+    """Install the packages that read LAZ, COPC and E57 from wheels (.whl) that were fetched before: without a network"""
+
+    bl_idname = "patina.install_reader_files"
+    bl_label = "Install from Files..."
+    bl_options = {'REGISTER', 'INTERNAL'}
+
+    filter_glob: StringProperty(default="*.whl", options={'HIDDEN'})
+    files: CollectionProperty(type=OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
+    directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
+
+    def invoke(self, context: Context, event: Event) -> set[str]:
+        self._invoked = True
+        return super().invoke(context, event)
+
+    def _wheels(self) -> Iterator[str]:
+        """Those chosen; of a folder all that are in it."""
+        chosen = [Path(self.directory) / item.name for item in self.files if item.name] or [Path(self.filepath)]
+        found = [wheel for path in chosen for wheel in (path.glob("*.whl") if path.is_dir() else [path])]
+        if not found:
+            raise readers.ReadersError(f"there is no .whl in {chosen[0]}")
+        yield from readers.install(found, preferences.readers_folder())
+
+
+class PATINA_OT_clear_cache(Operator):
+    """Delete kept clouds of linked files. They are made anew when they are drawn"""
+
+    bl_idname = "patina.clear_cache"
+    bl_label = "Clear"
+    bl_options = {'REGISTER', 'INTERNAL'}
+
+    def execute(self, _context: Context) -> set[str]:
+        clouds.CACHE.clear()  # maps some of them
+        count, size = cache.clear()
+        self.report({'INFO'}, f"Deleted {count} files, {size / 1e9:.2f} GB")
+        return {'FINISHED'}
+
+
+class PATINA_OT_open_manual(Operator):
+    """Open what tells how to use Patina"""
+
+    bl_idname = "patina.open_manual"
+    bl_label = "Manual"
+    bl_options = {'REGISTER', 'INTERNAL'}
+
+    def execute(self, _context: Context) -> set[str]:
+        path = manual()
+        if path is None:
+            self.report({'ERROR'}, "Patina: the manual is missing")
+            return {'CANCELLED'}
+        bpy.ops.wm.path_open(filepath=str(path))
+        return {'FINISHED'}
+
+
+def manual() -> Path | None:
+    """In the zip, else beside the add-on's folder in a checkout."""
+    own = Path(__file__).resolve().parents[1]
+    return next((path for path in (own / "README.md", own.parent / "README.md") if path.is_file()), None)
+
+
+def cache_text() -> str:
+    count, size = cache.held()
+    return f"{count} kept, {size / 1e9:.2f} GB"
+
+
+_CLASSES = (PATINA_OT_install_readers, PATINA_OT_install_reader_files, PATINA_OT_clear_cache, PATINA_OT_open_manual)
+
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From Blender's start scene to a picture of points: engine, camera and light, offered after the first import."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import bpy
+from bpy.types import Context, Object, Operator, Scene
+from mathutils import Vector
+
+from ..engine import PatinaRenderEngine
+from ..sync import attributes
+
+START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender begins with
+LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a cube beside it 1.5
+
+
+def is_points(obj: Object) -> bool:
+    return obj.type == 'POINTCLOUD' or obj.type == 'MESH' and (bool(obj.patina.linked_file) or not obj.data.polygons)
+
+
+def untouched(scene: Scene) -> bool:
+    """Whether there is nothing but points, and what Blender's start scene holds."""
+    others = [obj for obj in scene.objects if not is_points(obj)]
+    return (not bpy.data.filepath and len(bpy.data.scenes) == 1 and "EEVEE" in scene.render.engine
+            and all(START.get(obj.name) == obj.type for obj in others) and all(map(_as_it_came, others)))
+
+
+def _as_it_came(obj: Object) -> bool:
+    return obj.type != 'MESH' or len(obj.data.vertices) == 8 and obj.matrix_world.is_identity and not obj.modifiers
+
+
+def unlit(scene: Scene, points: Sequence[Object]) -> bool:
+    """Whether points without colours, which lights shade, get light of none."""
+    dark = [obj for obj in points if not obj.patina.linked_file and not _colored(obj)]
+    return bool(dark) and not scene.patina.studio.use_light and not any(_reaches(lamp, obj) for obj in dark for lamp in scene.objects
+                                                                       if lamp.type == 'LIGHT' and not lamp.hide_render)
+
+
+def _colored(obj: Object) -> bool:
+    return any(name in obj.data.attributes for name in attributes.COLOR_NAMES) or bool(
+        getattr(obj.data, "color_attributes", None) and obj.data.color_attributes.active_color)
+
+
+def _reaches(lamp: Object, obj: Object) -> bool:
+    if lamp.data.type == 'SUN':
+        return lamp.data.energy > LEAST
+    corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]  # where it stands amid them, too, it must reach
+    away = sum((lamp.matrix_world.translation - corner).length_squared for corner in corners) / 8.0
+    return lamp.data.energy > LEAST * 4.0 * math.pi * math.pi * max(away, 1e-12)
+
+
+class PATINA_OT_set_up(Operator):
+    """Render with Patina: leaves out the start scene's cube, aims the camera at the points, and where they have no colors and \
+no light reaches them, turns on the headlight"""
+
+    bl_idname = "scene.patina_set_up"
+    bl_label = "Set Up for Points"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def execute(self, context: Context) -> set[str]:
+        scene = context.scene
+        points = [obj for obj in context.view_layer.objects if is_points(obj) and obj.visible_get()]
+        if not points:
+            self.report({'ERROR'}, "Patina: the scene has no points")
+            return {'CANCELLED'}
+        cube = scene.objects.get("Cube")
+        if untouched(scene) and cube:
+            bpy.data.objects.remove(cube)
+        scene.render.engine = PatinaRenderEngine.bl_idname
+        context.view_layer.update()
+        for obj in context.view_layer.objects:
+            obj.select_set(obj in points)
+        if bpy.ops.object.patina_frame_points.poll():
+            bpy.ops.object.patina_frame_points()
+        if unlit(scene, points):
+            scene.patina.studio.use_headlight = True
+            self.report({'INFO'}, "No light reaches the points: the headlight shines from the camera")
+        return {'FINISHED'}
+
+
+def offer(context: Context) -> None:
+    """Asks, once the points are there, and goes away by itself."""
+    def draw(self: bpy.types.Menu, _context: Context) -> None:
+        self.layout.operator(PATINA_OT_set_up.bl_idname, icon='RESTRICT_RENDER_OFF')
+        self.layout.label(text="Engine, camera and light, for the points alone")
+
+    context.window_manager.popup_menu(draw, title="Render with Patina?", icon='QUESTION')
+
+
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_set_up,))

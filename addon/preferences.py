@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What holds for all files of an artist: caches, device, memory, readers of other formats."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import EnumProperty, IntProperty, StringProperty
+from bpy.types import AddonPreferences, Context
+
+from . import memory, readers
+
+GIGA = 1 << 30
+CACHE_GIGA = 32  # of clouds on the disk, 23 bytes a point: a sequence has many
+
+
+def get() -> PatinaPreferences | None:
+    """None where the add-on is not enabled in the preferences, as in tests: then defaults hold."""
+    addon = bpy.context.preferences.addons.get(__package__)
+    return addon.preferences if addon else None
+
+
+def readers_folder() -> Path:
+    """Of this Blender's Python."""
+    return Path(bpy.utils.user_resource('SCRIPTS', path="addons")) / "patina-readers" / readers.TAG
+
+
+def cache_bytes() -> int:
+    """How much the caches may take."""
+    known = get()
+    return GIGA * (known.cache_limit if known else CACHE_GIGA)
+
+
+def _use(group: PatinaPreferences, _context: Context) -> None:
+    memory.limit = GIGA * group.memory_limit
+
+
+class PatinaPreferences(AddonPreferences):
+    bl_idname = __package__
+
+    cache_folder: StringProperty(
+        name="Cache Folder", subtype='DIR_PATH',
+        description="Where linked clouds are kept, to open at once the next time. Empty: in Blender's folder of user data")
+    cache_limit: IntProperty(
+        name="Cache Size", default=CACHE_GIGA, min=1, soft_max=1024, max=1 << 20,
+        description="Gigabytes that kept clouds may take; those not used for longest go first")
+    device: EnumProperty(
+        name="Device", default='AUTO', description="What computes the pictures of scenes whose own device is Automatic",
+        items=(
+            ('AUTO', "Automatic", "The GPU where there is one, else the processor", 0),
+            ('CPU', "Processor", "The same pixels on every machine", 1),
+            ('GL', "OpenGL", "OpenGL 4.3 compute shaders", 3)))
+    threads: IntProperty(
+        name="Threads", default=0, min=0, max=1024,
+        description="Processor threads of scenes that do not say how many; 0 follows Blender's own setting")
+    memory_limit: IntProperty(
+        name="Memory", default=0, min=0, soft_max=256, max=1 << 20, update=_use,
+        description="Gigabytes that a final picture's planes may take before it is made in tiles; 0: half of what is free")
+
+    def draw(self, _context: Context) -> None:
+        from .operators import preferences as operators  # which needs these
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(heading="Caches")
+        column.prop(self, "cache_folder")
+        column.prop(self, "cache_limit", text="Most, GB")
+        row = column.row()
+        row.label(text=operators.cache_text())
+        row.operator("patina.clear_cache")
+        column = layout.column(heading="Defaults")
+        column.prop(self, "device")
+        column.prop(self, "threads", text="Threads (0: Automatic)")
+        column.prop(self, "memory_limit", text="Memory, GB (0: Automatic)")
+        column = layout.column()
+        lacking = readers.missing()
+        if lacking:
+            column.label(text=f"Not there: {', '.join(lacking)}", icon='INFO')
+            row = column.row()
+            row.operator("patina.install_readers")
+            row.operator("patina.install_reader_files")
+        else:
+            column.label(text="LAZ, COPC and E57 can be read", icon='CHECKMARK')
+        layout.operator("patina.open_manual", icon='HELP')
+
+
+def register() -> None:
+    bpy.utils.register_class(PatinaPreferences)
+    readers.look_in(readers_folder())
+    known = get()
+    if known:
+        _use(known, bpy.context)
+
+
+def unregister() -> None:
+    readers.look_no_more_in(readers_folder())
+    bpy.utils.unregister_class(PatinaPreferences)
+    memory.limit = 0

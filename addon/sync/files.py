@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which file an object links.
+
+A Volume datablock holds it, for those of datablocks are the paths that Blender itself takes care of: it makes them relative
+and absolute, maps them anew on Save As, finds them where they are missing, packs and unpacks them, and farms collect them.
+Paths among an add-on's own properties get nothing of that. Volumes stand in no list of pictures, and Blender opens none that
+no object shows. Object.patina.linked_file is how scripts say it, and what older versions saved.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..importers.reading import told
+from . import kept, sequence
+
+_unpacked: dict[tuple[int, int], Path] = {}  # of packed files, by place in memory and size
+
+
+def assign(obj: bpy.types.Object, path: str) -> None:
+    """The file, or pattern of files, that an object links from now on, absolute or as Blender writes relative ones; "": none."""
+    group = obj.patina
+    volume = group.linked_data
+    if not path:
+        group.linked_data = None
+        group.linked_file = ""
+        return
+    place = Path(bpy.path.abspath(path))
+    files = sequence.files_of(place) if sequence.is_pattern(place) else {}
+    first = files[min(files)] if files else place
+    follows = bool(files) and sequence.pattern_of(first) == place
+    if follows:
+        path = path[:len(path) - len(place.name)] + first.name
+    if volume is None or (volume.filepath, volume.is_sequence) != (path, follows):
+        known = (item for item in bpy.data.volumes if (item.filepath, item.is_sequence, item.library) == (path, follows, None))
+        own = volume if volume and not volume.library and volume.users == 1 else None
+        volume = group.linked_data = next(known, own) or bpy.data.volumes.new(told(bpy.path.basename(path)))
+        volume.filepath, volume.is_sequence = path, follows
+    if group.linked_file != text_of(obj):
+        group.linked_file = text_of(obj)
+
+
+def as_preferred(path: Path) -> str:
+    """A path as the artist's preferences want new ones: relative to the file that is open, or absolute."""
+    if not bpy.data.filepath or not bpy.context.preferences.filepaths.use_relative_paths:
+        return str(path)
+    try:
+        return bpy.path.relpath(str(path))
+    except ValueError:  # on another drive
+        return str(path)
+
+
+def path_of(obj: bpy.types.Object) -> Path | None:
+    """The file or pattern that an object links, absolute; of a packed one where it was put down. None: it links none."""
+    original = obj.original
+    volume = original.patina.linked_data
+    if volume is None:  # of an older version, and of a library
+        text = original.patina.linked_file
+        return Path(bpy.path.abspath(text, library=original.library)) if text else None
+    path = Path(bpy.path.abspath(volume.filepath, library=volume.library))
+    if volume.packed_file and not volume.is_sequence:  # of those Blender packs the first
+        return _put_down(volume.packed_file, path)
+    return (sequence.pattern_of(path) or path) if volume.is_sequence else path
+
+
+def _put_down(packed: bpy.types.PackedFile, path: Path) -> Path:
+    """A packed file in the folder of caches, from which it is read. By its content, so that it lies there once."""
+    key = (packed.as_pointer(), packed.size)
+    known = _unpacked.get(key)
+    if known is None or not known.is_file():
+        data = packed.data
+        name = hashlib.blake2b(data, digest_size=12).hexdigest()
+        known = kept.folder() / f"{name}-packed{path.suffix}"
+        if not known.is_file():
+            known.write_bytes(data)
+            os.utime(known, (0, 0))  # what is made of it is good for every copy
+        _unpacked[key] = known
+    return known
+
+
+def text_of(obj: bpy.types.Object) -> str:
+    """What linked_file is to say."""
+    volume = obj.patina.linked_data
+    if volume is None:
+        return obj.patina.linked_file
+    if not volume.is_sequence:
+        return volume.filepath
+    path = Path(volume.filepath)
+    return volume.filepath[:-len(path.name)] + (sequence.pattern_of(path) or path).name
+
+
+def follow(obj: bpy.types.Object) -> None:
+    """linked_file was set."""
+    if obj.patina.linked_file != text_of(obj) or obj.patina.linked_file and obj.patina.linked_data is None:
+        assign(obj, obj.patina.linked_file)
+
+
+@persistent
+def _tell(*_) -> None:
+    """Once a file is loaded, and before it is saved: objects of older versions get their volume, and all say what holds."""
+    for obj in bpy.data.objects:
+        if obj.library is None and (obj.patina.linked_data or obj.patina.linked_file):
+            text = text_of(obj)
+            if obj.patina.linked_data is None:
+                assign(obj, text)
+            elif obj.patina.linked_file != text:
+                obj.patina.linked_file = text
+
+
+@persistent
+def _forget(*_) -> None:
+    _unpacked.clear()
+
+
+_HANDLERS = ((bpy.app.handlers.load_pre, _forget), (bpy.app.handlers.load_post, _tell), (bpy.app.handlers.save_pre, _tell))
+
+
+def register() -> None:
+    for handlers, function in _HANDLERS:
+        handlers.append(function)
+
+
+def unregister() -> None:
+    for handlers, function in _HANDLERS:
+        handlers.remove(function)
+    _unpacked.clear()

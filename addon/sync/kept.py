@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where linked clouds are kept on the disk, and whether what is kept there is still what was written.
+
+A kept cloud is mapped at once, and read whole beside by a native task; what is damaged is thrown away and built anew.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .. import jobs, native, preferences
+
+
+def folder() -> Path:
+    """Of all kept clouds: the artist's own, else Blender's of user data; without a home, as services and farms have none, the system's for temporary
+    files, in a folder that is this user's alone."""
+    known = preferences.get()
+    if known and known.cache_folder:
+        chosen = Path(bpy.path.abspath(known.cache_folder))
+        chosen.mkdir(parents=True, exist_ok=True)
+        return chosen
+    own = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
+    if own and os.access(own, os.W_OK):
+        return Path(own)
+    user = getattr(os, "getuid", lambda: "")()
+    beside = Path(tempfile.gettempdir()) / f"patina-{user}"
+    beside.mkdir(mode=0o700, exist_ok=True)
+    if user != "" and beside.stat().st_uid != user:  # somebody else's
+        raise PermissionError(f"{beside} belongs to another user")
+    return beside
+
+
+def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], list[float]]:
+    """Origin, scanners and units of a kept cloud. ValueError or OSError where they are not there as they were written."""
+    notes = json.loads(path.read_text("utf-8"))
+    if not isinstance(notes, dict):
+        raise ValueError(f"{path} holds no object")
+    origin, scanners = _numbers(notes.get("origin")), _numbers(notes.get("scanners") or [])
+    units = _numbers(notes.get("units") or [1.0, 1.0])
+    if len(origin) != 3 or len(scanners) % 3 or len(units) != 2:
+        raise ValueError(f"{path} lacks what belongs to it")
+    return tuple(origin), scanners, units
+
+
+def _numbers(values: Any) -> list[float]:
+    if not isinstance(values, list) or not all(type(value) in {int, float} for value in values):
+        raise ValueError("numbers were expected")
+    return [float(value) for value in values]
+
+
+class Checks:
+    """Tasks that read kept clouds. Any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._tasks: dict[tuple, tuple[Path, native.Task, native.Progress]] = {}  # by the cloud's identity
+        self._seen: dict[tuple, int] = {}  # which file of a name was found good: its inode
+        self._damaged: dict[str, list[tuple]] = {"views": [], "finals": []}  # found, and not yet told to them
+
+    def start(self, identity: tuple, path: Path) -> None:
+        """Begins to look at the file of a cloud that was just opened, once a session."""
+        with self._lock:
+            if identity in self._tasks or self._seen.get(identity) == path.stat().st_ino:
+                return
+            progress = native.Progress()
+            self._tasks[identity] = (path, native.Cloud.start_verifying(path, progress), progress)
+
+    def busy(self) -> bool:
+        return bool(self._tasks)
+
+    def take_damaged(self, who: str = "views") -> list[tuple]:
+        """The identities of clouds found damaged since the last time; their files are gone."""
+        with self._lock:
+            self._look()
+            found, self._damaged[who] = self._damaged[who], []
+        return found
+
+    def finish(self, stopped: Callable[[], bool]) -> list[tuple]:
+        """The same for a final picture, of all that are under way, waiting for them."""
+        while any(not task.done() for _, task, _ in list(self._tasks.values())):
+            if stopped():
+                raise native.PatinaCancelled("cancelled", native.CANCELLED)
+            time.sleep(jobs.INTERVAL)
+        return self.take_damaged("finals")
+
+    def _look(self) -> None:
+        for identity, (path, task, _) in list(self._tasks.items()):
+            if not task.done():
+                continue
+            del self._tasks[identity]
+            try:
+                task.result()
+                self._seen[identity] = path.stat().st_ino
+            except native.PatinaError as error:
+                if error.code == native.FORMAT:
+                    path.unlink(missing_ok=True)
+                    for found in self._damaged.values():
+                        found.append(identity)
+            except OSError:  # somebody threw it away meanwhile
+                pass
+
+    def clear(self) -> None:
+        with self._lock:
+            for _, task, progress in self._tasks.values():
+                progress.cancel()
+                task.close()
+            self._tasks.clear()
+
+
+CHECKS = Checks()

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linked files that are missing or cannot be read, frames without points: a warning, and with --patina-strict a failure."""
+
+import contextlib
+import subprocess
+import sys
+
+import bpy
+from check_import import import_ply
+from check_linked import dense
+from check_sequence import link, scans
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, drawn, failing_render, new_scene, render, reports, sphere, written
+
+
+@contextlib.contextmanager
+def strictly():
+    before = sys.argv
+    sys.argv = ["blender", "--", "--patina-strict"]
+    try:
+        yield
+    finally:
+        sys.argv = before
+
+
+def spoil(path):
+    """Its header promises what is not there any more."""
+    path.write_bytes(path.read_bytes()[:-200])
+
+
+def test_left_out_with_a_warning():
+    """What is wrong with one file does not touch the others."""
+    for name, harm in (("spoilt.ply", spoil), ("vanished.ply", lambda path: path.unlink())):
+        new_scene()
+        path = dense(name)
+        import_ply(path, link=True)
+        add_points(*sphere(3000, 0.5))
+        harm(path)
+        picture = render()
+        check(len(drawn(picture)) > 100, f"{name}: an empty picture")
+        said = [(kind, text) for kind, text in reports if str(path) in text]
+        check([kind for kind, _ in said] == ['WARNING'], f"{name}: {reports}")
+        with strictly():
+            message = failing_render()
+            check(str(path) in message and not written, message)
+
+
+def test_an_animation_goes_on():
+    """Each frame is rendered; only those with the spoilt file warn."""
+    link(scans("spoilt", (1, 2, 3)))
+    spoilt = SCRATCH / "spoilt/scan_0002.ply"
+    spoilt.write_bytes(spoilt.read_bytes()[:-20])
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    scene.render.filepath = str(SCRATCH / "spoilt_frame_")
+    reports.clear()
+    bpy.ops.render.render(animation=True)
+    check(all((SCRATCH / f"spoilt_frame_{frame:04}.png").exists() for frame in (1, 2, 3)), "every frame")
+    check([text for kind, text in reports if kind == 'ERROR'] == [], f"{reports}")
+    check(len([text for _, text in reports if str(spoilt) in text]) == 1, f"{reports}")
+
+
+def test_nothing_to_draw():
+    new_scene()
+    check(not drawn(render()) and any("no visible object" in text for _, text in reports), f"{reports}")
+    with strictly():
+        check("no visible object" in failing_render(), f"{reports}")
+        add_points(*sphere(3000))
+        check(len(drawn(render())) > 100, "a whole picture is a picture")
+
+
+def test_farm_learns_of_it():
+    """Blender's exit code and what it wrote, as a farm's node starts it."""
+    if not bpy.app.binary_path:
+        raise Skip("needs Blender itself, not the module")
+    new_scene()
+    path = dense("farm.ply")
+    import_ply(path, link=True)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 2
+    scene.render.filepath = str(SCRATCH / "farm_")
+    file = SCRATCH / "farm.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)
+    start = SCRATCH / "farm_start.py"
+    start.write_text(f"import sys\nsys.path.insert(0, {str(REPOSITORY / 'tests/blender')!r})\nimport harness, check_linked\n")
+    command = [bpy.app.binary_path, "-b", "--factory-startup", "--python", str(start), str(file), "-E", "PATINA", "-a"]
+
+    def farm(*options):
+        for frame in SCRATCH.glob("farm_0*.png"):
+            frame.unlink()
+        done = subprocess.run([*command, "--", *options], capture_output=True, text=True, check=False)
+        return done.returncode, len(list(SCRATCH.glob("farm_0*.png"))), done.stdout + done.stderr
+
+    for options in ((), ("--patina-strict",)):
+        code, frames, said = farm(*options)
+        check((code, frames) == (0, 2), f"{options}: exit code {code}, {frames} frames: {said[-600:]}")
+    spoil(path)
+    code, frames, said = farm()
+    check((code, frames) == (0, 2) and str(path) in said, f"exit code {code}, {frames} frames: {said[-600:]}")
+    code, frames, said = farm("--patina-strict")
+    check(code != 0 and frames == 0 and str(path) in said, f"strict: exit code {code}, {frames} frames: {said[-600:]}")

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The viewport with Blender's overlays on, as by default: what is on the screen after every kind of change, once all is at rest.
+Blender draws vertices as black dots over every engine's picture, and the points' own surface has to hide them. See
+test_window.py for what a yield means."""
+
+import time
+
+import bpy
+import numpy as np
+import screen
+from harness import add_points, check, sphere
+from mathutils import Quaternion
+from window import area, setup, view, window_region
+
+from patina import viewport
+
+DARK = 40  # of 255: no channel of points and background is below 140
+LETTERS = 5000  # dark pixels of texts, cursor and gizmos in four views; the points' dots are 40,000 and more
+
+
+def at_rest(seconds=0.4):
+    """Whether nothing has been drawn or waited for, for so long."""
+    since = None
+
+    def come():
+        nonlocal since
+        views = [found for found in viewport._VIEWPORTS if found.engine()]
+        still = views and not bpy.app.timers.is_registered(viewport._tick) and all(
+            found.shown and found.shown.wish.level == viewport.pace.FULL and found._last is found.shown.wish for found in views)
+        since = (since or time.perf_counter()) if still else None
+        return still and time.perf_counter() - since > seconds
+    return come
+
+
+def dark_pixels():
+    """Of the 3D views on the screen, without having them drawn again."""
+    picture, total = screen.pixels(), 0
+    for place in bpy.context.window_manager.windows[0].screen.areas:
+        for region in place.regions if place.type == 'VIEW_3D' else ():
+            if region.type == 'WINDOW':
+                part = picture[region.y:region.y + region.height, region.x:region.x + region.width]
+                total += int((part.max(axis=2) < DARK).sum())
+    return total
+
+
+def do(operator, place=None, **options):
+    window = bpy.context.window_manager.windows[0]
+    place = place or area()
+    region = next(region for region in place.regions if region.type == 'WINDOW')
+    with bpy.context.temp_override(window=window, screen=window.screen, area=place, region=region):
+        operator(**options)
+
+
+def bright_scene():
+    scene = setup(overlays=True)
+    scene.render.film_transparent = False
+    scene.patina.studio.use_background = True
+    scene.patina.studio.background = (0.5, 0.5, 0.5)
+    positions, colors, normals = sphere(60000, 1.5, (0, 0, 0))
+    points = add_points(positions, np.full_like(colors, (220, 180, 140, 255)), normals)
+    points.patina.lighting = 'UNLIT'
+    return scene, points
+
+
+def redraw_by_engines():
+    for found in list(viewport._VIEWPORTS):
+        if found.engine():
+            found.engine().tag_redraw()
+
+
+def changes(scene, points):
+    """What an artist does: (name, step). A step that gives something waits for it."""
+    space = area().spaces[0]
+
+    def orbit():
+        for _ in range(5):
+            do(bpy.ops.view3d.view_orbit, angle=0.2, type='ORBITLEFT')
+            yield lambda: True
+
+    def shade(kind):
+        space.shading.type = kind
+        start = time.perf_counter()
+        yield lambda: time.perf_counter() - start > 0.3
+        space.shading.type = 'RENDERED'
+
+    def split():
+        do(bpy.ops.screen.area_split, direction='VERTICAL', factor=0.6)
+        for place in bpy.context.window.screen.areas:  # Blender gives the new one Solid
+            if place.type == 'VIEW_3D':
+                place.spaces[0].shading.type = 'RENDERED'
+
+    def close():
+        views = [place for place in bpy.context.window.screen.areas if place.type == 'VIEW_3D']
+        do(bpy.ops.screen.area_close, min(views, key=lambda place: place.width))
+
+    def mesh():
+        points.data.attributes["Col"].data.foreach_set("color_srgb", np.tile(np.float32([0.9, 0.8, 0.6, 1]), len(points.data.vertices)))
+        points.data.update()
+
+    yield "a look from above", lambda: do(bpy.ops.view3d.view_axis, type='TOP')
+    yield "an orbit", orbit
+    yield "one step", lambda: do(bpy.ops.view3d.view_orbit, angle=0.5, type='ORBITUP')
+    yield "a jump", lambda: setattr(view(), "view_rotation", Quaternion((0, 1, 0), 1.0))
+    yield "zoom", lambda: setattr(view(), "view_distance", 8.0)
+    yield "an object moved", lambda: setattr(points, "location", (0.3, 0.2, 0.0))
+    yield "painted", mesh
+    yield "a setting", lambda: setattr(scene.patina, "fill", 'CLOSED')
+    yield "Solid and back", lambda: shade('SOLID')
+    yield "Wireframe and back", lambda: shade('WIREFRAME')
+    yield "Material and back", lambda: shade('MATERIAL')
+    yield "four views", lambda: do(bpy.ops.screen.region_quadview)
+    yield "one view", lambda: do(bpy.ops.screen.region_quadview)
+    yield "split", split
+    yield "closed", close
+    yield "maximised", lambda: do(bpy.ops.screen.screen_full_area)
+    yield "back", lambda: do(bpy.ops.screen.screen_full_area)
+    yield "larger", lambda: setattr(space, "show_region_header", False)
+    yield "smaller", lambda: setattr(space, "show_region_header", True)
+    yield "overlays off", lambda: setattr(space.overlay, "show_overlays", False)
+    yield "overlays on", lambda: setattr(space.overlay, "show_overlays", True)
+    yield "another frame", lambda: scene.frame_set(scene.frame_current + 1)
+    yield "local view", lambda: do(bpy.ops.view3d.localview, frame_selected=False)
+    yield "global view", lambda: do(bpy.ops.view3d.localview, frame_selected=False)
+
+
+def test_points_hide_their_dots():
+    """After every change by the redraw that showed it; then by a whole one, and by one that only the engine asks for."""
+    scene, points = bright_scene()
+    yield at_rest()
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(False)
+    wrong, steps = [], [("the import", lambda: None), *changes(scene, points)]
+    for name, step in steps:
+        if name == "local view":
+            points.select_set(True)
+        found = step()
+        if hasattr(found, "__next__"):
+            yield from found
+        yield at_rest()
+        points.select_set(False)
+        counts = [dark_pixels()]
+        for redraw in (area().tag_redraw, redraw_by_engines) if name in {"the import", "global view"} else ():
+            redraw()
+            yield at_rest()
+            counts.append(dark_pixels())
+        if max(counts) > LETTERS:
+            wrong.append(f"{name}: {counts}")
+    check(not wrong, f"{len(wrong)} of {len(steps)} changes show dark pixels: {'; '.join(wrong)}")
+    view().view_perspective = 'PERSP'

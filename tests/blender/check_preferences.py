@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's preferences: readers of LAZ and E57 from files and by pip, the cache, defaults of device, threads and memory."""
+
+import contextlib
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import bpy
+import check_linked  # noqa: F401  no test leaves files with the user
+from check_import import import_ply
+from check_linked import dense
+from harness import REPOSITORY, SCRATCH, Skip, check, new_scene, render
+
+from patina import importers, memory, preferences, readers
+from patina.operators import preferences as operators
+from patina.sync import cache, kept, linked, settings
+
+FOLDER = SCRATCH / "readers" / readers.TAG
+
+
+@contextlib.contextmanager
+def enabled():
+    """As for an artist who enabled the add-on."""
+    addon = bpy.context.preferences.addons.new()
+    addon.module = "patina"
+    try:
+        yield preferences.get()
+    finally:
+        bpy.context.preferences.addons.remove(addon)
+        memory.limit = 0
+
+
+@contextlib.contextmanager
+def without_readers(*wanted):
+    """As on Debian's Blender: none of them is there. wanted: what is looked for in their place."""
+    packages, readers.PACKAGES = readers.PACKAGES, dict.fromkeys(wanted, "tests")
+    place, preferences.readers_folder = preferences.readers_folder, lambda: FOLDER
+    shutil.rmtree(FOLDER, ignore_errors=True)
+    try:
+        yield
+    finally:
+        readers.look_no_more_in(FOLDER)
+        readers.PACKAGES, preferences.readers_folder = packages, place
+        for name in wanted:
+            sys.modules.pop(name, None)
+
+
+def wheel(name, folder="wheels", tag="py3-none-any", holds=None):
+    (SCRATCH / folder).mkdir(exist_ok=True)
+    path = SCRATCH / folder / f"{name}-1.0-{tag}.whl"
+    with zipfile.ZipFile(path, "w") as archive:
+        for inner, text in (holds or {f"{name}/__init__.py": "ANSWER = 42\n"}).items():
+            archive.writestr(inner, text)
+    return path
+
+
+def fails(part, run):
+    try:
+        run()
+    except RuntimeError as error:
+        check(part in str(error), str(error))
+    else:
+        check(False, f"no word of '{part}'")
+
+
+def test_readers_from_files():
+    """Wheels that were fetched elsewhere, chosen one by one or as a folder, can be imported at once and after the next start."""
+    with without_readers("patina_try_a", "patina_try_b"):
+        check(readers.missing() == ["patina_try_a", "patina_try_b"], f"{readers.missing()}")
+        first, second = wheel("patina_try_a"), wheel("patina_try_b", tag=f"{readers.TAG}-{readers.TAG}-linux_x86_64")
+        bpy.ops.patina.install_reader_files(directory=str(first.parent), files=[{"name": first.name}])
+        check(readers.missing() == ["patina_try_b"], f"{readers.missing()}")
+        bpy.ops.patina.install_reader_files(filepath=str(second.parent))
+        check(not readers.missing(), f"{readers.missing()}")
+        import patina_try_a
+        check(patina_try_a.ANSWER == 42 and Path(patina_try_a.__file__).is_relative_to(FOLDER), patina_try_a.__file__)
+        bpy.ops.patina.install_reader_files(filepath=str(first))  # once more: in place of what is there
+        readers.look_no_more_in(FOLDER)
+        sys.modules.pop("patina_try_a")
+        check(len(readers.missing()) == 2, "not where Python looks by itself")
+        readers.look_in(preferences.readers_folder())  # as register() does
+        check(not readers.missing(), "lost by the next start")
+
+
+def test_real_readers_from_files():
+    """The packages themselves, as wheels: a LAZ file that could not be read can."""
+    source = next(iter((REPOSITORY / "build/out/readers/lib").glob("python3*/site-packages")), None)
+    if source is None or not (source / "laspy").is_dir() or f"python3.{sys.version_info[1]}" not in str(source):
+        raise Skip("the readers for this Python are not installed")
+    holds = [path for name in ("laspy", "lazrs") for path in (source / name).rglob("*")
+             if path.is_file() and path.suffix != ".pyc"] + list(source.glob("lazrs*.so"))
+    path = SCRATCH / "wheels" / f"laspy-2.7.0-{readers.TAG}-abi3-linux_x86_64.whl"
+    path.parent.mkdir(exist_ok=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        for item in holds:
+            archive.write(item, item.relative_to(source))
+    code = (f"import sys; sys.path.insert(0, {str(SCRATCH / 'packages')!r}); from pathlib import Path\n"
+            "import importlib.util as u; s = u.spec_from_file_location('readers', "
+            f"{str(REPOSITORY / 'addon/readers.py')!r}); m = u.module_from_spec(s); s.loader.exec_module(m)\n"
+            f"assert 'laspy' in m.missing(); list(m.install([Path({str(path)!r})], Path({str(FOLDER)!r})))\n"
+            "import laspy, lazrs; assert laspy.LazBackend.Lazrs.is_available(); print('READY', laspy.__file__)")
+    import numpy
+    done = subprocess.run([sys.executable, "-s", "-c", code], capture_output=True, text=True, check=False,
+                          env={"PATH": "/usr/bin", "PYTHONPATH": str(Path(numpy.__file__).parents[1])})
+    check(f"READY {FOLDER}" in done.stdout, done.stderr[-400:])
+
+
+def test_readers_leave_no_second_name_of_a_script():
+    """What multiprocessing keeps makes Blender 3.4 crash when it quits."""
+    text = "import sys\nsys.modules['__mp_main__'] = sys.modules['__main__']\n"
+    with without_readers("patina_try_g"):
+        path = wheel("patina_try_g", holds={"patina_try_g/__init__.py": text})
+        bpy.ops.patina.install_reader_files(filepath=str(path))
+        kept = sys.modules.pop("__mp_main__", None)
+        readers.load("patina_try_g")
+        check("__mp_main__" not in sys.modules, "it stays")
+        if kept:
+            sys.modules["__mp_main__"] = kept
+
+
+def test_readers_that_do_not_fit():
+    with without_readers("patina_try_c"):
+        for path, part in ((wheel("patina_try_c", tag="cp27-cp27m-linux_x86_64"), "another Python"),
+                           (wheel("patina_try_c", tag=f"{readers.TAG}-{readers.TAG}-beos_m68k"), "another system"),
+                           (wheel("patina_try_c", "evil", holds={"../outside.py": ""}), "is damaged")):
+            fails(part, lambda path=path: bpy.ops.patina.install_reader_files(filepath=str(path)))
+        broken = SCRATCH / "wheels" / "patina_try_c-2.0-py3-none-any.whl"
+        broken.write_bytes(b"PK nothing")
+        fails("is damaged", lambda: bpy.ops.patina.install_reader_files(filepath=str(broken)))
+        (SCRATCH / "notes.txt").write_text("")
+        fails("no wheel", lambda: bpy.ops.patina.install_reader_files(filepath=str(SCRATCH / "notes.txt")))
+        check(not FOLDER.exists() or not list(FOLDER.iterdir()), "something was left behind")
+        check(not (SCRATCH / "readers/outside.py").exists(), "it wrote outside")
+
+
+def test_readers_by_pip():
+    """What pip fetches is installed; what pip says is said; Esc ends it."""
+    made = wheel("patina_try_d", "fetched")
+    (SCRATCH / "pip.py").write_text(
+        "import shutil, sys\nargs = sys.argv\nassert 'download' in args and '--no-deps' in args and 'laspy==' in ' '.join(args)\n"
+        f"shutil.copy({str(made)!r}, args[args.index('-d') + 1])\n")
+    (SCRATCH / "no_pip.py").write_text("import sys\nprint('ERROR: Could not find a version')\nsys.exit(1)\n")
+    (SCRATCH / "slow_pip.py").write_text("import time\ntime.sleep(60)\n")
+    if not getattr(bpy.app, "online_access", True):
+        check(not bpy.ops.patina.install_readers.poll(), "Blender shall stay offline")
+        raise Skip("this Blender was told to stay offline")
+    try:
+        with without_readers("patina_try_d"):
+            operators.PIP = [sys.executable, str(SCRATCH / "pip.py")]
+            bpy.ops.patina.install_readers()
+            import patina_try_d
+            check(patina_try_d.ANSWER == 42, "not there")
+        with without_readers("patina_try_e"):
+            operators.PIP = [sys.executable, str(SCRATCH / "no_pip.py")]
+            fails("Could not find a version", bpy.ops.patina.install_readers)
+            fails("Install from Files", bpy.ops.patina.install_readers)
+            told = []
+            steps = readers.download(SCRATCH, [sys.executable, str(SCRATCH / "slow_pip.py")])
+            told.append(next(steps))
+            steps.close()  # as Esc does: pip is waited for no longer
+            check("0 of 4" in told[0], f"{told}")
+    finally:
+        operators.PIP = None
+
+
+def test_what_lacks_is_told_in_the_preview():
+    path = SCRATCH / "packed.laz"
+    from check_places import las_file
+    import numpy as np
+    head = bytearray(las_file("plain.las", np.zeros((3, 3))).read_bytes())
+    head[104] |= 0x80
+    path.write_bytes(bytes(head))
+    missing, readers.missing = readers.missing, lambda: ["laspy"]
+    try:
+        check(any("Install Readers" in line for line in importers.preview(path)), f"{importers.preview(path)}")
+    finally:
+        readers.missing = missing
+
+
+def test_cache_folder_size_and_clear():
+    mine = SCRATCH / "my caches"
+    with enabled() as chosen:
+        chosen.cache_folder = str(mine)
+        new_scene()
+        import_ply(dense("kept.ply"), link=True)
+        check(len(list(mine.glob("*.cloud"))) == 1, f"{list(mine.iterdir())}")
+        count, size = cache.held()
+        check(count == 1 and size > 20000 * 10, f"{count} {size}")
+        check(operators.cache_text() == "1 kept, 0.00 GB", operators.cache_text())
+        bpy.ops.patina.clear_cache()
+        check(not list(mine.iterdir()) and cache.held() == (0, 0), f"{list(mine.iterdir())}")
+        (mine / "mine.txt").write_text("stays")
+        render()
+        check(len(list(mine.glob("*.cloud"))) == 1, "it is made anew")
+        bpy.ops.patina.clear_cache()
+        check((mine / "mine.txt").is_file(), "somebody else's file is gone")
+        chosen.cache_limit = 1
+        check(preferences.cache_bytes() == 1 << 30, "the limit")
+    check(kept.folder() != mine and preferences.cache_bytes() == 32 << 30, "defaults hold without")
+    check(linked.source(SCRATCH / "kept.ply").kept.parent != mine, "linked clouds follow")
+
+
+def test_defaults_of_device_threads_and_memory():
+    scene = new_scene()
+    scene.patina.device, scene.patina.threads, scene.render.threads_mode = 'AUTO', 0, 'AUTO'
+    check(settings.device(scene) == settings.DeviceChoice("auto", 0), "without preferences")
+    with enabled() as chosen:
+        chosen.device, chosen.threads, chosen.memory_limit = 'CPU', 3, 2
+        check(settings.device(scene) == settings.DeviceChoice("cpu", 3), f"{settings.device(scene)}")
+        check(memory.for_planes() == 2 << 30, f"{memory.for_planes()}")
+        scene.patina.device, scene.patina.threads = 'CPU_SCALAR', 2
+        check(settings.device(scene) == settings.DeviceChoice("cpu-scalar", 2), "the scene's own come first")
+        chosen.memory_limit = 0
+        check(memory.limit == 0, "no limit again")
+
+
+def test_manual_is_there():
+    path = operators.manual()
+    check(path is not None and path.read_text("utf-8").startswith("# Patina"), f"{path}")

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""After the first import into Blender's start scene: engine, camera and light are offered, and do what they say."""
+
+import bpy
+import check_linked  # noqa: F401  no test leaves files with the user
+import numpy as np
+from check_import import columns, import_ply, write_ply
+from check_places import las_file
+from harness import SCRATCH, check, new_scene, render, sphere
+
+from patina.operators import set_up
+
+
+def start_scene():
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=False, app_template="")
+    return bpy.context.scene
+
+
+def gray(name, scale):
+    points, _, _ = sphere(20000, scale, (0, 0, 0))
+    return write_ply(name, [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")])
+
+
+def test_set_up_after_the_first_import():
+    """A survey without colours, 200 m wide: one click to a picture, where F12 was blank."""
+    scene = start_scene()
+    check(set_up.untouched(scene), "the start scene is untouched")
+    obj, = import_ply(gray("survey_gray.ply", 100.0))
+    check(set_up.untouched(scene), "points are no touch")
+    check(set_up.unlit(scene, [obj]), "a lamp of a kilowatt does not reach")
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'}, "set up")
+    check(scene.render.engine == 'PATINA' and "Cube" not in bpy.data.objects, "engine and cube")
+    check(scene.patina.studio.use_headlight, "no headlight")
+    scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
+    picture = render()["Combined"][..., :3].max(axis=2)
+    check((picture > 0.2).mean() > 0.1, f"{(picture > 0.2).mean():.0%} of the picture is bright")
+
+
+def test_set_up_leaves_what_is_lit():
+    scene = start_scene()
+    obj, = import_ply(gray("small_gray.ply", 1.0))
+    check(not set_up.unlit(scene, [obj]), "the start scene's lamp lights a small thing")
+    bpy.ops.scene.patina_set_up()
+    check(not scene.patina.studio.use_headlight, "a headlight that nobody needs")
+    scene = start_scene()
+    obj, = import_ply(write_ply("colored.ply", columns((500, 500, 0))))
+    check(not set_up.unlit(scene, [obj]), "colours need no light")
+
+
+def test_set_up_is_not_offered_twice():
+    """Only where nobody has begun anything else."""
+    for touch in (lambda scene: bpy.ops.mesh.primitive_monkey_add(), lambda scene: setattr(scene.render, "engine", 'PATINA'),
+                  lambda scene: setattr(bpy.data.objects["Cube"], "location", (1, 0, 0)),
+                  lambda scene: bpy.data.objects["Cube"].modifiers.new("smooth", 'SUBSURF')):
+        scene = start_scene()
+        touch(scene)
+        bpy.context.view_layer.update()
+        check(not set_up.untouched(scene), "touched")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=False, app_template="")
+    try:
+        bpy.ops.scene.patina_set_up()
+    except RuntimeError as error:
+        check("no points" in str(error), str(error))
+    else:
+        check(False, "set up without points")
+    check("Cube" in bpy.data.objects and bpy.context.scene.render.engine != 'PATINA', "and the scene is as it was")
+
+
+def test_import_frames_the_points():
+    scene = new_scene()
+    path = write_ply("framed.ply", columns((30, 40, 0)))
+    place = scene.camera.location.copy()
+    import_ply(path)
+    check((scene.camera.location - place).length == 0, "the camera moved without a wish")
+    import_ply(path, frame=True)
+    bpy.context.view_layer.update()
+    check((scene.camera.location - place).length > 10, "it did not move")
+    picture = render()
+    check(picture["Combined"][..., 3].any(), "and sees nothing")
+
+
+def test_names_without_copc():
+    from patina.importers import las
+    from patina.importers.reading import Filter, Progress
+    plain = las_file("plain.las", np.random.default_rng(1).uniform(0, 1, (50, 3)))
+    path = SCRATCH / "harbor.copc.las"
+    path.write_bytes(plain.read_bytes())
+    check(las.read(path, Filter(), Progress()).name == "harbor", las.read(path, Filter(), Progress()).name)
+    for link in (False, True):
+        new_scene()
+        obj, = import_ply(path, link=link)
+        check(obj.name == "harbor", obj.name)
+
+
+def test_leaves_an_empty_file():
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    check(not bpy.data.objects, "an empty file")
