@@ -7,7 +7,6 @@ A kept cloud is mapped at once, and read whole beside by a native task; what is 
 from __future__ import annotations
 
 import json
-import math
 import os
 import tempfile
 import threading
