@@ -153,7 +153,10 @@ bool reaches(view_args view, ivec2 place, uvec2 key, uint source)
     float scale = float(1u << view.level), z = pt_float(key.y);
     precise float width = view.perspective != 0u ? view.footprint * z : view.footprint;
     float share = key.x >= args.discs_first ? args.disc_reach : args.reach;
-    precise float most = (read_deff(source) * share) * pt_rcp(width * read_float4(source).w) + PT_FILL_SLACK * scale;
+    vec2 ray = abs(pt_ray(view, place.x, place.y)); // how much wider than in the middle the picture shows what faces the eye
+    float stretch = view.perspective != 0u ? pt_max(pt_max(ray.x, ray.y), 1.0) : 1.0;
+    precise float way = (read_deff(source) * share) * pt_rcp(width * read_float4(source).w);
+    precise float most = way * stretch + PT_FILL_SLACK * scale;
     uvec2 at = pt_pixel(source, args.from_width);
     precise float dx = (float(place.x) + 0.5) * scale - (float(at.x) + 0.5);
     precise float dy = (float(place.y) + 0.5) * scale - (float(at.y) + 0.5);

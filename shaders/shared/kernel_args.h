@@ -319,7 +319,8 @@ struct push_args {
 
 // fill: hole filling. [D 3.2, 3.3], SPEC 2.2. With `reach`, a pixel takes the least key among those neighbours whose surfaces
 // reach it, in the occluded phase of those that hide it; where none does it stays as it is. A surface reaches as far as
-// reach d_eff max(|n.v|, C) / footprint pixels of level 0 and PT_FILL_SLACK of this one from where it was measured.
+// reach d_eff max(|n.v|, C) / footprint pixels of level 0, off the middle of a perspective view max(|ray.x|, |ray.y|, 1) times as
+// far, and PT_FILL_SLACK pixels of this level from where it was measured.
 struct fill_args {
     struct view_args view;
     uint32_t phases;     // PT_FILL_*, in their order

@@ -94,7 +94,9 @@ static enum ref_truth reaches(const struct phase *phase, const struct ref_pixel 
     const struct view_args *view = &args->view;
     const double scale = (double)(1u << view->level), inverse = phase->normal[4 * (size_t)neighbour->from + 3];
     const double share = (double)(neighbour->id >= args->discs_first ? args->disc_reach : args->reach);
-    const double d = (double)phase->deff[neighbour->from] * share / ((double)view->footprint * inverse);
+    const struct ref_ray ray = ref_ray(view, x, y);
+    const double stretch = view->perspective ? fmax(fmax(fabs(ray.u), fabs(ray.v)), 1.0) : 1.0;
+    const double d = (double)phase->deff[neighbour->from] * share * stretch / ((double)view->footprint * inverse);
     const double slack = (double)PT_FILL_SLACK * scale, sx = neighbour->from % args->from_width, sy = neighbour->from / args->from_width;
     const double way = hypot((x + 0.5) * scale - (sx + 0.5), (y + 0.5) * scale - (sy + 0.5));
     const double least = d / (view->perspective ? neighbour->z.hi : 1.0), most = d / (view->perspective ? neighbour->z.lo : 1.0);

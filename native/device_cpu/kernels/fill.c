@@ -70,6 +70,16 @@ static void refine(const struct fill *fill, size_t at, size_t end)
 
 // ---- reach -----------------------------------------------------------------------------------------------------------------
 
+// How much wider than in the middle a picture shows what faces the eye there; at least, and no less than 1.
+static float stretch(const struct view_args *view, uint32_t x, uint32_t y)
+{
+    const float scale = (float)(1u << view->level);
+    const float px = ((float)((view->origin_x >> view->level) + (int32_t)x) + 0.5f) * scale;
+    const float py = ((float)((view->origin_y >> view->level) + (int32_t)y) + 0.5f) * scale;
+    const float u = view->ray_x0 + view->ray_xs * px, v = view->ray_y0 + view->ray_ys * py;
+    return view->perspective ? pt_max(pt_max(u < 0.0f ? -u : u, v < 0.0f ? -v : v), 1.0f) : 1.0f;
+}
+
 // Whether the surface that a neighbour shows reaches the pixel (x, y).
 static int reaches(const struct fill *fill, uint32_t x, uint32_t y, uint64_t key, uint32_t source)
 {
@@ -78,7 +88,8 @@ static int reaches(const struct fill *fill, uint32_t x, uint32_t y, uint64_t key
     const float scale = (float)(1u << view->level), z = pt_float((uint32_t)(key >> 32));
     const float width = view->perspective ? view->footprint * z : view->footprint;
     const float share = (uint32_t)key >= args->discs_first ? args->disc_reach : args->reach;
-    const float most = (fill->deff[source] * share) * pt_rcp(width * fill->normals[4 * (size_t)source + 3]) + PT_FILL_SLACK * scale;
+    const float way = (fill->deff[source] * share) * pt_rcp(width * fill->normals[4 * (size_t)source + 3]);
+    const float most = way * stretch(view, x, y) + PT_FILL_SLACK * scale;
     const float dx = ((float)x + 0.5f) * scale - ((float)(source % args->from_width) + 0.5f);
     const float dy = ((float)y + 0.5f) * scale - ((float)(source / args->from_width) + 0.5f);
     return dx * dx + dy * dy <= most * most;
