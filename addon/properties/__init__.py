@@ -279,7 +279,7 @@ class PatinaViewLayerProperties(PropertyGroup):
         description="Share of each pixel that a line covers, of the nearest layer; without lines 0")
     use_pass_certainty: BoolProperty(
         name="Certainty", default=False, update=_update_passes, override=_OVERRIDE,
-        description="How well what each point is taken for explains its neighbours, 0 to 1, of the nearest point; "
+        description="How well what each point is taken for explains its neighbors, 0 to 1, of the nearest point; "
                     "0 where nothing is, or the points were not analyzed")
     use_pass_thickness: BoolProperty(
         name="Thickness", default=False, update=_update_passes, override=_OVERRIDE,

@@ -133,7 +133,7 @@ class Bench(unittest.TestCase):
     def test_quoted(self) -> None:
         library = HERE.parents[1] / "build/out/release/libpatina.so"
         table = quoted.holes(library).splitlines()
-        self.assertEqual([row.split()[1] for row in table[2:]], ["0.1", "0.2", "0.3", "0.5", "1", "2", "4", "8", "16", "30"])
+        self.assertEqual([row.split()[1] for row in table[2:]], ["0.1", "0.2", "0.3", "0.4", "0.5", "0.75", "1", "2", "4", "8", "16", "30"])
         self.assertRegex(quoted.slopes(library), r"from 5° to 85°, 0\.3 to 10 points a pixel, loses at most 0\.\d{3} % ")
 
 
