@@ -15,7 +15,7 @@ from window import area, setup, view, window_region
 from patina import viewport
 
 DARK = 40  # of 255: no channel of points and background is below 140
-LETTERS = 5000  # dark pixels of texts, cursor and gizmos in four views; the points' dots are 40,000 and more
+LETTERS = 9000  # more than the dark pixels of texts, cursor and tools in four views, 2,000 to 7,000; the points' dots are 14,000 and more
 
 
 def at_rest(seconds=0.4):
@@ -53,6 +53,7 @@ def do(operator, place=None, **options):
 
 def bright_scene():
     scene = setup(overlays=True)
+    area().spaces[0].show_region_ui = False
     scene.render.film_transparent = False
     scene.patina.studio.use_background = True
     scene.patina.studio.background = (0.5, 0.5, 0.5)
