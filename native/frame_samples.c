@@ -54,9 +54,11 @@ static uint32_t filled_grid(double spacing)
 struct pt_sampling pt_choose_sampling(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     const uint32_t samples = scene->settings.pixel_samples;
-    struct pt_sampling sampling = { 1, 1 };
+    struct pt_sampling sampling = { 1, 1, 0 };
     if (samples < 2 || !pt_plan_shows(plan))
         return sampling;
+    if (!scene->instance_count) // meshes alone
+        return (struct pt_sampling){ 1, samples, 1 };
     uint32_t grid = (uint32_t)sqrt((double)samples); // exact below 2^26
     if (plan->filled) // of points by themselves no spacing is known: each is a pixel wide
         grid = at_most(grid, filled_grid(plan->spacing_middle));
@@ -95,6 +97,7 @@ void pt_finer_scene(const struct patina_scene *scene, const struct pt_sampling *
     settings->region[1] = (scene->settings.region[1] + first) * grid;
     settings->region[3] = (scene->settings.region[1] + end) * grid;
     settings->fill_iterations = at_most(settings->fill_iterations * grid, 64);
+    settings->antialias = sampling->hard ? PATINA_ANTIALIAS_OFF : settings->antialias;
     settings->passes = 1u << PATINA_PASS_COMBINED;
     settings->layer_passes = 0;
     out->finer = grid;

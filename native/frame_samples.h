@@ -9,6 +9,7 @@
 // How settings.pixel_samples are taken: pictures of grid x grid finer pixels, as many of them as there are shifts.
 struct pt_sampling {
     uint32_t grid, shifts;
+    int hard; // without anti-aliasing: a triangle covers a pixel's centre or does not, and the mean is what it covers
 };
 
 // plan: of the scene without samples. It says the same of a region as of the whole.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Samples of a pixel: a region is the crop of the whole to the bit, in bands too; threads change nothing; keys and data are those
 // of one sample; an outline is soft and covers what it should; what fails leaves the last picture.
+#include "meshes.h"
 #include "staging.h"
 
 #include <math.h>
@@ -153,6 +154,34 @@ static void test_outline(void **state)
     patina_device_destroy(device);
 }
 
+// Triangles alone: sixteen samples cover what they cover, to a sixteenth of a pixel of their border.
+static void test_meshes(void **state)
+{
+    (void)state;
+    const double eye[3] = {0, -5, 0}, target[3] = {0, 0, 0}, middle[3] = {0, 0, 0}, half[3] = {0.71, 0.5, 0.63};
+    patina_device *device = support_device_first();
+    patina_mesh *mesh = mesh_box(middle, half);
+    struct stage stage = {.settings = settings_default(64, 64)};
+    assert_int_equal(patina_scene_create(&stage.scene), PATINA_OK);
+    mesh_add(stage.scene, mesh, 0.5f, 0.25f, 0.125f);
+    stage.camera = camera_orthographic(eye, target, 3.0, 64, 64, 0.1, 100.0);
+    stage.settings.film_transparent = 1;
+    const double width = 1.42 / 3.0 * 64, height = 1.26 / 3.0 * 64;
+    for (uint32_t samples = 1; samples <= 16; samples *= 16) {
+        stage.settings.pixel_samples = samples;
+        struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        double alpha = 0.0;
+        for (size_t k = 0; k < (size_t)64 * 64; k++)
+            alpha += (double)picture.combined[4 * k + 3];
+        print_message("  a box, %u samples: covers %.1f pixels of %.1f\n", samples, alpha, width * height);
+        assert_true(samples < 16 || fabs(alpha - width * height) < 2.0 * (width + height) / 16.0);
+        picture_free(&picture);
+    }
+    patina_scene_destroy(stage.scene);
+    patina_mesh_destroy(mesh);
+    patina_device_destroy(device);
+}
+
 static double mean_light(const struct picture *picture)
 {
     double sum = 0.0;
@@ -223,7 +252,7 @@ int main(int argc, char **argv)
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_regions), cmocka_unit_test(test_bands),    cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_outline), cmocka_unit_test(test_looks),    cmocka_unit_test(test_failures),
+        cmocka_unit_test(test_outline), cmocka_unit_test(test_meshes), cmocka_unit_test(test_looks),    cmocka_unit_test(test_failures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
