@@ -17,6 +17,7 @@ enum { RISES = 90, TURNS = 180, BINS = RISES * TURNS, LEAST_SAMPLES = 1000, LEAS
 // tests/truth/scans, scenes for tuning, cameras 0, 3, 5: false surface 13.6 %, lost 4.1 %, 21.0 dB; with all three a tenth
 // wider 14.1, 3.5, 21.2; with 1.3, 0.55, 0.6 14.8, 3.2, 21.2.
 #define CELL 1.04
+#define CELL_CAMERA 1.4  // a depth camera's steps in depth are wider than its cells: no neighbour on the plane is no border yet
 #define CELL_BORDER 0.44 // where no neighbour lies beside it on both sides: a bar of a railing, a surface's end
 #define CELL_DOT 0.48    // radius of what is no surface
 #define CERTAIN 0.3      // least certainty of a plane that may lean: others are dots
@@ -221,8 +222,8 @@ void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct p
     carry(up, ray, hood->normal, facing, b);
     look_beside(sample, ray, hood->normal, facing, a, b, fmax(3.0 * hood->sigma, NEAR * width), beside);
     for (int k = 0; k < 3; k++) {
-        a[k] *= beside[0] ? CELL : CELL_BORDER;
-        b[k] *= beside[1] ? CELL : CELL_BORDER;
+        a[k] *= beam->even ? CELL_CAMERA : beside[0] ? CELL : CELL_BORDER;
+        b[k] *= beam->even ? CELL_CAMERA : beside[1] ? CELL : CELL_BORDER;
     }
     ellipse_of(a, b, axis, &major, &minor);
     if (!(major * minor < hood->major * hood->minor))
