@@ -138,10 +138,13 @@ static size_t keep_reached(struct fill *fill, size_t begin, size_t end)
     const struct entries *e = &fill->entries;
     size_t kept = begin;
     for (size_t i = begin; i < end; i++) {
-        if (reaches(fill, e->x[i], e->y[i], e->key[i], e->from[i]) || take_reaching(fill, i))
-            move_new(e, kept++, i);
-        else
+        if (reaches(fill, e->x[i], e->y[i], e->key[i], e->from[i]) || take_reaching(fill, i)) {
+            if (kept != i)
+                move_new(e, kept, i);
+            kept++;
+        } else {
             fill->touched[word_of(fill, e->x[i], e->y[i])] &= ~bit_of(e->x[i]);
+        }
     }
     return kept;
 }
