@@ -223,9 +223,9 @@ int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats)
 {
     if (!frame || !stats || stats->struct_size != sizeof *stats)
         return fail("patina_frame_get_stats: bad arguments");
-    if (!frame->picture_valid)
+    if (!frame->shown.picture_valid)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_get_stats: no finished render");
-    *stats = frame->stats;
+    *stats = frame->shown.stats;
     return PATINA_OK;
 }
 

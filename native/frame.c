@@ -409,7 +409,7 @@ static int run_plan(struct render *render)
             writing = 1;
         }
         if ((error = last > pass ? run_together(render, pass, count) : run_pass(render, pass))) {
-            frame->picture_valid &= !writing; // half a picture is none: the device failed
+            frame->shown.picture_valid &= !writing; // half a picture is none: the device failed
             return error;
         }
         if (last->kernel == PT_KERNEL_peel)
@@ -427,7 +427,8 @@ static int run_plan(struct render *render)
 static void keep_statistics(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan,
                             double ms)
 {
-    frame->stats = (patina_frame_stats){ .struct_size = sizeof frame->stats,
+    struct pt_shown *shown = &frame->shown;
+    shown->stats = (patina_frame_stats){ .struct_size = sizeof shown->stats,
                                          .width = plan->crop[2],
                                          .height = plan->crop[3],
                                          .points = plan->points,
@@ -438,36 +439,36 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .chunks_clipped = plan->chunks_clipped,
                                          .chunks_cut = plan->chunks_cut,
                                          .ms = ms };
-    frame->stats.plane_bytes = plane_total(frame);
-    frame->stats.spacing_px = (float)plan->spacing_px;
-    frame->stats.expected = plan->expected;
-    frame->stats.layers = frame->layer_count && plan->layers == 1;
+    shown->stats.plane_bytes = plane_total(frame);
+    shown->stats.spacing_px = (float)plan->spacing_px;
+    shown->stats.expected = plan->expected;
+    shown->stats.layers = frame->layer_count && plan->layers == 1;
     for (uint32_t i = 0; i < frame->layer_count; i++)
-        frame->stats.layers += frame->layers[i].pixels > 0;
-    frame->layer_most = plan->layers;
-    frame->layer_passes = scene->settings.layer_passes;
-    frame->stats.shadow_maps = frame->shadow_maps;
-    frame->stats.shadow_width = frame->shadow_size[0];
-    frame->stats.shadow_height = frame->shadow_size[1];
+        shown->stats.layers += frame->layers[i].pixels > 0;
+    shown->layer_most = plan->layers;
+    shown->layer_passes = scene->settings.layer_passes;
+    shown->stats.shadow_maps = frame->shadow_maps;
+    shown->stats.shadow_width = frame->shadow_size[0];
+    shown->stats.shadow_height = frame->shadow_size[1];
     for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
-        frame->stats.shadow_bytes += frame->shadows.words[i].size;
+        shown->stats.shadow_bytes += frame->shadows.words[i].size;
     frame->light_count = plan->light_count;
     for (uint32_t i = 0; i < plan->light_count; i++) {
         const struct pt_shadow_light *light = &frame->shadows.lights[i];
-        frame->stats.shadow_pending += light->samples < plan->lights[i].samples && !light->settled;
-        frame->stats.shadow_samples = light->samples > frame->stats.shadow_samples ? light->samples : frame->stats.shadow_samples;
-        frame->stats.shadow_error = fmaxf(frame->stats.shadow_error, light->error);
+        shown->stats.shadow_pending += light->samples < plan->lights[i].samples && !light->settled;
+        shown->stats.shadow_samples = light->samples > shown->stats.shadow_samples ? light->samples : shown->stats.shadow_samples;
+        shown->stats.shadow_error = fmaxf(shown->stats.shadow_error, light->error);
     }
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
     frame->skipped_count = plan->skipped_count;
-    frame->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
-    frame->all_lit = !plan->light_count;
-    frame->has_lines = plan->line_radius > 0.0f;
-    frame->assessed = plan->assessed;
-    memcpy(frame->crop, plan->crop, sizeof frame->crop);
-    frame->plane_width = plan->view.width;
+    shown->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
+    shown->all_lit = !plan->light_count;
+    shown->has_lines = plan->line_radius > 0.0f;
+    shown->assessed = plan->assessed;
+    memcpy(shown->crop, plan->crop, sizeof shown->crop);
+    shown->plane_width = plan->view.width;
     frame->keys_valid = 1;
-    frame->picture_valid = 1;
+    shown->picture_valid = 1;
 }
 
 int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
@@ -515,7 +516,7 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     frame->sampling[0] = frame->sampling[1] = 1;
     int error = scene->settings.pixel_samples > 1 ? pt_frame_sample(frame, scene) : pt_frame_draw(frame, scene);
     if (!error)
-        frame->stats.ms = pt_milliseconds() - start;
+        frame->shown.stats.ms = pt_milliseconds() - start;
     atomic_store(&frame->cancel, 0);
     return error;
 }
@@ -541,17 +542,17 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
 {
     if (pass >= PATINA_PASS_COUNT)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: no pass %u", pass);
-    if (!frame->picture_valid || !(frame->passes >> pass & 1u))
+    if (!frame->shown.picture_valid || !(frame->shown.passes >> pass & 1u))
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read: no %s pass was rendered",
                        pass_table[pass].name);
-    size_t expected = (size_t)frame->stats.width * frame->stats.height * pass_table[pass].channels * sizeof *pixels;
+    size_t expected = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels * sizeof *pixels;
     if (size != expected)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
-                       pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, expected,
+                       pass_table[pass].name, frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, expected,
                        size);
     const uint32_t known = 1u << PATINA_PASS_CERTAINTY | 1u << PATINA_PASS_THICKNESS;
-    if ((pass == PATINA_PASS_SHADOW && frame->all_lit) || (pass == PATINA_PASS_LINE && !frame->has_lines) ||
-        (known & ~frame->assessed) >> pass & 1u) { // no plane
+    if ((pass == PATINA_PASS_SHADOW && frame->shown.all_lit) || (pass == PATINA_PASS_LINE && !frame->shown.has_lines) ||
+        (known & ~frame->shown.assessed) >> pass & 1u) { // no plane
         for (size_t i = 0; i < size / sizeof *pixels; i++)
             pixels[i] = pass == PATINA_PASS_SHADOW ? 1.0f : 0.0f;
         return PATINA_OK;
@@ -567,13 +568,13 @@ int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32
                                             [PATINA_PASS_NORMAL] = PT_PLANE_LAYER_NORMALS };
     if (pass > PATINA_PASS_NORMAL || !layer || layer > PATINA_MAX_LAYERS)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: no pass %u of a layer %u", pass, layer);
-    if (!frame->keys_valid || !(frame->layer_passes >> pass & 1u) || layer > frame->layer_most)
+    if (!frame->keys_valid || !(frame->shown.layer_passes >> pass & 1u) || layer > frame->shown.layer_most)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_layer: no %s pass of layer %u was asked for",
                        pass_table[pass].name, layer);
-    size_t count = (size_t)frame->stats.width * frame->stats.height * pass_table[pass].channels;
+    size_t count = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels;
     if (size != count * sizeof *pixels)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: %s is %u x %u x %u floats; got %zu bytes",
-                       pass_table[pass].name, frame->stats.width, frame->stats.height, pass_table[pass].channels, size);
+                       pass_table[pass].name, frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, size);
     if (layer > frame->layer_count) { // peeling ended before
         for (size_t i = 0; i < count; i++)
             pixels[i] = pass == PATINA_PASS_DEPTH ? INFINITY : 0.0f;
@@ -587,12 +588,12 @@ int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t 
 {
     if (!frame->keys_valid)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: no finished render");
-    if (size != (size_t)frame->crop[2] * frame->crop[3] * sizeof *keys)
+    if (size != (size_t)frame->shown.crop[2] * frame->shown.crop[3] * sizeof *keys)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_keys: %u x %u keys; got %zu bytes",
-                       frame->crop[2], frame->crop[3], size);
-    size_t row = (size_t)frame->crop[2] * sizeof *keys;
-    for (uint32_t y = 0; y < frame->crop[3]; y++) {
-        size_t offset = ((size_t)(frame->crop[1] + y) * frame->plane_width + frame->crop[0]) * sizeof *keys;
+                       frame->shown.crop[2], frame->shown.crop[3], size);
+    size_t row = (size_t)frame->shown.crop[2] * sizeof *keys;
+    for (uint32_t y = 0; y < frame->shown.crop[3]; y++) {
+        size_t offset = ((size_t)(frame->shown.crop[1] + y) * frame->shown.plane_width + frame->shown.crop[0]) * sizeof *keys;
         int error = frame->device->ops->buffer_read(frame->device, &frame->planes[PT_PLANE_KEYS][0], offset,
                                                     (char *)keys + y * row, row);
         if (error)
@@ -657,7 +658,7 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
             free(copy);
             if (error || !file || fclose(file) || written != plane->size)
                 return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
-            uint32_t width = p >= PT_PLANE_COMBINED ? frame->crop[2] : (frame->plane_width + (1u << level) - 1) >> level;
+            uint32_t width = p >= PT_PLANE_COMBINED ? frame->shown.crop[2] : (frame->shown.plane_width + (1u << level) - 1) >> level;
             snprintf(path, sizeof path, "%s/%s_%d.txt", folder, plane_names[p], level);
             file = fopen(path, "w");
             if (!file || fprintf(file, "%s level %d: %u pixels wide, %zu rows, %u bytes a pixel, row 0 at the bottom\n",

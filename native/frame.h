@@ -24,12 +24,26 @@ struct pt_residency {
     struct pt_resident *first;
 };
 
+// What readers are told of the last finished render. The planes of its picture go with it.
+struct pt_shown {
+    patina_frame_stats stats;
+    uint32_t passes;       // bits of what was rendered
+    uint32_t assessed;     // passes of certainty and thickness that have planes, bits 1 << PATINA_PASS_*
+    uint32_t layer_most;   // that the settings allowed
+    uint32_t layer_passes; // bits of what was kept of each
+    uint32_t crop[4], plane_width;
+    int picture_valid;
+    int has_lines;
+    int all_lit; // no light cast a shadow: there is no plane that says so
+};
+
 struct patina_frame {
     struct pt_handle handle;
     struct patina_device *device;
     struct pt_residency residency;
     struct pt_numbering numbering; // of the last scene that was rendered, baked or loaded for
     struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS];
+    struct pt_shown shown;
     struct pt_shadows shadows;
     struct pt_clip_buffers clips;
     uint32_t shadow_maps, shadow_size[2]; // of this render
@@ -37,22 +51,14 @@ struct patina_frame {
     _Atomic float progress;
     float progress_done, progress_share; // of the render: before the picture at hand, and by it
     uint32_t sampling[2];                // of the last picture: grid and shifts of its samples
-    patina_frame_stats stats; // of the last finished render
     struct pt_timing timings[PT_TIMINGS];
     uint32_t timing_count;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
-    uint32_t passes;          // bits of what was rendered
-    int has_lines;
-    uint32_t assessed; // passes of certainty and thickness that have planes, bits 1 << PATINA_PASS_*
     struct pt_layer layers[PATINA_MAX_LAYERS];
     uint32_t layer_count;     // scattered
-    uint32_t layer_most;      // that the settings allowed
-    uint32_t layer_passes;    // bits of what was kept of each
-    uint32_t crop[4], plane_width;
     uint32_t light_count;     // that cast shadows
-    int keys_valid, picture_valid;
-    int all_lit; // no light cast a shadow: there is no plane that says so
+    int keys_valid;
 };
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene);

@@ -126,9 +126,7 @@ static void add_up(const float *fine, uint32_t grid, uint32_t width, uint32_t ro
 // What readers see of a picture, while others are made.
 struct kept {
     struct pt_buffer planes[PT_PLANE_COUNT];
-    patina_frame_stats stats;
-    uint32_t passes, crop[4], plane_width, layer_most, layer_passes;
-    int has_lines, picture_valid, all_lit;
+    struct pt_shown shown;
 };
 
 static void put_aside(struct patina_frame *frame, struct kept *kept)
@@ -138,15 +136,7 @@ static void put_aside(struct patina_frame *frame, struct kept *kept)
         kept->planes[p] = frame->planes[p][0];
         frame->planes[p][0] = (struct pt_buffer){ 0 };
     }
-    kept->stats = frame->stats;
-    kept->passes = frame->passes;
-    memcpy(kept->crop, frame->crop, sizeof kept->crop);
-    kept->plane_width = frame->plane_width;
-    kept->layer_most = frame->layer_most;
-    kept->layer_passes = frame->layer_passes;
-    kept->has_lines = frame->has_lines;
-    kept->picture_valid = frame->picture_valid;
-    kept->all_lit = frame->all_lit;
+    kept->shown = frame->shown;
 }
 
 static void put_back(struct patina_frame *frame, const struct kept *kept)
@@ -155,15 +145,7 @@ static void put_back(struct patina_frame *frame, const struct kept *kept)
         frame->device->ops->buffer_destroy(frame->device, &frame->planes[p][0]);
         frame->planes[p][0] = kept->planes[p];
     }
-    frame->stats = kept->stats;
-    frame->passes = kept->passes;
-    memcpy(frame->crop, kept->crop, sizeof kept->crop);
-    frame->plane_width = kept->plane_width;
-    frame->layer_most = kept->layer_most;
-    frame->layer_passes = kept->layer_passes;
-    frame->has_lines = kept->has_lines;
-    frame->picture_valid = kept->picture_valid;
-    frame->all_lit = kept->all_lit;
+    frame->shown = kept->shown;
     frame->keys_valid = 0;
 }
 

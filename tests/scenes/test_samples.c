@@ -5,6 +5,8 @@
 #include "staging.h"
 
 #include <math.h>
+#include <pthread.h>
+#include <sched.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -247,12 +249,51 @@ static void test_failures(void **state)
     patina_device_destroy(device);
 }
 
+static void *cancel_later(void *context) // within the samples
+{
+    patina_frame *frame = context;
+    while (patina_frame_progress(frame) < 0.02f || patina_frame_progress(frame) > 0.9f)
+        sched_yield();
+    patina_frame_cancel(frame);
+    return NULL;
+}
+
+// Samples that are cut off leave every pass of the last picture, certainty too, which the samples themselves do not make.
+static void test_cut_off(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_first();
+    struct stage stage = sphere(64, 20000);
+    patina_frame *frame = NULL;
+    pthread_t thread;
+    static float first[64 * 64], then[64 * 64];
+    CHECK(patina_cloud_analyse(stage.cloud, NULL, NULL), stage.cloud);
+    stage.settings.passes |= 1u << PATINA_PASS_CERTAINTY;
+    CHECK(patina_scene_set_camera(stage.scene, &stage.camera), stage.scene);
+    CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+    CHECK(patina_frame_create(device, &frame), device);
+    CHECK(patina_frame_render(frame, stage.scene), frame);
+    CHECK(patina_frame_read(frame, PATINA_PASS_CERTAINTY, first, sizeof first), frame);
+    stage.settings.pixel_samples = 4096;
+    CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+    assert_int_equal(pthread_create(&thread, NULL, cancel_later, frame), 0);
+    assert_int_equal(patina_frame_render(frame, stage.scene), PATINA_ERROR_CANCELLED);
+    pthread_join(thread, NULL);
+    CHECK(patina_frame_read(frame, PATINA_PASS_CERTAINTY, then, sizeof then), frame);
+    assert_true(first[64 * 32 + 32] > 0.0f);
+    assert_memory_equal(first, then, sizeof first);
+    patina_frame_destroy(frame);
+    stage_free(&stage);
+    patina_device_destroy(device);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_regions), cmocka_unit_test(test_bands),    cmocka_unit_test(test_threads),
         cmocka_unit_test(test_outline), cmocka_unit_test(test_meshes), cmocka_unit_test(test_looks),    cmocka_unit_test(test_failures),
+        cmocka_unit_test(test_cut_off),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
