@@ -742,7 +742,6 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     plan->filled = survey.points;
     plan->reaches = plan->discs_count && knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
-    plan->view.perspective = !scene->camera.orthographic;
     pt_choose_filling(scene, plan);
     pt_choose_layers(&scene->settings, plan);
     plan->line_radius = pt_line_radius(scene);

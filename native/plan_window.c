@@ -11,7 +11,6 @@ enum { DEFAULT_LAYERS = 8 };
 // Coarse levels at most where points that lie wide apart are discs: these have closed what is wider. On four virtual scans more
 // fill sky (34.6 % in place of 22.2) and show nothing truer; one loses 0.5 dB.
 enum { LEVELS_BESIDE_DISCS = 2 }; // of the caller's pixels
-enum { MOST_ITERATIONS = 6 };
 
 // Spacing on screen, pixels, from which on coarser levels help to fill. In maps of lights in perspective, which take two
 // iterations, 1.6% of an umbra stays lit at 1.65, where nothing does at 1.2; a sun at 2 degrees gets acne at 1.2.
@@ -45,7 +44,7 @@ void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
         plan->iterations = asked ? asked : 1;
     if (plan->fill != PATINA_FILL_CLOSED)
         return;
-    const double widest = plan->map && plan->view.perspective ? WIDEST_OF_LAMPS : WIDEST;
+    const double widest = plan->map && !scene->camera.orthographic ? WIDEST_OF_LAMPS : WIDEST;
     for (; s > widest || (plan->levels && s > 1.0); s *= 0.5)
         if (++plan->levels >= (uint32_t)(most < PT_LEVELS ? most : PT_LEVELS - 1))
             break;

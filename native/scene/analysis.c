@@ -23,7 +23,7 @@ struct walk {
     struct pt_beams beams;
     patina_progress *progress;
     uint32_t k;
-    int rows;  // the cloud's samples lie in rows, far apart
+    int rows;  // without stations: the cloud's samples lie in rows, far apart
     int given; // normals that the cloud has know their side
     struct tally {
         uint32_t kinds[6], estimated, unoriented;
@@ -143,8 +143,6 @@ static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_ch
     return walk->beams.count ? &walk->beams.each[pt_beam_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
 }
 
-#define ROWS 3.5 // unevenness: random points show less, nine in ten of them
-
 // A dot is no wider than points lie apart anywhere; a surface, whose rows may lie farther apart, four times that.
 static void limit_stray(const struct walk *walk, struct pt_neighbourhood *hood)
 {
@@ -190,7 +188,7 @@ static int lies_in_rows(const struct walk *walk)
         for (uint32_t left = pt_leaf_lanes(&walk->tree, leaf); left; left &= left - 1) {
             const struct pt_neighbourhood *hood = &hoods[__builtin_ctz(left)];
             flat += hood->kind == PT_KIND_SURFACE;
-            uneven += hood->kind == PT_KIND_SURFACE && hood->uneven > ROWS;
+            uneven += hood->kind == PT_KIND_SURFACE && hood->uneven > PT_UNEVEN_ROWS;
         }
     }
     return 2 * uneven > flat;
@@ -379,7 +377,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
         pt_neighbours_destroy(&walk->tree);
         return error;
     }
-    walk->rows = lies_in_rows(walk);
+    walk->rows = !walk->beams.count && lies_in_rows(walk); // a station's cells tell better
     pt_parallel(pool, cloud->chunk_count, 1, walk_chunks, walk);
     pt_neighbours_destroy(&walk->coarse);
     error = pt_progress_cancelled(walk->progress) ? PATINA_ERROR_CANCELLED : vote_sides(walk, pool);

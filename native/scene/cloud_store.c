@@ -215,25 +215,33 @@ static int map_sections(int descriptor, const struct section sections[SECTIONS])
     return 0;
 }
 
+// The header, and what it says of the sections; cloud: its fields that the header holds are set.
+static int read_header(const char *path, int descriptor, struct patina_cloud *cloud, struct header *header,
+                       struct section sections[SECTIONS])
+{
+    struct stat status;
+    if (fstat(descriptor, &status) || pread(descriptor, header, sizeof *header, 0) != (ssize_t)sizeof *header)
+        return refuse(path, "not a saved cloud");
+    int code = check_header(path, header, (uint64_t)status.st_size);
+    if (code)
+        return code;
+    cloud->info = header->info;
+    cloud->slots = header->slots;
+    cloud->chunk_count = header->chunk_count;
+    cloud->color_format = header->color_format;
+    cloud->spacing_base = header->spacing_base;
+    cloud->class_hash = header->class_hash;
+    list_sections(cloud, sections);
+    return file_size(sections) == header->size ? PATINA_OK : refuse(path, "its header is damaged");
+}
+
 static int open_descriptor(const char *path, int descriptor, struct patina_cloud *cloud)
 {
     struct header header;
     struct section sections[SECTIONS];
-    struct stat status;
-    if (fstat(descriptor, &status) || pread(descriptor, &header, sizeof header, 0) != (ssize_t)sizeof header)
-        return refuse(path, "not a saved cloud");
-    int code = check_header(path, &header, (uint64_t)status.st_size);
+    int code = read_header(path, descriptor, cloud, &header, sections);
     if (code)
         return code;
-    cloud->info = header.info;
-    cloud->slots = header.slots;
-    cloud->chunk_count = header.chunk_count;
-    cloud->color_format = header.color_format;
-    cloud->spacing_base = header.spacing_base;
-    cloud->class_hash = header.class_hash;
-    list_sections(cloud, sections);
-    if (file_size(sections) != header.size)
-        return refuse(path, "its header is damaged");
     int error = map_sections(descriptor, sections);
     if (error)
         return fail_with(path, "mapped", error);
@@ -278,20 +286,9 @@ static int verify_section(const char *path, int descriptor, uint64_t at, uint64_
 static int verify_descriptor(const char *path, int descriptor, char *buffer, patina_progress *progress)
 {
     struct header header;
-    struct stat status;
-    if (fstat(descriptor, &status) || pread(descriptor, &header, sizeof header, 0) != (ssize_t)sizeof header)
-        return refuse(path, "not a saved cloud");
-    int code = check_header(path, &header, (uint64_t)status.st_size);
-    if (code)
-        return code;
-    struct patina_cloud cloud = {.info = header.info,
-                                 .slots = header.slots,
-                                 .chunk_count = header.chunk_count,
-                                 .color_format = header.color_format};
     struct section sections[SECTIONS];
-    list_sections(&cloud, sections);
-    if (file_size(sections) != header.size)
-        return refuse(path, "its header is damaged");
+    struct patina_cloud cloud = {0};
+    int code = read_header(path, descriptor, &cloud, &header, sections);
     uint64_t at = SECTION;
     for (int i = 0; i < SECTIONS && !code; i++) {
         code = verify_section(path, descriptor, at, sections[i].size, header.sums[i], buffer, progress);

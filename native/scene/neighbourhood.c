@@ -9,7 +9,7 @@
 
 // ---- the rule of footprints: what is tuned, in one place -------------------------------------------------------------------
 
-#define COVER 1.2            // half axes in spacings: of random points exp(-pi r^2) stay uncovered, 1 %, which filling closes
+#define COVER 1.2           // half axes in spacings: of random points exp(-pi r^2) stay uncovered, 1 %, which filling closes
 #define COVER_BORDER 0.35   // across a border
 #define COVER_LINE 0.6      // of a line's points, in spacings along it
 #define COVER_DOT 0.2       // of volume and strays, in distances to the nearest neighbour
@@ -17,7 +17,6 @@
 #define ROUGH 0.35          // thickness over width, squared: between FLATTEST and this the one turns into the other
 #define UNEVEN 2.5          // spacings along and across differ less than this by chance: of random points two in three
 #define UNEVEN_DOUBT 4.0    // 16 neighbours on rows 1 : 5 hold too few of the rows beside: they overrate them
-#define UNEVEN_ROWS 3.5     // nine in ten random points show less
 #define UNEVEN_MOST 13.0    // what a shape word holds
 
 #define FLATTEST 0.1        // thickness over width, squared: what still is a surface
@@ -32,8 +31,9 @@
 #define STRAY_DISTANCE 3.5  // to the second nearest neighbour, in distances of neighbours among each other
 #define ON_PLANE 0.25       // spacings: how near to a plane its points lie
 
-#define MOST_MUTUAL 1.6 // half axes at most, in neighbours' distances from each other, but where a surface is even: there
-#define FAR_MUTUAL 3.6 // random points show 2.6, one in a hundred more than this
+// Half axes at most, in neighbours' distances from each other; where a surface is even only those beyond FAR_MUTUAL are cut down.
+#define MOST_MUTUAL 1.6
+#define FAR_MUTUAL 3.6 // even random points show 2.6, one in a hundred of them more than this
 
 // Half axes from the spacings along the two directions of the plane.
 static void cover(double along, double across, struct pt_neighbourhood *out)
@@ -82,7 +82,7 @@ static double mutual_distance(const struct pt_sample *sample)
 
 void pt_neighbourhood_bound(const struct pt_sample *sample, struct pt_neighbourhood *hood)
 {
-    const int even = hood->kind == PT_KIND_SURFACE && hood->uneven < UNEVEN_ROWS;
+    const int even = hood->kind == PT_KIND_SURFACE && hood->uneven < PT_UNEVEN_ROWS;
     const double mutual = mutual_distance(sample), most = MOST_MUTUAL * mutual;
     if (!(mutual > 0.0) || !(hood->major > (even ? FAR_MUTUAL * mutual : most)))
         return;

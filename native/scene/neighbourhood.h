@@ -18,6 +18,8 @@ struct pt_plane { // of the point and those of its neighbours that `inside` mark
     double axis[3][3]; // orthonormal; axis[0] is the normal
 };
 
+#define PT_UNEVEN_ROWS 3.5 // pt_neighbourhood.uneven of rows: nine in ten random points show less
+
 struct pt_neighbourhood {
     uint32_t kind; // PT_KIND_*
     int has_normal;

@@ -57,15 +57,9 @@ static int compare_doubles(const void *a, const void *b)
 }
 
 struct counted {
-    double spacing;
+    double spacing; // first: compare_doubles sorts by it
     uint64_t points;
 };
-
-static int compare_counted(const void *a, const void *b)
-{
-    const double x = ((const struct counted *)a)->spacing, y = ((const struct counted *)b)->spacing;
-    return (x > y) - (x < y);
-}
 
 // Chunks of a few points that lie much farther apart than all others are strays, and what lies between them is nothing: they get
 // the spacing that all but one in STRAYS of the points stay below. Without it 0.1% of strays, 90 to 130 spacings apart, decide the
@@ -85,7 +79,7 @@ static int tame_strays(struct patina_cloud *cloud)
             list[count++] = (struct counted){ (double)cloud->chunks[c].spacing, cloud->chunks[c].count };
             points += cloud->chunks[c].count;
         }
-    qsort(list, count, sizeof *list, compare_counted);
+    qsort(list, count, sizeof *list, compare_doubles);
     while (at < count && (below += list[at].points) < points - points / STRAYS)
         at++;
     const double usual = at < count ? list[at].spacing : 0.0;

@@ -6,7 +6,7 @@ with the scanners' places where the file knows them.
     build/out/venv/bin/python tests/bench/gallery.py NAME --view X,Y,Z,AZIMUTH,ELEVATION,DISTANCE... [--out FOLDER]
 
 Writes FOLDER/NAME.jpg, a contact sheet each: the cameras from left to right, before above, after beneath. --manual: into
-.pictures/scans, and docs/scans.md that shows them. --view: other cameras, FOLDER/NAME-view.png, to choose them by.
+.pictures/scans, and its README.md that shows them. --view: other cameras, FOLDER/NAME-view.png, to choose them by.
 X, Y, Z: where it looks, in parts of the box of the points without strays; degrees around z from -y and above the
 horizon; how far from there, in diagonals of the box."""
 
@@ -194,7 +194,7 @@ def page(told: list[tuple[Scan, str]]) -> str:
              "alone, of points as they come (`--analysis off --surface fill`). Beneath: the default, analysed, with the scanners'",
              "places where the file knows them. `build/gallery --manual` draws the pictures and writes this page.", ""]
     for scan, what in told:
-        parts += [f"**{Path(scan.file).name}**: {scan.told}; {what}.", "", f"![{scan.told}](../.pictures/scans/{scan.name}.jpg)", ""]
+        parts += [f"**{Path(scan.file).name}**: {scan.told}; {what}.", "", f"![{scan.told}]({scan.name}.jpg)", ""]
     return "\n".join([*parts, CREDITS])
 
 
@@ -237,8 +237,7 @@ def main() -> int:
         told.append((scan, what))
         print(f"{scan.name}: {what}", flush=True)
     if options.manual and not options.names:
-        (ROOT / "docs").mkdir(exist_ok=True)
-        (ROOT / "docs/scans.md").write_text(page(told), encoding="utf-8")
+        (options.out / "README.md").write_text(page(told), encoding="utf-8")
     return 0
 
 
