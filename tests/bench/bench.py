@@ -11,7 +11,8 @@ of them, in the same order; "absent" what could not be measured, and why.
 
     --quick   one size and density of each scene: within two minutes
     --full    scenes x devices x qualities x sizes x densities, and 10^8 points where memory allows: hours
-    --readme  every figure that README.md quotes, written into it: half an hour; with --only, those of these groups
+    --readme  every figure that README.md and tests/bench/README.md quote, written into them: half an hour; with --only,
+              those of these groups
 
 Some groups are of --full, --readme and --only alone: meshes (as triangles against as points), import (a LAZ of 30 million points
 into Blender), viewport (orbiting 10 million in its window), tests (what tests find), leaves (shadows on real scans), scans (virtual
@@ -279,7 +280,7 @@ def main() -> int:
     parser.add_argument("--frames", type=int, default=24, help="measured frames a case, at most (default 24)")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/bench")
     parser.add_argument("--library", type=Path, default=ROOT / "build/out/release/libpatina.so")
-    parser.add_argument("--readme", action="store_true", help="write the figures into README.md and .pictures/")
+    parser.add_argument("--readme", action="store_true", help="write the figures into README.md, tests/bench/README.md and .pictures/")
     parser.add_argument("--from", dest="source", type=Path, metavar="BENCH.json",
                         help="measure nothing: tables of that run")
     options = parser.parse_args()

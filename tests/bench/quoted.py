@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests find, as the README quotes it: each function runs a test's program or measures, and answers in Markdown, with a
+"""What tests find, as the pages of figures quote it: each function runs a test's program or measures, and answers in Markdown, with a
 line that begins with "skip" where something is not there."""
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a run's figures into README.md, between <!-- bench NAME --> and <!-- end -->, and its plots into
-.pictures/."""
+"""Writes a run's figures into the pages that quote them, between <!-- bench NAME --> and <!-- end -->, and its plots
+into .pictures/."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import papers
 import plots
 from report import Row, count, joined, name_of, table
 
+PAGES = ("README.md", "tests/bench/README.md")
 NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2",
          "cpu-scalar": "processor, plain", "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
 QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs",
@@ -195,8 +196,27 @@ def independent(result: dict[str, Any]) -> str:
                   "depth bias, spacings"], body)
 
 
+def short(result: dict[str, Any]) -> str:
+    """The first page's table: ours and the peers' moving camera, each with its error."""
+    library = next(row for row in joined(result, "headline") if row["quality"] == "refined")
+    rows = [row for row in joined(result, "peers") if not row["device"].startswith("Patina") and row["quality"] == "moving camera"]
+    body = []
+    for row in [library, *rows]:
+        own = row is library
+        body.append(["**Patina**" if own else row["device"], f"{row['ms_median']:.0f}",
+                     "" if own else f"{row['ms_median'] / library['ms_median']:.0f}×",
+                     f"{100.0 * (1.0 - row['error']['coverage_iou']):.1f}", f"{row['error']['color_psnr']:.1f}"])
+    return table(["program", "ms a frame", "as long", "coverage wrong, %", "PSNR, dB"], body)
+
+
+def has_rows(part: str) -> bool:
+    """Whether every table of a part has rows, so that nothing that was measured gives way to an empty one."""
+    lines = [*part.splitlines(), ""]
+    return not any(set(line) == set("|-") and not after.startswith("|") for line, after in zip(lines, lines[1:]))
+
+
 def update(result: dict[str, Any], root: Path) -> str:
-    """Writes what the run holds and the README has marks for; returns what, in a sentence."""
+    """Writes what the run holds and the pages have marks for; returns what, in a sentence a page."""
     against = [row for row in joined(result, "headline", "peers") if row["points"] == 1_000_000 and row["error"]]
     title = f"{result['processor']}, {result['cores']} cores, {result['date']}"
     parts = {}
@@ -204,7 +224,7 @@ def update(result: dict[str, Any], root: Path) -> str:
         plots.pareto(against, root / ".pictures/pareto.png", title)
         parts |= {"speed": speed(result), "aims": aims(result), "memory": memory(result)}
         if joined(result, "peers"):
-            parts["others"] = others(result)
+            parts |= {"others": others(result), "short": short(result)}
         if any(row["device"].startswith("VTK") for row in joined(result, "effects")):
             parts["effects"] = effects(result)
     for name, part in (("discs", discs), ("lines", lines), ("inside", inside), ("cues", cues), ("styles", styles),
@@ -225,13 +245,18 @@ def update(result: dict[str, Any], root: Path) -> str:
     for name, part in result["parts"].items():
         if not any(line.startswith("skip") for line in part["text"].splitlines()):
             parts[name] = hard(part["text"]) if name == "hard" else part["text"]
-    path = root / "README.md"
-    text, written = path.read_text(), []
-    for name, part in parts.items():
-        begin, end = f"<!-- bench {name} -->\n", "<!-- end -->"
-        if begin in text:
-            before, rest = text.split(begin, 1)
-            text = before + begin + part + "\n" + rest[rest.index(end):]
-            written.append(name)
-    path.write_text(text)
-    return f"README.md: {', '.join(written) or 'no marks found'}"
+    told = []
+    for page in PAGES:
+        path = root / page
+        if not path.is_file():
+            continue
+        text, written = path.read_text(), []
+        for name, part in parts.items():
+            begin, end = f"<!-- bench {name} -->\n", "<!-- end -->"
+            if begin in text and has_rows(part):
+                before, rest = text.split(begin, 1)
+                text = before + begin + part + "\n" + rest[rest.index(end):]
+                written.append(name)
+        path.write_text(text)
+        told.append(f"{page}: {', '.join(written) or 'no marks found'}")
+    return "\n".join(told)

@@ -7,7 +7,7 @@
 MODE: default, stations (the scanners' places are known), free (and what they saw through is left out), filling, discs (ours);
 vtk 1, vtk 3 EDL, … (points of so many pixels); cycles 0.02, eevee 0.02, … (spheres of a radius in metres; EEVEE takes
 minutes a picture on llvmpipe). The default
-is all but eevee. --add: rows of earlier runs, whose modes are not measured again; --readme: README.md's table."""
+is all but eevee. --add: rows of earlier runs, whose modes are not measured again; --readme: the table of figures."""
 
 from __future__ import annotations
 

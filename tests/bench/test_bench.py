@@ -97,6 +97,13 @@ class Bench(unittest.TestCase):
         readme.update({**self.result, "parts": parts}, self.out)
         self.assertEqual(path.read_text(), "<!-- bench leaves -->\nold\n<!-- end -->\n<!-- bench slopes -->\nnew\n<!-- end -->\n")
 
+    def test_readme_keeps_a_table_in_place_of_an_empty_one(self) -> None:
+        path = self.out / "README.md"
+        full, empty = "| a |\n|---|\n| 1 |", "| a |\n|---|"
+        path.write_text("<!-- bench leaves -->\nold\n<!-- end -->\n<!-- bench slopes -->\nold\n<!-- end -->\n")
+        readme.update({**self.result, "parts": {"leaves": {"title": "", "text": empty}, "slopes": {"title": "", "text": full}}}, self.out)
+        self.assertEqual(path.read_text(), f"<!-- bench leaves -->\nold\n<!-- end -->\n<!-- bench slopes -->\n{full}\n<!-- end -->\n")
+
     def test_graphics_refuses_software(self) -> None:
         """Figures of a graphics processor come from one, or are not there."""
         case = bench.case_of("graphics", device="gl-egl", points=10_000, size=64, frames=1, graphics=1)

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import curves  # noqa: E402
 import native  # noqa: E402
 
-FACTOR = 2.0  # other shapes have more outline or less; README says what was found, and how far a gyroid is off
+FACTOR = 2.0  # other shapes have more outline or less; the figures say what was found, and how far a gyroid is off
 
 
 class Expected(unittest.TestCase):
