@@ -126,9 +126,9 @@ class PATINA_OT_open_manual(Operator):
 
 
 def manual() -> Path | None:
-    """In the zip, else beside the add-on's folder in a checkout."""
+    """The page in the zip, else what it is made of, in a checkout."""
     own = Path(__file__).resolve().parents[1]
-    return next((path for path in (own / "README.md", own.parent / "README.md") if path.is_file()), None)
+    return next((path for path in (own / "manual/index.html", own / "README.md") if path.is_file()), None)
 
 
 def cache_text() -> str:
@@ -136,6 +136,21 @@ def cache_text() -> str:
     return f"{count} kept, {size / 1e9:.2f} GB"
 
 
+def draw_help(menu: bpy.types.Menu, _context: Context) -> None:
+    menu.layout.separator()
+    menu.layout.operator("patina.open_manual", text="Patina Manual", icon='HELP')
+
+
 _CLASSES = (PATINA_OT_install_readers, PATINA_OT_install_reader_files, PATINA_OT_clear_cache, PATINA_OT_open_manual)
 
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(_CLASSES)
+
+
+def register() -> None:
+    _register_classes()
+    bpy.types.TOPBAR_MT_help.append(draw_help)
+
+
+def unregister() -> None:
+    bpy.types.TOPBAR_MT_help.remove(draw_help)
+    _unregister_classes()

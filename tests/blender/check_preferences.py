@@ -219,4 +219,5 @@ def test_defaults_of_device_threads_and_memory():
 
 def test_manual_is_there():
     path = operators.manual()
-    check(path is not None and path.read_text("utf-8").startswith("# Patina"), f"{path}")
+    check(path is not None and path.read_text("utf-8").startswith("# The manual"), f"{path}")
+    check(any(draw.__module__ == operators.__name__ for draw in bpy.types.TOPBAR_MT_help._dyn_ui_initialize()), "not in the menu Help")

@@ -8,6 +8,7 @@ BLENDER_USER_SCRIPTS, _CONFIG and _EXTENSIONS must name throwaway folders, PATIN
 """
 import math
 import os
+import re
 import sys
 import tempfile
 import traceback
@@ -46,6 +47,11 @@ def test_install():
     inside = os.environ["BLENDER_USER_SCRIPTS" if LEGACY else "BLENDER_USER_EXTENSIONS"]
     assert Path(inside).resolve() in folder().parents, folder()
     assert (folder() / "LICENSE").is_file()
+    manual = folder() / "manual/index.html"
+    page = manual.read_text(encoding="utf-8")
+    pictures = re.findall(r'src="([^"]+)"', page)
+    assert len(pictures) > 5 and all((manual.parent / picture).is_file() for picture in pictures), pictures
+    assert "<table>" in page and "<pre>" in page and 'href="..' not in page
     if not LEGACY and list((ROOT / "build/out/wheels").glob("*.whl")):
         import laspy
         import lazrs
