@@ -20,12 +20,18 @@ from typing import Any
 import numpy as np
 
 from . import abi
-from .abi import (CANCELLED, FORMAT, INTERNAL, KINDS, MEMORY, MOST_LAYERS, MOST_RAMP, NEIGHBOURHOODS, PLANES, PatinaCancelled,
-                  PatinaError, check, forget_library, library, library_path, log_lines, split_plane)
+from .abi import MAX_LAYERS as MOST_LAYERS
+from .abi import MAX_RAMP as MOST_RAMP
+from .abi import PASSES as PLANES
+from .loader import (CANCELLED, FORMAT, INTERNAL, MEMORY, NEIGHBOURHOODS, TYPES, PatinaCancelled, PatinaError, check,
+                      forget_library, library, library_path, log_lines, split_plane)
 
 __all__ = ["CANCELLED", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
            "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "forget_library",
            "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
+
+
+KINDS = tuple(abi.KIND)  # patina_kind
 
 
 def _destroy(destroy: Callable[[c_void_p], None], handle: c_void_p, _keep: Any) -> None:
@@ -115,7 +121,7 @@ def _view(array: np.ndarray | None, count: int) -> abi.Array:
         return abi.Array()
     if array.ndim != 2 or len(array) != count or not array.flags.c_contiguous:
         raise PatinaError(f"an array of shape {array.shape} cannot hold {count} points")
-    return abi.Array(data=array.ctypes.data, type=abi.TYPES[array.dtype.name], components=array.shape[1])
+    return abi.Array(data=array.ctypes.data, type=TYPES[array.dtype.name], components=array.shape[1])
 
 
 def _describe(positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
@@ -346,7 +352,7 @@ class File(_Handle):
     def colors(self) -> np.ndarray | None:
         if not self._info.color_type:
             return None
-        if self._info.color_type == abi.TYPES["uint8"]:
+        if self._info.color_type == TYPES["uint8"]:
             return self._column("read_colors_u8", (self.count, 4), dtype=np.uint8)
         return self._column("read_colors_f32", (self.count, 4))
 

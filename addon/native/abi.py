@@ -1,67 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""patina.h for ctypes: its structures, enumerations and calls, field by field, and the library that has them.
-
-Only the handles beside use it. Every call that fails raises `PatinaError` with the library's own sentence.
-"""
+"""patina.h for ctypes. Made of the header by build/generate_abi: change that, and run this."""
 
 from __future__ import annotations
 
-import ctypes
-import os
-import sys
-import threading
-from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_double, c_float, c_int
-from ctypes import c_size_t, c_uint32, c_uint64, c_void_p, sizeof
-from pathlib import Path
+from ctypes import Array as Array_
+from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int, c_size_t, c_uint32, c_uint64, c_void_p,
+                    sizeof)
 from typing import Any
 
-import numpy as np
+VERSION = (0, 1)  # of the header; the patch number may differ
 
-VERSION = (0, 1)  # of the header that this file follows; the patch number may differ
+SIDES_VOTED = 2
+MAX_RAMP = 256
+MAX_LAYERS = 16
 
-MEMORY = -2  # PATINA_ERROR_MEMORY
-FORMAT = -4  # PATINA_ERROR_FORMAT
-CANCELLED = -7  # PATINA_ERROR_CANCELLED
-INTERNAL = -10  # PATINA_ERROR_INTERNAL
-
-# patina_pass: plane name → (number, channels)
-PLANES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1), "LINE": (5, 1),
+# patina_pass: name → (number, channels)
+PASSES = {"COMBINED": (0, 4), "DEPTH": (1, 1), "NORMAL": (2, 3), "SOURCE": (3, 1), "SHADOW": (4, 1), "LINE": (5, 1),
           "CERTAINTY": (6, 1), "THICKNESS": (7, 1)}
 
-MOST_LAYERS = 16  # PATINA_MAX_LAYERS
-MOST_RAMP = 256  # PATINA_MAX_RAMP
-
-
-def split_plane(plane: str) -> tuple[str, int]:
-    """"DEPTH 3" is the depth of layer 3; "DEPTH" that of the picture, layer 0."""
-    name, _, layer = plane.partition(" ")
-    return name, int(layer or 0)
-
-
-KINDS = ("UNKNOWN", "SURFACE", "BORDER", "LINE", "VOLUME", "STRAY")  # patina_kind
-
-# Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
-NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),
-                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "certainty": (np.float32, 0), "seen_through": (np.uint8, 0), "numbers": (np.uint32, -1),
-                  "distances": (np.float64, -1), "soft_radius": (np.float32, 0), "uncertainty": (np.float32, 0)}
-
-# patina_type by numpy type
-TYPES = {"float32": 1, "float64": 2, "uint8": 3, "uint16": 4, "uint32": 5, "int8": 6, "int16": 7, "int32": 8}
-
-
-class PatinaError(Exception):
-    """A call that failed: `code` from the header's list, the library's sentence as text."""
-
-    def __init__(self, message: str, code: int = INTERNAL) -> None:
-        super().__init__(message)
-        self.code = code
-
-
-class PatinaCancelled(PatinaError):
-    """A call that was cancelled on request."""
-
-
-# ---- structures ----------------------------------------------------------------------------------------------
+ERROR = {"OK": 0, "ERROR_ARGUMENT": -1, "ERROR_MEMORY": -2, "ERROR_FILE": -3, "ERROR_FORMAT": -4, "ERROR_UNSUPPORTED": -5,
+         "ERROR_DEVICE": -6, "ERROR_CANCELLED": -7, "ERROR_TOO_MANY_POINTS": -8, "ERROR_EMPTY": -9, "ERROR_INTERNAL": -10}
+TYPE = {"NONE": 0, "FLOAT32": 1, "FLOAT64": 2, "UINT8": 3, "UINT16": 4, "UINT32": 5, "INT8": 6, "INT16": 7, "INT32": 8}
+KIND = {"UNKNOWN": 0, "SURFACE": 1, "BORDER": 2, "LINE": 3, "VOLUME": 4, "STRAY": 5}
+LIGHTING = {"AUTO": 0, "UNLIT": 1, "LIT": 2}
+COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5}
+FREE_SPACE = {"OFF": 0, "SHOW": 1, "USE": 2}
+SHADOW_OFF = {"NO_CAST": 1, "NO_RECEIVE": 2, "NO_SELF": 4}
+CLIP_SHAPE = {"BOX": 0, "PLANE": 1}
+LIGHT_TYPE = {"SUN": 1, "POINT": 2, "SPOT": 3, "AREA": 4}
+AREA_SHAPE = {"RECTANGLE": 0, "ELLIPSE": 1}
+QUALITY = {"REFINED": 0, "PAPER": 1}
+FILL = {"CLOSED": 0, "PAPER": 1, "OFF": 2}
+SURFACE = {"AUTO": 0, "SPLATS": 1, "FILL": 2}
+DEPTH = {"POINT": 0, "SURFACE": 1}
+SMOOTH = {"ALLEVIATED": 0, "GAUSSIAN": 1, "BOX": 2, "OFF": 3}
+ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
+LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
+LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
 
 
 class Descriptor(Structure):
@@ -72,11 +47,7 @@ class Descriptor(Structure):
         types = dict(self._fields_)
         for name, value in fields.items():
             kind = types[name]
-            setattr(self, name, kind(*value) if issubclass(kind, ctypes.Array) else value)
-
-
-class Array(Structure):
-    _fields_ = [("data", c_void_p), ("type", c_uint32), ("components", c_uint32), ("stride", c_uint64)]
+            setattr(self, name, kind(*value) if issubclass(kind, Array_) else value)
 
 
 class DeviceDesc(Descriptor):
@@ -85,14 +56,18 @@ class DeviceDesc(Descriptor):
 
 
 class DeviceInfo(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("name", c_char * 32), ("description", c_char * 192),
-                ("threads", c_uint32), ("hardware", c_uint32), ("key64", c_uint32)]
+    _fields_ = [("struct_size", c_size_t), ("name", c_char * 32), ("description", c_char * 192), ("threads", c_uint32),
+                ("hardware", c_uint32), ("key64", c_uint32)]
+
+
+class Array(Structure):
+    _fields_ = [("data", c_void_p), ("type", c_uint32), ("components", c_uint32), ("stride", c_uint64)]
 
 
 class CloudDesc(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", Array), ("normal", Array),
-                ("color", Array), ("opacity", Array), ("scalar", Array), ("classes", Array),
-                ("origin", c_double * 3), ("threads", c_uint32), ("radius", Array)]
+    _fields_ = [("struct_size", c_size_t), ("count", c_uint64), ("position", Array), ("normal", Array), ("color", Array),
+                ("opacity", Array), ("scalar", Array), ("classes", Array), ("origin", c_double * 3), ("threads", c_uint32),
+                ("radius", Array)]
 
 
 class CloudInfo(Descriptor):
@@ -101,10 +76,10 @@ class CloudInfo(Descriptor):
                 ("spacing_min", c_double), ("spacing_max", c_double), ("invalid_positions", c_uint64),
                 ("invalid_normals", c_uint64), ("invalid_colors", c_uint64), ("has_normals", c_uint32),
                 ("has_colors", c_uint32), ("has_opacities", c_uint32), ("origin", c_double * 3),
-                ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float),
-                ("has_scalars", c_uint32), ("has_classes", c_uint32), ("scalar_range", c_float * 2),
-                ("class_bits", c_uint32 * 8), ("has_shapes", c_uint32), ("normals_oriented", c_uint32),
-                ("estimated_normals", c_uint64), ("kinds", c_uint64 * 6), ("seen_through", c_uint64)]
+                ("layer_distance", c_double), ("has_radii", c_uint32), ("radius_most", c_float), ("has_scalars", c_uint32),
+                ("has_classes", c_uint32), ("scalar_range", c_float * 2), ("class_bits", c_uint32 * 8),
+                ("has_shapes", c_uint32), ("normals_oriented", c_uint32), ("estimated_normals", c_uint64),
+                ("kinds", c_uint64 * 6), ("seen_through", c_uint64)]
 
 
 class AnalysisDesc(Descriptor):
@@ -116,15 +91,25 @@ class AnalysisDesc(Descriptor):
 class Neighbourhoods(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("normal", c_void_p), ("axis", c_void_p), ("spacing", c_void_p),
                 ("half_axes", c_void_p), ("sigma", c_void_p), ("kind", c_void_p), ("certainty", c_void_p),
-                ("seen_through", c_void_p), ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p), ("distances", c_void_p),
-                ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
+                ("seen_through", c_void_p), ("neighbours", c_uint32), ("threads", c_uint32), ("numbers", c_void_p),
+                ("distances", c_void_p), ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
+
+
+class MeshDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", Array), ("normal", Array),
+                ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p)]
+
+
+class MeshInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("triangle_count", c_uint64), ("bytes", c_uint64),
+                ("box_min", c_double * 3), ("box_max", c_double * 3)]
 
 
 class FileInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
-                ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32),
-                ("origin", c_double * 3), ("box_min", c_double * 3), ("box_max", c_double * 3),
-                ("invalid_positions", c_uint64), ("stations", c_uint32)]
+                ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
+                ("box_min", c_double * 3), ("box_max", c_double * 3), ("invalid_positions", c_uint64),
+                ("stations", c_uint32)]
 
 
 class FileAttribute(Descriptor):
@@ -140,20 +125,10 @@ class CloudStyle(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("lighting", c_uint32),
                 ("cull_back", c_uint32), ("d_min", c_float), ("color", c_float * 3), ("ambient", c_float),
                 ("diffuse", c_float), ("specular", c_float), ("shininess", c_uint32), ("transparency", c_float),
-                ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p), ("ramp_count", c_uint32),
-                ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
+                ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p),
+                ("ramp_count", c_uint32), ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
                 ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
                 ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float)]
-
-
-class Clip(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("world_from_clip", c_double * 16), ("shape", c_uint32), ("cut", c_uint32),
-                ("tint", c_float * 3), ("tint_strength", c_float), ("tint_width", c_float)]
-
-
-class MeshDesc(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", Array), ("normal", Array),
-                ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p)]
 
 
 class MeshStyle(Descriptor):
@@ -161,34 +136,33 @@ class MeshStyle(Descriptor):
                 ("shadow_off", c_uint32)]
 
 
+class Clip(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("world_from_clip", c_double * 16), ("shape", c_uint32), ("cut", c_uint32),
+                ("tint", c_float * 3), ("tint_strength", c_float), ("tint_width", c_float)]
+
+
 class LightDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("type", c_uint32), ("color", c_float * 3), ("power", c_float),
                 ("position", c_double * 3), ("direction", c_double * 3), ("side", c_double * 3), ("angle", c_float),
-                ("radius", c_float), ("size", c_float * 2), ("shape", c_uint32), ("cone", c_float),
-                ("blend", c_float), ("shadows", c_uint32)]
+                ("radius", c_float), ("size", c_float * 2), ("shape", c_uint32), ("cone", c_float), ("blend", c_float),
+                ("shadows", c_uint32)]
 
 
 class Camera(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("orthographic", c_uint32), ("world_from_camera", c_double * 16),
-                ("left", c_double), ("right", c_double), ("bottom", c_double), ("top", c_double),
-                ("near_clip", c_double), ("far_clip", c_double)]
-
-
-class Panorama(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
-                ("world_from_camera", c_double * 16), ("longitude", c_double * 2), ("latitude", c_double * 2),
-                ("near_clip", c_double), ("far_clip", c_double)]
+                ("left", c_double), ("right", c_double), ("bottom", c_double), ("top", c_double), ("near_clip", c_double),
+                ("far_clip", c_double)]
 
 
 class Settings(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
                 ("quality", c_uint32), ("fill", c_uint32), ("fill_iterations", c_uint32), ("smooth", c_uint32),
-                ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3),
-                ("passes", c_uint32), ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float),
-                ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
-                ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("shadow_error", c_float),
-                ("own_background", c_uint32), ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32),
-                ("pixel_samples", c_uint32), ("depth", c_uint32)]
+                ("antialias", c_uint32), ("film_transparent", c_uint32), ("world_color", c_float * 3), ("passes", c_uint32),
+                ("layers", c_uint32), ("layer_passes", c_uint32), ("error_target", c_float), ("strata", c_uint32),
+                ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32), ("shadow_lazy", c_uint32),
+                ("shadow_progressive", c_uint32), ("shadow_error", c_float), ("own_background", c_uint32),
+                ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32), ("pixel_samples", c_uint32),
+                ("depth", c_uint32)]
 
 
 class Effects(Descriptor):
@@ -207,13 +181,8 @@ class Lines(Descriptor):
                 ("transparency", c_float), ("soft", c_float), ("surface", c_uint32), ("paper", c_float * 3)]
 
 
-class Read(Structure):
-    _fields_ = [("pass_", c_uint32), ("pixels", c_void_p), ("size", c_size_t)]
-
-
 class ExpectedError(Structure):
-    _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float),
-                ("doubt", c_float)]
+    _fields_ = [("color", c_float), ("coverage", c_float), ("depth", c_float), ("normal", c_float), ("doubt", c_float)]
 
 
 class FrameStats(Descriptor):
@@ -226,31 +195,46 @@ class FrameStats(Descriptor):
                 ("chunks_cut", c_uint64)]
 
 
-# ---- the library ---------------------------------------------------------------------------------------------
+class Panorama(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("region", c_uint32 * 4),
+                ("world_from_camera", c_double * 16), ("longitude", c_double * 2), ("latitude", c_double * 2),
+                ("near_clip", c_double), ("far_clip", c_double)]
 
-_OUT = POINTER(c_void_p)
 
-# name → argument types; everything returns int except what _RESULTS names
-_CALLS = {
+class Read(Structure):
+    _fields_ = [("pass_", c_uint32), ("pixels", c_void_p), ("size", c_size_t)]
+
+
+# name → types of arguments; what returns anything but int stands in RESULTS
+CALLS = {
     "patina_version": (),
+    "patina_error_text": (c_int,),
     "patina_message": (c_void_p, c_char_p, c_size_t),
-    "patina_log_next": (c_char_p, c_size_t, POINTER(c_int)),
-    "patina_progress_create": (_OUT,),
+    "patina_log_next": (c_char_p, c_size_t, c_void_p),
+    "patina_progress_create": (POINTER(c_void_p),),
     "patina_progress_destroy": (c_void_p,),
     "patina_progress_cancel": (c_void_p,),
     "patina_progress_value": (c_void_p,),
-    "patina_device_create": (POINTER(DeviceDesc), _OUT),
+    "patina_device_create": (POINTER(DeviceDesc), POINTER(c_void_p)),
     "patina_device_destroy": (c_void_p,),
     "patina_device_get_info": (c_void_p, POINTER(DeviceInfo)),
-    "patina_cloud_create": (POINTER(CloudDesc), c_void_p, _OUT),
+    "patina_cloud_create": (POINTER(CloudDesc), c_void_p, POINTER(c_void_p)),
     "patina_cloud_destroy": (c_void_p,),
-    "patina_cloud_save": (c_void_p, c_char_p),
-    "patina_cloud_open": (c_char_p, _OUT),
     "patina_cloud_set_colors": (c_void_p, POINTER(Array)),
+    "patina_cloud_set_scalars": (c_void_p, POINTER(Array)),
+    "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
+    "patina_cloud_dense_box": (c_void_p, c_void_p, c_void_p),
+    "patina_cloud_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p),
+    "patina_cloud_neighbourhoods": (c_void_p, POINTER(Neighbourhoods), c_void_p),
+    "patina_cloud_save": (c_void_p, c_char_p),
+    "patina_cloud_open": (c_char_p, POINTER(c_void_p)),
+    "patina_cloud_verify": (c_char_p, c_void_p),
     "patina_cloud_get_info": (c_void_p, POINTER(CloudInfo)),
-    "patina_mesh_create": (POINTER(MeshDesc), _OUT),
+    "patina_mesh_create": (POINTER(MeshDesc), POINTER(c_void_p)),
     "patina_mesh_destroy": (c_void_p,),
-    "patina_file_open": (c_char_p, c_void_p, _OUT),
+    "patina_mesh_get_info": (c_void_p, POINTER(MeshInfo)),
+    "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_file_destroy": (c_void_p,),
     "patina_file_get_info": (c_void_p, POINTER(FileInfo)),
     "patina_file_get_attribute": (c_void_p, c_uint32, POINTER(FileAttribute)),
@@ -260,130 +244,61 @@ _CALLS = {
     "patina_file_read_colors_f32": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_stations": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_attribute": (c_void_p, c_uint32, c_void_p, c_size_t),
-    "patina_scene_create": (_OUT,),
+    "patina_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p),
+    "patina_file_cloud": (c_void_p, c_uint32, c_void_p, POINTER(c_void_p)),
+    "patina_cloud_load": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_write_ply": (c_char_p, POINTER(CloudDesc)),
+    "patina_ramp": (c_char_p, c_void_p),
+    "patina_scene_create": (POINTER(c_void_p),),
     "patina_scene_destroy": (c_void_p,),
+    "patina_scene_clear": (c_void_p,),
     "patina_scene_add_cloud": (c_void_p, c_void_p, POINTER(CloudStyle)),
     "patina_scene_add_mesh": (c_void_p, c_void_p, POINTER(MeshStyle)),
-    "patina_scene_add_light": (c_void_p, POINTER(LightDesc)),
     "patina_scene_add_clip": (c_void_p, POINTER(Clip)),
-    "patina_ramp": (c_char_p, c_void_p),
-    "patina_cloud_set_scalars": (c_void_p, POINTER(Array)),
-    "patina_cloud_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p),
-    "patina_cloud_neighbourhoods": (c_void_p, POINTER(Neighbourhoods), c_void_p),
-    "patina_cloud_scalar_range": (c_void_p, c_double, c_void_p),
-    "patina_cloud_dense_box": (c_void_p, c_void_p, c_void_p),
+    "patina_scene_add_light": (c_void_p, POINTER(LightDesc)),
     "patina_scene_set_camera": (c_void_p, POINTER(Camera)),
-    "patina_scene_set_lines": (c_void_p, POINTER(Lines)),
     "patina_scene_set_settings": (c_void_p, POINTER(Settings)),
     "patina_scene_set_effects": (c_void_p, POINTER(Effects)),
-    "patina_frame_create": (c_void_p, _OUT),
+    "patina_scene_set_lines": (c_void_p, POINTER(Lines)),
+    "patina_scene_frame_camera": (c_void_p, c_double, c_double, c_double, POINTER(Camera)),
+    "patina_frame_create": (c_void_p, POINTER(c_void_p)),
     "patina_frame_destroy": (c_void_p,),
     "patina_frame_render": (c_void_p, c_void_p),
     "patina_frame_cancel": (c_void_p,),
     "patina_frame_progress": (c_void_p,),
     "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
-    "patina_frame_read_keys": (c_void_p, c_void_p, c_size_t),
     "patina_frame_read_layer": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
+    "patina_frame_read_keys": (c_void_p, c_void_p, c_size_t),
     "patina_frame_bake_shadows": (c_void_p, c_void_p),
+    "patina_frame_read_shadows": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_save_shadows": (c_void_p, c_char_p),
     "patina_frame_load_shadows": (c_void_p, c_void_p, c_char_p),
-    "patina_frame_read_shadows": (c_void_p, c_uint32, c_uint32, c_void_p, c_size_t),
     "patina_frame_get_stats": (c_void_p, POINTER(FrameStats)),
     "patina_frame_stats_json": (c_void_p, c_char_p, c_size_t),
-    "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), POINTER(c_uint32)),
+    "patina_frame_plan_text": (c_void_p, c_void_p, c_char_p, c_size_t),
+    "patina_frame_dump_planes": (c_void_p, c_char_p),
+    "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), c_void_p),
     "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
     "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
-    "patina_task_render": (c_void_p, c_void_p, c_void_p, c_uint32, _OUT),
-    "patina_task_build": (POINTER(CloudDesc), c_void_p, _OUT),
-    "patina_task_set_colors": (c_void_p, POINTER(Array), _OUT),
-    "patina_task_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p, _OUT),
-    "patina_task_fingerprint": (POINTER(CloudDesc), POINTER(c_uint64), _OUT),
-    "patina_task_open_file": (c_char_p, c_void_p, _OUT),
-    "patina_task_save": (c_void_p, c_char_p, _OUT),
-    "patina_task_verify": (c_char_p, c_void_p, _OUT),
-    "patina_task_take_file": (c_void_p, _OUT),
-    "patina_task_done": (c_void_p,),
-    "patina_task_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p, _OUT),
+    "patina_task_render": (c_void_p, c_void_p, POINTER(Read), c_uint32, POINTER(c_void_p)),
+    "patina_task_build": (POINTER(CloudDesc), c_void_p, POINTER(c_void_p)),
+    "patina_task_set_colors": (c_void_p, POINTER(Array), POINTER(c_void_p)),
+    "patina_task_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p, POINTER(c_void_p)),
     "patina_task_apply": (c_void_p,),
+    "patina_task_fingerprint": (POINTER(CloudDesc), c_void_p, POINTER(c_void_p)),
+    "patina_task_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p, POINTER(c_void_p)),
+    "patina_task_open_file": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_task_save": (c_void_p, c_char_p, POINTER(c_void_p)),
+    "patina_task_verify": (c_char_p, c_void_p, POINTER(c_void_p)),
+    "patina_task_done": (c_void_p,),
     "patina_task_wait": (c_void_p,),
-    "patina_task_take_cloud": (c_void_p, _OUT),
+    "patina_task_take_cloud": (c_void_p, POINTER(c_void_p)),
+    "patina_task_take_file": (c_void_p, POINTER(c_void_p)),
     "patina_task_destroy": (c_void_p,),
 }
-_RESULTS = {
-    "patina_version": c_char_p, "patina_message": c_size_t, "patina_log_next": c_size_t,
-    "patina_progress_destroy": None, "patina_progress_cancel": None, "patina_progress_value": c_float,
-    "patina_device_destroy": None, "patina_cloud_destroy": None, "patina_mesh_destroy": None, "patina_file_destroy": None,
-    "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
-    "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_task_destroy": None,
-}
-
-_loaded: ctypes.CDLL | None = None
-_loading = threading.Lock()
-
-
-def library_path() -> Path:
-    """Where the library is looked for: $PATINA_LIBRARY, else lib/ in this package."""
-    override = os.environ.get("PATINA_LIBRARY")
-    if override:
-        return Path(override)
-    name = {"win32": "patina.dll", "darwin": "libpatina.dylib"}.get(sys.platform, "libpatina.so")
-    return Path(__file__).parents[1] / "lib" / name
-
-
-def library() -> ctypes.CDLL:
-    """Loads the library at the first call. PatinaError when it is missing or of another version."""
-    global _loaded
-    with _loading:
-        if _loaded is None:
-            _loaded = _load(library_path())
-        return _loaded
-
-
-def forget_library() -> None:
-    """The next call of library() looks for the file again. Handles that live on keep the old one."""
-    global _loaded
-    with _loading:
-        _loaded = None
-
-
-def _load(path: Path) -> ctypes.CDLL:
-    if not path.is_file():
-        raise PatinaError(f"Patina's library is missing: there is no {path}. Install the add-on's zip for this "
-                          "platform, or let the environment variable PATINA_LIBRARY name the file")
-    try:
-        lib = ctypes.CDLL(str(path))
-        for name, arguments in _CALLS.items():
-            call = getattr(lib, name)
-            call.argtypes = arguments
-            call.restype = _RESULTS.get(name, c_int)
-    except (OSError, AttributeError) as error:
-        raise PatinaError(f"Patina's library {path} cannot be loaded: {error}") from None
-    version = lib.patina_version().decode()
-    if tuple(int(part) for part in version.split(".")[:2]) != VERSION:
-        wanted = ".".join(str(part) for part in VERSION)
-        raise PatinaError(f"Patina's library {path} is version {version}, the add-on needs {wanted}: "
-                          "restart Blender after an update")
-    return lib
-
-
-def _message(handle: c_void_p | None) -> str:
-    buffer = ctypes.create_string_buffer(2048)
-    library().patina_message(handle, buffer, len(buffer))
-    return buffer.value.decode("utf-8", "replace")
-
-
-def check(code: int, *handles: c_void_p | None) -> None:
-    """Raises for a negative code with the first message found at the handles, else at the thread."""
-    if code >= 0:
-        return
-    text = next(filter(None, map(_message, (*handles, None))), f"the library failed with code {code}")
-    raise (PatinaCancelled if code == CANCELLED else PatinaError)(text, code)
-
-
-def log_lines() -> list[tuple[int, str]]:
-    """Takes the unread log lines: (level, text), level 0 error, 1 warning, 2 information."""
-    lines = []
-    buffer, level = ctypes.create_string_buffer(1024), c_int()
-    while library().patina_log_next(buffer, len(buffer), byref(level)):
-        lines.append((level.value, buffer.value.decode("utf-8", "replace")))
-    return lines
+RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_message": c_size_t,
+           "patina_log_next": c_size_t, "patina_progress_destroy": None, "patina_progress_cancel": None,
+           "patina_progress_value": c_float, "patina_device_destroy": None, "patina_cloud_destroy": None,
+           "patina_mesh_destroy": None, "patina_file_destroy": None, "patina_scene_destroy": None,
+           "patina_frame_destroy": None, "patina_frame_cancel": None, "patina_frame_progress": c_float,
+           "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t, "patina_task_destroy": None}

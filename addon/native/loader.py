@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shared library: where it is, its calls with their types, its errors as exceptions, its log.
+
+Only the handles beside use it. Every call that fails raises `PatinaError` with the library's own sentence.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import threading
+from ctypes import byref, c_int, c_void_p
+from pathlib import Path
+
+import numpy as np
+
+from . import abi
+
+MEMORY, FORMAT, CANCELLED, INTERNAL = (abi.ERROR[f"ERROR_{name}"] for name in ("MEMORY", "FORMAT", "CANCELLED", "INTERNAL"))
+
+# Arrays of patina_neighbourhoods: type and width, 0: one number a point, -1: as many as neighbours.
+NEIGHBOURHOODS = {"normal": (np.float32, 3), "axis": (np.float32, 3), "spacing": (np.float32, 0), "half_axes": (np.float32, 2),
+                  "sigma": (np.float32, 0), "kind": (np.uint8, 0), "certainty": (np.float32, 0), "seen_through": (np.uint8, 0), "numbers": (np.uint32, -1),
+                  "distances": (np.float64, -1), "soft_radius": (np.float32, 0), "uncertainty": (np.float32, 0)}
+
+TYPES = {name.lower(): value for name, value in abi.TYPE.items()}  # patina_type by numpy's name
+
+
+def split_plane(plane: str) -> tuple[str, int]:
+    """"DEPTH 3" is the depth of layer 3; "DEPTH" that of the picture, layer 0."""
+    name, _, layer = plane.partition(" ")
+    return name, int(layer or 0)
+
+
+class PatinaError(Exception):
+    """A call that failed: `code` from the header's list, the library's sentence as text."""
+
+    def __init__(self, message: str, code: int = INTERNAL) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class PatinaCancelled(PatinaError):
+    """A call that was cancelled on request."""
+
+
+_loaded: ctypes.CDLL | None = None
+_loading = threading.Lock()
+
+
+def library_path() -> Path:
+    """Where the library is looked for: $PATINA_LIBRARY, else lib/ in this package."""
+    override = os.environ.get("PATINA_LIBRARY")
+    if override:
+        return Path(override)
+    name = {"win32": "patina.dll", "darwin": "libpatina.dylib"}.get(sys.platform, "libpatina.so")
+    return Path(__file__).parents[1] / "lib" / name
+
+
+def library() -> ctypes.CDLL:
+    """Loads the library at the first call. PatinaError when it is missing or of another version."""
+    global _loaded
+    with _loading:
+        if _loaded is None:
+            _loaded = _load(library_path())
+        return _loaded
+
+
+def forget_library() -> None:
+    """The next call of library() looks for the file again. Handles that live on keep the old one."""
+    global _loaded
+    with _loading:
+        _loaded = None
+
+
+def _load(path: Path) -> ctypes.CDLL:
+    if not path.is_file():
+        raise PatinaError(f"Patina's library is missing: there is no {path}. Install the add-on's zip for this "
+                          "platform, or let the environment variable PATINA_LIBRARY name the file")
+    try:
+        lib = ctypes.CDLL(str(path))
+        for name, arguments in abi.CALLS.items():
+            call = getattr(lib, name)
+            call.argtypes = arguments
+            call.restype = abi.RESULTS.get(name, c_int)
+    except (OSError, AttributeError) as error:
+        raise PatinaError(f"Patina's library {path} cannot be loaded: {error}") from None
+    version = lib.patina_version().decode()
+    if tuple(int(part) for part in version.split(".")[:2]) != abi.VERSION:
+        wanted = ".".join(str(part) for part in abi.VERSION)
+        raise PatinaError(f"Patina's library {path} is version {version}, the add-on needs {wanted}: "
+                          "restart Blender after an update")
+    return lib
+
+
+def _message(handle: c_void_p | None) -> str:
+    buffer = ctypes.create_string_buffer(2048)
+    library().patina_message(handle, buffer, len(buffer))
+    return buffer.value.decode("utf-8", "replace")
+
+
+def check(code: int, *handles: c_void_p | None) -> None:
+    """Raises for a negative code with the first message found at the handles, else at the thread."""
+    if code >= 0:
+        return
+    text = next(filter(None, map(_message, (*handles, None))), f"the library failed with code {code}")
+    raise (PatinaCancelled if code == CANCELLED else PatinaError)(text, code)
+
+
+def log_lines() -> list[tuple[int, str]]:
+    """Takes the unread log lines: (level, text), level 0 error, 1 warning, 2 information."""
+    lines = []
+    buffer, level = ctypes.create_string_buffer(1024), c_int()
+    while library().patina_log_next(buffer, len(buffer), byref(level)):
+        lines.append((level.value, buffer.value.decode("utf-8", "replace")))
+    return lines
