@@ -6,7 +6,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 const char *const pt_kernel_names[PT_KERNEL_COUNT] = {
 #define PT_KERNEL(name, kind, buffers) #name,
@@ -91,8 +90,10 @@ int patina_device_create(const patina_device_desc *desc, patina_device **out)
     if (!desc)
         desc = &defaults;
     int error = create_named(desc, desc->name ? desc->name : "auto", out);
-    if (!error)
-        pthread_mutex_init(&(*out)->busy, NULL);
+    if (!error) {
+        pthread_mutex_init(&(*out)->turns, NULL);
+        pthread_cond_init(&(*out)->changed, NULL);
+    }
     return error;
 }
 
@@ -100,7 +101,8 @@ void patina_device_destroy(patina_device *device)
 {
     if (!device)
         return;
-    pthread_mutex_destroy(&device->busy);
+    pthread_cond_destroy(&device->changed);
+    pthread_mutex_destroy(&device->turns);
     device->ops->destroy(device);
 }
 
@@ -138,17 +140,22 @@ void patina_frame_destroy(patina_frame *frame)
 // Waits for the device. A cancel must not wait for another frame's turn.
 static int take_turn(patina_frame *frame)
 {
-    while (pthread_mutex_trylock(&frame->device->busy)) {
-        if (atomic_exchange(&frame->cancel, 0))
-            return pt_fail(&frame->handle, PATINA_ERROR_CANCELLED, "rendering was cancelled");
-        nanosleep(&(struct timespec){ .tv_nsec = 1000000 }, NULL);
-    }
-    return PATINA_OK;
+    struct patina_device *device = frame->device;
+    int cancelled = 0;
+    pthread_mutex_lock(&device->turns);
+    while (device->taken && !(cancelled = atomic_exchange(&frame->cancel, 0)))
+        pthread_cond_wait(&device->changed, &device->turns);
+    device->taken |= !cancelled;
+    pthread_mutex_unlock(&device->turns);
+    return cancelled ? pt_fail(&frame->handle, PATINA_ERROR_CANCELLED, "rendering was cancelled") : PATINA_OK;
 }
 
 static int end_turn(patina_frame *frame, int error)
 {
-    pthread_mutex_unlock(&frame->device->busy);
+    pthread_mutex_lock(&frame->device->turns);
+    frame->device->taken = 0;
+    pthread_cond_broadcast(&frame->device->changed);
+    pthread_mutex_unlock(&frame->device->turns);
     return error;
 }
 
@@ -192,8 +199,12 @@ int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint
 
 void patina_frame_cancel(patina_frame *frame)
 {
-    if (frame)
-        atomic_store(&frame->cancel, 1);
+    if (!frame)
+        return;
+    atomic_store(&frame->cancel, 1);
+    pthread_mutex_lock(&frame->device->turns); // never held for long
+    pthread_cond_broadcast(&frame->device->changed);
+    pthread_mutex_unlock(&frame->device->turns);
 }
 
 float patina_frame_progress(const patina_frame *frame) { return frame ? atomic_load(&frame->progress) : 0.0f; }

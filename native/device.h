@@ -70,7 +70,10 @@ struct patina_device {
     const struct pt_device_ops *ops;
     patina_device_info info;
     uint64_t memory_cap; // bytes of planes a frame may hold; 0: no limit
-    pthread_mutex_t busy; // frames of one device take turns: its scratch is one
+    // Frames of one device take turns, for its scratch is one. `changed` is told when a turn ends, or a frame is cancelled.
+    pthread_mutex_t turns;
+    pthread_cond_t changed;
+    int taken;
 };
 
 // Constructors; each returns PATINA_ERROR_UNSUPPORTED with the reason at the thread when it cannot be had.

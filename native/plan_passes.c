@@ -18,13 +18,12 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
                        size_t argument_size, const struct pt_ref *refs, uint32_t ref_count)
 {
     struct pt_plan *plan = builder->plan;
-    static struct pt_pass nowhere; // written to when memory lacks; the plan then fails as a whole
     if (plan->pass_count == builder->room) {
         uint32_t room = builder->room ? 2 * builder->room : 32;
         struct pt_pass *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
         if (!grown) {
             builder->failed = 1;
-            return &nowhere;
+            return &builder->nowhere;
         }
         if (plan->pass_count)
             memcpy(grown, plan->passes, plan->pass_count * sizeof *grown);
@@ -44,9 +43,10 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
 
 void pt_skip(struct pt_builder *builder, const char *name, const char *reason)
 {
-    if (builder->layer > 1)
+    struct pt_plan *plan = builder->plan;
+    if (builder->layer > 1 || plan->skipped_count == sizeof plan->skipped / sizeof plan->skipped[0])
         return;
-    struct pt_skipped *skipped = &builder->plan->skipped[builder->plan->skipped_count++];
+    struct pt_skipped *skipped = &plan->skipped[plan->skipped_count++];
     skipped->name = name;
     snprintf(skipped->reason, sizeof skipped->reason, "%s", reason);
 }

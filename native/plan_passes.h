@@ -15,6 +15,7 @@ struct pt_builder {
     uint32_t finish; // first shading pass of the last layer planned
     int behind;      // of a light's map: the limit plane holds
     int failed;      // memory lacked: the plan fails as a whole
+    struct pt_pass nowhere; // written to then
 };
 
 // ---- what a pass binds -----------------------------------------------------------------------------------------------

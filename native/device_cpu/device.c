@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The CPU device: buffers are memory, kernels are functions of the best level that the processor has.
+#include "color.h"
 #include "cpu.h"
 #include "memory.h"
 #include "tables.h"
@@ -73,8 +74,7 @@ uint64_t pt_pack_table[256];
 static void fill_tables(void)
 {
     for (int i = 0; i < 256; i++) {
-        double c = i / 255.0;
-        pt_srgb_table[i] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+        pt_srgb_table[i] = (float)pt_linear_of_srgb(i / 255.0);
         for (uint64_t lane = 0, count = 0; lane < 8; lane++)
             if (i >> lane & 1)
                 pt_pack_table[i] |= lane << 8 * count++;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "color.h"
 #include "device_gl.h"
 
 #include <math.h>
@@ -160,10 +161,8 @@ static int is_software(const char *renderer)
 static void make_srgb_table(struct pt_gl_device *d)
 {
     float table[256][4] = {{0}}; // uniform blocks keep arrays by 16 bytes
-    for (int i = 0; i < 256; i++) {
-        double c = i / 255.0;
-        table[i][0] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
-    }
+    for (int i = 0; i < 256; i++)
+        table[i][0] = (float)pt_linear_of_srgb(i / 255.0);
     d->gl.GenBuffers(1, &d->srgb);
     d->gl.BindBuffer(GL_UNIFORM_BUFFER, d->srgb);
     d->gl.BufferData(GL_UNIFORM_BUFFER, sizeof table, table, GL_STATIC_DRAW);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Building a cloud: box -> Morton order -> chunks (strata, boxes, spacing) -> surface words and cones -> colours.
 #include "cloud.h"
+#include "color.h"
 #include "kernel_args.h"
 #include "memory.h"
 #include "progress.h"
@@ -420,8 +421,7 @@ static void read_color(const patina_array *array, uint64_t index, float rgb[3])
         } else if (array->type == PATINA_UINT16) {
             uint16_t v;
             memcpy(&v, at + 2 * k, 2);
-            double c = v / 65535.0; // sRGB transfer function, IEC 61966-2-1
-            rgb[k] = (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+            rgb[k] = (float)pt_linear_of_srgb(v / 65535.0);
         }
     }
 }
@@ -658,6 +658,7 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
         pt_handle_init(&cloud->handle);
         atomic_init(&alive->references, 1);
         atomic_init(&alive->alive, 1);
+        cloud->threads = desc->threads;
         cloud->alive = alive;
         cloud->info = (patina_cloud_info){ .struct_size = sizeof cloud->info,
                                            .count = desc->count,
@@ -703,7 +704,7 @@ static int replace_colors(struct build *build)
     enum pt_color_format old_format = cloud->color_format;
     void *old = cloud->colors;
     build->tallies = calloc(cloud->chunk_count + 1, sizeof *build->tallies);
-    build->pool = pt_pool_create(0, 0);
+    build->pool = pt_pool_create(cloud->threads, 0);
     cloud->color_format = color_format(&build->desc.color);
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
     if (!build->tallies || !build->pool || (cloud->color_format && !cloud->colors)) {

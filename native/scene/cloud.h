@@ -58,6 +58,7 @@ struct patina_cloud {
     uint8_t *classes;   // slots, or NULL
     uint64_t class_hash;
     enum pt_color_format color_format;
+    uint32_t threads;    // at most, as the caller said; 0: not said
     double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 

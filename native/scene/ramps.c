@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Ramps by name: a few stops in sRGB, evenly spaced, straight between in sRGB; and the colours of LAS classes.
+#include "color.h"
 #include "error.h"
 
 #include <math.h>
@@ -25,10 +26,7 @@ static const uint32_t classes[CLASSES] = { 0x8C8C8C, 0xB4B4B4, 0xA9794A, 0xB5D77
                                            0xD23CC8, 0xE8C890, 0x3C78D2, 0x6E5A78, 0x5A5F66, 0x9C9CC8, 0xE6C83C,
                                            0xF0A01E, 0x96503C, 0xC8A03C, 0xA08C78, 0xFF3C96 };
 
-static float linear(double srgb)
-{
-    return (float)(srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4));
-}
+static float linear(double srgb) { return (float)pt_linear_of_srgb(srgb); }
 
 static void put_color(uint32_t from, uint32_t to, double share, float out[3])
 {
