@@ -23,7 +23,7 @@ def class_name(number: int) -> str:
 
 class PatinaColorProperties(PropertyGroup):
     source: EnumProperty(
-        name="Color", override=_OVERRIDE, default='OWN',
+        name="Color Source", override=_OVERRIDE, default='OWN',
         description="Where the color of the points comes from",
         items=(
             ('OWN', "Attribute", "The points' own colors", 0),

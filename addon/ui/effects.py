@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
+from . import rows
 from .panels import PatinaPanel
 
 
@@ -44,7 +45,10 @@ class _EffectPanel(PatinaPanel):
         effects = context.scene.patina.effects
         layout.active = getattr(effects, self.switch)
         for name in self.names:
-            layout.prop(effects, name)
+            if f"use_{name}" in effects.bl_rna.properties:
+                rows.automatic(layout, effects, name)
+            else:
+                layout.prop(effects, name)
 
 
 class PATINA_PT_edl(_EffectPanel, Panel):

@@ -29,7 +29,7 @@ class SidebarPanel:
 
 class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
     bl_label = "Camera"
-    bl_order = 1
+    bl_order = 2
 
     def draw(self, context: Context) -> None:
         self.layout.operator("object.patina_frame_points")
@@ -38,6 +38,7 @@ class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
 
 class PATINA_PT_statistics(SidebarPanel, Panel):
     bl_label = "Statistics"
+    bl_order = 3
 
     def draw(self, context: Context) -> None:
         layout = self.layout

@@ -25,7 +25,9 @@ class _StylePanel:
         column.menu(PATINA_MT_styles.__name__, text="", icon='DOWNARROW_HLT')
         column = layout.column()
         column.prop(style, "chosen", text="")
-        column.prop(style, "objects")
+        inner = column.column()
+        inner.use_property_split = True
+        inner.prop(style, "objects")
         if style.notice:
             sentence(column, style.notice, 'INFO')
 
