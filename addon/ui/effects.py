@@ -72,7 +72,7 @@ class PATINA_PT_fog(_EffectPanel, Panel):
     names = ("fog_start", "fog_end", "fog_density", "fog_use_color")
 
     def draw(self, context: Context) -> None:
-        super().draw(context)
+        _EffectPanel.draw(self, context)
         row = self.layout.row()
         row.active = context.scene.patina.effects.fog_use_color
         row.prop(context.scene.patina.effects, "fog_color")

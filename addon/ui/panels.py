@@ -122,7 +122,7 @@ class PATINA_PT_film(PatinaPanel, Panel):
         inner.prop(studio, "background", text="")
         if view_transform.changes_colors(context.scene):
             column = self.layout.column()
-            column.label(text=f"{context.scene.view_settings.view_transform} changes the colors of scans", icon='INFO')
+            rows.sentence(context, column, f"{context.scene.view_settings.view_transform} changes the colors of scans", 'INFO')
             column.operator(view_transform.PATINA_OT_true_colors.bl_idname)
 
 

@@ -24,6 +24,7 @@ def _shows_points(context: Context) -> bool:
 
 class _FirstLines:
     bl_label = "Points"
+    decorated = True
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -32,6 +33,7 @@ class _FirstLines:
     def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
+        layout.use_property_decorate = self.decorated
         patina = context.object.patina
         colors = patina.colors
         column = layout.column()
@@ -54,6 +56,7 @@ class _FirstLines:
 
 class PATINA_PT_sidebar_points(_FirstLines, SidebarPanel, Panel):
     bl_order = 1
+    decorated = False  # dots of keys would take a fifth of its width
 
 
 class PATINA_PT_object_points(_FirstLines, PatinaPanel, Panel):

@@ -7,8 +7,9 @@ import bpy
 from bpy.types import Context, Menu, Panel
 
 from .. import styles
+from . import rows
 from .panels import PatinaPanel
-from .statistics import SidebarPanel, sentence
+from .statistics import SidebarPanel
 
 
 class _StylePanel:
@@ -29,7 +30,7 @@ class _StylePanel:
         inner.use_property_split = True
         inner.prop(style, "objects")
         if style.notice:
-            sentence(column, style.notice, 'INFO')
+            rows.sentence(context, column, style.notice, 'INFO')
 
 
 class PATINA_MT_styles(Menu):

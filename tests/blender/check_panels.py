@@ -114,10 +114,21 @@ class Row:
         return call
 
 
+class Drawing:
+    """A panel that draws into another layout than Blender's for it."""
+
+    def __init__(self, cls, layout):
+        self.__dict__.update(cls=cls, layout=layout)
+
+    def __getattr__(self, name):
+        found = getattr(self.cls, name)
+        return (lambda *arguments: found(self, *arguments)) if callable(found) and not hasattr(found, "__self__") else found
+
+
 def context_of(obj=None, **more):
     scene = bpy.context.scene
     return SimpleNamespace(scene=scene, object=obj, engine=scene.render.engine, view_layer=bpy.context.view_layer, area=None,
-                           region=None, material=None, light=None, camera=None, **more)
+                           region=None, material=None, light=None, camera=None, preferences=bpy.context.preferences, **more)
 
 
 def drawn_by(cls, context):
@@ -125,8 +136,7 @@ def drawn_by(cls, context):
     if not cls.poll(context):
         return None
     layout = Row()
-    cls.draw(SimpleNamespace(layout=layout, **{"_draw_ramp": lambda group: cls._draw_ramp(SimpleNamespace(layout=layout), group)}),
-             context)
+    cls.draw(Drawing(cls, layout), context)
     return layout.drawn
 
 
