@@ -10,6 +10,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy.types import AddonPreferences, Context
 
 from . import memory, readers
+from .properties.automatic import switch
 
 GIGA = 1 << 30
 CACHE_GIGA = 32  # of clouds on the disk, 23 bytes a point: a sequence has many
@@ -53,26 +54,29 @@ class PatinaPreferences(AddonPreferences):
             ('GL', "OpenGL", "OpenGL 4.3 compute shaders", 3)))
     threads: IntProperty(
         name="Threads", default=0, min=0, max=1024,
-        description="Processor threads of scenes that do not say how many; 0 follows Blender's own setting")
+        description="Processor threads of scenes that do not say how many")
+    use_threads: switch("threads", 4, "A fixed number of threads; else Blender's own setting holds")
     memory_limit: IntProperty(
         name="Memory", default=0, min=0, soft_max=256, max=1 << 20, update=_use,
-        description="Gigabytes that a final picture's planes may take before it is made in tiles; 0: half of what is free")
+        description="Gigabytes that a final picture's planes may take before it is made in tiles")
+    use_memory_limit: switch("memory_limit", 4, "A fixed number of gigabytes; else half of what is free", "Set Memory")
 
     def draw(self, _context: Context) -> None:
         from .operators import preferences as operators  # which needs these
+        from .ui import rows
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column(heading="Caches")
         column.prop(self, "cache_folder")
-        column.prop(self, "cache_limit", text="Most, GB")
+        column.prop(self, "cache_limit", text="Size (GB)")
         row = column.row()
         row.label(text=operators.cache_text())
         row.operator("patina.clear_cache")
         column = layout.column(heading="Defaults")
         column.prop(self, "device")
-        column.prop(self, "threads", text="Threads (0: Automatic)")
-        column.prop(self, "memory_limit", text="Memory, GB (0: Automatic)")
+        rows.automatic(column, self, "threads")
+        rows.automatic(column, self, "memory_limit", text="Memory (GB)")
         column = layout.column()
         lacking = readers.missing()
         if lacking:

@@ -82,7 +82,7 @@ def _draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[
         reason = str(error)  # the error itself would keep the whole picture alive
     forget_device()
     picture = _draw_on(_open(replace(description.device, name="cpu"), poll), description, wanted, poll, tile_size)
-    notice = f"{device.name} failed, the CPU drew this picture: {reason}"
+    notice = f"{device.label} failed, the processor drew this picture: {reason}"
     return replace(picture, notice=f"{notice}; {picture.notice}" if picture.notice else notice)
 
 
@@ -152,7 +152,7 @@ def _draw_on(device: native.Device, description: SceneDescription, wanted: list[
 
         with ANALYSES.drawing():
             jobs.run(work, frame.cancel, lambda: poll((done + frame.progress()) / len(regions)))
-        return Picture(picture, stats, device.name, notice)
+        return Picture(picture, stats, device.label, notice)
 
 
 def _draw_panorama(device: native.Device, description: SceneDescription, wanted: list[str],

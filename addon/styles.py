@@ -205,7 +205,8 @@ def _properties(group: bpy.types.Struct, names: Iterable[str]) -> Iterator[tuple
         if rest:
             yield from ((f"{name}.{path}", item) for path, item in _properties(found.fixed_type, [rest]))
         elif found.type == 'POINTER':
-            inner = [key for key in found.fixed_type.properties.keys() if key not in {"rna_type", "name"}]
+            inner = [key for key, item in found.fixed_type.properties.items()
+                     if key not in {"rna_type", "name"} and not item.is_skip_save]
             yield from ((f"{name}.{path}", item) for path, item in _properties(found.fixed_type, inner))
         else:
             yield name, found

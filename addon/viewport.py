@@ -314,7 +314,7 @@ class Viewport:
 
     def _lose_device(self, choice: sync.DeviceChoice, reason: str) -> None:
         """From now on the processor draws, until another device is asked for."""
-        self._lost = (choice, f"{self._frame[0].name} failed, the processor draws: {reason}")
+        self._lost = (choice, f"{self._frame[0].label} failed, the processor draws: {reason}")
         self.notices = [*self.notices, self._lost[1]]
         self._frame, self._others = None, []
         render.forget_device()
@@ -342,7 +342,7 @@ class Viewport:
         return Shown(wish, description.clouds, *planes,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
-                     stats, passes, device.name)
+                     stats, passes, device.label)
 
 
     def _draw_frame(self, frame: native.Frame, description: sync.SceneDescription, planes: tuple[str, ...],

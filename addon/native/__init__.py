@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from . import abi
+from . import abi, devices
 from .abi import MAX_LAYERS as MOST_LAYERS
 from .abi import MAX_RAMP as MOST_RAMP
 from .abi import PASSES as PLANES
@@ -113,6 +113,7 @@ class Device(_Handle):
         self.name = info.name.decode()
         self.description = info.description.decode("utf-8", "replace")
         self.hardware = bool(info.hardware)
+        self.label = devices.label(self.name, self.description, self.hardware)  # for people
 
 
 def _view(array: np.ndarray | None, count: int) -> abi.Array:

@@ -49,6 +49,25 @@ draws them, and the compositor takes what is nearer. That scene follows this one
         return {'FINISHED'}
 
 
+class PATINA_OT_other_scene(Operator):
+    """Show the other scene of the two that are combined in this window"""
+
+    bl_idname = "scene.patina_other"
+    bl_label = "Go to Other Scene"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.scene is not None and _other(context.scene) is not None
+
+    def execute(self, context: Context) -> set[str]:
+        context.window.scene = _other(context.scene)
+        return {'FINISHED'}
+
+
+def _other(scene: Scene) -> Scene | None:
+    return pairs.first_of(scene) or pairs.points_of(scene)
+
+
 def _points_scene(scene: Scene) -> Scene:
     """A scene of the same objects that Patina draws, without faces and without background. The one from last time goes."""
     old = pairs.points_of(scene)
@@ -144,9 +163,11 @@ def _menu(self: bpy.types.Menu, _context: Context) -> None:
 
 def register() -> None:
     bpy.utils.register_class(PATINA_OT_combine)
+    bpy.utils.register_class(PATINA_OT_other_scene)
     TOPBAR_MT_render.append(_menu)
 
 
 def unregister() -> None:
     TOPBAR_MT_render.remove(_menu)
+    bpy.utils.unregister_class(PATINA_OT_other_scene)
     bpy.utils.unregister_class(PATINA_OT_combine)

@@ -13,6 +13,7 @@ from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume
 
 from .. import styles
 from ..native import MOST_LAYERS
+from .automatic import switch
 from .clips import PatinaClipProperties
 from .colors import PatinaColorProperties
 from .effects import PatinaEffectsProperties
@@ -50,7 +51,8 @@ class PatinaSceneProperties(PropertyGroup):
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
         description="Expected error of colors, in percent of white, that the picture may have: the cheapest quality and "
-                    "hole filling that keep to it are chosen. 0: as they are set below")
+                    "hole filling that keep to it are chosen")
+    use_error_target: switch("error_target", 1.0, "Quality and hole filling follow an expected error; else they are as set below")
     quality: EnumProperty(
         name="Quality", override=_OVERRIDE, default='REFINED',
         description="How filled pixels get their depth and normal",
@@ -66,7 +68,8 @@ class PatinaSceneProperties(PropertyGroup):
             ('OFF', "Off", "Only measured points", 2)))
     fill_iterations: IntProperty(
         name="Iterations", override=_OVERRIDE, default=0, min=0, max=64,
-        description="Rounds of hole filling; 0 follows the spacing of the points on screen")
+        description="Rounds of hole filling")
+    use_fill_iterations: switch("fill_iterations", 4, "A fixed number of rounds; else it follows the spacing of the points on screen")
     smooth: EnumProperty(
         name="Smoothing", override=_OVERRIDE, default='ALLEVIATED',
         description="Smooths colors between neighboring pixels of one surface",
@@ -96,7 +99,8 @@ class PatinaSceneProperties(PropertyGroup):
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
         description="Expected error of soft shadows, in percent of their light: each light takes as many samples as it needs, "
-                    "at most 256. 0: as many as are set below")
+                    "at most 256")
+    use_shadow_error: switch("shadow_error", 1.0, "Each light's samples follow an expected error; else there are as many as set below")
     shadow_resolution: IntProperty(
         name="Resolution", override=_OVERRIDE, default=4096, min=16, max=16384, subtype='PIXEL',
         description="Most texels along a side of a light's depth map; it has fewer where the points lie wider")
@@ -117,7 +121,8 @@ class PatinaSceneProperties(PropertyGroup):
             ('GL_SOFTWARE', "OpenGL in Software", "OpenGL on the processor: slow, for comparison", 4)))
     threads: IntProperty(
         name="Threads", override=_OVERRIDE, default=0, min=0, max=1024,
-        description="Processor threads; 0 follows Blender's own setting. Never changes the picture")
+        description="Processor threads. Never changes the picture")
+    use_threads: switch("threads", 4, "A fixed number of threads; else Blender's own setting holds")
 
     meshes: EnumProperty(
         name="Meshes", override=_OVERRIDE, default='TRIANGLES',
@@ -147,12 +152,23 @@ class PatinaSceneProperties(PropertyGroup):
                     "spread over them, at least one each")
     tile_size: IntProperty(
         name="Tile Size", override=_OVERRIDE, default=0, min=0, max=16384, subtype='PIXEL',
-        description="Side of the tiles that large pictures are made in: less memory, the same pixels. 0: as large "
-                    "as the memory that is free allows, at most 4096")
+        description="Side of the tiles that large pictures are made in: less memory, the same pixels")
+    use_tile_size: switch("tile_size", 2048, "Tiles of a fixed size; else they are as large as the memory that is free allows, at most "
+                                             "4096")
     navigation_ms: IntProperty(
         name="Navigation", override=_OVERRIDE, default=60, min=5, soft_max=200, max=1000,
         description="Milliseconds until a picture of the viewport is seen while the view moves, with what Blender takes for "
                     "its window; fewer points and pixels are drawn until it fits. At rest the whole picture follows")
+
+
+def _known_distance(group: PropertyGroup) -> float:
+    """The layer distance that the last picture took for the object, to begin with."""
+    from ..sync import estimates  # which needs these properties
+    return estimates.layer_distance(group.id_data.name_full) or 0.01
+
+
+def _known_gap(group: PropertyGroup) -> float:
+    return 2.0 * _known_distance(group)
 
 
 def _follow_file(group: PropertyGroup, _context: Context) -> None:
@@ -185,20 +201,23 @@ class PatinaObjectProperties(PropertyGroup):
     d_min: FloatProperty(
         name="Layer Distance", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE',
         unit='LENGTH', precision=4,
-        description="Least distance between two surfaces that are told apart; 0 follows the spacing of the points")
+        description="Least distance between two surfaces that are told apart")
+    use_d_min: switch("d_min", _known_distance, "A fixed distance; else it follows the spacing of the points", "Set Layer Distance")
     radius: FloatProperty(
         name="Disc Radius", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH',
         precision=4,
-        description="Of the discs that points are drawn as, see Render Properties > Surface. 0: each point's own where an "
-                    "attribute says so, else 1.75 times the spacing of the points")
+        description="Of the discs that points are drawn as, see Render Properties > Surface")
+    use_radius: switch("radius", _known_distance, "One radius for all points; else each point's own where an attribute says so, else what "
+                                                  "its neighbors or 1.75 times the spacing of the points say", "Set Disc Radius")
     radius_attribute: StringProperty(
-        name="Disc Radii", override=_OVERRIDE,
+        name="Disc Radius Attribute", override=_OVERRIDE,
         description="Point attribute of numbers: the radius of each point's disc")
     largest_gap: FloatProperty(
         name="Largest Gap", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH',
         precision=4,
-        description="Where points are discs none is wider than this, so that wider gaps stay open. 0: as wide as the neighbors of "
-                    "each point say")
+        description="Where points are discs none is wider than this, so that wider gaps stay open")
+    use_largest_gap: switch("largest_gap", _known_gap,
+                            "Discs have a greatest width; else they are as wide as the neighbors of each point say")
     free_space: EnumProperty(
         name="Free Space", override=_OVERRIDE, default='OFF',
         description="Points that another scan of the same file saw through: what passed by, reflections, edges that are not there. "
@@ -223,7 +242,7 @@ class PatinaObjectProperties(PropertyGroup):
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much the surface hides of what lies behind it")
     opacity_attribute: StringProperty(
-        name="Opacities", override=_OVERRIDE,
+        name="Opacity Attribute", override=_OVERRIDE,
         description="Point attribute that opacity is multiplied by: numbers from 0 to 1, yes or no, or the alpha of a "
                     "color attribute; empty: none")
     color: FloatVectorProperty(
@@ -243,10 +262,10 @@ class PatinaObjectProperties(PropertyGroup):
     self_shadows: BoolProperty(
         name="On Itself", override=_OVERRIDE, default=True, description="These points' shadows fall on themselves")
     color_attribute: StringProperty(
-        name="Colors", override=_OVERRIDE,
+        name="Color Attribute", override=_OVERRIDE,
         description="Point attribute to take colors from; empty: the active color attribute, or a usual name")
     normal_attribute: StringProperty(
-        name="Normals", override=_OVERRIDE,
+        name="Normal Attribute", override=_OVERRIDE,
         description="Point attribute to take normals from; empty: the first of normal, Normal, nor, N")
     ambient: FloatProperty(
         name="Ambient", override=_OVERRIDE, default=1.0, min=0.0, soft_max=1.0, subtype='FACTOR',

@@ -23,15 +23,15 @@ def class_name(number: int) -> str:
 
 class PatinaColorProperties(PropertyGroup):
     source: EnumProperty(
-        name="Color", override=_OVERRIDE, default='OWN',
+        name="Color Source", override=_OVERRIDE, default='OWN',
         description="Where the color of the points comes from",
         items=(
-            ('OWN', "Attribute", "The points' own colors", 0),
-            ('FIXED', "Fixed", "One color for all points", 1),
-            ('SCALAR', "Ramp over Attribute", "A ramp over numbers that the points have: intensity, class, scan number", 2),
-            ('HEIGHT', "Ramp over Height", "A ramp over the world's Z", 3),
-            ('OBJECT_HEIGHT', "Ramp over Local Height", "A ramp over the object's own Z", 4),
-            ('DISTANCE', "Ramp over Distance", "A ramp over the distance from the camera", 5)))
+            ('OWN', "Own Colors", "The points' own colors", 0),
+            ('FIXED', "One Color", "One color for all points", 1),
+            ('SCALAR', "Attribute", "A ramp over numbers that the points have: intensity, class, scan number", 2),
+            ('HEIGHT', "Height", "A ramp over the world's Z", 3),
+            ('OBJECT_HEIGHT', "Local Height", "A ramp over the object's own Z", 4),
+            ('DISTANCE', "Distance", "A ramp over the distance from the camera", 5)))
     scalar: StringProperty(
         name="Attribute", override=_OVERRIDE, description="Point attribute that the ramp is laid over")
     ramp: EnumProperty(

@@ -6,6 +6,8 @@ from __future__ import annotations
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty
 from bpy.types import PropertyGroup
 
+from .automatic import switch
+
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 
 
@@ -28,7 +30,8 @@ class PatinaEffectsProperties(PropertyGroup):
     obscurance_radius: FloatProperty(
         name="Radius", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, subtype='DISTANCE', unit='LENGTH',
         precision=4,
-        description="How far around a point others darken it, at most 32 pixels; 0: a 32nd of the clouds' diagonal")
+        description="How far around a point others darken it, at most 32 pixels")
+    use_obscurance_radius: switch("obscurance_radius", 0.1, "A fixed radius; else it is a 32nd of the clouds' diagonal")
     use_fog: BoolProperty(
         name="Fog", override=_OVERRIDE, default=False, description="Points fade with their distance")
     fog_start: FloatProperty(

@@ -6,6 +6,8 @@ from __future__ import annotations
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 from bpy.types import PropertyGroup
 
+from .automatic import switch
+
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 
 
@@ -27,8 +29,9 @@ class PatinaLinesProperties(PropertyGroup):
         description="Width in the scene's units")
     offset: FloatProperty(
         name="Least Step", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH', precision=4,
-        description="How far something must lie behind to show a line. Small steps show creases and noise too. 0: twice the "
-                    "spacing of the points, or their layer distance")
+        description="How far something must lie behind to show a line. Small steps show creases and noise too")
+    use_offset: switch("offset", 0.02, "A fixed step; else it is twice the spacing of the points, or their layer distance",
+                       "Set Least Step")
     opacity: FloatProperty(
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much a line hides of what is under it")
@@ -56,7 +59,8 @@ class PatinaLinesProperties(PropertyGroup):
         description="Distance from the camera up to which lines have the line color")
     far: FloatProperty(
         name="Far", override=_OVERRIDE, default=0.0, min=0.0, subtype='DISTANCE', unit='LENGTH',
-        description="Distance from which on lines have the far color; not beyond Near: what the scene spans")
+        description="Distance from which on lines have the far color")
+    use_far: switch("far", lambda group: group.near + 10.0, "A fixed distance beyond Near; else it is what the scene spans", least="near")
     surface: EnumProperty(
         name="Surface", override=_OVERRIDE, default='SHOWN',
         description="What lies under the lines",

@@ -46,6 +46,6 @@ class PatinaStyleProperties(PropertyGroup):
         description="Which objects a chosen style changes, beside the scene",
         items=(
             ('ALL', "All Points", "Every object of the scene that Patina draws", 0),
-            ('SELECTED', "Selected Points", "Selected objects only: others keep their colors and lighting", 1)))
+            ('SELECTED', "Selected", "Selected objects only: others keep their colors and lighting", 1)))
     applied: StringProperty(options={'HIDDEN'})
     notice: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})

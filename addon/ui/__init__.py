@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
-from . import colors, effects, lines, motion, panels, panorama, presets, sequence, standard, statistics, styles
+from . import (colors, combine, effects, lines, materials, motion, panels, panorama, points, presets, sequence, standard, statistics,
+               styles)
 
 # What makes the look comes first, then how it is drawn.
-_MODULES = (presets, styles, lines, effects, panels, colors, motion, panorama, sequence, statistics, standard)
+_MODULES = (presets, styles, lines, effects, panels, points, colors, motion, combine, panorama, sequence, materials, statistics,
+            standard)
 
 
 def register() -> None:

@@ -29,9 +29,13 @@ class PATINA_PT_color(_ColorPanel, Panel):
         layout.use_property_split = True
         obj = context.object
         group = obj.patina.colors
-        layout.prop(group, "source")
+        layout.prop(group, "source", text="Source")
+        if group.source == 'OWN':
+            if not obj.patina.linked_file:
+                layout.prop_search(obj.patina, "color_attribute", obj.data, "attributes", text="Attribute")
+            layout.prop(obj.patina, "color", text="Fallback")
         if group.source == 'FIXED':
-            layout.prop(obj.patina, "color", text=" ")
+            layout.prop(obj.patina, "color")
         if group.source == 'SCALAR':
             if obj.patina.linked_file:
                 layout.prop(group, "scalar")
@@ -64,6 +68,7 @@ class PATINA_PT_color(_ColorPanel, Panel):
 class PATINA_PT_classes(_ColorPanel, Panel):
     bl_label = "Hidden Classes"
     bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 1
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -80,6 +85,7 @@ class PATINA_PT_classes(_ColorPanel, Panel):
 
 class PATINA_PT_cuts(_ColorPanel, Panel):
     bl_label = "Clip"
+    bl_order = 1
 
     def draw_header(self, context: Context) -> None:
         self.layout.prop(context.object.patina.colors, "use_clips", text="")
@@ -90,7 +96,6 @@ class PATINA_PT_cuts(_ColorPanel, Panel):
         row = layout.row(align=True)
         row.operator("object.patina_add_clip_box")
         row.operator("object.patina_add_clip_plane")
-        layout.prop(context.scene.patina, "shadow_uncut")
 
 
 class PATINA_PT_clip(PatinaPanel, Panel):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
+from . import rows
 from .panels import PatinaPanel
 
 
@@ -44,7 +45,10 @@ class _EffectPanel(PatinaPanel):
         effects = context.scene.patina.effects
         layout.active = getattr(effects, self.switch)
         for name in self.names:
-            layout.prop(effects, name)
+            if f"use_{name}" in effects.bl_rna.properties:
+                rows.automatic(layout, effects, name)
+            else:
+                layout.prop(effects, name)
 
 
 class PATINA_PT_edl(_EffectPanel, Panel):
@@ -68,7 +72,7 @@ class PATINA_PT_fog(_EffectPanel, Panel):
     names = ("fog_start", "fog_end", "fog_density", "fog_use_color")
 
     def draw(self, context: Context) -> None:
-        super().draw(context)
+        _EffectPanel.draw(self, context)
         row = self.layout.row()
         row.active = context.scene.patina.effects.fog_use_color
         row.prop(context.scene.patina.effects, "fog_color")

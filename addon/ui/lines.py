@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
+from . import rows
 from .panels import PatinaPanel
 
 
@@ -29,12 +30,13 @@ class PATINA_PT_lines(PatinaPanel, Panel):
         layout.prop(lines, "source")
         layout.prop(lines, "tint" if lines.source == 'POINT' else "color")
         if lines.source == 'DEPTH':
-            for name in ("far_color", "near", "far"):
-                layout.prop(lines, name)
+            layout.prop(lines, "far_color")
+            layout.prop(lines, "near")
+            rows.automatic(layout, lines, "far")
         layout.prop(lines, "surface")
         if lines.surface == 'PAPER':
             layout.prop(lines, "paper")
-        layout.prop(lines, "offset")
+        rows.automatic(layout, lines, "offset")
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_lines,))

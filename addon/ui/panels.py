@@ -8,8 +8,9 @@ from bpy.types import Context, Panel, Scene
 
 from ..engine import PatinaRenderEngine
 from ..operators import view_transform
-from .presets import PATINA_PT_presets
 from ..sync import estimates
+from . import rows
+from .presets import PATINA_PT_presets
 
 
 def _length(scene: Scene, meters: float) -> str:
@@ -52,16 +53,13 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         patina = context.scene.patina
         layout.prop(patina, "surface")
         filled = patina.surface != 'SPLATS'
-        row = layout.row()
+        row = rows.automatic(layout, patina, "error_target", otherwise="As Set Below")
         row.active = filled
-        row.prop(patina, "error_target")
         column = layout.column()
         column.active = filled and not patina.error_target
         column.prop(patina, "quality")
         column.prop(patina, "fill")
-        row = column.row()
-        row.active = patina.fill != 'OFF'
-        row.prop(patina, "fill_iterations")
+        rows.automatic(column, patina, "fill_iterations").active = patina.fill != 'OFF'
         layout.prop(patina, "smooth")
         layout.prop(patina, "antialias")
         layout.prop(patina, "samples")
@@ -69,7 +67,6 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         layout.prop(patina, "meshes")
         if patina.meshes == 'POINTS':
             layout.prop(patina, "mesh_points")
-        layout.operator_menu_enum("scene.patina_combine", "engine", text="Combine by Depth with")
 
 
 class PATINA_PT_transparency(PatinaPanel, Panel):
@@ -96,11 +93,12 @@ class PATINA_PT_shadows(PatinaPanel, Panel):
         layout.use_property_decorate = False
         patina = context.scene.patina
         layout.active = patina.use_shadows
-        layout.prop(patina, "shadow_error")
+        rows.automatic(layout, patina, "shadow_error", otherwise="As Set Below")
         row = layout.row()
         row.active = not patina.shadow_error
         row.prop(patina, "shadow_samples")
         layout.prop(patina, "shadow_resolution")
+        layout.prop(patina, "shadow_uncut")
         layout.prop(patina, "shadow_file")
         row = layout.row(align=True)
         row.operator("patina.bake_shadows")
@@ -124,7 +122,7 @@ class PATINA_PT_film(PatinaPanel, Panel):
         inner.prop(studio, "background", text="")
         if view_transform.changes_colors(context.scene):
             column = self.layout.column()
-            column.label(text=f"{context.scene.view_settings.view_transform} changes the colors of scans", icon='INFO')
+            rows.sentence(context, column, f"{context.scene.view_settings.view_transform} changes the colors of scans", 'INFO')
             column.operator(view_transform.PATINA_OT_true_colors.bl_idname)
 
 
@@ -137,10 +135,11 @@ class PATINA_PT_performance(PatinaPanel, Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(context.scene.patina, "device")
-        layout.prop(context.scene.patina, "threads")
-        layout.prop(context.scene.patina, "tile_size")
-        layout.prop(context.scene.patina, "navigation_ms", text="Viewport, ms")
+        patina = context.scene.patina
+        layout.prop(patina, "device")
+        rows.automatic(layout, patina, "threads")
+        rows.automatic(layout, patina, "tile_size")
+        layout.prop(patina, "navigation_ms", text="Viewport (ms)")
 
 
 class PATINA_PT_passes(PatinaPanel, Panel):
@@ -172,45 +171,65 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
     def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        patina, data = context.object.patina, context.object.data
-        layout.prop(patina, "lighting")
-        layout.prop(patina, "cull_back")
-        layout.prop(patina, "analysis")
-        if not patina.linked_file:
-            layout.operator("object.patina_analyze", text="Analyze to Attributes")
-        column = layout.column(align=True)
-        column.prop(patina, "d_min")
-        estimate = estimates.layer_distance(context.object.name_full)
-        if estimate is not None and not patina.d_min:
-            row = column.row()
-            row.alignment = 'RIGHT'
-            row.label(text=f"automatic: {_length(context.scene, estimate)}")
-        row = layout.row()
-        row.active = context.scene.patina.surface != 'FILL'
-        row.prop(patina, "radius")
-        row = layout.row()
-        row.active = context.scene.patina.surface != 'FILL'
-        row.prop(patina, "largest_gap")
+        patina = context.object.patina
         layout.prop(patina, "opacity")
+        layout.prop(patina, "lighting")
+        rows.automatic(layout, patina, "radius").active = context.scene.patina.surface != 'FILL'
+        layout.prop(patina, "cull_back")
         column = layout.column()
         if patina.linked_file:
             held = patina.linked_data  # whose path is what holds
             column.prop(held or patina, "filepath" if held else "linked_file", text="Linked File")
             column.operator("object.patina_linked_to_mesh")
-            column.prop(patina, "color")
-            return
-        column.prop_search(patina, "color_attribute", data, "attributes")
-        column.prop_search(patina, "normal_attribute", data, "attributes")
-        column.prop_search(patina, "opacity_attribute", data, "attributes")
-        column.prop_search(patina, "radius_attribute", data, "attributes")
-        column.prop(patina, "color")
-        column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
+        else:
+            column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
+
+
+class PATINA_PT_analysis(_PatinaObjectPanel, Panel):
+    bl_label = "Analysis"
+    bl_parent_id = "PATINA_PT_points"
+    bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 1
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        patina = context.object.patina
+        layout.prop(patina, "analysis")
+        if not patina.linked_file:
+            layout.operator("object.patina_analyze", text="Analyze to Attributes")
+        known = estimates.layer_distance(context.object.name_full)
+        rows.automatic(layout, patina, "d_min",
+                       otherwise="Automatic" if known is None else f"Automatic ({_length(context.scene, known)})")
+        rows.automatic(layout, patina, "largest_gap").active = context.scene.patina.surface != 'FILL'
+
+
+class PATINA_PT_attributes(_PatinaObjectPanel, Panel):
+    """Which of the points' attributes say what; the color's is in its own panel."""
+
+    bl_label = "Attributes"
+    bl_parent_id = "PATINA_PT_points"
+    bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 1
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and not context.object.patina.linked_file
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        patina, data = context.object.patina, context.object.data
+        layout.prop_search(patina, "normal_attribute", data, "attributes", text="Normal")
+        layout.prop_search(patina, "opacity_attribute", data, "attributes", text="Opacity")
+        layout.prop_search(patina, "radius_attribute", data, "attributes", text="Disc Radius")
 
 
 class PATINA_PT_hidden(_PatinaObjectPanel, Panel):
     bl_label = "Hidden Points"
     bl_parent_id = "PATINA_PT_points"
     bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 1
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -232,6 +251,7 @@ class PATINA_PT_shading(_PatinaObjectPanel, Panel):
     bl_label = "Shading"
     bl_parent_id = "PATINA_PT_points"
     bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 1
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -250,6 +270,7 @@ class PATINA_PT_point_shadows(_PatinaObjectPanel, Panel):
     bl_label = "Shadows"
     bl_parent_id = "PATINA_PT_points"
     bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 1
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -294,6 +315,7 @@ class PATINA_PT_light(PatinaPanel, Panel):
 
 
 _CLASSES = (PATINA_PT_surface, PATINA_PT_transparency, PATINA_PT_shadows, PATINA_PT_film, PATINA_PT_performance,
-            PATINA_PT_passes, PATINA_PT_points, PATINA_PT_hidden, PATINA_PT_shading, PATINA_PT_point_shadows, PATINA_PT_light)
+            PATINA_PT_passes, PATINA_PT_points, PATINA_PT_analysis, PATINA_PT_attributes, PATINA_PT_hidden, PATINA_PT_shading,
+            PATINA_PT_point_shadows, PATINA_PT_light)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

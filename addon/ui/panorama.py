@@ -9,6 +9,7 @@ from bpy.types import Context, Panel
 
 from ..engine import PatinaRenderEngine
 from ..operators import scanner
+from . import rows
 
 
 class _DataPanel:
@@ -26,7 +27,7 @@ class PATINA_PT_panorama(_DataPanel, Panel):
         return context.engine in cls.COMPAT_ENGINES and context.camera is not None and context.camera.type == 'PANO'
 
     def draw(self, context: Context) -> None:
-        self.layout.label(text="Drawn as an equirectangular picture", icon='INFO')
+        rows.sentence(context, self.layout, "Drawn as an equirectangular picture", 'INFO')
 
 
 class PATINA_PT_scanner(_DataPanel, Panel):

@@ -8,6 +8,7 @@ from bpy.types import Context, Panel
 
 from ..engine import PatinaRenderEngine
 from ..sync import files, sequence
+from . import rows
 
 
 class PATINA_PT_sequence(Panel):
@@ -32,7 +33,7 @@ class PATINA_PT_sequence(Panel):
         layout.prop(settings, "step")
         layout.prop(settings, "outside")
         found = sequence.files_of(files.path_of(obj))
-        layout.label(text=f"{len(found)} files, {min(found)} to {max(found)}" if found else "no file fits", icon='INFO')
+        rows.sentence(context, layout, f"{len(found)} files, {min(found)} to {max(found)}" if found else "No file fits", 'INFO')
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_sequence,))

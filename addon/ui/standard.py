@@ -15,7 +15,7 @@ EXCLUDED = {
     'RENDER_PT_freestyle_options', 'DATA_PT_light', 'NODE_DATA_PT_light', 'RENDER_PT_gpencil',
 }
 # Panels of another engine that fit ours.
-BORROWED = {'EEVEE_WORLD_PT_surface'}
+BORROWED = {'EEVEE_WORLD_PT_surface', 'EEVEE_MATERIAL_PT_context_material'}
 
 
 def _panels() -> list[type]:

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import bpy
-from bpy.types import Context, Panel, UILayout
+from bpy.types import Context, Panel
 
 from .. import pace, viewport
 from ..engine import PatinaRenderEngine
 from ..sync.analyzing import ANALYSES
+from . import rows
 
 
 def expected_text(expected: dict[str, float]) -> str:
@@ -29,7 +30,7 @@ class SidebarPanel:
 
 class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
     bl_label = "Camera"
-    bl_order = 1
+    bl_order = 2
 
     def draw(self, context: Context) -> None:
         self.layout.operator("object.patina_frame_points")
@@ -38,36 +39,37 @@ class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
 
 class PATINA_PT_statistics(SidebarPanel, Panel):
     bl_label = "Statistics"
+    bl_order = 3
 
     def draw(self, context: Context) -> None:
         layout = self.layout
         found = viewport.of_area(context.area)
         if found and found.message:
-            sentence(layout, found.message, 'ERROR')
+            rows.sentence(context, layout, found.message, 'ERROR')
         if not found or not found.shown:
-            layout.label(text="Switch to Rendered shading to see figures")
+            rows.sentence(context, layout, "Switch to Rendered shading to see figures", 'NONE')
             return
         shown = found.shown
         stats, level = shown.stats, shown.wish.level
-        rows = [("Points", f"{stats['points']:,}"), ("Drawn", f"{stats['points_scattered']:,}"),
-                ("Triangles", f"{stats['triangles']:,}"),
-                ("Chunks", f"{stats['chunks'] - stats['chunks_culled']:,} of {stats['chunks']:,}"),
-                ("Spacing", f"{stats['spacing_px']:.2f} pixels"),
-                ("Expected Error", expected_text(stats["expected"])),
-                ("Picture", f"{stats['width']} x {stats['height']}"), ("Time", f"{stats['ms']:.1f} ms"),
-                ("Planes", f"{stats['plane_bytes'] / 1e6:,.0f} MB"),
-                ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]
+        figures = [("Points", f"{stats['points']:,}"), ("Drawn", f"{stats['points_scattered']:,}"),
+                   ("Triangles", f"{stats['triangles']:,}"),
+                   ("Chunks", f"{stats['chunks'] - stats['chunks_culled']:,} of {stats['chunks']:,}"),
+                   ("Spacing", f"{stats['spacing_px']:.2f} pixels"),
+                   ("Expected Error", expected_text(stats["expected"])),
+                   ("Picture", f"{stats['width']} x {stats['height']}"), ("Time", f"{stats['ms']:.1f} ms"),
+                   ("Planes", f"{stats['plane_bytes'] / 1e6:,.0f} MB"),
+                   ("Clouds", f"{sum(item.cloud.bytes for item in shown.clouds) / 1e6:,.0f} MB"), ("Device", shown.device)]
         shares = [share for item in shown.clouds if (share := ANALYSES.progress(item.cloud)) is not None]
         if shares:
-            rows.append(("Analysis", f"{shares[0]:.0%}"))
+            figures.append(("Analysis", f"{shares[0]:.0%}"))
         if level != pace.FULL:
-            rows.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
+            figures.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
         if stats["shadow_samples"]:
             expected = f", expected error {stats['shadow_error']:.2%}" if stats["shadow_error"] else ""
-            rows.append(("Shadows", f"{stats['shadow_samples']} samples{expected}"))
-        _table(layout, rows)
+            figures.append(("Shadows", f"{stats['shadow_samples']} samples{expected}"))
+        rows.table(context, layout, figures)
         for notice in found.notices:
-            sentence(layout, notice, 'INFO')
+            rows.sentence(context, layout, notice, 'INFO')
 
 
 class PATINA_PT_statistics_passes(SidebarPanel, Panel):
@@ -80,29 +82,9 @@ class PATINA_PT_statistics_passes(SidebarPanel, Panel):
         if not found or not found.shown:
             return
         passes = found.shown.passes
-        _table(self.layout, [(name, f"{ms:.2f} ms") for name, ms in passes["passes"].items()])
+        rows.table(context, self.layout, [(name, f"{ms:.2f} ms") for name, ms in passes["passes"].items()])
         for name, reason in passes["skipped"].items():
-            sentence(self.layout, f"no {name}: {reason}", 'NONE')
-
-
-def _table(layout: UILayout, rows: list[tuple[str, str]]) -> None:
-    column = layout.column(align=True)
-    for name, value in rows:
-        split = column.split(factor=0.4)
-        split.label(text=name)
-        split.label(text=value)
-
-
-def sentence(layout: UILayout, text: str, icon: str, width: int = 38) -> None:
-    """A sentence on as many lines as a sidebar needs."""
-    column = layout.column(align=True)
-    column.scale_y = 0.8
-    line = ""
-    for word in [*text.split(), ""]:
-        if line and (not word or len(line) + len(word) >= width):
-            column.label(text=line, icon=icon)
-            line, icon = "", 'BLANK1' if icon != 'NONE' else 'NONE'
-        line = f"{line} {word}".strip()
+            rows.sentence(context, self.layout, f"no {name}: {reason}", 'NONE')
 
 
 _CLASSES = (PATINA_PT_sidebar_camera, PATINA_PT_statistics, PATINA_PT_statistics_passes)

@@ -7,8 +7,9 @@ import bpy
 from bpy.types import Context, Menu, Panel
 
 from .. import styles
+from . import rows
 from .panels import PatinaPanel
-from .statistics import SidebarPanel, sentence
+from .statistics import SidebarPanel
 
 
 class _StylePanel:
@@ -25,9 +26,11 @@ class _StylePanel:
         column.menu(PATINA_MT_styles.__name__, text="", icon='DOWNARROW_HLT')
         column = layout.column()
         column.prop(style, "chosen", text="")
-        column.prop(style, "objects")
+        inner = column.column()
+        inner.use_property_split = True
+        inner.prop(style, "objects")
         if style.notice:
-            sentence(column, style.notice, 'INFO')
+            rows.sentence(context, column, style.notice, 'INFO')
 
 
 class PATINA_MT_styles(Menu):

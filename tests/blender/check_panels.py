@@ -2,9 +2,11 @@
 """What the artist sees of properties: each is in a panel, has a name and a tooltip, and is written as the others are."""
 
 import re
+from types import SimpleNamespace
 
 import bpy
-from harness import REPOSITORY, check, new_scene
+import numpy as np
+from harness import REPOSITORY, add_points, check, new_scene
 
 import patina
 
@@ -36,10 +38,215 @@ def test_there_are_many():
 
 
 def test_every_property_is_in_a_panel():
+    """A switch stands in the row of its number."""
     source = "\n".join(path.read_text(encoding="utf-8") for path in (REPOSITORY / "addon/ui").glob("*.py"))
-    for path, _ in properties():
+    for path, kind in properties():
         name = path.rpartition(".")[2]
+        if kind.is_skip_save:
+            name = name.removeprefix("use_")
         check(f'"{name}"' in source, f"{path} is in no panel")
+
+
+def switches():
+    """(group, number, switch) of every number whose zero is automatic, in a new scene."""
+    scene = new_scene()
+    for owner in (scene.patina, scene.patina.effects, scene.patina.lines, add_points([(0, 0, -4)]).patina):
+        for name, kind in owner.bl_rna.properties.items():
+            if kind.is_skip_save and name.startswith("use_"):
+                yield owner, name.removeprefix("use_"), name
+
+
+def test_automatic_is_a_box():
+    """Zero is automatic; the box gives a number to begin with, and takes it; scripts see the number alone."""
+    found = list(switches())
+    check(len(found) >= 11, f"{[name for _, _, name in found]}")
+    for group, number, box in found:
+        kind = group.bl_rna.properties[number]
+        check(kind.default == 0 and not getattr(group, box), f"{number}: it begins as {kind.default}")
+        setattr(group, box, True)
+        value = getattr(group, number)
+        check(value > 0 and getattr(group, box), f"{number}: ticked, it is {value}")
+        setattr(group, number, kind.type == 'INT' and 7 or 0.5)
+        setattr(group, box, True)
+        check(getattr(group, number) == (kind.type == 'INT' and 7 or 0.5), f"{number}: ticked twice")
+        setattr(group, box, False)
+        check(getattr(group, number) == 0 and not getattr(group, box), f"{number}: {getattr(group, number)}")
+    lines = bpy.context.scene.patina.lines
+    lines.near, lines.far = 30.0, 20.0
+    check(not lines.use_far, "not beyond Near is automatic")
+    lines.use_far = True
+    check(lines.far > 30.0, f"{lines.far}")
+
+
+def test_no_tooltip_speaks_of_zero():
+    """As automatic: what an artist sees says Automatic."""
+    kinds = [kind for _, kind in properties()] + list(patina.preferences.PatinaPreferences.bl_rna.properties)
+    found = [kind.description for kind in kinds if re.search(r"(^|[;.,] )0(: | follows| is automatic)", kind.description)
+             and kind.subtype not in {'ANGLE'} and kind.identifier not in {"tint_strength"}]
+    check(not found, f"{found}")
+
+
+# ---- panels, drawn into a list -----------------------------------------------------------------------------------
+
+
+class Row:
+    """Stands for a UILayout: keeps (kind, owner, name, text) of what is drawn."""
+
+    def __init__(self, drawn=None):
+        object.__setattr__(self, "drawn", [] if drawn is None else drawn)
+        object.__setattr__(self, "use_property_decorate", True)
+
+    def __setattr__(self, name, value):
+        check(name in bpy.types.UILayout.bl_rna.properties, f"layouts have no {name}")
+
+    def __getattr__(self, kind):
+        def call(*arguments, **options):
+            named = bpy.types.UILayout.bl_rna.functions[kind].parameters
+            check(set(options) <= set(named.keys()), f"{kind} takes no {set(options) - set(named.keys())}")
+            owner = arguments[0] if kind.startswith(("prop", "template")) else None
+            names = [item for item in arguments if isinstance(item, str)]
+            text = options.get("text", options.get("heading", ""))
+            if owner is not None and names:
+                check(names[0] in owner.bl_rna.properties, f"{owner} has no {names[0]}")
+                text = options.get("text", owner.bl_rna.properties[names[0]].name)
+            self.drawn.append((kind, owner, names[0] if names else "", text))
+            return type("Options", (), {})() if kind == "operator" else Row(self.drawn)
+        return call
+
+
+class Drawing:
+    """A panel that draws into another layout than Blender's for it."""
+
+    def __init__(self, cls, layout):
+        self.__dict__.update(cls=cls, layout=layout)
+
+    def __getattr__(self, name):
+        found = getattr(self.cls, name)
+        return (lambda *arguments: found(self, *arguments)) if callable(found) and not hasattr(found, "__self__") else found
+
+
+def context_of(obj=None, **more):
+    scene = bpy.context.scene
+    return SimpleNamespace(scene=scene, object=obj, engine=scene.render.engine, view_layer=bpy.context.view_layer, area=None,
+                           region=None, material=None, light=None, camera=None, preferences=bpy.context.preferences, **more)
+
+
+def drawn_by(cls, context):
+    """None where it does not show."""
+    if not cls.poll(context):
+        return None
+    layout = Row()
+    cls.draw(Drawing(cls, layout), context)
+    return layout.drawn
+
+
+def of_points(place):
+    """The panels of a place that show for an object of points, and what they draw."""
+    space, tab = place
+    obj = add_points([(0, 0, -4)], np.full((1, 4), 128, np.uint8))
+    found = {}
+    for cls in panels():
+        if cls.bl_space_type == space and getattr(cls, "bl_context", "") == tab:
+            drawn = drawn_by(cls, context_of(obj))
+            if drawn is not None:
+                found[cls] = drawn
+    return obj, found
+
+
+def test_first_lines():
+    """Color, opacity, lighting, radius and clip of the active points: in the sidebar, and in the object's own tab."""
+    for place in (('VIEW_3D', ""), ('PROPERTIES', "object")):
+        new_scene()
+        obj, found = of_points(place)
+        lines = [drawn for cls, drawn in found.items() if cls.bl_label == "Points"]
+        check(len(lines) == 1, f"{place}: {[cls.__name__ for cls in found]}")
+        names = [name for kind, owner, name, _ in lines[0] if owner is not None]
+        check(names == ["source", "opacity", "lighting", "use_radius", "use_clips"], f"{place}: {names}")
+        obj.patina.use_radius = True
+        obj.patina.colors.source = 'HEIGHT'
+        _, found = of_points(place)
+        panel = next(cls for cls in found if cls.bl_label == "Points")
+        names = [name for _, owner, name, _ in drawn_by(panel, context_of(obj)) if owner is not None]
+        check(names == ["source", "ramp", "opacity", "lighting", "use_radius", "radius", "radius", "use_clips"], f"{place}: {names}")
+
+
+def test_first_lines_are_of_points():
+    """A mesh with faces has none in the sidebar, a lamp neither; one whose modifiers may make points has."""
+    scene = new_scene()
+    panel = bpy.types.PATINA_PT_sidebar_points
+    mesh = bpy.data.meshes.new("faces")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    obj = bpy.data.objects.new("faces", mesh)
+    check(not panel.poll(context_of(obj)) and not panel.poll(context_of(scene.camera)) and not panel.poll(context_of(None)), "polls")
+    obj.modifiers.new("points", 'NODES')
+    check(panel.poll(context_of(obj)), "modifiers")
+    scene.render.engine = 'BLENDER_WORKBENCH'
+    check(not panel.poll(context_of(add_points([(0, 0, 0)]))), "another engine")
+
+
+def test_one_color():
+    """Among the data's panels one is called Color, and one label in all of them."""
+    new_scene()
+    obj, found = of_points(('PROPERTIES', "data"))
+    check([cls.bl_label for cls in found if "color" in cls.bl_label.lower()] == ["Color"], f"{found.keys()}")
+    for source in ('OWN', 'FIXED', 'SCALAR', 'HEIGHT'):
+        obj.patina.colors.source = source
+        texts = [text for cls in found for _, owner, _, text in drawn_by(cls, context_of(obj)) if owner is not None]
+        check(texts.count("Color") == (source == 'FIXED') and "Colors" not in texts, f"{source}: {texts}")
+
+
+def test_objects_show_nothing_of_the_scene():
+    new_scene()
+    for tab in ("data", "object"):
+        _, found = of_points(('PROPERTIES', tab))
+        for cls, drawn in found.items():
+            own = [name for _, owner, name, _ in drawn if owner is not None and isinstance(owner.id_data, bpy.types.Scene)]
+            check(not own, f"{cls.__name__} shows {own}")
+
+
+def test_combine_has_a_panel():
+    """It offers what can be done, then says which scene is which, in both, and goes over."""
+    scene = new_scene()
+    add_points([(0, 0, -4)])
+    panel = bpy.types.PATINA_PT_combine
+
+    def operators():
+        return [name for kind, _, name, _ in drawn_by(panel, context_of()) if kind.startswith("operator")]
+
+    check(operators() == ["scene.patina_combine"], f"{operators()}")
+    surface = drawn_by(bpy.types.PATINA_PT_surface, context_of())
+    check(not any(name == "scene.patina_combine" for _, _, name, _ in surface), "it is in Surface too")
+    points = scene.copy()
+    points[patina.pairs.MARK] = scene
+    scene.render.engine = 'BLENDER_WORKBENCH'
+    try:
+        check(operators() == ["scene.patina_other"], f"{operators()}")
+        bpy.ops.scene.patina_other()
+        check(bpy.context.scene == points and operators() == ["scene.patina_other"], bpy.context.scene.name)
+        bpy.ops.scene.patina_other()
+        check(bpy.context.scene == scene, "back")
+    finally:
+        bpy.data.scenes.remove(points)
+    check(drawn_by(panel, context_of()) is None, "of another engine, with nothing combined")
+
+
+def test_material_tab_shows_base_color():
+    new_scene()
+    material = bpy.data.materials.new("paint")
+    panel = bpy.types.PATINA_PT_material
+    shown = {cls.__name__ for cls in bpy.types.Panel.__subclasses__() if 'PATINA' in getattr(cls, "COMPAT_ENGINES", ())}
+    check("EEVEE_MATERIAL_PT_context_material" in shown, "slots")
+    if bpy.app.version < (5, 0, 0):
+        context = context_of()
+        context.material = material
+        check([name for _, _, name, _ in drawn_by(panel, context)] == ["diffuse_color"], "without nodes")
+        material.use_nodes = True
+    context = context_of()
+    context.material = material
+    check([kind for kind, *_ in drawn_by(panel, context)] == ["template_node_view"], "with nodes")
+    context.material = None
+    check(drawn_by(panel, context) is None, "without a material")
+    bpy.data.materials.remove(material)
 
 
 def test_names():
@@ -132,3 +339,21 @@ def test_american_spelling():
                 texts += [text for item in kind.enum_items for text in (item.name, item.description)]
         found += [f"{cls.__name__}: {text}" for text in texts if text and british.search(text)]
     check(not found, f"{len(found)}: {found[:3]}")
+
+
+def test_devices_have_names_for_people():
+    """As drivers and processors name themselves."""
+    from patina import native
+    for name, description, hardware, wanted in (
+            ("cpu-avx512", "AMD EPYC 9654 96-Core Processor", False, "Processor (AVX-512)"),
+            ("cpu-scalar", "", False, "Processor (Plain)"), ("cpu-neon", "", False, "Processor (NEON)"),
+            ("gl-egl", "NVIDIA H100 PCIe/PCIe/SSE2, OpenGL 4.6.0 NVIDIA 535.1", True, "NVIDIA H100 PCIe"),
+            ("gl-egl", "Mesa Intel(R) UHD Graphics 620 (KBL GT2), OpenGL 4.6 (Core Profile) Mesa 22.3.6", True, "Intel UHD Graphics 620"),
+            ("gl-egl", "AMD Radeon RX 6800 XT (navi21, LLVM 15.0.6, DRM 3.49), OpenGL 4.6", True, "AMD Radeon RX 6800 XT"),
+            ("gl-osmesa", "llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5", False, "llvmpipe (OpenGL in Software)"),
+            ("gl-egl", "", True, "OpenGL")):
+        found = native.devices.label(name, description, hardware)
+        check(found == wanted, f"{description}: '{found}'")
+    with_device = native.Device("cpu")
+    check(with_device.label.startswith("Processor ("), with_device.label)
+    with_device.close()

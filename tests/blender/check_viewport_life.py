@@ -284,7 +284,7 @@ def test_processor_takes_over():
     """A GPU that fails in mid-session: the processor goes on, the sidebar says why; another choice is tried anew."""
     scene = setup()
     gpu = viewport.native.Device("cpu")  # stands for one: here it is to fail, not to draw
-    gpu.name = "gl-egl"
+    gpu.name, gpu.label = "gl-egl", "A GPU"
     honest, honest_start, tried = viewport.render.device_for, viewport.native.Frame.start, []
 
     def failing(self, *arguments):
@@ -297,14 +297,14 @@ def test_processor_takes_over():
     try:
         scene.patina.device = 'GL'
         add_points(*sphere(5000, 1.0, (0, 0, 0)))
-        yield lambda: settled(5000) and shown().shown.device == "gl-egl"
+        yield lambda: settled(5000) and shown().shown.device == "A GPU"
         found = shown()
         viewport.native.Frame.start = failing
         for turn in (0.5, 0.7):
             before = found.pictures
             view().view_rotation = Quaternion((0, 1, 0), turn)
             yield newer(before)
-            check(found.shown.device.startswith("cpu") and not found.message, f"{found.shown.device}: {found.message}")
+            check(found.shown.device.startswith("Processor (") and not found.message, f"{found.shown.device}: {found.message}")
             check(any("the context is lost" in notice for notice in found.notices), f"{found.notices}")
         check(len(tried) == 1, f"the lost device was tried {len(tried)} times")
         scene.patina.device = 'CPU'

@@ -21,6 +21,7 @@ PATIENCE = 30.0  # seconds for one thing to come
 
 
 def tests():
+    import check_drawn
     import check_newcomer
     import check_overlays
     import check_viewport
@@ -32,7 +33,7 @@ def tests():
     if names == ["figures"]:
         import figures
         yield "figures", figures.orbit_figures
-    for name, test in [item for module in (check_viewport, check_viewport_life, check_overlays, check_newcomer) for item in vars(module).items()]:
+    for name, test in [item for module in (check_viewport, check_viewport_life, check_overlays, check_drawn, check_newcomer) for item in vars(module).items()]:
         if name.startswith("test_") and (not names or any(part in name for part in names)):
             yield name.removeprefix("test_"), test
 

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Switches beside numbers whose zero leaves them to Patina: what an artist sees is a box and the word Automatic, never a zero.
+
+A switch holds nothing of its own, so that files, styles and scripts know only the number. It is the property `use_NAME` beside
+NAME; ui/rows.py draws the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bpy.props import BoolProperty
+from bpy.types import PropertyGroup
+
+
+def switch(name: str, start: float | Callable[[PropertyGroup], float], description: str, label: str = "",
+           least: str = "") -> BoolProperty:
+    """Of the number `name`. start: what it becomes when the box is ticked; least: another number that it has to be above, else
+    zero."""
+    def bound(group: PropertyGroup) -> float:
+        return getattr(group, least) if least else 0.0
+
+    def get(group: PropertyGroup) -> bool:
+        return getattr(group, name) > bound(group)
+
+    def set_(group: PropertyGroup, value: bool) -> None:
+        if value != get(group):
+            setattr(group, name, (start(group) if callable(start) else start) if value else 0)
+
+    return BoolProperty(name=label or f"Set {name.replace('_', ' ').title()}", description=description, get=get, set=set_,
+                        options={'SKIP_SAVE'}, override={'LIBRARY_OVERRIDABLE'})

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first lines of points, where an artist looks first: in the sidebar and in the object's own tab. All lines are in the tab of
+the object's data, below ten panels of Blender's own."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.types import Context, Panel
+
+from ..operators.clips import PATINA_OT_add_clip_box, PATINA_OT_add_clip_plane
+from . import rows
+from .panels import PatinaPanel
+from .statistics import SidebarPanel
+
+
+def _shows_points(context: Context) -> bool:
+    """Whether the active object is points, or may be: modifiers make points of faces."""
+    obj = context.object
+    if obj is None or obj.type not in {'MESH', 'POINTCLOUD'}:
+        return False
+    return (obj.type == 'POINTCLOUD' or bool(obj.patina.linked_file) or bool(obj.modifiers) or not len(obj.data.polygons)
+            or context.scene.patina.meshes == 'POINTS')
+
+
+class _FirstLines:
+    bl_label = "Points"
+    decorated = True
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and _shows_points(context)
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = self.decorated
+        patina = context.object.patina
+        colors = patina.colors
+        column = layout.column()
+        column.prop(colors, "source", text="Color")
+        if colors.source == 'FIXED':
+            column.prop(patina, "color", text=" ")
+        elif colors.source != 'OWN':
+            column.prop(colors, "ramp")
+        layout.prop(patina, "opacity")
+        layout.prop(patina, "lighting")
+        rows.automatic(layout, patina, "radius").active = context.scene.patina.surface != 'FILL'
+        row = layout.row(heading="Clip", align=True)
+        row.use_property_decorate = False
+        row.prop(colors, "use_clips", text="")
+        row = row.row(align=True)
+        row.active = colors.use_clips
+        row.operator(PATINA_OT_add_clip_box.bl_idname, text="Box")
+        row.operator(PATINA_OT_add_clip_plane.bl_idname, text="Plane")
+
+
+class PATINA_PT_sidebar_points(_FirstLines, SidebarPanel, Panel):
+    bl_order = 1
+    decorated = False  # dots of keys would take a fifth of its width
+
+
+class PATINA_PT_object_points(_FirstLines, PatinaPanel, Panel):
+    bl_context = "object"
+
+
+_CLASSES = (PATINA_PT_sidebar_points, PATINA_PT_object_points)
+
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

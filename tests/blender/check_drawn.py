@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels as Blender draws them, in the window: each where it belongs, none with an error, labels that can be read. See
+test_window.py for what a yield means."""
+
+import traceback
+from types import SimpleNamespace
+
+import bpy
+from harness import SCRATCH, add_light, add_points, check, sphere
+from window import area, settled, setup
+
+from check_panels import Drawing, Row, context_of, panels
+from patina.sync.analysis import SCANNERS
+from patina.ui import rows
+
+TABS = {"render": 'RENDER', "view_layer": 'VIEW_LAYER', "object": 'OBJECT', "data": 'DATA', "material": 'MATERIAL'}
+DECORATOR, ARROW, PAD = 20, 20, 8  # beside a menu's text
+
+
+def editor():
+    return next(found for found in bpy.context.window.screen.areas if found.type == 'PROPERTIES')
+
+
+def probe(space, region, tab, category=""):
+    """A panel of Blender's that holds all of ours that belong to its place, those that are closed too. Returns it and what it keeps:
+    names of panels that were drawn, errors."""
+    drawn, errors = set(), []
+
+    def draw(self, context):
+        for cls in panels():
+            if (cls.bl_space_type, cls.bl_region_type, getattr(cls, "bl_context", "")) != (space, region, tab) or cls == kind:
+                continue
+            try:
+                if cls.poll(context):
+                    held = Drawing(cls, self.layout.column())
+                    for part in ("draw_header", "draw_header_preset", "draw"):
+                        if hasattr(cls, part):
+                            getattr(cls, part)(held, context)
+                    drawn.add(cls.__name__)
+            except Exception:
+                errors.append(f"{cls.__name__}: {traceback.format_exc(limit=-1)}")
+
+    words = {"bl_label": "Probe", "bl_space_type": space, "bl_region_type": region, "draw": draw}
+    words |= {"bl_context": tab} if tab else {"bl_category": category}
+    kind = type(f"TEST_PT_{space.lower()}_{tab or category.lower()}", (bpy.types.Panel,), words)
+    bpy.utils.register_class(kind)
+    return kind, drawn, errors
+
+
+def objects():
+    """One of each kind that has panels of its own."""
+    points = add_points(*sphere(2000, 1.0, (0, 0, 0)))
+    points.data[SCANNERS] = [0.0, 0.0, 5.0]
+    number = add_points([(0, 0, 0)], name="sequence")
+    number.patina.linked_file = str(SCRATCH / "scan_####.ply")
+    mesh = bpy.data.meshes.new("faces")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    mesh.materials.append(bpy.data.materials.new("paint"))
+    faces = bpy.data.objects.new("faces", mesh)
+    empty = bpy.data.objects.new("empty", None)
+    camera = bpy.data.objects.new("panorama", bpy.data.cameras.new("panorama"))
+    camera.data.type = 'PANO'
+    for obj in (faces, empty, camera):
+        bpy.context.scene.collection.objects.link(obj)
+    return [points, number, faces, empty, camera, add_light('AREA', 10)]
+
+
+def select(obj):
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other == obj)
+    bpy.context.view_layer.objects.active = obj
+
+
+def test_panels_are_drawn_without_errors():
+    """Every panel of ours, in its tab or the sidebar, for objects of every kind, as they come and with every switch on."""
+    scene = setup()
+    held = objects()
+    probes = [probe('PROPERTIES', 'WINDOW', tab) for tab in TABS] + [probe('VIEW_3D', 'UI', "", category) for category in ("Item", "Tool", "View")]
+    try:
+        area().spaces[0].show_region_ui = True
+        for on in (False, True):
+            groups = [scene.patina, scene.patina.studio, scene.patina.effects, scene.patina.lines, held[0].patina,
+                      held[0].patina.colors]
+            for group in groups if on else ():
+                for name, kind in group.bl_rna.properties.items():
+                    if kind.type == 'BOOLEAN' and not kind.is_array and name.startswith("use"):
+                        setattr(group, name, True)
+                    elif kind.type == 'ENUM' and not name.startswith("device"):
+                        setattr(group, name, kind.enum_items[-1].identifier)
+            for obj in held:
+                select(obj)
+                for tab, name in TABS.items():
+                    if tab in {"render", "view_layer"} and obj != held[0]:
+                        continue  # the same for all
+                    try:
+                        editor().spaces[0].context = name
+                    except TypeError:  # an object without such a tab
+                        continue
+                    editor().tag_redraw()
+                    area().tag_redraw()
+                    bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
+            yield None
+        errors = [error for _, _, found in probes for error in found]
+        check(not errors, f"{len(errors)}: {errors[:1]}")
+        drawn = set().union(*(found for _, found, _ in probes))
+        missing = {cls.__name__ for cls in panels()} - drawn - {"PATINA_PT_presets"}  # which hangs from a button
+        check(not missing, f"never drawn: {sorted(missing)}")
+    finally:
+        area().spaces[0].show_region_ui = False
+        for kind, _, _ in probes:
+            bpy.utils.unregister_class(kind)
+        bpy.data.materials.remove(bpy.data.materials["paint"])
+
+
+def sidebar():
+    return [cls for cls in panels() if (cls.bl_space_type, cls.bl_region_type) == ('VIEW_3D', 'UI')]
+
+
+def test_labels_fit_the_sidebar():
+    """As wide as it opens first: names take two fifths of a line, the words of menus and buttons what is left of it."""
+    setup()
+    obj = add_points(*sphere(2000, 1.0, (0, 0, 0)))
+    select(obj)
+    yield lambda: settled(2000)
+    context, known = context_of(obj), bpy.context
+    context.area = area()
+    wide = []
+
+    def must(text, room, where):
+        width = rows.text_width(known, text)
+        if width > room:
+            wide.append(f"{where}: '{text}' is {width:.0f} wide, {room:.0f} are there")
+
+    for source in ('OWN', 'FIXED', 'HEIGHT'):
+        obj.patina.colors.source = source
+        for cls in sidebar():
+            layout = Row()
+            check(cls.poll(context), cls.__name__)
+            cls.draw(Drawing(cls, layout), context)
+            must(cls.bl_label, rows.LEAST - 2 * ARROW, cls.__name__)
+            for kind, owner, name, text in layout.drawn:
+                if kind.startswith("label"):
+                    must(text, rows.LEAST - PAD, cls.__name__)
+                elif owner is not None and name:
+                    found = owner.bl_rna.properties[name]
+                    if found.type == 'BOOLEAN':
+                        must(text, rows.LEAST - ARROW - PAD, cls.__name__)
+                        continue
+                    must(text, 0.4 * rows.LEAST, cls.__name__)
+                    for item in found.enum_items if found.type == 'ENUM' and text else ():
+                        must(item.name, 0.6 * rows.LEAST - ARROW - PAD, f"{cls.__name__}.{name}")
+                elif kind == "row" and text:
+                    must(text, 0.4 * rows.LEAST, cls.__name__)
+    check(not wide, f"{len(wide)}: {wide[:8]}")
+
+
+def test_texts_are_broken_where_they_must():
+    """No word of a sentence or a table is lost, no line is wider than the region."""
+    context = bpy.context
+    text = "Points that are far from what their neighbors are part of are not drawn and cast no shadow"
+    for width in (80, 160, 400):
+        found = rows.lines(context, text, width)
+        check(" ".join(found) == text, f"{found}")
+        check(all(rows.text_width(context, line) <= width for line in found), f"{width}: {found}")
+    check(len(rows.lines(context, text, 80)) > len(rows.lines(context, text, 400)), "as many lines everywhere")
+    layout = Row()
+    with_region = SimpleNamespace(preferences=context.preferences, region=None)
+    rows.table(with_region, layout, [("Time", "3 ms"), ("Expected Error", "37.22% of white, up to 60%")])
+    said = [text for kind, _, _, text in layout.drawn if kind == "label" and text]
+    check(said[:3] == ["Time", "3 ms", "Expected Error"] and " ".join(said[3:]) == "37.22% of white, up to 60%", f"{said}")
+    yield None
