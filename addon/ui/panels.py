@@ -201,7 +201,7 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
             return
         column.prop_search(patina, "color_attribute", data, "attributes")
         column.prop_search(patina, "normal_attribute", data, "attributes")
-        column.prop_search(patina, "opacity_attribute", data, "attributes")
+        column.prop(patina, "opacity_attribute")  # with vertex groups
         column.prop_search(patina, "radius_attribute", data, "attributes")
         column.prop(patina, "color")
         column.operator("object.patina_mesh_to_linked", text="Convert to Linked Cloud...")
