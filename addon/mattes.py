@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from . import backdrop
 from .sync import CloudItem, Effects, MeshItem, SceneDescription
 from .sync.clouds import LIT, NOTHING
 from .sync.colors import FIXED
@@ -40,7 +41,8 @@ def needed(description: SceneDescription) -> list[SceneDescription]:
     plain = replace(description, lines=None, effects=_focus_alone(description.effects), shadow_file="", clips=[
         replace(clip, tint_strength=0.0) for clip in description.clips])
     plain = replace(plain, settings=replace(plain.settings, film_transparent=1))
-    unlit = replace(plain, lights=[], headlight=None, settings=replace(plain.settings, world_color=(1.0,) * 3))
+    unlit = replace(plain, lights=[], headlight=None, settings=replace(
+        plain.settings, world_color=(1.0,) * 3, world_directed=0))
     colors = {HOLDOUT: RED, CATCHER: GREEN}
     found = [_painted(unlit, lambda item: _flat(item, colors.get(item.role, BLACK)))]
     if any(item.role == CATCHER for item in (*description.clouds, *description.meshes)):
@@ -50,23 +52,25 @@ def needed(description: SceneDescription) -> list[SceneDescription]:
     return found
 
 
-def finish(color: np.ndarray, description: SceneDescription, planes: list[np.ndarray]) -> np.ndarray:
-    """color (height, width, 4), premultiplied, of picture(): without holdouts, catchers as their shadows. planes: of needed()."""
+def finish(color: np.ndarray, description: SceneDescription, planes: list[np.ndarray],
+           behind: np.ndarray | None = None) -> np.ndarray:
+    """color (height, width, 4), premultiplied, of picture(): without holdouts, catchers as their shadows. planes: of needed().
+    behind: (height, width, 3) of a world that lies behind all."""
     held, caught = planes[0][..., 0], planes[0][..., 1]
     shadow = np.zeros_like(caught)
     if len(planes) > 1:
         lit, all_light = (plane[..., :3].sum(axis=2) for plane in planes[1:])
         np.divide(lit, all_light, out=shadow, where=all_light > 0.0)
         shadow = np.where(all_light > 0.0, caught * (1.0 - np.clip(shadow, 0.0, 1.0)), 0.0)
-    out = color.copy()
+    out = color.copy() if behind is None else backdrop.over(color, behind)
     settings = description.settings
-    if settings.film_transparent:
+    if settings.film_transparent and behind is None:
         out[..., 3] = np.clip(color[..., 3] - held - caught + shadow, 0.0, 1.0)
         out[..., :3] *= (held + caught < color[..., 3] - 1e-4)[..., None]  # effects may have coloured what is held out
     else:
-        background = settings.background if settings.own_background else settings.world_color
-        out[..., :3] += (caught - shadow)[..., None] * np.float32(background)
-        out[..., 3] = np.clip(color[..., 3] - held, 0.0, 1.0)
+        background = np.float32(settings.background if settings.own_background else settings.world_color) if behind is None else behind
+        out[..., :3] += (caught - shadow)[..., None] * background
+        out[..., 3] = np.clip(out[..., 3] - held, 0.0, 1.0)
         out[..., :3] *= (held < 1.0 - 1e-4)[..., None]
     return out
 

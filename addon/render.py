@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from . import jobs, mattes, memory, native
+from . import backdrop, jobs, mattes, memory, native
 from .sync import Camera, DeviceChoice, SceneDescription
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
@@ -54,8 +54,12 @@ def forget_device() -> None:
 def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool],
          tile_size: int = 0) -> Picture:
     """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel."""
+    behind = backdrop.pixels(description, lambda: poll(0.0)) if description.behind else None
     if not mattes.are_needed(description):
-        return _draw(description, planes, poll, tile_size)
+        picture = _draw(description, planes, poll, tile_size)
+        if behind is None:
+            return picture
+        return replace(picture, planes=picture.planes | {"COMBINED": backdrop.over(picture.planes["COMBINED"], behind)})
     others = mattes.needed(description)
     count = 1 + len(others)
 
@@ -65,7 +69,7 @@ def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[f
     picture = _draw(mattes.picture(description), planes, part(0), tile_size)
     found = [_draw(other, ["COMBINED"], part(number), tile_size).planes["COMBINED"] for number, other in enumerate(others, 1)]
     return replace(picture, planes=picture.planes | {
-        "COMBINED": mattes.finish(picture.planes["COMBINED"], description, found)})
+        "COMBINED": mattes.finish(picture.planes["COMBINED"], description, found, behind)})
 
 
 def _draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool], tile_size: int) -> Picture:

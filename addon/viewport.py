@@ -20,7 +20,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import mattes, native, pace, render, sync
+from . import backdrop, mattes, native, pace, render, sky, sync
 from .jobs import Pause, Steps
 from .sync import analysis
 from .sync.analyzing import ANALYSES
@@ -64,6 +64,7 @@ class Shown:
     clouds: list[sync.CloudItem]  # built
     color: np.ndarray  # (height, width, 4), premultiplied, scene-linear; the next picture but one overwrites it
     depth: np.ndarray  # (height, width, 1), linear z
+    behind: sync.World | None  # what lies behind it
     pixel: float  # its width, at distance 1 in perspective
     place: tuple[float, float, float, float]  # of the viewport that it covers, 0..1
     stats: dict[str, Any]
@@ -102,12 +103,14 @@ class Viewport:
         self._news = False
         self._frame: tuple[native.Device, native.Frame] | None = None
         self._others: list[tuple[native.Device, native.Frame]] = []  # for mattes
+        self._sky = sky.Sky()
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
         _VIEWPORTS.add(self)
 
     def update(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """The scene changed."""
         self.trusted.forget(sync.changed_owners(depsgraph) if self._scene else None)
+        sync.world.follow(depsgraph)
         view = self._read_view(context)
         scene = sync.describe_viewport(depsgraph, view, self.trusted, context.space_data)
         lost = {item.cloud.lost: None for item in scene.clouds if item.cloud.lost}  # each once
@@ -168,6 +171,7 @@ class Viewport:
         if self._steps:
             self._steps.close()
         self._others = []
+        self._sky = sky.Sky()
         self._drawn = self._frame = self._steps = self._task = None  # here, for textures go on Blender's thread
         ANALYSES.wish(self, [])
         _VIEWPORTS.discard(self)
@@ -217,7 +221,11 @@ class Viewport:
         gpu.state.depth_test_set('NONE')
         gpu.state.depth_mask_set(False)
         gpu.state.blend_set('NONE')  # Blender has cleared what is beneath
+        if shown.behind:
+            self._sky.draw(shown.behind, shown.wish.view.camera, shown.place)
+            gpu.state.blend_set('ALPHA_PREMULT')
         _fill_rectangle(corners, 'EXACT' if shown.wish.level.shrink == 1 else 'SMOOTH', color)
+        gpu.state.blend_set('NONE')
         if overlays:  # where nothing of Blender's is nearer, so that they are hidden rightly
             projection, camera = context.region_data.window_matrix, shown.wish.view.camera
             near = camera.near_clip if camera.orthographic else 0.0
@@ -332,14 +340,16 @@ class Viewport:
             found = []
             for (_, beside), other in zip(self._others, others, strict=True):
                 found += yield from self._draw_frame(beside, other, ("COMBINED",), [])
-            planes[0] = mattes.finish(planes[0], description, found)
+            behind = backdrop.pixels(description) if description.behind else None
+            planes[0] = mattes.finish(planes[0], description, found, behind)
+            description = replace(description, behind=None)  # it is in the picture
         else:
             self._others = []
             planes = yield from self._draw_frame(frame, description, ("COMBINED", "DEPTH"), self._spare)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
-        return Shown(wish, description.clouds, *planes,
+        return Shown(wish, description.clouds, *planes, description.behind,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.label)
@@ -391,6 +401,8 @@ def close_all() -> None:
     ANALYSES.clear()
     CHECKS.clear()
     _compiled.clear()
+    sky.forget()
+    sync.world.forget()
 
 
 def _work(until: float) -> None:

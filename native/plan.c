@@ -233,11 +233,40 @@ static void set_lights(const struct pt_plan *plan, const struct patina_scene *sc
     }
 }
 
+// world_light seen from the camera: its first three directions as a vector, the last five as a symmetric matrix, which turn.
+static void set_ambient(const struct patina_scene *scene, struct shade_args *args)
+{
+    double axes[9], position[3];
+    args->directed = scene->settings.world_directed;
+    if (!args->directed)
+        return;
+    pt_camera_axes(&scene->camera, axes, position);
+    for (int c = 0; c < 3; c++) {
+        const float *world = scene->settings.world_light[c];
+        const double along[3] = {world[1], world[2], world[3]}, xy = 0.5 * world[4], yz = 0.5 * world[5], zx = 0.5 * world[6];
+        const double matrix[9] = {world[7] - world[8], xy, zx, xy, -world[7] - world[8], yz, zx, yz, 2.0 * world[8]};
+        double turned[9], rows[9];
+        float *view = args->ambient + 9 * c;
+        for (int k = 0; k < 3; k++)
+            pt_apply(matrix, axes + 3 * k, rows + 3 * k);
+        for (int k = 0; k < 3; k++)
+            pt_apply(rows, axes + 3 * k, turned + 3 * k);
+        view[0] = world[0];
+        set_vector(axes, along, view + 1);
+        view[4] = (float)(2.0 * turned[1]);
+        view[5] = (float)(2.0 * turned[5]);
+        view[6] = (float)(2.0 * turned[2]);
+        view[7] = (float)(0.5 * (turned[0] - turned[4]));
+        view[8] = (float)(0.5 * turned[8]);
+    }
+}
+
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args)
 {
     const struct patina_scene *scene = builder->scene;
     *args = (struct shade_args){.view = builder->plan->view};
     memcpy(args->world, scene->settings.world_color, sizeof args->world);
+    set_ambient(scene, args);
     args->eye_z = scene->camera.orthographic ? (float)scene->camera.near_clip : 0.0f;
     args->arrived =
         builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);

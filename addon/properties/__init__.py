@@ -26,6 +26,13 @@ _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 _PATH = {'ANIMATABLE', *({'PATH_SUPPORTS_BLEND_RELATIVE'} if bpy.app.version >= (4, 5, 0) else ())}  # which warns without
 
 
+def _numbers(self: PropertyGroup, _context: Context, _text: str) -> list[str]:
+    """Names of point attributes and vertex groups."""
+    obj = self.id_data
+    found = [item.name for item in getattr(obj.data, "attributes", ()) if item.domain == 'POINT']
+    return found + [group.name for group in getattr(obj, "vertex_groups", ()) if group.name not in found]
+
+
 def enum_number(group: PropertyGroup, name: str) -> int:
     """The number of the chosen item, which is the library's."""
     return group.bl_rna.properties[name].enum_items[getattr(group, name)].value
@@ -211,7 +218,8 @@ class PatinaObjectProperties(PropertyGroup):
                                                   "its neighbors or 1.75 times the spacing of the points say", "Set Disc Radius")
     radius_attribute: StringProperty(
         name="Disc Radius Attribute", override=_OVERRIDE,
-        description="Point attribute of numbers: the radius of each point's disc")
+        description="Point attribute of numbers, or vertex group: the radius of each point's disc; empty: where all points are "
+                    "discs, the own radius of point clouds")
     largest_gap: FloatProperty(
         name="Largest Gap", override=_OVERRIDE, default=0.0, min=0.0, soft_max=1.0, subtype='DISTANCE', unit='LENGTH',
         precision=4,
@@ -242,12 +250,12 @@ class PatinaObjectProperties(PropertyGroup):
         name="Opacity", override=_OVERRIDE, default=1.0, min=0.0, max=1.0, subtype='FACTOR',
         description="How much the surface hides of what lies behind it")
     opacity_attribute: StringProperty(
-        name="Opacity Attribute", override=_OVERRIDE,
-        description="Point attribute that opacity is multiplied by: numbers from 0 to 1, yes or no, or the alpha of a "
-                    "color attribute; empty: none")
+        name="Opacity Attribute", override=_OVERRIDE, search=_numbers, search_options={'SUGGESTION'},
+        description="Point attribute or vertex group that opacity is multiplied by: numbers from 0 to 1, weights, yes or no, or "
+                    "the alpha of a color attribute; empty: none")
     color: FloatVectorProperty(
         name="Color", override=_OVERRIDE, default=(0.8, 0.8, 0.8), min=0.0, max=1.0, subtype='COLOR', size=3,
-        description="Color of points that have none")
+        description="Color of points that have none. Until it is set: the base color of their material, if they have one")
     linked_data: PointerProperty(  # where the file's path is kept: sync/files.py
         type=Volume, name="Linked Data", override=_OVERRIDE, options={'HIDDEN'})
     linked_file: StringProperty(

@@ -8,7 +8,7 @@ calling thread; clouds are built by native threads.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -22,11 +22,11 @@ from .lights import Headlight, Light
 from .lines import Lines
 from .meshes import MeshItem
 from .settings import DeviceChoice, Settings
-from .world import Mist
+from .world import Mist, World
 
 __all__ = ["Camera", "CameraError", "Clip", "CloudItem", "CloudStyle", "DeviceChoice", "Light", "Lines", "MeshItem", "Mist",
            "Panorama", "Pending", "PendingLink", "Effects", "Focus",
-           "SceneDescription", "Settings", "Trusted", "View", "changed_owners", "describe", "describe_items",
+           "SceneDescription", "Settings", "Trusted", "View", "World", "changed_owners", "describe", "describe_items",
            "describe_viewport", "final_view", "style_of", "view_clips", "viewport_view"]
 
 
@@ -44,6 +44,7 @@ class SceneDescription:
     effects: Effects
     device: DeviceChoice
     mist: Mist | None
+    behind: World | None  # what is seen behind all, by direction; None: the settings' background, or a transparent film
     shadow_file: str  # baked shadow textures; empty: none
     notices: list[str]  # what the artist should know about things left out, a sentence each
 
@@ -79,20 +80,23 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
     notices += filter(None, [migrate.notice(scene), clipping.notice(points, view)])
     studio = scene.patina.studio
     replaced = studio.use_light and studio.use_background  # then nothing of the world is drawn
-    background = world.background(None if replaced else scene.world, notices)
+    around = world.read(None if replaced else scene.world, notices)
+    read = settings.read(scene, view, around)
+    behind = around if around.behind and not (read.film_transparent or studio.use_background) else None
     return SceneDescription(
         clouds=points,
         meshes=[item for item in items if isinstance(item, MeshItem)],
         clips=clips.collect(depsgraph),
-        lights=lights.collect(depsgraph, notices),
+        lights=lights.collect(depsgraph, notices, around.spot),
         headlight=lights.headlight(scene, view, notices),
         lines=lines.read(scene, view.camera),
         camera=view.camera,
         panorama=view.panorama,
-        settings=settings.read(scene, view, background),
+        settings=replace(read, film_transparent=1) if behind else read,  # then it is laid behind
         effects=effects.read(scene, view.focus, notices),
         device=settings.device(scene),
         mist=world.mist(scene.world),
+        behind=behind,
         shadow_file=settings.shadow_file(scene),
         notices=notices,
     )

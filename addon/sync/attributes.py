@@ -157,6 +157,24 @@ def as_classes(values: np.ndarray) -> np.ndarray:
     return np.where((values >= 0) & (values <= 255), values, 0).astype(np.uint8)
 
 
+def weights(obj: bpy.types.Object, data: bpy.types.ID, count: int, name: str,
+            pause: Callable[[], None] = lambda: None) -> np.ndarray | None:
+    """(count, 1) float32 of an evaluated mesh object's vertex group; 0 for vertices that are not in it. pause() is called during
+    long steps and may raise."""
+    group = obj.vertex_groups.get(name) if name and obj.type == 'MESH' else None
+    if group is None:
+        return None
+    index, values = group.index, np.zeros((count, 1), np.float32)
+    for at, vertex in enumerate(data.vertices):
+        if at % BLOCK == 0:
+            pause()
+        for item in vertex.groups:
+            if item.group == index:
+                values[at] = item.weight
+                break
+    return values
+
+
 def _color_candidates(data: bpy.types.ID) -> Iterator[bpy.types.Attribute]:
     group = data.color_attributes
     for index in (getattr(group, "render_color_index", -1), getattr(group, "active_color_index", -1)):

@@ -18,7 +18,7 @@ from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, linked, losses, meshes, roles
+from . import analysis, attributes, clips, colors, estimates, linked, losses, materials, meshes, roles
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -265,9 +265,10 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         # the library's triangles receive no shadows, its points do
         as_triangles = patina.meshes == 'TRIANGLES' and role != roles.CATCHER
         faces_as = 0 if not solid else triangles if as_triangles else patina.mesh_points
-        place = link.identity() if link else (obj.data.as_pointer(), faces_as, *_attribute_names(obj), analysis.wanted(obj))
+        radius = _radius_name(obj, patina.surface)
+        place = link.identity() if link else (obj.data.as_pointer(), radius, faces_as, *_attribute_names(obj), analysis.wanted(obj))
         if place not in taken:
-            identity = place if link else (*_identity(obj, used), faces_as)
+            identity = place if link else (*_identity(obj, used), radius, faces_as)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
@@ -321,7 +322,7 @@ class TakingNow:
         if identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
             pause()
             return meshes.CACHE.obtain(identity, obj)
-        arrays = None if link else _read(obj, self._notices, identity[-1], pause)
+        arrays = None if link else _read(obj, self._notices, *identity[-2:], pause)
         if arrays is None and link is None:
             return None
         if arrays and len(arrays.positions) < SMALL:
@@ -416,7 +417,8 @@ class Trusted:
         self._used = set()
 
         def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | native.Mesh | None:
-            owners = (obj, obj.data, *(slot.material for slot in obj.material_slots if slot.material))
+            owners = {item: None for item in (obj, obj.data, *(slot.material for slot in obj.material_slots),
+                                              *getattr(obj.data, "materials", ())) if item}  # each once
             key = (*identity, tuple((_kind(owner), owner.original.name_full) for owner in owners))
             self._used.add(key)
             if key not in self._known:
@@ -428,7 +430,7 @@ class Trusted:
                     self._known[key] = (meshes.CACHE.obtain(identity, obj), said)
                 else:
                     self.reads += 1
-                    arrays = _read(obj, said, identity[-1])
+                    arrays = _read(obj, said, *identity[-2:])
                     self._known[key] = (Pending(obj.name, identity, arrays) if arrays else None, said)
             pending, said = self._known[key]
             notices.extend(said)
@@ -473,15 +475,23 @@ def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
             obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored)
 
 
-def _read(obj: bpy.types.Object, notices: list[str], mesh_points: int,
+def _radius_name(obj: bpy.types.Object, surface: str) -> str:
+    """The attribute that discs' radii are taken from. Geometry Nodes gives every point cloud radii, asked or not: they count where
+    the artist wants discs."""
+    if obj.patina.radius_attribute or obj.type != 'POINTCLOUD' or surface != 'SPLATS':
+        return obj.patina.radius_attribute
+    return "radius" if "radius" in obj.data.attributes else ""
+
+
+def _read(obj: bpy.types.Object, notices: list[str], radius_name: str, mesh_points: int,
           pause: Callable[[], None] = lambda: None) -> PointArrays | None:
     """The object's points; mesh_points > 0: so many on its faces. pause() is called between steps and may raise."""
     pause()
     with attributes.readable(obj) as data:
-        return _read_data(obj, data, notices, mesh_points, pause)
+        return _read_data(obj, data, notices, radius_name, mesh_points, pause)
 
 
-def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], mesh_points: int,
+def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], radius_name: str, mesh_points: int,
                pause: Callable[[], None]) -> PointArrays | None:
     if mesh_points:
         found = meshes.sample(obj, data, mesh_points)
@@ -498,15 +508,22 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], me
     rgb = attributes.colors(data, count, obj.patina.color_attribute, pause)
     pause()
     scalar, class_name = colors.scalar_name(obj), obj.patina.colors.class_attribute
-    scalars = attributes.scalars(data, count, scalar)
+
+    def numbers(name: str) -> np.ndarray | None:
+        found = attributes.scalars(data, count, name)
+        return attributes.weights(obj, data, count, name, pause) if found is None else found
+
+    scalars = numbers(scalar)
     classes = attributes.classes(data, count, class_name)
     pause()
     opacities = attributes.opacities(data, count, obj.patina.opacity_attribute)
-    radii = attributes.scalars(data, count, obj.patina.radius_attribute)
+    if opacities is None:
+        opacities = attributes.weights(obj, data, count, obj.patina.opacity_attribute, pause)
+    radii = numbers(radius_name)
     for kind, name, found in (("color", obj.patina.color_attribute, rgb),
                               ("normal", obj.patina.normal_attribute, normals),
                               ("opacity", obj.patina.opacity_attribute, opacities),
-                              ("radius", obj.patina.radius_attribute, radii),
+                              ("radius", radius_name, radii),
                               ("scalar", scalar, scalars), ("class", class_name, classes)):
         if name and found is None:
             notices.append(f"'{obj.name}' has no point attribute '{name}' to take as {kind}")
@@ -519,13 +536,14 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], me
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
     patina = obj.patina
+    color = materials.color(obj)
     dark = not (patina.ambient or patina.diffuse or patina.specular)
     return CloudStyle(
         world_from_object=row_major(matrix),
         lighting=enum_number(patina, "lighting"),
         cull_back=int(patina.cull_back),
         d_min=patina.d_min,
-        color=tuple(patina.color) if any(patina.color) else (NOTHING,) * 3,
+        color=color if any(color) else (NOTHING,) * 3,
         ambient=NOTHING if dark else patina.ambient,
         diffuse=patina.diffuse,
         specular=patina.specular,

@@ -10,6 +10,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .camera import Camera, View
+from .world import Spot
 
 TYPES = {'SUN': 1, 'POINT': 2, 'SPOT': 3, 'AREA': 4}  # patina_light_type
 MOST = 32  # lights of a scene in the library
@@ -59,7 +60,8 @@ def headlight(scene: bpy.types.Scene, view: View, notices: list[str]) -> Headlig
     return Headlight((1.0, 1.0, 1.0), studio.headlight)
 
 
-def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Light]:
+def collect(depsgraph: bpy.types.Depsgraph, notices: list[str], spot: Spot | None = None) -> list[Light]:
+    """spot: the sun in the world's picture."""
     if depsgraph.scene_eval.patina.studio.use_light:
         return _studio(depsgraph.scene_eval)
     lights = []
@@ -72,11 +74,12 @@ def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Light]:
         if power <= 0.0 or max(color) <= 0.0:  # zero would mean "default" to the library
             continue
         lights.append(_light(obj.data, instance.matrix_world, color, power, use_shadows))
-    most = MOST - depsgraph.scene_eval.patina.studio.use_headlight
+    suns = [_sun(spot.color, 1.0, -Vector(spot.toward), spot.angle, use_shadows)] if spot else []
+    most = MOST - len(suns) - depsgraph.scene_eval.patina.studio.use_headlight
     if len(lights) > most:
         notices.append(f"only the {most} strongest of {len(lights)} lights shine")
         lights = sorted(lights, key=lambda light: -light.power * max(light.color))[:most]
-    return lights
+    return suns + lights
 
 
 def _studio(scene: bpy.types.Scene) -> list[Light]:
@@ -100,7 +103,7 @@ def _studio(scene: bpy.types.Scene) -> list[Light]:
 def _sun(color: tuple[float, float, float], power: float, direction: Vector, angle: float, shadows: bool) -> Light:
     return Light(
         type=TYPES['SUN'], color=color, power=power, position=(0.0, 0.0, 0.0), direction=tuple(direction),
-        side=(0.0, 0.0, 0.0), angle=angle, radius=0.0, size=(0.0, 0.0), shape=0, cone=0.0, blend=0.0, shadows=int(shadows))
+        side=(0.0, 0.0, 0.0), angle=min(angle, math.pi), radius=0.0, size=(0.0, 0.0), shape=0, cone=0.0, blend=0.0, shadows=int(shadows))
 
 
 def _light(data: bpy.types.Light, matrix: Matrix, color: tuple[float, float, float], power: float,

@@ -10,6 +10,7 @@ import bpy
 from .. import options, preferences
 from ..properties import enum_number
 from .camera import View
+from .world import World
 
 # Scene.patina.device → patina_device_desc.name
 DEVICES = {'AUTO': "auto", 'CPU': "cpu", 'CPU_SCALAR': "cpu-scalar", 'GL': "gl-egl", 'GL_SOFTWARE': "gl-osmesa"}
@@ -49,9 +50,11 @@ class Settings:
     shadow_uncut: int = 0
     pixel_samples: int = 1  # of a final picture
     depth: int = 0
+    world_directed: int = 0  # 1: world_light, not world_color, lights
+    world_light: tuple[float, ...] = (0.0,) * 27
 
 
-def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, float]) -> Settings:
+def read(scene: bpy.types.Scene, view: View, world: World) -> Settings:
     patina, studio = scene.patina, scene.patina.studio
     forced = options.read()
     quality = forced.get("quality")
@@ -63,9 +66,11 @@ def read(scene: bpy.types.Scene, view: View, world_color: tuple[float, float, fl
         smooth=enum_number(patina, "smooth"),
         antialias=enum_number(patina, "antialias"),
         film_transparent=int(scene.render.film_transparent),
-        world_color=tuple(studio.ambient) if studio.use_light else world_color,
-        own_background=int(studio.use_light or studio.use_background),
-        background=tuple(studio.background) if studio.use_background else world_color,
+        world_color=tuple(studio.ambient) if studio.use_light else world.ambient,
+        world_directed=int(bool(world.light) and not studio.use_light),
+        world_light=world.light or (0.0,) * 27,
+        own_background=int(studio.use_light or studio.use_background or world.plain_light is not None),
+        background=tuple(studio.background) if studio.use_background else world.color,
         shadow_uncut=int(patina.shadow_uncut),
         layers=patina.layers,
         surface=enum_number(patina, "surface"),

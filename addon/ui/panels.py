@@ -221,7 +221,7 @@ class PATINA_PT_attributes(_PatinaObjectPanel, Panel):
         layout.use_property_split = True
         patina, data = context.object.patina, context.object.data
         layout.prop_search(patina, "normal_attribute", data, "attributes", text="Normal")
-        layout.prop_search(patina, "opacity_attribute", data, "attributes", text="Opacity")
+        layout.prop(patina, "opacity_attribute", text="Opacity")  # with vertex groups
         layout.prop_search(patina, "radius_attribute", data, "attributes", text="Disc Radius")
 
 

@@ -68,10 +68,10 @@ static void shade_definitions(const struct shade_args *args, int shading, char *
         snprintf(lights, sizeof lights, "%uu", args->light_count);
     snprintf(text, size,
              "#define SHADING %d\n#define ARRIVED %d\n#define OPACITY %u\n#define COLOR_FORMAT %u\n#define LIT %d\n"
-             "#define LIGHTS %s\n#define PLAIN %d\n#define RECOLOR %d\n%s",
+             "#define LIGHTS %s\n#define PLAIN %d\n#define RECOLOR %d\n#define DIRECTED %d\n%s",
              shading, args->arrived != 0, opacity, instance->color_format % 5,
              !instance->lit ? 0 : instance->specular > 0.0f ? 2 : 1, lights, plain_lights(args),
-             args->recolor.source || args->recolor.graded, blend[args->blend < 2 ? args->blend : 2]);
+             args->recolor.source || args->recolor.graded, args->directed && instance->lit, blend[args->blend < 2 ? args->blend : 2]);
 }
 
 // Variants are numbered as they come; beyond the last, it gives way.

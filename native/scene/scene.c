@@ -16,6 +16,14 @@ static int fail(const patina_scene *scene, const char *what)
     return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "%s", what);
 }
 
+static int finite_floats(const float *values, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!isfinite(values[i]))
+            return 0;
+    return 1;
+}
+
 static int all_finite(const double *values, int count)
 {
     for (int i = 0; i < count; i++)
@@ -351,6 +359,8 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: world_color is not finite");
     if (s.own_background > 1 || !isfinite(s.background[0] + s.background[1] + s.background[2]))
         return fail(scene, "settings: own_background is 0 or 1, background is finite");
+    if (s.world_directed > 1 || !finite_floats(&s.world_light[0][0], 27))
+        return fail(scene, "settings: world_directed is 0 or 1, world_light is finite");
     if (s.layers > PATINA_MAX_LAYERS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u layers; the most is %d", s.layers,
                        PATINA_MAX_LAYERS);

@@ -5,7 +5,7 @@
 // Normals and opacity: BLEND: of filled pixels over 3 x 3 pixels, kept while walking along a line; WIDE: over any window;
 // OPACITY 0: the instance's, 1: points have their own, 2: the colours' plane has it.
 // Colour, by COLOR_FORMAT and LIT (2: with highlights); LIGHTS: how many; PLAIN: only suns and points, and none casts;
-// RECOLOR: by a ramp, exposure, contrast.
+// RECOLOR: by a ramp, exposure, contrast. DIRECTED: ambient light differs by direction.
 // SHADING, ARRIVED: whether these planes are written.
 #version 430 core
 #include "lib/math.glsl"
@@ -214,6 +214,18 @@ void add_light(uint light, uint type, vec3 from, float share, uint shininess, ve
 #endif
 }
 
+#if DIRECTED
+float ambient_of(uint k, vec3 n)
+{
+    precise float low = (args.ambient[k] + args.ambient[k + 1u] * n.x) + (args.ambient[k + 2u] * n.y + args.ambient[k + 3u] * n.z);
+    precise float mixed = (args.ambient[k + 4u] * (n.x * n.y) + args.ambient[k + 5u] * (n.y * n.z)) +
+                          args.ambient[k + 6u] * (n.z * n.x);
+    precise float square = args.ambient[k + 7u] * (n.x * n.x - n.y * n.y) + args.ambient[k + 8u] * (3.0 * (n.z * n.z) - 1.0);
+    precise float sum = (low + mixed) + square;
+    return pt_max(sum, 0.0);
+}
+#endif
+
 // c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
 // the light. shadow: the mean m of lights that cast.
 vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint id, uint id_count, pixel p,
@@ -255,6 +267,9 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
     }
     precise float mean = sum / float(casting);
     shadow = casting != 0u ? mean : 1.0;
+#if DIRECTED
+    world = vec3(ambient_of(0u, n), ambient_of(9u, n), ambient_of(18u, n));
+#endif
     precise vec3 light = factors.x * world + factors.y * diffuse;
     precise vec3 total = p.albedo * (light + factors.z * specular);
     return total;

@@ -367,7 +367,9 @@ struct recolor_args {
 struct shade_args {
     struct view_args view;
     struct instance_args instance;
-    float world[3];     // ambient radiance
+    float world[3];     // ambient radiance; with `directed` for nothing
+    uint32_t directed;  // 1: ambient radiance is max(sum of ambient[c][k] b_k(n), 0), n in view space, turned to the eye
+    float ambient[27];  // c = 0..2, k = 0..8: 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1
     float eye_z;        // orthographic: near, so that view z = -(z + near); perspective: 0
     uint32_t blend;     // the window's radius at most, 0..8
     uint32_t arrived;   // 1: written

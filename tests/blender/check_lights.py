@@ -237,4 +237,4 @@ def test_linked_world_is_named():
     node = tree.nodes.new('ShaderNodeTexSky')
     tree.links.new(node.outputs[0], tree.nodes["Background"].inputs["Color"])
     check_close(background(scene)[:3], (0.1, 0.3, 0.5), 1e-6, "its own colour")
-    check(any("Background node" in message for _, message in reports), f"reports {reports}")
+    check(any("Sky Texture" in message for _, message in reports), f"reports {reports}")

@@ -4,11 +4,12 @@
 import bpy
 import numpy as np
 from check_combine import hide_each_other
+from check_world import image_of, sky, world_with
 from harness import add_light, add_points, check, check_close, render, sphere
 from mathutils import Matrix, Quaternion
 from window import (area, clip_border, newer, screenshot, settled, setup, shown, toggle_local_view, view, window_region)
 
-from patina import pace, viewport
+from patina import backdrop, pace, viewport
 
 
 def test_draws_points():
@@ -381,3 +382,32 @@ def test_holdouts_and_catchers():
     yield lambda: newer(before)() and settled(180000)
     color = shown().shown.color
     check(at(0.5, 1.0)[3] == 1.0 and at(-1.2, 0.0)[3] == 1.0, "seen again")
+
+
+def test_the_world_lies_behind():
+    """Each pixel of the screen shows what a final picture has there, however the world is made; a transparent film has none."""
+    scene = setup()
+    scene.render.film_transparent = False
+    scene.view_settings.view_transform = 'Standard'
+    positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
+    add_points(positions, colors, normals)
+    view().view_rotation = Quaternion((0.8, 0.5, 0.3, 0.2)).normalized()
+    image = image_of(sky())
+    for kind, properties in (('ShaderNodeTexEnvironment', dict(image=image, turn=(0.3, 0.1, 1.0))),
+                             ('ShaderNodeTexEnvironment', dict(image=image, projection='MIRROR_BALL')),
+                             ('ShaderNodeTexGradient', dict(gradient_type='RADIAL', turn=(0.0, 0.7, 0.4)))):
+        before = shown().pictures if shown() else 0
+        world_with(kind, **properties)
+        yield lambda: settled(20000) and newer(before)()
+        picture = screenshot(f"world_{kind}")[..., :3]
+        found = shown().shown
+        behind = backdrop.pixels(found.wish.description(found.clouds))
+        wanted = np.where(behind <= 0.0031308, 12.92 * behind, 1.055 * np.maximum(behind, 1e-9) ** (1 / 2.4) - 0.055).clip(0, 1)
+        bare = found.color[..., 3] == 0
+        bare[-60:], bare[:, :60], bare[:, -60:] = False, False, False  # there Blender draws headers and tools over it
+        check(bare.mean() > 0.3 and np.ptp(wanted[bare]) > 0.1, f"{kind}: {bare.mean():.2f} of it is world")
+        off = np.abs(picture - wanted)[bare]
+        check(np.percentile(off, 99) * 255 < 2.5, f"{kind}: {shown().message} {np.percentile(off, 99) * 255:.1f} of 255 off")
+    scene.render.film_transparent = True
+    yield lambda: settled(20000) and shown().shown.behind is None
+    check(not shown().shown.color[0, 0].any(), "a transparent film")

@@ -248,6 +248,22 @@ static void shapes(struct harness *h)
     }
 }
 
+// Ambient light by direction, bright and near nothing, with lights and alone.
+static void directed(struct harness *h)
+{
+    for (uint64_t seed = 20; seed < 26; seed++) {
+        struct rng rng = {seed};
+        struct setup s = make(h, &rng, seed % 2 ? 1 : 0, seed < 24 ? PICTURE_SURFACES : PICTURE_NOISE, 2);
+        s.args.directed = 1;
+        for (int k = 0; k < 27; k++)
+            s.args.ambient[k] = (float)rng_range(&rng, -1.0, 1.0) * (seed % 3 ? 1.0f : 50.0f);
+        s.args.light_count = seed % 4 ? s.args.light_count : 0;
+        s.args.instance.specular = seed % 2 ? 0.5f : 0.0f;
+        s.args.blend = seed % 3 ? 1 : 2;
+        check(h, &s, TOL_UNSURE_SHARE);
+    }
+}
+
 // Ramps of all sources and lengths; scalars among which some are NaN and infinite; exposure and contrast.
 static void ramps(struct harness *h)
 {
@@ -329,6 +345,13 @@ static void sanity(struct harness *h)
     args.lights[0].shadow = 0;
     args.instance.specular = 1.0f; // the highlight doubles it
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.5) < 1e-6);
+    args.light_count = 0;
+    args.instance.ambient = args.directed = 1;
+    args.ambient[0] = 0.5f; // half a sphere's worth of white sky above the eye, which the wall, turned to it, sees whole
+    args.ambient[3] = 0.5f;
+    args.ambient[26] = -1.0f; // below zero: no light
+    HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 1.0) < 1e-6);
+    HARNESS_CHECK(h, ref_shade(&args, &planes, 0, 0).color[2] == 0.0);
     HARNESS_CHECK(h, fabs(ref_srgb(188) - 0.502886) < 1e-5 && ref_srgb(255) == 1.0 && ref_srgb(0) == 0.0);
 }
 
@@ -343,6 +366,7 @@ int main(int argc, char **argv)
         {"materials", materials, 0},
         {"lights", lights, 0},
         {"spots and panels", shapes, 0},
+        {"ambient light by direction", directed, 0},
         {"sanity of ramps", ramp_sanity, 1},
         {"ramps, exposure, contrast", ramps, 0},
     };

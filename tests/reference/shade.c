@@ -234,6 +234,19 @@ static void add_light(struct lighting *s, const struct light_args *light, struct
     }
 }
 
+// off: by the normal's error, and by roundings, a few of each term.
+static double ambient_of(const float k[9], struct ref_vec n, double normal_error, double *off)
+{
+    const double basis[9] = {1.0, n.x, n.y, n.z, n.x * n.y, n.y * n.z, n.z * n.x, n.x * n.x - n.y * n.y, 3.0 * n.z * n.z - 1.0};
+    const double slopes[9] = {0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 6.0}; // at most, of a unit normal
+    double sum = 0.0;
+    for (int i = 0; i < 9; i++) {
+        sum += k[i] * basis[i];
+        *off += fabs((double)k[i]) * (slopes[i] * (normal_error + TOL_NORMAL) + 12.0 * TOL_UNIT);
+    }
+    return fmax(sum, 0.0);
+}
+
 struct ref_shade ref_shade(const struct shade_args *args, const struct ref_planes *planes, int x, int y)
 {
     const struct view_args *view = &args->view;
@@ -265,7 +278,7 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     double facing = ref_dot(n, viewer);
     if (facing < 0.0)
         n = ref_scale(n, -1.0);
-    out.unsure |= fabs(facing) <= out.normal_error + TOL_NORMAL && args->light_count > 0;
+    out.unsure |= fabs(facing) <= out.normal_error + TOL_NORMAL && (args->light_count > 0 || args->directed);
     struct ref_vec position = view->perspective ? ref_vec(ray.u * z, ray.v * z, -z)
                                                 : ref_vec(ray.u, ray.v, -z - args->eye_z);
     double position_error = 4.0 * TOL_UNIT *
@@ -273,8 +286,9 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
                             (ray.error_u + ray.error_v) * (view->perspective ? z : 1.0);
     struct lighting s = {.instance = instance, .n = n, .viewer = viewer, .position = position, .position_error = position_error};
     for (int c = 0; c < 3; c++) {
-        s.light[c] = (double)instance->ambient * args->world[c];
-        s.loose[c] = TOL_COLOR * fabs(s.light[c]);
+        double off = 0.0, ambient = args->directed ? ambient_of(args->ambient + 9 * c, n, out.normal_error, &off) : args->world[c];
+        s.light[c] = instance->ambient * ambient;
+        s.loose[c] = TOL_COLOR * fabs(s.light[c]) + instance->ambient * off;
     }
     uint32_t casting = 0;
     double arrived = 0.0;

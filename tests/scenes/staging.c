@@ -76,6 +76,8 @@ const struct staging stagings[] = {
     {"footprints with opacities", 203, 151, 20000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, KNOWN, 0, 0, 1, 1,
      {0.6f, 1, 5, LAYER_PASSES}},
     {"footprints among meshes", 203, 151, 9000, POINTS_ALL, STAGE_MESHES, 0, 1, LIT, REFINED, KNOWN, 0, 0, 0, 1, OPAQUE},
+    {"meshes and points under a sky", 203, 151, 20000, POINTS_ALL, STAGE_SKY, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
+    {"discs under a sky, orthographic", 203, 151, 9000, POINTS_COLORS, STAGE_SKY, 1, 0, LIT, REFINED, DISCS, 0, 0, 1, 0, OPAQUE},
 };
 const uint32_t staging_count = sizeof stagings / sizeof stagings[0];
 
@@ -177,7 +179,7 @@ struct stage stage_build(const struct staging *staging)
         add(&stage, staging, point, 0.9f);
         add(&stage, staging, far_off, 0.5f);
     }
-    if (staging->objects == STAGE_MESHES) {
+    if (staging->objects == STAGE_MESHES || staging->objects == STAGE_SKY) {
         const double hub[3] = {0.1, 0.0, 0.1}, ball[3] = {0.9, 0.3, 0.1}, half[3] = {0.15, 1.3, 0.2};
         stage.meshes[0] = mesh_box(hub, half);
         stage.meshes[1] = mesh_sphere(ball, 0.45, 40, 1);
@@ -204,6 +206,9 @@ struct stage stage_build(const struct staging *staging)
     stage.settings.world_color[0] = 0.05f;
     stage.settings.world_color[1] = 0.06f;
     stage.settings.world_color[2] = 0.08f;
+    stage.settings.world_directed = staging->objects == STAGE_SKY;
+    for (int k = 0; k < 27; k++)
+        stage.settings.world_light[k / 9][k % 9] = k % 9 ? 0.3f * (float)sin(1.7 * k) : 0.5f;
     return stage;
 }
 

@@ -6,7 +6,7 @@
 #include "clouds.h"
 #include "support.h"
 
-enum staging_objects { STAGE_ONE, STAGE_MANY, STAGE_MESHES };
+enum staging_objects { STAGE_ONE, STAGE_MANY, STAGE_MESHES, STAGE_SKY }; // SKY: meshes under a world that differs by direction
 
 struct staging {
     const char *name;
@@ -29,7 +29,7 @@ extern const uint32_t staging_count;
 
 struct stage {
     patina_cloud *cloud;
-    patina_mesh *meshes[2]; // of STAGE_MESHES
+    patina_mesh *meshes[2]; // of STAGE_MESHES and STAGE_SKY
     patina_scene *scene;
     patina_camera camera;
     patina_settings settings;

@@ -150,6 +150,10 @@ static void test_bad_lights_and_shadows(void **state)
     settings = (patina_settings){ .struct_size = sizeof settings, .shadow_error = -0.1f };
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "shadow_error is negative");
+    settings = (patina_settings){ .struct_size = sizeof settings, .world_directed = 2 };
+    assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
+    settings = (patina_settings){ .struct_size = sizeof settings, .world_light = { [2] = { [8] = NAN } } };
+    assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     settings = (patina_settings){ .struct_size = sizeof settings, .shadow_resolution = 16385 };
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "shadow samples");

@@ -179,13 +179,22 @@ static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z
         s->n[k] = vf_select(away, zero - n[k], n[k]);
 }
 
-// Whether all light is of suns without shadows, and nothing shines.
+// Whether all light is of suns without shadows and the same from all around, and nothing shines.
 static inline int pt_plain(const struct shade_args *args)
 {
-    uint32_t others = args->instance.specular > 0.0f;
+    uint32_t others = args->instance.specular > 0.0f || args->directed;
     for (uint32_t i = 0; i < args->light_count; i++)
         others |= (args->lights[i].type ^ 1u) | args->lights[i].shadow;
     return !others;
+}
+
+// Ambient light by the direction of the normal.
+static inline vf pt_ambient(const float *k, const vf n[3])
+{
+    vf low = (vf_set(k[0]) + vf_set(k[1]) * n[0]) + (vf_set(k[2]) * n[1] + vf_set(k[3]) * n[2]);
+    vf mixed = (vf_set(k[4]) * (n[0] * n[1]) + vf_set(k[5]) * (n[1] * n[2])) + vf_set(k[6]) * (n[2] * n[0]);
+    vf square = vf_set(k[7]) * (n[0] * n[0] - n[1] * n[1]) + vf_set(k[8]) * (vf_set(3.0f) * (n[2] * n[2]) - vf_set(1.0f));
+    return vf_max((low + mixed) + square, vf_zero());
 }
 
 // c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
@@ -199,7 +208,7 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
     struct pt_surface_point point;
     vf ray[2], diffuse[3], specular[3], arrived = vf_zero();
     uint32_t casting = 0;
-    if (plain && instance->specular > 0.0f)
+    if (plain && (instance->specular > 0.0f || args->directed))
         __builtin_unreachable();
     vf_ray(&args->view, x, y, ray);
     pt_place(args, ray, z, n, &point);
@@ -221,7 +230,10 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
             pt_add_light(instance, light, light->points + 3 * j, share, &point, diffuse, specular);
     }
     for (int k = 0; k < 3; k++) {
-        vf light = vf_set(instance->ambient * args->world[k]) + vf_set(instance->diffuse) * diffuse[k];
+        vf light = vf_set(instance->ambient * args->world[k]);
+        if (args->directed)
+            light = vf_set(instance->ambient) * pt_ambient(args->ambient + 9 * k, point.n);
+        light = light + vf_set(instance->diffuse) * diffuse[k];
         if (instance->specular > 0.0f)
             light = light + vf_set(instance->specular) * specular[k];
         color[k] = color[k] * light;

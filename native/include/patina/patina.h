@@ -523,6 +523,9 @@ typedef struct patina_settings {
                                  // as is set (truest with antialias on). Other passes and keys are those of one sample. More than
                                  // one: whole shadow textures, in spite of shadow_lazy and _progressive
     uint32_t depth;              // patina_depth
+    uint32_t world_directed;     // 1 = ambient light differs by direction: world_light, not world_color, which stays the background
+    float world_light[3][9];     // with world_directed, of red, green, blue: the irradiance over pi of a surface with the normal n
+                                 // (unit, world) as weights of 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1; below 0 it counts as 0
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
