@@ -162,7 +162,7 @@ class Settings(Descriptor):
                 ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32), ("shadow_lazy", c_uint32),
                 ("shadow_progressive", c_uint32), ("shadow_error", c_float), ("own_background", c_uint32),
                 ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32), ("pixel_samples", c_uint32),
-                ("depth", c_uint32), ("world_directed", c_uint32), ("world_light", c_float * 9 * 3)]
+                ("depth", c_uint32), ("world_directed", c_uint32), ("world_light", c_float * 27)]
 
 
 class Effects(Descriptor):
