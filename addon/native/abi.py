@@ -188,7 +188,7 @@ class Settings(Descriptor):
                 ("strata", c_uint32), ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32),
                 ("shadow_lazy", c_uint32), ("shadow_progressive", c_uint32), ("shadow_error", c_float),
                 ("own_background", c_uint32), ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32),
-                ("pixel_samples", c_uint32), ("depth", c_uint32)]
+                ("pixel_samples", c_uint32), ("depth", c_uint32), ("pixel_progressive", c_uint32), ("pixel_noise", c_float)]
 
 
 class Effects(Descriptor):
@@ -223,7 +223,8 @@ class FrameStats(Descriptor):
                 ("expected", ExpectedError), ("shadow_bytes", c_uint64), ("shadow_maps", c_uint32),
                 ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32),
                 ("shadow_samples", c_uint32), ("shadow_error", c_float), ("chunks_clipped", c_uint64),
-                ("chunks_cut", c_uint64)]
+                ("chunks_cut", c_uint64), ("pixel_samples", c_uint32), ("pixel_pending", c_uint32),
+                ("pixel_error", c_float)]
 
 
 # ---- the library ---------------------------------------------------------------------------------------------
@@ -279,6 +280,7 @@ _CALLS = {
     "patina_frame_create": (c_void_p, _OUT),
     "patina_frame_destroy": (c_void_p,),
     "patina_frame_render": (c_void_p, c_void_p),
+    "patina_frame_refine": (c_void_p, c_void_p, c_double),
     "patina_frame_cancel": (c_void_p,),
     "patina_frame_progress": (c_void_p,),
     "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
@@ -294,6 +296,7 @@ _CALLS = {
     "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
     "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, c_void_p, c_uint32, _OUT),
+    "patina_task_refine": (c_void_p, c_void_p, c_double, c_void_p, c_uint32, _OUT),
     "patina_task_build": (POINTER(CloudDesc), c_void_p, _OUT),
     "patina_task_set_colors": (c_void_p, POINTER(Array), _OUT),
     "patina_task_grid_normals": (POINTER(GridDesc), c_void_p, c_void_p, _OUT),
