@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Devices, frames and progress as callers see them: check, delegate. The other exported functions stand with what they
 // concern: scene/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
-#include "frame.h"
+#include "frame_samples.h"
 #include "progress.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -165,6 +166,14 @@ int patina_frame_render(patina_frame *frame, const patina_scene *scene)
         return fail("patina_frame_render: frame or scene is NULL");
     int error = take_turn(frame);
     return error ? error : end_turn(frame, pt_frame_render(frame, scene));
+}
+
+int patina_frame_refine(patina_frame *frame, const patina_scene *scene, double ms)
+{
+    if (!frame || !scene || isnan(ms))
+        return fail("patina_frame_refine: frame or scene is NULL, or ms is not a number");
+    int error = take_turn(frame);
+    return error ? error : end_turn(frame, pt_frame_refine(frame, scene, ms));
 }
 
 int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene)

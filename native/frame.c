@@ -438,6 +438,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .chunks_culled = plan->chunks_culled,
                                          .chunks_clipped = plan->chunks_clipped,
                                          .chunks_cut = plan->chunks_cut,
+                                         .pixel_samples = 1,
                                          .ms = ms };
     shown->stats.plane_bytes = plane_total(frame);
     shown->stats.spacing_px = (float)plan->spacing_px;
@@ -514,6 +515,7 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
     frame->timing_count = 0;
     frame->shadow_maps = frame->shadow_size[0] = frame->shadow_size[1] = 0;
     frame->sampling[0] = frame->sampling[1] = 1;
+    pt_mean_destroy(frame);
     int error = scene->settings.pixel_samples > 1 ? pt_frame_sample(frame, scene) : pt_frame_draw(frame, scene);
     if (!error)
         frame->shown.stats.ms = pt_milliseconds() - start;
@@ -642,11 +644,12 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
 
 int pt_frame_dump(const struct patina_frame *frame, const char *folder)
 {
+    const int sampled = frame->sampling[0] * frame->sampling[1] > 1; // what lies between is of the last finer picture
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int level = 0; level < PT_SLOTS; level++) {
             const struct pt_buffer *plane = &frame->planes[p][level];
             char path[4096];
-            if (!plane->size)
+            if (!plane->size || (sampled && p != PT_PLANE_KEYS && p < PT_PLANE_COMBINED))
                 continue;
             void *copy = malloc(plane->size);
             if (!copy)
@@ -671,6 +674,7 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
 
 void pt_frame_release(struct patina_frame *frame)
 {
+    pt_mean_destroy(frame);
     destroy_planes(frame);
     pt_shadows_release(frame);
     pt_clip_buffers_release(frame->device, &frame->clips);

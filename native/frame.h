@@ -18,6 +18,7 @@ struct pt_layer {
 };
 
 struct pt_resident;
+struct pt_mean;
 
 // The clouds whose buffers a device holds for a frame.
 struct pt_residency {
@@ -51,6 +52,7 @@ struct patina_frame {
     _Atomic float progress;
     float progress_done, progress_share; // of the render: before the picture at hand, and by it
     uint32_t sampling[2];                // of the last picture: grid and shifts of its samples
+    struct pt_mean *mean;                // while samples of the last picture are pending
     struct pt_timing timings[PT_TIMINGS];
     uint32_t timing_count;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];

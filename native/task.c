@@ -24,6 +24,7 @@ struct patina_task {
     uint64_t *fingerprint;
     const patina_read *reads;
     uint32_t read_count;
+    double refine_ms;
     patina_cloud *painted; // the caller's
     patina_cloud *cloud;   // built, until it is taken
     char *path;            // its own copy
@@ -69,12 +70,24 @@ static int start(const struct patina_task *task, patina_task **out)
     return pt_fail(NULL, PATINA_ERROR_MEMORY, "a task: the system gives no thread");
 }
 
-static int render(struct patina_task *task)
+static int read_passes(struct patina_task *task)
 {
-    int code = patina_frame_render(task->frame, task->scene);
+    int code = PATINA_OK;
     for (uint32_t i = 0; i < task->read_count && !code; ++i)
         code = patina_frame_read(task->frame, task->reads[i].pass, task->reads[i].pixels, task->reads[i].size);
     return code;
+}
+
+static int render(struct patina_task *task)
+{
+    const int code = patina_frame_render(task->frame, task->scene);
+    return code ? code : read_passes(task);
+}
+
+static int refine(struct patina_task *task)
+{
+    const int code = patina_frame_refine(task->frame, task->scene, task->refine_ms);
+    return code ? code : read_passes(task);
 }
 
 static int build(struct patina_task *task) { return patina_cloud_create(&task->desc, task->progress, &task->cloud); }
@@ -102,6 +115,17 @@ int patina_task_render(patina_frame *frame, const patina_scene *scene, const pat
     if (count && !reads)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_render: reads is NULL");
     const struct patina_task task = { .work = render, .frame = frame, .scene = scene, .reads = reads, .read_count = count };
+    return start(&task, out);
+}
+
+int patina_task_refine(patina_frame *frame, const patina_scene *scene, double ms, const patina_read *reads, uint32_t count,
+                       patina_task **out)
+{
+    if (count && !reads)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_refine: reads is NULL");
+    const struct patina_task task = {
+        .work = refine, .frame = frame, .scene = scene, .refine_ms = ms, .reads = reads, .read_count = count
+    };
     return start(&task, out);
 }
 

@@ -162,7 +162,8 @@ class Settings(Descriptor):
                 ("shadow_samples", c_uint32), ("shadow_resolution", c_uint32), ("shadow_lazy", c_uint32),
                 ("shadow_progressive", c_uint32), ("shadow_error", c_float), ("own_background", c_uint32),
                 ("background", c_float * 3), ("surface", c_uint32), ("shadow_uncut", c_uint32), ("pixel_samples", c_uint32),
-                ("depth", c_uint32), ("world_directed", c_uint32), ("world_light", c_float * 27)]
+                ("depth", c_uint32), ("world_directed", c_uint32), ("world_light", c_float * 27),
+                ("pixel_progressive", c_uint32), ("pixel_noise", c_float)]
 
 
 class Effects(Descriptor):
@@ -192,7 +193,8 @@ class FrameStats(Descriptor):
                 ("expected", ExpectedError), ("shadow_bytes", c_uint64), ("shadow_maps", c_uint32),
                 ("shadow_width", c_uint32), ("shadow_height", c_uint32), ("shadow_pending", c_uint32),
                 ("shadow_samples", c_uint32), ("shadow_error", c_float), ("chunks_clipped", c_uint64),
-                ("chunks_cut", c_uint64)]
+                ("chunks_cut", c_uint64), ("pixel_samples", c_uint32), ("pixel_pending", c_uint32),
+                ("pixel_error", c_float)]
 
 
 class Panorama(Descriptor):
@@ -264,6 +266,7 @@ CALLS = {
     "patina_frame_create": (c_void_p, POINTER(c_void_p)),
     "patina_frame_destroy": (c_void_p,),
     "patina_frame_render": (c_void_p, c_void_p),
+    "patina_frame_refine": (c_void_p, c_void_p, c_double),
     "patina_frame_cancel": (c_void_p,),
     "patina_frame_progress": (c_void_p,),
     "patina_frame_read": (c_void_p, c_uint32, c_void_p, c_size_t),
@@ -281,6 +284,7 @@ CALLS = {
     "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
     "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, POINTER(Read), c_uint32, POINTER(c_void_p)),
+    "patina_task_refine": (c_void_p, c_void_p, c_double, POINTER(Read), c_uint32, POINTER(c_void_p)),
     "patina_task_build": (POINTER(CloudDesc), c_void_p, POINTER(c_void_p)),
     "patina_task_set_colors": (c_void_p, POINTER(Array), POINTER(c_void_p)),
     "patina_task_analyse": (c_void_p, POINTER(AnalysisDesc), c_void_p, POINTER(c_void_p)),

@@ -376,6 +376,9 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: no such depth");
     if (s.pixel_samples > 4096)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u samples a pixel; the most is 4096", s.pixel_samples);
+    if (!(s.pixel_noise >= 0.0f) || !isfinite(s.pixel_noise) || s.pixel_progressive > 1)
+        return fail(scene, "settings: pixel_noise is negative or not finite, or pixel_progressive not 0 or 1");
+    s.pixel_samples = s.pixel_samples ? s.pixel_samples : s.pixel_noise > 0.0f ? 256 : 1;
     s.shadow_samples = s.shadow_samples ? s.shadow_samples : s.shadow_error > 0.0f ? 256 : 1;
     s.shadow_resolution = s.shadow_resolution ? s.shadow_resolution : 4096;
     if (!s.passes)

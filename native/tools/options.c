@@ -255,6 +255,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_count(value, 1, 4096, &s->shadow_samples);
     else if (!strcmp(name, "--pixel-samples"))
         bad = parse_count(value, 1, 4096, &s->pixel_samples);
+    else if (!strcmp(name, "--noise"))
+        bad = parse_error(value, &s->pixel_noise);
     else if (!strcmp(name, "--depth"))
         bad = parse_word(value, "point|surface", &s->depth);
     else if (!strcmp(name, "--shadow-error"))

@@ -204,5 +204,6 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     else
         printf("null"); // not known
     printf(", \"analysis_ms\": %.1f", analysis_ms);
-    printf(", \"shadow_samples\": %u, \"shadow_error\": %.6f}\n", stats->shadow_samples, (double)stats->shadow_error);
+    printf(", \"shadow_samples\": %u, \"shadow_error\": %.6f", stats->shadow_samples, (double)stats->shadow_error);
+    printf(", \"pixel_samples\": %u, \"pixel_error\": %.6f}\n", stats->pixel_samples, (double)stats->pixel_error);
 }

@@ -282,6 +282,24 @@ def test_pixel_samples():
         assert run("render", "soft.ply", "-o", "no.png", "--pixel-samples", bad, code=2)
 
 
+def test_noise():
+    """Samples end where the picture is as good as was asked for; the planes beside it are of one sample."""
+    ball("noisy.ply")
+    (FOLDER / "noisy").mkdir()
+    taken = []
+    for noise, *most in (("0.03",), ("0.01",), ("0.001", "--pixel-samples", "36")):
+        told = json.loads(run("render", "noisy.ply", "-o", "noisy.png", "--size", "64x64", "--transparent", "--noise", noise, *most,
+                              "--dump-planes", "noisy", "--stats", "json").stdout)
+        assert 0 < told["pixel_error"] <= float(noise) or told["pixel_samples"] == 36, told
+        taken.append(told["pixel_samples"])
+    assert 4 <= taken[0] < taken[1] <= 256 and taken[2] == 36, taken
+    files = {path.name: path.stat().st_size for path in (FOLDER / "noisy").iterdir()}
+    assert files["DEPTH_0.raw"] == 64 * 64 * 4 and "KEYS_0.raw" in files, files
+    assert "FROM_0.raw" not in files, files  # it would be of the last of the finer pictures
+    for bad in ("0", "1.5", "x"):
+        assert run("render", "noisy.ply", "-o", "no.png", "--noise", bad, code=2)
+
+
 def test_default_picture():
     ball("default.ply")
     assert "default.png" in run("render", "default.ply", "-o", "default.png").stderr

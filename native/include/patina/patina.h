@@ -518,14 +518,19 @@ typedef struct patina_settings {
     float background[3];       // linear, with own_background; not where the film is transparent
     uint32_t surface;            // patina_surface
     uint32_t shadow_uncut;       // 1 = what clips cut away still casts shadows
-    uint32_t pixel_samples;      // of a final picture, 1..4096; 0 = 1: the colour is the mean of about so many samples a pixel, of
-                                 // finer pixels where that is truer, shifted pictures for the rest, each smoothed and anti-aliased
-                                 // as is set (truest with antialias on). Other passes and keys are those of one sample. More than
-                                 // one: whole shadow textures, in spite of shadow_lazy and _progressive
+    uint32_t pixel_samples;      // of a picture at rest, 1..4096; 0 = 1, with pixel_noise at most so many, 0 = 256: the colour is
+                                 // the mean of about so many samples a pixel, of finer pixels where that is truer, shifted
+                                 // pictures for the rest, each smoothed and anti-aliased as is set (truest with antialias on). Other
+                                 // passes and keys are those of one sample. More than one: whole shadow textures, in spite of
+                                 // shadow_lazy, and of shadow_progressive without pixel_progressive
     uint32_t depth;              // patina_depth
     uint32_t world_directed;     // 1 = ambient light differs by direction: world_light, not world_color, which stays the background
     float world_light[3][9];     // with world_directed, of red, green, blue: the irradiance over pi of a surface with the normal n
                                  // (unit, world) as weights of 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1; below 0 it counts as 0
+    uint32_t pixel_progressive;  // 1 = patina_frame_render makes the picture of one sample, and each patina_frame_refine betters
+                                 // it. What comes in the end is the same to the bit
+    float pixel_noise;           // > 0: samples end once stats.pixel_error is at most this; of a region by its own pixels. Asked at
+                                 // certain numbers of samples, which neither threads nor steps change. 0 = pixel_samples as set
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -665,6 +670,10 @@ typedef struct patina_frame_stats {
     float shadow_error;         // the largest of the lights' expected errors, with settings.shadow_error
     uint64_t chunks_clipped;    // of the culled: those that clips and hidden classes took whole
     uint64_t chunks_cut;        // in view, whose points were tested one by one
+    uint32_t pixel_samples;     // whose mean every pixel is at least; 1: of the picture without samples
+    uint32_t pixel_pending;     // progressive: samples a pixel that patina_frame_refine takes yet, at most
+    float pixel_error;          // expected standard error of the mean, shares of white in levels as sRGB's, root mean square over
+                                // the pixels whose samples differ; 0 = not known: fewer than two shifted pictures
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
@@ -673,7 +682,13 @@ PATINA_API int patina_frame_create(patina_device *device, patina_frame **out);
 PATINA_API void patina_frame_destroy(patina_frame *frame);
 // Renders; blocks. On any error the last good picture stays readable.
 PATINA_API int patina_frame_render(patina_frame *frame, const patina_scene *scene);
-PATINA_API void patina_frame_cancel(patina_frame *frame); // the running (or else the next) render stops soon
+// Betters the picture that patina_frame_render made with settings.pixel_progressive, by a step: with shadow_progressive the next
+// sample of soft shadows, then samples of pixels: a shifted or finer picture, or some of its rows, and further ones until ms
+// have passed. For as long as stats.pixel_pending says so; else PATINA_ERROR_EMPTY. The scene must be as it was: what has changed
+// since would be mixed in (PATINA_ERROR_ARGUMENT where size, region or samples have). Blocks. On any error, and when it is
+// cancelled, what was reached stays readable, and patina_frame_refine may go on; another patina_frame_render ends it.
+PATINA_API int patina_frame_refine(patina_frame *frame, const patina_scene *scene, double ms);
+PATINA_API void patina_frame_cancel(patina_frame *frame); // the running (or else the next) render or refinement stops soon
 PATINA_API float patina_frame_progress(const patina_frame *frame); // 0..1
 // Copies a pass, width * height * channels float32, into the caller's buffer; size in bytes must fit exactly.
 PATINA_API int patina_frame_read(const patina_frame *frame, uint32_t pass, float *pixels, size_t size);
@@ -757,6 +772,9 @@ typedef struct patina_read {
 
 // patina_frame_render, then patina_frame_read of each of `count` reads, which must stay like other arrays; 0: none.
 PATINA_API int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
+                                  patina_task **out);
+// The same of patina_frame_refine.
+PATINA_API int patina_task_refine(patina_frame *frame, const patina_scene *scene, double ms, const patina_read *reads, uint32_t count,
                                   patina_task **out);
 PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress,
                                  patina_task **out); // patina_cloud_create
