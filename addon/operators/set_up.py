@@ -53,7 +53,7 @@ def _reaches(lamp: Object, obj: Object) -> bool:
 
 
 class PATINA_OT_set_up(Operator):
-    """Render with Patina: leaves out the start scene's cube, aims the camera at the points, and where they have no colors and \
+    """Render with Patina: leaves out the start scene's cube, aims the camera at the points and looks through it, and where they have no colors and \
 no light reaches them, turns on the headlight"""
 
     bl_idname = "scene.patina_set_up"
@@ -75,10 +75,20 @@ no light reaches them, turns on the headlight"""
             obj.select_set(obj in points)
         if bpy.ops.object.patina_frame_points.poll():
             bpy.ops.object.patina_frame_points()
+            _look_through_camera(context)
         if unlit(scene, points):
             scene.patina.studio.use_headlight = True
             self.report({'INFO'}, "No light reaches the points: the headlight shines from the camera")
         return {'FINISHED'}
+
+
+def _look_through_camera(context: Context) -> None:
+    """In the largest 3D view of the window, as 0 on the number pad does: the points may lie far from where it looks."""
+    views = [area for area in context.window.screen.areas if area.type == 'VIEW_3D'] if context.window else []
+    if views:
+        space = max(views, key=lambda area: area.width * area.height).spaces[0]
+        if space.region_3d:
+            space.region_3d.view_perspective = 'CAMERA'
 
 
 def offer(context: Context) -> None:

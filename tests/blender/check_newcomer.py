@@ -36,6 +36,7 @@ def test_set_up_is_offered_after_the_first_import():
         screenshot("path_0_offered")
         check(in_view(bpy.ops.scene.patina_set_up) == {'FINISHED'}, "set up")
         check(bpy.context.scene.render.engine == 'PATINA' and "Cube" not in bpy.data.objects, "engine and cube")
+        check(area().spaces[0].region_3d.view_perspective == 'CAMERA', "the view looks through the camera that was aimed")
         invoke_import(path)
         yield lambda: "offered.001" in bpy.data.objects
         check(len(offers) == 1, f"{len(offers)} offers")
