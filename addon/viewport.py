@@ -29,6 +29,7 @@ from .sync.kept import CHECKS
 
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
+HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that overlays' depth is nearer than the surface: Blender's dots of vertices are hidden, or not
 REST = 0.12  # seconds without motion after which the whole picture is drawn
 
 
@@ -232,7 +233,8 @@ class Viewport:
             gpu.state.color_mask_set(False, False, False, False)
             gpu.state.depth_test_set('LESS_EQUAL')
             gpu.state.depth_mask_set(True)
-            _fill_rectangle(corners, 'DEPTH', depth, cover=4.0 * shown.pixel, projection=(
+            cover = SHOWN if _selects_vertices(context) else HIDDEN
+            _fill_rectangle(corners, 'DEPTH', depth, cover=cover * shown.pixel, projection=(
                 projection[2][2], projection[2][3], near, camera.orthographic))
             gpu.state.color_mask_set(True, True, True, True)
             gpu.state.depth_test_set('NONE')
@@ -384,9 +386,10 @@ _compiled: dict[str, gpu.types.GPUShader] = {}  # by what they draw
 
 
 def of_area(area: bpy.types.Area) -> Viewport | None:
-    """The viewport that draws in an area, for its statistics."""
+    """The viewport that draws in an area, for its statistics; of a quad view's, and of what was there before, one that shows a picture."""
     place = area.as_pointer() if area else 0
-    return next((viewport for viewport in _VIEWPORTS if viewport.area == place and viewport.engine()), None)
+    found = [viewport for viewport in _VIEWPORTS if viewport.area == place and viewport.engine()]
+    return next((viewport for viewport in found if viewport.shown), found[0] if found else None)
 
 
 def forget_points() -> None:
@@ -458,6 +461,11 @@ def _texture(pixels: np.ndarray, kind: str) -> gpu.types.GPUTexture:
     return gpu.types.GPUTexture((width, height), format=kind, data=gpu.types.Buffer('FLOAT', flat.size, flat))
 
 
+def _selects_vertices(context: bpy.types.Context) -> bool:
+    """Whether vertices are selected in Edit Mode: then it has to be seen which, though the others' dots cover the picture."""
+    return context.mode == 'EDIT_MESH' and any(obj.data.total_vert_sel for obj in context.objects_in_mode)
+
+
 def _covering(depth: np.ndarray) -> np.ndarray:
     """The nearest of 5 x 5 pixels, for all pixels. Here and not in the shader: a GPU in software takes ten times as long."""
     height, width = depth.shape[:2]
@@ -512,8 +520,9 @@ def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTextu
                     **uniforms: float | tuple[float, ...]) -> None:
     """Draws a texture over x0, y0, x1, y1 of -1..1. kind: EXACT, texel by texel; SMOOTH, between them; DEPTH, linear z as
     depths of Blender's projection, uniforms of which are its third row, the near plane and whether it is orthographic.
-    Overlays hide behind a depth two pixels wider than the surface and four pixels' width (cover) nearer: Blender draws the
-    vertices of our points as dots over every engine's picture, and these lie just behind it."""
+    Overlays hide behind a depth two pixels wider than the surface and `cover` nearer: Blender draws the vertices of our points as dots
+    over every engine's picture, and these lie just behind it. Where vertices are selected in Edit Mode it is farther, and hides
+    those of the other side."""
     shader = _shader(kind)
     x0, y0, x1, y1 = corners
     batch = batch_for_shader(shader, 'TRI_STRIP', {"pos": ((x0, y0), (x1, y0), (x0, y1), (x1, y1)),

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import bpy
 from harness import SCRATCH, add_light, add_points, check, sphere
-from window import area, settled, setup
+from window import area, settled, setup, window_region
 
 from check_panels import Drawing, Row, context_of, panels
+from patina import viewport
 from patina.sync.analysis import SCANNERS
 from patina.ui import rows
 
@@ -169,3 +170,27 @@ def test_texts_are_broken_where_they_must():
     said = [text for kind, _, _, text in layout.drawn if kind == "label" and text]
     check(said[:3] == ["Time", "3 ms", "Expected Error"] and " ".join(said[3:]) == "37.22% of white, up to 60%", f"{said}")
     yield None
+
+
+def test_statistics_of_a_quad_view():
+    """They are figures, not the advice to switch to what is on."""
+    setup()
+    add_points(*sphere(2000, 1.0, (0, 0, 0)))
+    yield lambda: settled(2000)
+
+    def quad():
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=window_region()):
+            bpy.ops.screen.region_quadview()
+
+    quad()
+    try:
+        yield lambda: sum(found.engine() is not None and found.shown is not None for found in viewport._VIEWPORTS) >= 4
+        layout, context = Row(), context_of()
+        context.area = area()
+        bpy.types.PATINA_PT_statistics.draw(Drawing(bpy.types.PATINA_PT_statistics, layout), context)
+        said = [text for _, _, _, text in layout.drawn]
+        check("2,000" in said, f"{said}")
+    finally:
+        quad()
+    yield lambda: settled(2000)

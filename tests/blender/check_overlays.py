@@ -148,3 +148,30 @@ def test_points_hide_their_dots():
             wrong.append(f"{name}: {counts}")
     check(not wrong, f"{len(wrong)} of {len(steps)} changes show dark pixels: {'; '.join(wrong)}")
     view().view_perspective = 'PERSP'
+
+
+def orange_pixels():
+    """Of the screen: what Blender draws selected vertices with."""
+    red, green, blue = np.moveaxis(screen.pixels().astype(np.int16), 2, 0)
+    return int(((red > 220) & (green > 80) & (green < 160) & (blue < 60)).sum())
+
+
+def test_edit_mode_shows_what_is_selected():
+    """In Rendered shading too, on the side that is seen; with nothing selected, and outside of Edit Mode, the dots are hidden again."""
+    _, points = bright_scene()
+    bpy.context.view_layer.objects.active = points
+    yield at_rest()
+    counts = []
+    for action in ('SELECT', 'DESELECT'):
+        do(bpy.ops.object.mode_set, mode='EDIT')
+        do(bpy.ops.mesh.select_all, action=action)
+        area().tag_redraw()
+        yield at_rest()
+        counts.append((orange_pixels(), dark_pixels()))
+        do(bpy.ops.object.mode_set, mode='OBJECT')
+        points.select_set(False)
+        area().tag_redraw()
+        yield at_rest()
+    check(counts[0][0] > 20000 and counts[1][0] < 2000, f"selected and not: {counts} orange and dark pixels")
+    check(counts[1][1] < LETTERS, f"nothing is selected: {counts[1][1]} dark pixels")
+    check(dark_pixels() < LETTERS, f"{dark_pixels()} dark pixels after Edit Mode")
