@@ -41,12 +41,24 @@ draws them, and the compositor takes what is nearer. That scene follows this one
         except TypeError:
             self.report({'ERROR'}, f"Patina: this Blender has no {self.engine}: its add-on is switched off")
             return {'CANCELLED'}
+        if self.engine == 'CYCLES' and scene.cycles.use_denoising and not _denoises():
+            scene.cycles.use_denoising = False  # else F12 ends with an error and no picture
+            self.report({'WARNING'}, "Denoise is off now: this Blender's Cycles was built without it")
         points = _points_scene(scene)
         for one in (scene, points):
             one.view_layers[layer].use_pass_z = True
         _link_nodes(scene, points, layer)
         self.report({'INFO'}, f"F12 renders '{scene.name}' with points now; Patina's settings are in scene '{points.name}'")
         return {'FINISHED'}
+
+
+def _denoises() -> bool:
+    """Whether Cycles was built with its denoiser: Debian's was not, though its new scenes ask for it."""
+    try:
+        import _cycles
+    except ImportError:
+        return True
+    return getattr(_cycles, "with_openimagedenoise", True)
 
 
 class PATINA_OT_other_scene(Operator):
