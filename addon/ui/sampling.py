@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import Context, Panel
 
+from . import rows
 from .panels import PatinaPanel
 
 
@@ -20,7 +21,7 @@ class PATINA_PT_sampling(PatinaPanel, Panel):
         for title, prefix in (("Viewport", "viewport_"), ("Render", "")):
             column = self.layout.column(align=True)
             column.label(text=title)
-            column.prop(patina, f"{prefix}noise", text="Noise Threshold")
+            rows.automatic(column, patina, f"{prefix}noise", "Noise Threshold", "All Samples")
             column.prop(patina, f"{prefix}samples", text="Most Samples" if getattr(patina, f"{prefix}noise") else "Samples")
 
 
