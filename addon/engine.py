@@ -75,42 +75,52 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     def _render_eye(self, depsgraph: bpy.types.Depsgraph, eye: str) -> None:
         """One picture, the mean of its moments where motion is blurred."""
         frame, moments = depsgraph.scene_eval.frame_current_final, motion.moments(depsgraph.scene_eval)
-        color, ms, told = 0.0, 0.0, set()
-        try:
-            for self._moment, moment in enumerate(moments):
-                self._moments = len(moments)
+        done, color, ms, told = 0, 0.0, 0.0, set()
+        data: tuple[sync.SceneDescription, render.Picture] | None = None
+        with passes.Shown(self, depsgraph.view_layer_eval, eye) as shown:
+            show = None if bpy.app.background else shown.put
+            try:
+                for self._moment, moment in enumerate(moments):
+                    self._moments = len(moments)
+                    if len(moments) > 1:
+                        self._go_to(frame + moment.offset)
+                    try:
+                        description, picture = self._render_moment(depsgraph, eye, moment, math.floor(frame), told,
+                                                                   None if done else show)
+                    except native.PatinaCancelled:
+                        if not done:
+                            raise
+                        break  # those that there are stay
+                    done, color, ms = done + 1, color + picture.planes["COMBINED"], ms + picture.stats["ms"]
+                    if moment.gives_data or not data:
+                        data = description, picture
+                    if show and 1 < done < len(moments):
+                        show(description, {"COMBINED": color / np.float32(done)})
+            finally:
                 if len(moments) > 1:
-                    self._go_to(frame + moment.offset)
-                description, picture = self._render_moment(depsgraph, eye, moment, math.floor(frame), told)
-                color, ms = color + picture.planes["COMBINED"], ms + picture.stats["ms"]
-                if moment.gives_data:
-                    data = description, picture
-        finally:
-            if len(moments) > 1:
-                self._go_to(frame)
+                    self._go_to(frame)
         description, picture = data
-        picture.planes["COMBINED"] = color / np.float32(len(moments)) if len(moments) > 1 else color
+        picture.planes["COMBINED"] = color / np.float32(done) if done > 1 else color
         passes.write(self, depsgraph.view_layer_eval, description, picture.planes, eye)
-        layers = picture.stats["layers"]
-        self._status(f"{picture.stats['points']:,} points, {ms:.1f} ms, {picture.device}" +
-                     (f", {layers} layers" if layers > 1 else ""), 1.0)
+        self._status(_summary(picture, ms, done < len(moments)), 1.0)
 
-    def _render_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment, frame: int,
-                       told: set[str]) -> tuple[sync.SceneDescription, render.Picture]:
-        """The scene as it stands now. told: notices so far, each is reported once."""
-        description, picture = self._draw_moment(depsgraph, eye, moment, frame)
-        damaged = CHECKS.finish(self._stopped)  # beside the picture, as a rule
+    def _render_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment, frame: int, told: set[str],
+                       show: Callable[..., None] | None) -> tuple[sync.SceneDescription, render.Picture]:
+        """The scene as it stands now. told: notices so far, each is reported once; show: as passes.Shown.put, if anybody looks."""
+        description, picture = self._draw_moment(depsgraph, eye, moment, frame, show)
+        # beside the picture, as a rule; where it was cut off nobody waits
+        damaged = [] if picture.stats.get("pixel_pending") else CHECKS.finish(self._stopped)
         if damaged:
             sync.clouds.CACHE.drop(damaged)
-            description, picture = self._draw_moment(depsgraph, eye, moment, frame)
+            description, picture = self._draw_moment(depsgraph, eye, moment, frame, show)
         for notice in filter(None, (*description.notices, picture.notice)):
             if notice not in told:
                 self._tell('WARNING', notice)
                 told.add(notice)
         return description, picture
 
-    def _draw_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment,
-                     frame: int) -> tuple[sync.SceneDescription, render.Picture]:
+    def _draw_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment, frame: int,
+                     show: Callable[..., None] | None) -> tuple[sync.SceneDescription, render.Picture]:
         camera, place = self.camera_override or depsgraph.scene_eval.camera, None
         if eye and camera:
             self.active_view_set(eye)
@@ -119,10 +129,12 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         description = sync.describe(depsgraph, view, self._poll_reading, frame)
         losses.check(description.notices)
         description = render.shifted(description, moment.shift)
-        description = replace(description, settings=replace(description.settings, pixel_samples=moment.samples))
+        description = replace(description, settings=replace(description.settings, pixel_samples=moment.samples,
+                                                            pixel_noise=sync.settings.noise(depsgraph.scene_eval)))
         self._status("Rendering", BUILDING)
         return description, render.draw(description, {item.plane for item in passes.enabled(depsgraph.view_layer_eval)},
-                                        self._poll_drawing, depsgraph.scene_eval.patina.tile_size)
+                                        self._poll_drawing, depsgraph.scene_eval.patina.tile_size,
+                                        show and (lambda planes: show(description, planes)))
 
     def _go_to(self, frame: float) -> None:
         self.frame_set(math.floor(frame), frame - math.floor(frame))
@@ -153,6 +165,18 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         self._tell('ERROR', text)
         if bpy.app.version < (4, 5, 0):  # later ones report it once more
             self.error_set(told(f"Patina: {text}"))
+
+
+def _summary(picture: render.Picture, ms: float, stopped: bool) -> str:
+    """The line above a final picture."""
+    stats, parts = picture.stats, []
+    if stats["layers"] > 1:
+        parts.append(f"{stats['layers']} layers")
+    if stats.get("pixel_samples", 1) > 1:
+        parts.append(f"{stats['pixel_samples']} samples")
+    if stopped or stats.get("pixel_pending"):
+        parts.append("stopped")
+    return ", ".join([f"{stats['points']:,} points, {ms:.1f} ms, {picture.device}", *parts])
 
 
 def _text(error: Exception) -> str:

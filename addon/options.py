@@ -2,7 +2,7 @@
 """What a command line sets for one run:
 
     blender -b scene.blend -E PATINA -a -- --patina-device cpu --patina-threads 4 --patina-quality paper --patina-samples 8 \
-        --patina-strict
+        --patina-noise 0.01 --patina-strict
 
 --patina-strict: a frame that lacks what it was to show (a file that is missing or cannot be read, any points at all) fails, where
 it else is rendered without and warns. Words of other add-ons behind the `--` are left alone.
@@ -21,11 +21,11 @@ SWITCHES = {"strict"}  # without a value
 _PREFIX = "--patina-"
 
 
-def read(arguments: Sequence[str] | None = None) -> dict[str, str | int]:
+def read(arguments: Sequence[str] | None = None) -> dict[str, str | int | float]:
     """Scene properties by name that the command line overrides. PatinaError for what it misspells."""
     words = list(sys.argv if arguments is None else arguments)
     words = words[words.index("--") + 1:] if "--" in words else []
-    found: dict[str, str | int] = {}
+    found: dict[str, str | int | float] = {}
     for index, word in enumerate(words):
         if word.startswith(_PREFIX):
             name, sign, value = word[len(_PREFIX):].partition("=")
@@ -35,7 +35,7 @@ def read(arguments: Sequence[str] | None = None) -> dict[str, str | int]:
     return found
 
 
-def _value(name: str, value: str) -> str | int:
+def _value(name: str, value: str) -> str | int | float:
     if name in SWITCHES:
         if value:
             raise PatinaError(f"{_PREFIX}{name} '{value}': it takes no value", -1)
@@ -45,8 +45,16 @@ def _value(name: str, value: str) -> str | int:
         if value not in choices:
             raise PatinaError(f"{_PREFIX}{name} '{value}': one of {', '.join(choices)} was expected", -1)
         return choices[value]
+    if name == "noise":
+        try:
+            noise = float(value)
+        except ValueError:
+            noise = -1.0
+        if not 0.0 <= noise <= 1.0:
+            raise PatinaError(f"{_PREFIX}{name} '{value}': a number from 0 to 1 was expected", -1)
+        return noise
     if name in {"threads", "samples"}:
         if not value.isdigit() or int(value) > 1024:
             raise PatinaError(f"{_PREFIX}{name} '{value}': a number up to 1024 was expected", -1)
         return int(value)
-    raise PatinaError(f"there is no option {_PREFIX}{name}: only device, threads, quality, samples and strict", -1)
+    raise PatinaError(f"there is no option {_PREFIX}{name}: only device, threads, quality, samples, noise and strict", -1)

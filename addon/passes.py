@@ -144,28 +144,56 @@ def register(engine: bpy.types.RenderEngine, scene: bpy.types.Scene, layer: bpy.
         engine.register_pass(scene, layer, item.name, item.channels, item.channel_ids, item.kind)
 
 
+class Shown:
+    """A picture on its way into Blender, of one view layer and eye (the name of a stereo view): what there is of it may be shown
+    before it is finished. Its size is that of a whole picture; a render border counts as one."""
+
+    def __init__(self, engine: bpy.types.RenderEngine, layer: bpy.types.ViewLayer, eye: str = "") -> None:
+        self._engine, self._layer, self._eye = engine, layer, eye
+        self._result: bpy.types.RenderResult | None = None
+        self._items = enabled(layer)
+
+    def __enter__(self) -> Shown:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Blender keeps what was put."""
+        if self._result is not None:
+            self._engine.end_result(self._result)
+            self._result = None
+
+    def put(self, scene: SceneDescription, planes: dict[str, np.ndarray], show: bool = True) -> None:
+        """Planes of the picture, at first all of them and later those that changed. show: at once."""
+        height, width = planes["COMBINED"].shape[:2]
+        if self._result is None and not self._begin(width, height):
+            return
+        for item in self._items:
+            if item.plane in planes:
+                pixels = np.ascontiguousarray(item.convert(planes[item.plane], scene), np.float32)
+                for target in self._result.layers[0].passes:
+                    if target.name == item.name:
+                        _set_pixels(target, pixels)
+        if show:
+            self._engine.update_result(self._result)
+
+    def _begin(self, width: int, height: int) -> bool:
+        for item in self._items:
+            if item.name != "Combined":
+                self._engine.add_pass(item.name, item.channels, item.channel_ids, layer=self._layer.name)
+        self._result = self._engine.begin_result(0, 0, width, height, layer=self._layer.name, view=self._eye)
+        if self._result is None:
+            return False
+        if (self._result.resolution_x, self._result.resolution_y) != (width, height):
+            raise RuntimeError(f"Blender asks for {self._result.resolution_x} x {self._result.resolution_y} pixels, "
+                               f"{width} x {height} were rendered")
+        return True
+
+
 def write(engine: bpy.types.RenderEngine, layer: bpy.types.ViewLayer, scene: SceneDescription,
           planes: dict[str, np.ndarray], eye: str = "") -> None:
-    """Hands the planes of a whole picture (a render border counts as one) to Blender. eye: the name of a stereo view."""
-    height, width = planes["COMBINED"].shape[:2]
-    items = enabled(layer)
-    for item in items:
-        if item.name != "Combined":
-            engine.add_pass(item.name, item.channels, item.channel_ids, layer=layer.name)
-    result = engine.begin_result(0, 0, width, height, layer=layer.name, view=eye)
-    if result is None:
-        return
-    try:
-        if (result.resolution_x, result.resolution_y) != (width, height):
-            raise RuntimeError(f"Blender asks for {result.resolution_x} x {result.resolution_y} pixels, "
-                               f"{width} x {height} were rendered")
-        for item in items:
-            pixels = np.ascontiguousarray(item.convert(planes[item.plane], scene), np.float32)
-            for target in result.layers[0].passes:
-                if target.name == item.name:
-                    _set_pixels(target, pixels)
-    finally:
-        engine.end_result(result)
+    """Hands the planes of a finished picture to Blender."""
+    with Shown(engine, layer, eye) as shown:
+        shown.put(scene, planes, show=False)
 
 
 def _set_pixels(target: bpy.types.RenderPass, pixels: np.ndarray) -> None:

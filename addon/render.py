@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -22,10 +24,17 @@ PIXEL_BYTES = 130
 LARGE_PICTURE = 1 << 24  # pixels
 LEAST_TILE, TILE_STEP = 512, 256  # pixels a side
 
+# Pictures of several samples: milliseconds of them between two looks at whether somebody wants to see the picture; seconds between
+# two that are shown, and how many times as long they last at least as showing one took.
+STEP, SHOWN_EVERY, SHOWN_SHARE = 100.0, 0.25, 10.0
+
+Planes = dict[str, np.ndarray]  # (height, width, channels) by plane name, row 0 at the bottom
+Show = Callable[[Planes], None]
+
 
 @dataclass(frozen=True)
 class Picture:
-    planes: dict[str, np.ndarray]  # (height, width, channels) by plane name, row 0 at the bottom
+    planes: Planes
     stats: dict[str, Any]
     device: str
     notice: str = ""  # what the artist should know about how it came to be
@@ -52,32 +61,43 @@ def forget_device() -> None:
 
 
 def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool],
-         tile_size: int = 0) -> Picture:
-    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel."""
+         tile_size: int = 0, show: Show | None = None) -> Picture:
+    """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel. show: is given what there is
+    of a picture of several samples, on this thread too, all planes first and then those that changed. Cancelled once it is
+    there, such a picture keeps the samples that it has: its stats tell how many are pending."""
+    wanted = list(planes)
     behind = backdrop.pixels(description, lambda: poll(0.0)) if description.behind else None
-    if not mattes.are_needed(description):
-        picture = _draw(description, planes, poll, tile_size)
-        if behind is None:
-            return picture
-        return replace(picture, planes=picture.planes | {"COMBINED": backdrop.over(picture.planes["COMBINED"], behind)})
-    others = mattes.needed(description)
-    count = 1 + len(others)
+    if mattes.are_needed(description):
+        parts = [(mattes.picture(description), wanted), *((other, ["COMBINED"]) for other in mattes.needed(description))]
+    else:
+        parts = [(description, wanted)]
+
+    def finish(found: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+        color, *others = (planes["COMBINED"] for planes in found)
+        if others:
+            color = mattes.finish(color, description, others, behind)
+        elif behind is not None:
+            color = backdrop.over(color, behind)
+        return found[0] | {"COMBINED": color}
+
+    budget = memory.for_planes()
+    whole = len(tiles(description.settings.region, tile_size, budget // len(parts) if budget else budget)) == 1
+    if whole and not description.panorama and description.settings.pixel_samples != 1:
+        return _on_device(description.device, poll, lambda device: _draw_samples(device, parts, finish, poll, show))
 
     def part(number: int) -> Callable[[float], bool]:
-        return lambda progress: poll((number + progress) / count)
+        return lambda progress: poll((number + progress) / len(parts))
 
-    picture = _draw(mattes.picture(description), planes, part(0), tile_size)
-    found = [_draw(other, ["COMBINED"], part(number), tile_size).planes["COMBINED"] for number, other in enumerate(others, 1)]
-    return replace(picture, planes=picture.planes | {
-        "COMBINED": mattes.finish(picture.planes["COMBINED"], description, found, behind)})
+    pictures = [_on_device(item.device, part(number), lambda device, item=item, names=names, number=number: _draw_on(
+        device, item, names, part(number), tile_size)) for number, (item, names) in enumerate(parts)]
+    return replace(pictures[0], planes=finish([picture.planes for picture in pictures]))
 
 
-def _draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool], tile_size: int) -> Picture:
+def _on_device(choice: DeviceChoice, poll: Callable[[float], bool], draw_on: Callable[[native.Device], Picture]) -> Picture:
     """Where the GPU fails in the middle of it (lost context, memory, a broken driver) the CPU draws the picture."""
-    wanted = list(planes)
-    device = _open(description.device, poll)
+    device = _open(choice, poll)
     try:
-        return _draw_on(device, description, wanted, poll, tile_size)
+        return draw_on(device)
     except native.PatinaCancelled:
         raise
     except native.PatinaError as error:
@@ -85,9 +105,87 @@ def _draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[
             raise
         reason = str(error)  # the error itself would keep the whole picture alive
     forget_device()
-    picture = _draw_on(_open(replace(description.device, name="cpu"), poll), description, wanted, poll, tile_size)
+    picture = draw_on(_open(replace(choice, name="cpu"), poll))
     notice = f"{device.label} failed, the processor drew this picture: {reason}"
     return replace(picture, notice=f"{notice}; {picture.notice}" if picture.notice else notice)
+
+
+class _News:
+    """What there is of a picture, from the worker that makes it to the thread that shows it."""
+
+    def __init__(self, show: Show | None) -> None:
+        self._show = show
+        self._planes: Planes | None = None
+        self._next = 0.0  # when somebody wants to see more
+
+    def wanted(self) -> bool:
+        """The worker asks."""
+        return self._show is not None and self._planes is None and time.monotonic() >= self._next
+
+    def bring(self, planes: Planes) -> None:
+        """The worker's; afterwards it does not write into them."""
+        self._planes = planes
+
+    def show(self) -> None:
+        """The other thread's, over and over."""
+        if self._planes is None or self._show is None:
+            return
+        start = time.monotonic()
+        self._show(self._planes)
+        now = time.monotonic()
+        self._next = now + max(SHOWN_EVERY, SHOWN_SHARE * (now - start))
+        self._planes = None
+
+
+def _draw_samples(device: native.Device, parts: list[tuple[SceneDescription, list[str]]],
+                  finish: Callable[[list[Planes]], Planes], poll: Callable[[float], bool], show: Show | None) -> Picture:
+    """A picture of several samples, out of parts with the planes that each gives: the first sample of all of them, then the others
+    by and by."""
+    news, notice = _News(show), ""
+    found: list[Planes] = []
+    with ExitStack() as stack:  # frames are made and closed on this thread, so that poll never meets a dead handle
+        frames = [stack.enter_context(native.Frame(device)) for _ in parts]
+
+        def better(scenes: list[native.Scene]) -> None:
+            while any(pending := [frame.stats()["pixel_pending"] for frame in frames]):
+                for number, (frame, scene) in enumerate(zip(frames, scenes, strict=True)):
+                    if pending[number]:
+                        frame.refine(scene, STEP / len(frames))
+                if news.wanted():
+                    read()
+                    news.bring({"COMBINED": finish(found)["COMBINED"]})
+
+        def read() -> None:
+            for number, frame in enumerate(frames):
+                found[number] = found[number] | {"COMBINED": frame.read("COMBINED")}
+
+        def work() -> None:
+            nonlocal notice
+            notice = _load_shadows(frames[0], parts[0][0])
+            with ExitStack() as open_scenes:
+                scenes = [open_scenes.enter_context(native.Scene()) for _ in parts]
+                for frame, scene, (description, wanted) in zip(frames, scenes, parts, strict=True):
+                    describe(scene, replace(description, settings=replace(description.settings, pixel_progressive=1)), wanted)
+                    frame.render(scene)
+                    found.append({name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted})
+                if show:
+                    news.bring(finish(found))
+                try:
+                    better(scenes)
+                except native.PatinaCancelled:  # what there is stays
+                    pass
+                read()
+
+        def look() -> bool:
+            news.show()
+            return poll(sum(frame.progress() for frame in frames) / len(frames))
+
+        with ANALYSES.drawing():
+            jobs.run(work, lambda: [frame.cancel() for frame in frames], look)
+        stats = [frame.stats() for frame in frames]
+        return Picture(finish(found), stats[0] | {"ms": sum(each["ms"] for each in stats),
+                                                  "pixel_pending": max(each["pixel_pending"] for each in stats)},
+                       device.label, notice)
 
 
 def bake_shadows(description: SceneDescription, path: str) -> None:

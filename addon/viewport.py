@@ -31,6 +31,7 @@ TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
 HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that overlays' depth is nearer than the surface: Blender's dots of vertices are hidden, or not
 REST = 0.12  # seconds without motion after which the whole picture is drawn
+BETTER = 200.0  # milliseconds of further samples between two pictures of a view at rest
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class Wish:
             self.scene.settings, width=-(-self.view.width // shrink), height=-(-self.view.height // shrink),
             region=(x0 // shrink, y0 // shrink, -(-x1 // shrink), -(-y1 // shrink)),
             strata=pace.WHOLE if self.level.strata == pace.STRATA else self.level.strata,
-            shadow_lazy=0, shadow_progressive=1)  # one sample after a change of lights, refined at rest
+            shadow_lazy=0, shadow_progressive=1,  # one sample after a change of lights, refined at rest
+            pixel_samples=self.scene.settings.pixel_samples if self.level == pace.FULL else 1, pixel_progressive=1)
         lines = self.scene.lines
         if lines and not lines.world:
             lines = replace(lines, width=lines.width / shrink)
@@ -71,6 +73,23 @@ class Shown:
     stats: dict[str, Any]
     passes: dict[str, Any]
     device: str
+    first: bool = True  # of its wish
+
+
+@dataclass
+class Bettered:
+    """A picture whose samples are still coming."""
+
+    wish: Wish
+    parts: list[tuple[native.Frame, sync.SceneDescription]]  # those that make it: one, or more with mattes
+    colors: list[np.ndarray]  # of each part
+    description: sync.SceneDescription
+    behind: np.ndarray | None  # what mattes stand before
+
+    def picture(self) -> np.ndarray:
+        if len(self.colors) == 1:
+            return self.colors[0]
+        return mattes.finish(self.colors[0], self.description, self.colors[1:], self.behind)
 
 
 class Viewport:
@@ -105,6 +124,7 @@ class Viewport:
         self._frame: tuple[native.Device, native.Frame] | None = None
         self._others: list[tuple[native.Device, native.Frame]] = []  # for mattes
         self._sky = sky.Sky()
+        self._bettered: Bettered | None = None  # what is shown, while samples of it are pending
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
         _VIEWPORTS.add(self)
 
@@ -173,7 +193,7 @@ class Viewport:
             self._steps.close()
         self._others = []
         self._sky = sky.Sky()
-        self._drawn = self._frame = self._steps = self._task = None  # here, for textures go on Blender's thread
+        self._drawn = self._frame = self._steps = self._task = self._bettered = None  # here, for textures go on Blender's thread
         ANALYSES.wish(self, [])
         _VIEWPORTS.discard(self)
         if self in _TURNS:
@@ -207,14 +227,17 @@ class Viewport:
         under_way = [item.cloud for item in self.shown.clouds if item.cloud in ANALYSES]
         if under_way:
             return analysis.label(under_way[0])
-        return f"{self.shown.stats['points']:,} points, {self.shown.stats['ms']:.0f} ms, {self.shown.device}"
+        stats = self.shown.stats
+        samples = f", {stats['pixel_samples']} samples" if stats["pixel_samples"] > 1 else ""
+        return f"{stats['points']:,} points, {stats['ms']:.0f} ms, {self.shown.device}{samples}"
 
     def _draw_picture(self, context: bpy.types.Context) -> None:
         overlays = context.space_data.overlay.show_overlays
         if self._drawn is None or self._drawn[0] is not self.shown:
-            if self.shown.wish.view != self._view:  # it moves on
+            if self.shown.wish.view != self._view and self.shown.first:  # it moves on
                 self.pace.seen(time.monotonic() - self.shown.wish.asked - self.shown.stats["ms"] / 1000.0)
-            self._drawn = (self.shown, _upload(self.shown), None)
+            same = self._drawn and self._drawn[0].depth is self.shown.depth
+            self._drawn = (self.shown, _upload(self.shown), self._drawn[2] if same else None)
         if overlays and self._drawn[2] is None:
             self._drawn = (*self._drawn[:2], _texture(_covering(self.shown.depth), 'R32F'))
         shown, color, depth = self._drawn
@@ -269,12 +292,12 @@ class Viewport:
         if cancelled and not self._wanted:
             self._wanted = wish  # the cancel was meant for the picture before
         if shown:
-            self._spare = [self.shown.color, self.shown.depth] if self.shown else []
-            self.shown = shown
+            last, self.shown = self.shown, shown
+            self._spare = [last.color, last.depth] if last and last.depth is not shown.depth else []
             self.pictures += 1
             self._wish_analyses()
-            if shown.stats["shadow_pending"] and not self._wanted:
-                self._wanted = wish  # more samples of soft shadows
+            if (shown.stats["shadow_pending"] or self._bettered) and not self._wanted:
+                self._wanted = wish  # more samples of soft shadows, or of pixels
         return True
 
     def _wish_analyses(self) -> None:
@@ -296,6 +319,14 @@ class Viewport:
         return self._wanted is not None
 
     def _render(self, wish: Wish) -> Steps[Shown]:
+        bettered, self._bettered = self._bettered, None
+        if bettered and bettered.wish is wish:
+            try:
+                return (yield from self._better(bettered))
+            except native.PatinaCancelled:
+                raise
+            except native.PatinaError:
+                pass  # the device failed: the whole picture anew, on another one if need be
         with native.Progress() as self._progress:
             try:
                 clouds = []
@@ -334,37 +365,55 @@ class Viewport:
             self._frame = (device, native.Frame(device))
         frame, settings = self._frame[1], description.settings
         x0, y0, x1, y1 = settings.region
+        parts, spare = [(frame, description)], self._spare
         if mattes.are_needed(description):
-            others, shown = mattes.needed(description), mattes.picture(description)
+            others = mattes.needed(description)
             self._others = self._others if len(self._others) == len(others) and self._others[0][0] is device else [
                 (device, native.Frame(device)) for _ in others]
-            planes = yield from self._draw_frame(frame, shown, ("COMBINED", "DEPTH"), [])
-            found = []
-            for (_, beside), other in zip(self._others, others, strict=True):
-                found += yield from self._draw_frame(beside, other, ("COMBINED",), [])
-            behind = backdrop.pixels(description) if description.behind else None
-            planes[0] = mattes.finish(planes[0], description, found, behind)
-            description = replace(description, behind=None)  # it is in the picture
+            parts = [(frame, mattes.picture(description)), *((beside, other) for (_, beside), other in zip(
+                self._others, others, strict=True))]
+            spare = []
         else:
             self._others = []
-            planes = yield from self._draw_frame(frame, description, ("COMBINED", "DEPTH"), self._spare)
+        color, depth = yield from self._draw_frame(*parts[0], ("COMBINED", "DEPTH"), spare)
+        colors = [color]
+        for beside, other in parts[1:]:
+            colors += yield from self._draw_frame(beside, other, ("COMBINED",), [])
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
-        return Shown(wish, description.clouds, *planes, description.behind,
+        behind = backdrop.pixels(description) if self._others and description.behind else None  # which is in the picture then
+        bettered = Bettered(wish, parts, colors, description, behind)
+        self._keep_bettering(bettered)
+        return Shown(wish, description.clouds, bettered.picture(), depth, None if self._others else description.behind,
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.label)
 
+    def _keep_bettering(self, bettered: Bettered) -> None:
+        """Where samples are pending."""
+        self._bettered = bettered if any(frame.stats()["pixel_pending"] for frame, _ in bettered.parts) else None
+
+    def _better(self, bettered: Bettered) -> Steps[Shown]:
+        """What is shown, by further samples. One that is cut off is given up: something else is wanted then."""
+        colors = []
+        for (frame, description), color in zip(bettered.parts, bettered.colors, strict=True):
+            if frame.stats()["pixel_pending"]:
+                color, = yield from self._draw_frame(frame, description, ("COMBINED",), [], BETTER / len(bettered.parts))
+            colors.append(color)
+        bettered = replace(bettered, colors=colors)
+        self._keep_bettering(bettered)
+        frame = bettered.parts[0][0]
+        return replace(self.shown, color=bettered.picture(), stats=frame.stats(), passes=frame.pass_stats(), first=False)
 
     def _draw_frame(self, frame: native.Frame, description: sync.SceneDescription, planes: tuple[str, ...],
-                    spare: list[np.ndarray]) -> Steps[list[np.ndarray]]:
+                    spare: list[np.ndarray], better_ms: float | None = None) -> Steps[list[np.ndarray]]:
         x0, y0, x1, y1 = description.settings.region
         with native.Scene() as scene:
             render.describe(scene, description, planes)
 
             def start() -> native.Task:
-                return frame.start(scene, planes, y1 - y0, x1 - x0, spare)
+                return frame.start(scene, planes, y1 - y0, x1 - x0, spare, better_ms)
 
             while (task := ANALYSES.begin_frame(start)) is None:
                 yield Pause()

@@ -211,6 +211,9 @@ static int draw_step(struct patina_frame *frame, const struct patina_scene *scen
     return PATINA_OK;
 }
 
+// Whether a picture has its fellow on the other side of the pixel's middle: without it the mean lies aside.
+static int is_paired(const struct pt_mean *mean) { return mean->sampling.shifts == 1 || !((mean->sampling.shifts - mean->done) & 1u); }
+
 // Writes the mean of what there is into the picture that readers see, a band at a time.
 static int show(struct patina_frame *frame)
 {
@@ -244,9 +247,9 @@ static int advance(struct patina_frame *frame, const struct patina_scene *scene,
     swap(frame, &mean->aside);
     do
         error = draw_step(frame, scene);
-    while (!error && !mean->ended && pt_milliseconds() - start < ms);
+    while (!error && !mean->ended && ((!is_paired(mean) && !mean->rows) || pt_milliseconds() - start < ms));
     swap(frame, &mean->aside);
-    const int shown = show(frame);
+    const int shown = mean->done == 1 && !is_paired(mean) ? PATINA_OK : show(frame);
     frame->shown.stats.ms += pt_milliseconds() - start;
     frame->shown.stats.pixel_pending =
         mean->ended ? 0 : mean->sampling.grid * mean->sampling.grid * (mean->sampling.shifts - mean->done);

@@ -423,17 +423,25 @@ class Frame(_Handle):
                self._device._handle)
 
     def start(self, scene: Scene, planes: Sequence[str], height: int, width: int,
-              spare: Sequence[np.ndarray] = ()) -> Task:
+              spare: Sequence[np.ndarray] = (), refine_ms: float | None = None) -> Task:
         """A task that renders, and gives these planes of the picture as read() would. Its size: of the scene's region.
         spare: what start() gave for another picture of these planes and is no longer needed; where it fits it is written
-        again, for fresh memory costs more than what is written to it."""
+        again, for fresh memory costs more than what is written to it. refine_ms: as refine(), in place of rendering."""
         shapes = [(height, width, PLANES[plane][1]) for plane in planes]
         fits = [values.shape for values in spare] == shapes
         pixels = list(spare) if fits else [np.empty(shape, np.float32) for shape in shapes]
         reads = (abi.Read * len(pixels))(*(abi.Read(PLANES[plane][0], values.ctypes.data, values.nbytes)
                                         for plane, values in zip(planes, pixels, strict=True)))
-        return Task("render", self._handle, scene._handle, reads, len(reads), keep=(self, self._device, scene, reads, pixels),
-                    finish=lambda task: pixels)
+        call, *how = ("render",) if refine_ms is None else ("refine", refine_ms)
+        return Task(call, self._handle, scene._handle, *how, reads, len(reads),
+                    keep=(self, self._device, scene, reads, pixels), finish=lambda task: pixels)
+
+    def refine(self, scene: Scene, ms: float) -> None:
+        """Betters the picture by samples of the same scene until so many milliseconds have passed, for as long as stats() say
+        that some are pending. PatinaCancelled keeps those that there are."""
+        if not self._finalizer.alive:
+            raise PatinaError("this frame is closed")
+        check(library().patina_frame_refine(self._handle, scene._handle, ms), self._handle, scene._handle, self._device._handle)
 
     def bake_shadows(self, scene: Scene) -> None:
         """Whole shadow textures of the scene's casting lights, without a picture."""

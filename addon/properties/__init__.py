@@ -152,7 +152,20 @@ class PatinaSceneProperties(PropertyGroup):
     samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
         description="Of each pixel: a final render takes the mean of about so many finer or shifted ones, each anti-aliased as "
-                    "set. Data passes are those of one sample")
+                    "set. Esc keeps those that there are. Data passes are those of one sample")
+    noise: FloatProperty(
+        name="Noise Threshold", override=_OVERRIDE, default=0.0, min=0.0, soft_max=0.1, max=1.0, step=0.1, precision=4,
+        description="Samples end once colors are expected to be off by no more than this share of white, at Samples at the latest "
+                    "(1: at 256)")
+    use_noise: switch("noise", 0.01, "Samples end once the picture is good enough; else all of them are taken")
+    viewport_samples: IntProperty(
+        name="Viewport Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
+        description="Of each pixel of a viewport at rest, one after another: the picture betters until the view moves")
+    viewport_noise: FloatProperty(
+        name="Viewport Noise Threshold", override=_OVERRIDE, default=0.0, min=0.0, soft_max=0.1, max=1.0, step=0.1, precision=4,
+        description="Samples of a viewport at rest end once colors are expected to be off by no more than this share of white, at "
+                    "Viewport Samples at the latest (1: at 256)")
+    use_viewport_noise: switch("viewport_noise", 0.02, "Samples end once the picture is good enough; else all of them are taken")
     motion_steps: IntProperty(
         name="Steps", override=_OVERRIDE, default=8, min=1, soft_max=64, max=1024,
         description="Moments while the shutter is open that a final render takes the mean of. Samples for anti-aliasing are "

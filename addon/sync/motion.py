@@ -31,7 +31,7 @@ def moments(scene: bpy.types.Scene) -> list[Moment]:
     if not render.use_motion_blur or render.motion_blur_shutter <= 0.0:
         return [Moment(0.0, samples, (0.0, 0.0), True)]
     steps = scene.patina.motion_steps
-    share = -(-samples // steps)
+    share = -(-samples // steps) if samples else 0
     begin = {'START': 0.0, 'CENTER': -0.5, 'END': -1.0}[position(scene)]
     offsets = [(begin + (step + 0.5) / steps) * render.motion_blur_shutter for step in range(steps)]
     nearest = min(range(steps), key=lambda step: abs(offsets[step]))

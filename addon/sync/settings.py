@@ -48,10 +48,12 @@ class Settings:
     own_background: int = 0
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     shadow_uncut: int = 0
-    pixel_samples: int = 1  # of a final picture
+    pixel_samples: int = 1  # of a picture at rest; 0: by the noise alone
     depth: int = 0
     world_directed: int = 0  # 1: world_light, not world_color, lights
     world_light: tuple[float, ...] = (0.0,) * 27
+    pixel_progressive: int = 0  # the first sample, which is bettered by and by
+    pixel_noise: float = 0.0
 
 
 def read(scene: bpy.types.Scene, view: View, world: World) -> Settings:
@@ -91,8 +93,23 @@ def shadow_file(scene: bpy.types.Scene) -> str:
 
 
 def samples(scene: bpy.types.Scene) -> int:
-    """Of a final picture, for each pixel."""
-    return int(options.read().get("samples", scene.patina.samples)) or 1
+    """Of a final picture, for each pixel; 0: by the noise alone."""
+    return int(options.read().get("samples", 0)) or _at_most(scene.patina.samples, noise(scene))
+
+
+def noise(scene: bpy.types.Scene) -> float:
+    """That ends the samples of a final picture; 0: none does."""
+    return float(options.read().get("noise", scene.patina.noise))
+
+
+def viewport_samples(scene: bpy.types.Scene) -> tuple[int, float]:
+    """Of a viewport at rest, and the noise that ends them."""
+    return _at_most(scene.patina.viewport_samples, scene.patina.viewport_noise), scene.patina.viewport_noise
+
+
+def _at_most(samples: int, threshold: float) -> int:
+    """One sample has no noise to be told: with a threshold it stands for as many as it takes."""
+    return 0 if samples == 1 and threshold > 0.0 else samples
 
 
 def _number(group: bpy.types.PropertyGroup, name: str, item: str) -> int:

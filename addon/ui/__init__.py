@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from . import (colors, combine, effects, lines, materials, motion, panels, panorama, points, presets, sequence, standard, statistics,
-               styles)
+from . import (colors, combine, effects, lines, materials, motion, panels, panorama, points, presets, sampling, sequence, standard,
+               statistics, styles)
 
 # What makes the look comes first, then how it is drawn.
-_MODULES = (presets, styles, lines, effects, panels, points, colors, motion, combine, panorama, sequence, materials, statistics,
+_MODULES = (presets, styles, lines, effects, panels, sampling, points, colors, motion, combine, panorama, sequence, materials, statistics,
             standard)
 
 

@@ -62,7 +62,6 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         rows.automatic(column, patina, "fill_iterations").active = patina.fill != 'OFF'
         layout.prop(patina, "smooth")
         layout.prop(patina, "antialias")
-        layout.prop(patina, "samples")
         layout.prop(patina, "depth")
         layout.prop(patina, "meshes")
         if patina.meshes == 'POINTS':

@@ -199,7 +199,8 @@ def test_options():
     check(read(["blender", "--", "--other", "1", "--patina-device", "cpu", "--patina-samples=4"]) ==
           {"device": 'CPU', "samples": 4}, "two options")
     check(read(["--", "--patina-strict", "--patina-threads", "2"]) == {"strict": 1, "threads": 2}, "a switch")
-    for words, part in ((["--patina-device", "abacus"], "auto, cpu"), (["--patina-colour"], "only device"),
+    check(read(["--", "--patina-noise", "0.02"]) == {"noise": 0.02}, "noise")
+    for words, part in ((["--patina-noise", "much"], "a number from 0 to 1"), (["--patina-device", "abacus"], "auto, cpu"), (["--patina-colour"], "only device"),
                         (["--patina-threads", "many"], "a number"),
                         (["--patina-strict=no"], "no value")):
         try:

@@ -26,6 +26,7 @@ def tests():
     import check_overlays
     import check_viewport
     import check_viewport_life
+    import check_viewport_samples
     names = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     if names == ["long_session"]:
         import session_rounds
@@ -33,7 +34,8 @@ def tests():
     if names == ["figures"]:
         import figures
         yield "figures", figures.orbit_figures
-    for name, test in [item for module in (check_viewport, check_viewport_life, check_overlays, check_drawn, check_newcomer) for item in vars(module).items()]:
+    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_newcomer)
+    for name, test in [item for module in modules for item in vars(module).items()]:
         if name.startswith("test_") and (not names or any(part in name for part in names)):
             yield name.removeprefix("test_"), test
 

@@ -10,3 +10,4 @@ patina.fill = 'PAPER'
 patina.fill_iterations = 0
 patina.antialias = 'BACKGROUND'
 patina.samples = 1
+patina.noise = 0.0

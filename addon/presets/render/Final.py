@@ -10,3 +10,4 @@ patina.fill = 'CLOSED'
 patina.fill_iterations = 0
 patina.antialias = 'LAYERS'
 patina.samples = 16
+patina.noise = 0.0

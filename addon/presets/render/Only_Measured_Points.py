@@ -10,3 +10,4 @@ patina.fill = 'OFF'
 patina.fill_iterations = 0
 patina.antialias = 'OFF'
 patina.samples = 1
+patina.noise = 0.0

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Samples of final pictures as they come: shown from the first one on, kept when Esc ends them, ended by a noise threshold."""
+
+import re
+
+import bpy
+import numpy as np
+from check_motion import stage
+from check_passes import dense_scene
+from harness import add_points, check, new_scene, render, reports, sphere, stats, written
+
+from patina import engine, native
+from patina import render as drawing
+
+_described: list[tuple] = []
+
+
+def scene_of(samples, width=96, height=72):
+    scene = new_scene(width, height)
+    scene.patina.fill, scene.patina.surface = 'CLOSED', 'FILL'
+    scene.patina.samples = samples
+    add_points(*sphere(6000))
+    return scene
+
+
+def taken():
+    """How many samples the last picture says that it has."""
+    found = re.search(r"(\d+) samples", stats[-1])
+    return int(found[1]) if found else 1
+
+
+def stopped_when(condition):
+    """The pictures of a render whose artist presses Esc then, and Blender's own pixels."""
+    stopped, engine.PatinaRenderEngine._stopped = engine.PatinaRenderEngine._stopped, lambda self: condition()
+    try:
+        return render()
+    finally:
+        engine.PatinaRenderEngine._stopped = stopped
+
+
+def shown_steps(wanted=("COMBINED", "DEPTH")):
+    """What draw() shows of the scene's picture, and the picture."""
+    draw, found = drawing.draw, []
+
+    def watch(description, planes, poll, tile_size, _show):
+        every, drawing.SHOWN_EVERY, drawing.SHOWN_SHARE, drawing.STEP = drawing.SHOWN_EVERY, 0.0, 0.0, 0.0
+        try:
+            return draw(description, planes, poll, tile_size, lambda shown: found.append(dict(shown)))
+        finally:
+            drawing.SHOWN_EVERY, drawing.SHOWN_SHARE, drawing.STEP = every, 10.0, 100.0
+
+    drawing.draw = watch
+    try:
+        return found, render()
+    finally:
+        drawing.draw = draw
+
+
+def test_shown_from_the_first_on():
+    """The first picture that is shown is that of one sample, with all its planes; later ones are nearer to the last."""
+    scene = scene_of(400)
+    found, last = shown_steps()
+    check(len(found) > 3, f"{len(found)} pictures were shown")
+    check({"COMBINED", "DEPTH"} <= set(found[0]) and all(set(planes) == {"COMBINED"} for planes in found[1:]),
+          f"{[set(planes) for planes in found[:3]]}")
+    off = [float(np.square(planes["COMBINED"] - last["Combined"]).sum()) for planes in found]
+    check(off[0] > 0 and off[1] < 0.8 * off[0] and off[-1] < 0.2 * off[0], f"{off}")
+    scene.patina.samples = 1
+    one = render()
+    check((found[0]["COMBINED"] == one["Combined"]).all(), "the first picture is not that of one sample")
+    check((last["Depth"] == one["Depth"]).all(), "depth is that of one sample")
+
+
+def test_steps_are_one_go():
+    """Tiles, which are made at one go, have the same pixels."""
+    scene = scene_of(12)
+    whole = render()
+    check(taken() > 8, stats[-1])
+    scene.patina.tile_size = 40
+    tiled = render()
+    for name, pixels in whole.items():
+        check((pixels == tiled[name]).all(), f"{name} differs")
+
+
+def test_esc_keeps_the_picture():
+    """What there is when Esc comes is written, with its other passes; nothing is told as an error."""
+    scene = scene_of(1)
+    one = render()
+    scene.patina.samples = 1024
+    calls = []
+    kept = stopped_when(lambda: calls.append(1) or len(calls) > 12)
+    check(kept, "nothing was written")
+    check("stopped" in stats[-1] and 1 <= taken() < 1024, stats[-1])
+    check(taken() > 1, f"{stats[-1]}: nothing came after the first sample")
+    check((kept["Depth"] == one["Depth"]).all(), "depth is that of one sample")
+    soft = [((picture["Combined"][..., 3] > 0.01) & (picture["Combined"][..., 3] < 0.99)).sum() for picture in (one, kept)]
+    check(soft[1] > soft[0] + 40, f"{soft} soft pixels with one sample and with those that were kept")
+    check(not any(kind == 'ERROR' for kind, _ in reports), f"{reports}")
+    scene.patina.samples = 4
+    check(render() and "stopped" not in stats[-1], "the next render is whole")
+
+
+def test_esc_keeps_moments():
+    """With motion blur the moments that there are make the picture."""
+    scene = stage()
+    scene.patina.motion_steps = 400
+    calls = []
+    kept = stopped_when(lambda: calls.append(1) or len(calls) > 40)
+    check(kept and "stopped" in stats[-1], f"{stats[-1]}")
+    check(scene.frame_current == 1 and scene.frame_subframe == 0.0, "the frame is the artist's again")
+    total = kept["Combined"][..., 3].sum()
+    check(abs(total / 64.0 - 1.0) < 0.01, f"the tile covers {total:.2f} of 64 pixels")
+
+
+def test_noise_threshold():
+    """As many samples as it takes; Samples are the most."""
+    scene = scene_of(1)
+    counts = []
+    for noise in (0.05, 0.01):
+        scene.patina.noise = noise
+        check(render(), "nothing was drawn")
+        counts.append(taken())
+    check(4 <= counts[0] < counts[1] <= 256, f"{counts}")
+    scene.patina.samples = 6
+    scene.patina.noise = 0.0001
+    render()
+    check(taken() <= 6, stats[-1])
+    scene.patina.noise = 0.0
+    scene.patina.samples = 1
+    render()
+    check("samples" not in stats[-1], stats[-1])
+
+
+def test_holdouts_sample_by_sample():
+    """A picture that is made of several betters as a whole: a hole stays a hole, with soft borders."""
+    scene = scene_of(200)
+    hole = add_points(*sphere(6000, 0.4, (0.3, 0, -2.5)))
+    hole.is_holdout = True
+    found, last = shown_steps()
+    check(len(found) > 2, f"{len(found)} pictures were shown")
+    alpha = last["Combined"][..., 3]
+    check(alpha.max() > 0.99 and ((alpha > 0.05) & (alpha < 0.95)).sum() > 60, "soft borders")
+    held = [float(planes["COMBINED"][30:42, 54:60, 3].max()) for planes in found]
+    check(max(held) < 0.02, f"something stands in the hole: {held}")
