@@ -52,6 +52,7 @@ class Settings:
     depth: int = 0
     world_directed: int = 0  # 1: world_light, not world_color, lights
     world_light: tuple[float, ...] = (0.0,) * 27
+    average: int = 0
 
 
 def read(scene: bpy.types.Scene, view: View, world: World) -> Settings:
@@ -79,6 +80,7 @@ def read(scene: bpy.types.Scene, view: View, world: World) -> Settings:
         shadow_error=0.01 * patina.shadow_error,
         shadow_resolution=patina.shadow_resolution,
         depth=enum_number(patina, "depth"),
+        average=int(patina.average),
         shadow_lazy=1)  # a final picture
 
 
