@@ -50,6 +50,7 @@ class Wish:
             self.scene.settings, width=-(-self.view.width // shrink), height=-(-self.view.height // shrink),
             region=(x0 // shrink, y0 // shrink, -(-x1 // shrink), -(-y1 // shrink)),
             strata=pace.WHOLE if self.level.strata == pace.STRATA else self.level.strata,
+            average=self.scene.settings.average if self.level.strata == pace.STRATA else 0,
             shadow_lazy=0, shadow_progressive=1,  # one sample after a change of lights, refined at rest
             pixel_samples=self.scene.settings.pixel_samples if self.level == pace.FULL else 1, pixel_progressive=1)
         lines = self.scene.lines

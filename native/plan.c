@@ -293,12 +293,14 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
         args.instance.color_format = PT_COLOR_OF_PLANE;
         args.instance.has_opacities = plan->transparent != 0;
     }
+    if (shown && pt_averages(builder, instance))
+        args.instance.color_format = PT_COLOR_OF_PIXEL;
     if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && (!discs || plan->iterations))
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     pt_own_colors(color, &args);
     if (shown)
         pt_plan_recolor(builder, instance, &args);
-    int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE;
+    int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
     enum pt_instance_buffer colors = args.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
@@ -577,6 +579,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     struct pt_plan *plan = builder->plan;
     plan_surfaces(builder);
     pt_plan_meshes(builder, 1);
+    pt_plan_average(builder);
     if (builder->layer == 1)
         plan_marks(builder);
     pt_plan_lines(builder);
@@ -645,7 +648,7 @@ static void plan_points(struct pt_builder *builder)
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
     static const char *const others[] = {"raster", "cover",  "mark",  "lit", "limit", "shade",     "obscure", "edl",
-                                         "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel",
+                                         "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel", "average",
                                          "lines",  "ink",    "assess"};
     builder->plan->light_count = 0;
     builder->plan->line_radius = 0.0f;

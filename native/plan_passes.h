@@ -98,6 +98,10 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
 void pt_plan_splat(struct pt_builder *builder);
 void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of every instance
 
+// plan_average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
+void pt_plan_average(struct pt_builder *builder);
+int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance *instance);
+
 // plan_assess.c: certainty and thickness of what the picture shows.
 void pt_plan_assess(struct pt_builder *builder);
 

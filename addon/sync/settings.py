@@ -54,6 +54,7 @@ class Settings:
     world_light: tuple[float, ...] = (0.0,) * 27
     pixel_progressive: int = 0  # the first sample, which is bettered by and by
     pixel_noise: float = 0.0
+    average: int = 0
 
 
 def read(scene: bpy.types.Scene, view: View, world: World) -> Settings:
@@ -81,6 +82,7 @@ def read(scene: bpy.types.Scene, view: View, world: World) -> Settings:
         shadow_error=0.01 * patina.shadow_error,
         shadow_resolution=patina.shadow_resolution,
         depth=enum_number(patina, "depth"),
+        average=int(patina.average),
         shadow_lazy=1)  # a final picture
 
 

@@ -62,6 +62,9 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         rows.automatic(column, patina, "fill_iterations").active = patina.fill != 'OFF'
         layout.prop(patina, "smooth")
         layout.prop(patina, "antialias")
+        row = layout.row()
+        row.active = filled
+        row.prop(patina, "average")
         layout.prop(patina, "depth")
         layout.prop(patina, "meshes")
         if patina.meshes == 'POINTS':

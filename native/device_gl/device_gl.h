@@ -31,7 +31,7 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_FILLED, // fill: a bit for each pixel filled in this phase
     PT_GL_SCRATCH_STAMPS, // fill: the step for which a tile was listed last
     PT_GL_SCRATCH_WOKEN,  // fill: tiles that the next step has to look at
-    PT_GL_SCRATCH_SUMS,   // blend: of the pixels of a band
+    PT_GL_SCRATCH_SUMS,   // blend, average: of the pixels of a band
     PT_GL_SCRATCH_LARGE,  // discs: how many are large, and which
     PT_GL_SCRATCH_TILES,  // what each tile holds
     PT_GL_SCRATCH_TILE_LISTS,
@@ -139,6 +139,8 @@ int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt
                 const atomic_int *cancel);
 int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt_buffer *const *buffers,
                 const atomic_int *cancel);
+int pt_gl_average(struct pt_gl_device *d, const struct average_args *args, struct pt_buffer *const *buffers,
+                  const atomic_int *cancel);
 int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
               const atomic_int *cancel);
 int pt_gl_center(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,

@@ -287,6 +287,8 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
     }
     if (kernel == PT_KERNEL_blend)
         return pt_gl_blend(d, arguments, buffers, cancel);
+    if (kernel == PT_KERNEL_average)
+        return pt_gl_average(d, arguments, buffers, cancel);
     if (kernel == PT_KERNEL_lit)
         return pt_gl_lit(d, argument_size, buffers, count, cancel);
     if (kernel == PT_KERNEL_center)

@@ -57,19 +57,24 @@ static int plain_lights(const struct shade_args *args)
     return 1;
 }
 
+static int of_plane(const struct instance_args *instance)
+{
+    return instance->color_format == PT_COLOR_OF_PLANE || instance->color_format == PT_COLOR_OF_PIXEL;
+}
+
 // What the program knows beforehand, as llvmpipe runs all that it may have to: branches, and loops once more than they turn.
 static void shade_definitions(const struct shade_args *args, int shading, char *text, size_t size)
 {
     static const char *const blend[] = {"", "#define BLEND 1\n", "#define WIDE 1\n"};
     const struct instance_args *instance = &args->instance;
-    const uint32_t opacity = !instance->has_opacities ? 0 : instance->color_format == PT_COLOR_OF_PLANE ? 2 : 1;
+    const uint32_t opacity = !instance->has_opacities ? 0 : of_plane(instance) ? 2 : 1;
     char lights[24] = "args.light_count";
     if (args->light_count <= MOST_UNROLLED)
         snprintf(lights, sizeof lights, "%uu", args->light_count);
     snprintf(text, size,
              "#define SHADING %d\n#define ARRIVED %d\n#define OPACITY %u\n#define COLOR_FORMAT %u\n#define LIT %d\n"
              "#define LIGHTS %s\n#define PLAIN %d\n#define RECOLOR %d\n#define DIRECTED %d\n%s",
-             shading, args->arrived != 0, opacity, instance->color_format % 5,
+             shading, args->arrived != 0, opacity, instance->color_format % 6,
              !instance->lit ? 0 : instance->specular > 0.0f ? 2 : 1, lights, plain_lights(args),
              args->recolor.source || args->recolor.graded, args->directed && instance->lit, blend[args->blend < 2 ? args->blend : 2]);
 }

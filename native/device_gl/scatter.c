@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
-// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend: a pass a band of rows; lit, sift, center: one
-// instance.
+// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average: a pass a band of rows; lit, sift,
+// center, average: one instance.
 #include "device_gl.h"
 
 #include <stdio.h>
@@ -283,6 +283,61 @@ int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt
         result = pt_gl_bind_texture(d, 5, buffers[5 + 6 * args->instances]);
     for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)
         result = blend_band(d, args, buffers, y, y + rows < height ? y + rows : height, cancel);
+    return result;
+}
+
+// The instance's buffers begin at buffers[5]: chunks, positions, surface, colours, and words of what is drawn.
+static int bind_average(struct pt_gl_device *d, const struct average_args *args, struct pt_buffer *const *buffers)
+{
+    const struct pt_buffer *const planes[] = {args->sifted ? buffers[9] : NULL, buffers[8], buffers[3], buffers[4]};
+    int result = PATINA_OK;
+    for (uint32_t k = 0; k < 4 && result == PATINA_OK; k++) {
+        const int missing = !planes[k] || !planes[k]->name; // any stands in
+        result = pt_gl_bind(d, 5 + k, missing ? d->arguments : planes[k]->name, 0, missing ? sizeof *args : planes[k]->size,
+                            "average");
+    }
+    for (uint32_t k = 0; k < 3 && result == PATINA_OK; k++) // keys, from, deff
+        result = pt_gl_bind_texture(d, k, buffers[k]);
+    return result;
+}
+
+static int average_band(struct pt_gl_device *d, const struct average_args *args, const struct instance_buffers *b, uint32_t first,
+                        uint32_t end, const atomic_int *cancel)
+{
+    const uint32_t zero = 0, width = args->view.width;
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_SUMS].name);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)((size_t)(end - first) * width * SUM_BYTES),
+                             GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    for (uint32_t step = ADD; step <= MEAN; step++) {
+        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_average][step], 3, (GLint)first);
+        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_average][step], 4, (GLint)end);
+    }
+    int result = run_instance(d, b, ADD, cancel);
+    return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_average, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
+}
+
+int pt_gl_average(struct pt_gl_device *d, const struct average_args *args, struct pt_buffer *const *buffers,
+                  const atomic_int *cancel)
+{
+    const size_t most = d->block_size < BAND_BYTES ? d->block_size : BAND_BYTES;
+    const uint32_t width = args->view.width, last = args->view.rect[3];
+    const struct instance_buffers b = {PT_KERNEL_average, 2, buffers[5], buffers[6], buffers[7], 0, 0};
+    uint32_t rows = (uint32_t)(most / SUM_BYTES / width);
+    if (args->view.rect[1] >= last || !buffers[5]->size)
+        return PATINA_OK;
+    rows = rows < 1 ? 1 : rows < last - args->view.rect[1] ? rows : last - args->view.rect[1];
+    int result = pt_gl_kernel_program(d, PT_KERNEL_average, ADD, "#define STEP 0\n");
+    if (result == PATINA_OK)
+        result = pt_gl_kernel_program(d, PT_KERNEL_average, MEAN, "#define STEP 1\n");
+    if (result == PATINA_OK)
+        result = pt_gl_scratch(d, PT_GL_SCRATCH_SUMS, (size_t)rows * width * SUM_BYTES, 0);
+    if (result == PATINA_OK)
+        result = pt_gl_bind(d, 1, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, (size_t)rows * width * SUM_BYTES, "average");
+    if (result == PATINA_OK)
+        result = bind_average(d, args, buffers);
+    for (uint32_t y = args->view.rect[1]; y < last && result == PATINA_OK; y += rows)
+        result = average_band(d, args, &b, y, y + rows < last ? y + rows : last, cancel);
     return result;
 }
 

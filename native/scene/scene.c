@@ -374,6 +374,8 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: shadow_error is negative or not finite");
     if (s.depth > PATINA_DEPTH_SURFACE)
         return fail(scene, "settings: no such depth");
+    if (s.average > 1)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: average %u is none of 0 and 1", s.average);
     if (s.pixel_samples > 4096)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u samples a pixel; the most is 4096", s.pixel_samples);
     if (!(s.pixel_noise >= 0.0f) || !isfinite(s.pixel_noise) || s.pixel_progressive > 1)

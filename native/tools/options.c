@@ -167,6 +167,8 @@ static int parse_switch(const char *name, struct tool_options *options)
         options->cull = 1;
     else if (!strcmp(name, "--transparent"))
         options->transparent = 1;
+    else if (!strcmp(name, "--average"))
+        options->settings.average = 1;
     else if (!strcmp(name, "--shadows"))
         options->shadows = 1;
     else if (!strcmp(name, "--headlight"))

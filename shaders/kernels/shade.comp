@@ -317,9 +317,10 @@ void main()
 #endif
         if (id < id_count && own.key.y != PT_KEY_EMPTY_Z) {
             // 2. colour and opacity
-            float opacity = opacity_of(instance_opacity, id, own.source);
+            uint of_color = COLOR_FORMAT == 5 ? at : own.source;
+            float opacity = opacity_of(instance_opacity, id, of_color);
             p.ray = pt_ray(view, x, y);
-            p.albedo = pt_gather_albedo(style, id, own.source);
+            p.albedo = pt_gather_albedo(style, id, of_color);
 #if RECOLOR
             p.albedo = recolor(view, eye_z, p.ray, p.z, style, p.albedo);
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A point's own colour, before light, by COLOR_FORMAT. Include it behind POINT_COLOR(i), a word of them, four bytes, and
-// lib/srgb.glsl. at: the pixel where it was measured.
+// lib/srgb.glsl. at: the pixel where it was measured; of format 5, the one that shows it.
 #ifndef PT_ALBEDO_GLSL
 #define PT_ALBEDO_GLSL
 
@@ -13,7 +13,7 @@ vec3 pt_gather_albedo(vec3 style, uint id, uint at)
 #elif COLOR_FORMAT == 2
     return vec3(uintBitsToFloat(POINT_COLOR(3u * id)), uintBitsToFloat(POINT_COLOR(3u * id + 1u)),
                 uintBitsToFloat(POINT_COLOR(3u * id + 2u)));
-#elif COLOR_FORMAT == 3 // blended discs
+#elif COLOR_FORMAT == 3 || COLOR_FORMAT == 5 // blended discs, averaged points
     return vec3(uintBitsToFloat(POINT_COLOR(4u * at)), uintBitsToFloat(POINT_COLOR(4u * at + 1u)),
                 uintBitsToFloat(POINT_COLOR(4u * at + 2u)));
 #else // three bytes from byte 3 id on: they lie in one word or two

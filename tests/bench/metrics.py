@@ -33,6 +33,8 @@ MEANING = {  # name -> unit and what it says; the order of tables
     "transmittance_rms": "1 - alpha, inner pixels of transparent scenes",
     "shadow_rms": "light that shadows leave, in shares of the full light, inner pixels",
     "temporal_variance": "per-pixel variance of colour minus truth over a slow turn of the camera",
+    "flicker_inside": "levels of 255 by which colour minus truth changes from picture to picture of that turn, inner pixels",
+    "flicker_edges": "the same, pixels that an outline crosses",
 }
 BEST_HIGH = ("coverage_iou", "color_psnr", "color_ssim")
 GREY = 0.2140  # linear; sRGB 0.5
@@ -129,18 +131,36 @@ def shadow(exact: Picture, unshadowed: Picture, ambient: np.ndarray, shown: Show
     return {"shadow_rms": _rms((plain - exact.color[inner]).sum(axis=1) / span[inner])}
 
 
+def levels(rgba: np.ndarray) -> np.ndarray:
+    """Of 255, sRGB, over grey."""
+    return 255.0 * srgb(rgba[..., :3] + (1.0 - rgba[..., 3:4]) * GREY)
+
+
 class Steadiness:
     """Per-pixel variance of (picture - truth) over the pictures that are added, mean over pixels and channels. Counted
-    where the truth covers the 3x3 pixels around in every picture."""
+    where the truth covers the 3x3 pixels around in every picture. Flicker: root mean square of what that difference changes by
+    from one picture to the next, there and where an outline crosses the 3x3 pixels in some picture."""
 
     def __init__(self) -> None:
         self._count, self._inside, self._sum, self._squares = 0, True, 0.0, 0.0
+        self._crossed: np.ndarray | bool = False
+        self._last: np.ndarray | None = None
+        self._changes: np.ndarray | float = 0.0
 
     def add(self, exact: Picture, shown: Shown) -> None:
         off = shown.rgba.astype(np.float64) - exact.smooth
-        self._inside = self._inside & (around(np.isfinite(exact.depth)) == 9)
+        near = around(np.isfinite(exact.depth))
+        self._inside, self._crossed = self._inside & (near == 9), self._crossed | ((near > 0) & (near < 9))
         self._sum, self._squares, self._count = self._sum + off, self._squares + off**2, self._count + 1
+        seen_off = levels(shown.rgba.astype(np.float64)) - levels(exact.smooth)
+        if self._last is not None:
+            self._changes = self._changes + (seen_off - self._last) ** 2
+        self._last = seen_off
 
     def result(self) -> dict[str, float]:
         variance = self._squares / self._count - (self._sum / self._count) ** 2
-        return {"temporal_variance": float(np.maximum(variance, 0.0)[self._inside].mean())}
+        result = {"temporal_variance": float(np.maximum(variance, 0.0)[self._inside].mean())}
+        for name, where in (("flicker_inside", self._inside), ("flicker_edges", self._crossed)):
+            if self._count > 1 and where.any():
+                result[name] = float(np.sqrt(np.mean(np.asarray(self._changes)[where] / (self._count - 1))))
+        return result

@@ -15,7 +15,7 @@ PAGES = ("README.md", "tests/bench/README.md")
 NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2",
          "cpu-scalar": "processor, plain", "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
 QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs",
-             "analysed": "analysed", "final": "analysed, 16 samples"}
+             "analysed": "analysed", "averaged": "analysed, averages", "final": "analysed, 16 samples"}
 
 
 def _line(row: Row) -> list[str]:
@@ -187,13 +187,24 @@ def memory(result: dict[str, Any]) -> str:
 
 
 def independent(result: dict[str, Any]) -> str:
-    """Shapes that no rule was made on, by filling and by discs."""
-    body = [[row["scene"], f"{row['density']:g}", QUALITIES.get(row["quality"], row["quality"]), f"{row['ms_median']:.1f}",
-             f"{row['error']['color_psnr']:.1f}", f"{100.0 * row['error']['inner_holes']:.2f}",
-             f"{100.0 * row['error']['outer_growth']:.2f}", f"{row['error']['depth_rms_spacings']:.2f}",
-             f"{row['error']['depth_bias_spacings']:+.2f}"] for row in joined(result, "independent")]
-    return table(["shape", "points a pixel", "quality", "ms", "PSNR, dB", "open inside, %", "grown off the outline, %", "depth rms, spacings",
-                  "depth bias, spacings"], body)
+    """Shapes that no rule was made on: decibels by density, and of all else the worst at any of them."""
+    rows = joined(result, "independent")
+    densities = sorted({row["density"] for row in rows})
+    body = []
+    for scene, quality in dict.fromkeys((row["scene"], row["quality"]) for row in rows):
+        own = {row["density"]: row for row in rows if (row["scene"], row["quality"]) == (scene, quality)}
+        errors = [row["error"] for row in own.values()]
+        flicker = [max((error[name] for error in errors if name in error), default=None) for name in ("flicker_inside", "flicker_edges")]
+        body.append([scene, QUALITIES.get(quality, quality),
+                     *(f"{own[density]['error']['color_psnr']:.1f}" if density in own else "–" for density in densities),
+                     f"{max(row['ms_median'] for row in own.values()):.1f}",
+                     f"{100.0 * max(error['inner_holes'] for error in errors):.2f}",
+                     f"{100.0 * max(error['outer_growth'] for error in errors):.2f}",
+                     f"{max(error['depth_rms_spacings'] for error in errors):.2f}",
+                     f"{max((error['depth_bias_spacings'] for error in errors), key=abs):+.3f}",
+                     " / ".join("–" if one is None else f"{one:.1f}" for one in flicker)])
+    return table(["shape", "quality", *(f"dB at {density:g}" for density in densities), "slowest, ms", "open inside, %",
+                  "grown off the outline, %", "depth rms, spacings", "depth bias, spacings", "flicker inside / at edges, levels"], body)
 
 
 def short(result: dict[str, Any]) -> str:

@@ -122,6 +122,19 @@ class Bench(unittest.TestCase):
             readme.update(result, self.out)
             self.assertEqual("old" not in path.read_text(), wanted)
 
+    def test_independent(self) -> None:
+        """A line a shape and quality, the worst of each column but decibels."""
+        row, detail = self.result["rows"][0], {**self.result["details"][0], "group": "independent"}
+        rows, details = [], []
+        for density, psnr, bias in ((1.0, 30.0, -0.2), (4.0, 35.0, 0.1)):
+            error = {"color_psnr": psnr, "inner_holes": 0.001 * density, "outer_growth": 0.0, "depth_rms_spacings": density,
+                     "depth_bias_spacings": bias, "flicker_inside": 0.5 * density, "flicker_edges": 2.0}
+            rows.append({**row, "scene": "knot", "quality": "analysed", "error": error, "ms_median": density})
+            details.append({**detail, "density": density})
+        table = readme.independent({**self.result, "rows": rows, "details": details}).splitlines()
+        self.assertEqual(len(table), 3)
+        self.assertTrue(table[2].startswith("| knot | analysed | 30.0 | 35.0 | 4.0 | 0.40 | 0.00 | 4.00 | -0.200 | 2.0 / 2.0 |"), table[2])
+
     def test_graphics_and_scaling(self) -> None:
         row, detail = self.result["rows"][0], self.result["details"][0]
         rows = [{**row, "device": device, "mode": mode, "threads": threads, "ms_median": ms}

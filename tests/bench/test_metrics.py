@@ -158,16 +158,19 @@ class Bite(unittest.TestCase):
         self.assertGreater(missing["shadow_rms"], moved["shadow_rms"])
 
     def test_steadiness(self) -> None:
-        def turn(noise: float, bias: float) -> float:
+        def turn(noise: float, bias: float, name: str = "temporal_variance") -> float:
             steady, random = metrics.Steadiness(), np.random.default_rng(2)
             for azimuth in (0.0, 0.2, 0.4, 0.6):
                 exact = scenes.build("sphere").picture(orbit(azimuth), 48, 48)
                 steady.add(exact, Shown(exact.smooth + bias + noise * random.normal(size=exact.smooth.shape)))
-            return steady.result()["temporal_variance"]
+            return steady.result()[name]
 
         self.assertLess(turn(0.0, 0.1), 1e-15)  # a constant error does not flicker
         self.assertAlmostEqual(turn(0.02, 0.0), 0.0004 * 0.75, 4)
         self.assertGreater(turn(0.04, 0.0), 3.0 * turn(0.02, 0.0))
+        for name in ("flicker_inside", "flicker_edges"):
+            self.assertLess(turn(0.0, 0.0, name), 1e-9)
+            self.assertGreater(turn(0.02, 0.0, name), 1.0)
 
 
 if __name__ == "__main__":

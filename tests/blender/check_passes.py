@@ -55,6 +55,25 @@ def test_depth_of_surfaces():
     check(farther.mean() > 0 and (farther > 0).mean() > 0.8, f"{farther.mean()}, {(farther > 0).mean():.2f} of the pixels")
 
 
+def test_average():
+    """Of many points in a pixel, black and white, greys show in place of either; the same pixels, as deep."""
+    scene = dense_scene(32, 24)
+    scene.patina.smooth = 'OFF'
+    positions, colors, normals = sphere(40000)
+    colors[:, :3] = 255 * (np.arange(len(colors)) % 2)[:, None]
+    scene.collection.objects.unlink(scene.collection.objects["points"])
+    add_points(positions, colors, normals)
+    plain = render()
+    scene.patina.average = True
+    mean = render()
+    for name in ("Depth", "Source"):
+        check(np.array_equal(plain[name], mean[name]), f"{name} is the same")
+    inside = (plain["Combined"][..., 3] == 1) & (plain["Source"][..., 0] == 1)
+    before, after = plain["Combined"][inside][:, 0], mean["Combined"][inside][:, 0]
+    check(inside.sum() > 100 and after.std() < 0.4 * before.std(), f"{after.std()} beside {before.std()}")
+    check(np.abs(after.mean() - before.mean()) < 0.1, f"{after.mean()} beside {before.mean()}")
+
+
 def test_normal():
     scene = new_scene()
     normal = np.array((0.48, -0.36, 0.8))

@@ -181,6 +181,30 @@ struct ref_normal {
 };
 struct ref_normal ref_normals(const struct normals_args *args, const struct ref_planes *planes, int x, int y);
 
+// ---- average.c --------------------------------------------------------------------------------------------------------
+
+// A point that adds to the pixels around it.
+struct ref_tent {
+    uint32_t id;
+    int possible, definite; // may be drawn; is drawn
+    struct ref_place place;
+    double half, half_error; // pixels, from its middle to where it ends
+    struct ref_vec n;        // unit, towards the viewer; 0: none
+    double normal_error;
+    int across; // the view, so that float32 may turn it either way
+};
+struct ref_tent ref_tent(const struct average_args *args, const struct chunk_view *chunk, const float *positions,
+                         const uint32_t *surface, uint32_t slot);
+struct ref_average {
+    double color[3], color_error[3];
+    struct ref_vec n;
+    double normal_error;
+    int unsure;
+};
+// A pixel at z, deff that of its source, n its normal; nearest: the point of its key. looks: of the points, as they lie in tents.
+struct ref_average ref_average(const struct average_args *args, const struct ref_tent *tents, const struct ref_look *looks,
+                               uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int measured, int x, int y);
+
 struct ref_surface {
     struct ref_vec n;
     double normal_error;

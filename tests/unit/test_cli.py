@@ -300,6 +300,25 @@ def test_noise():
         assert run("render", "noisy.ply", "-o", "no.png", "--noise", bad, code=2)
 
 
+def test_average():
+    """Of many points a pixel, in colours at random, the mean shows: grey, where one of them would be as colourful as it is."""
+    dice = random.Random(3)
+    rows = [(dice.uniform(-1, 1), dice.uniform(-1, 1), 0.0, *(255 * dice.randrange(2) for _ in range(3))) for _ in range(20000)]
+    with open(FOLDER / "dice.ply", "w") as file:
+        file.write("ply\nformat ascii 1.0\nelement vertex 20000\nproperty float x\nproperty float y\nproperty float z\n"
+                   "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n")
+        file.writelines(" ".join(map(str, row)) + "\n" for row in rows)
+    spread = []
+    for more in ((), ("--average",)):
+        run("render", "dice.ply", "-o", "dice.png", "--size", "40x40", "--look", "0,0,5,0,0,0,30", "--unlit", *more)
+        values = [value for row in read_png("dice.png")[3][10:30] for pixel in row[10:30] for value in pixel]
+        middle = sum(values) / len(values)
+        spread.append((sum((value - middle) ** 2 for value in values) / len(values)) ** 0.5)
+    assert spread[1] < 0.5 * spread[0], spread
+    plan = run("render", "dice.ply", "-o", "dice.png", "--size", "40x40", "--average", "--dump-plan")
+    assert "run  average" in plan.stdout + plan.stderr, plan
+
+
 def test_default_picture():
     ball("default.ply")
     assert "default.png" in run("render", "default.ply", "-o", "default.png").stderr

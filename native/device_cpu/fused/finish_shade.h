@@ -65,7 +65,8 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
         vm ours = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
         if (!vm_bits(ours))
             continue;
-        const vi source = pt_source(&finish->planes, (size_t)y * width + x);
+        const size_t at = (size_t)y * width + x;
+        const vi source = pt_color_pixels(&args->instance, pt_source(&finish->planes, at), at);
         vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 4), pt_cpu_data(call, 7), id, source, ours);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
@@ -159,7 +160,8 @@ static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *
         vm ours = pt_of_instance(finish->planes.keys + at, &args->instance, pt_lanes_left(x, width), &id);
         if (!vm_bits(ours))
             continue;
-        pt_albedo(&args->instance, pt_cpu_data(call, 4), id, pt_source(&finish->planes, at), ours, albedo);
+        const vi source = pt_color_pixels(&args->instance, pt_source(&finish->planes, at), at);
+        pt_albedo(&args->instance, pt_cpu_data(call, 4), id, source, ours, albedo);
         if (pt_recolors(args))
             pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
         for (uint32_t k = 0; k < 3; k++)

@@ -40,7 +40,7 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         vm ours = pt_of_instance(shade->planes.keys + at, &args->instance, pt_lanes_left(x, rect[2]), &id);
         if (!vm_bits(ours))
             continue;
-        const vi source = pt_source(&shade->planes, at);
+        const vi source = pt_color_pixels(&args->instance, pt_source(&shade->planes, at), at);
         pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, source, ours, color);
         if (pt_recolors(args))
             pt_recolor(args, x, y, vf_load(around[args->blend]->z + x), ours, color);

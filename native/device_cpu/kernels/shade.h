@@ -6,7 +6,7 @@
 #include "device_cpu/kernels/blend_normals.h"
 #include "device_cpu/kernels/recolor.h"
 
-static const uint32_t pt_color_bytes[] = { 0, 3, 12, 0, 4 }; // of a point, by color_format
+static const uint32_t pt_color_bytes[] = { 0, 3, 12, 0, 4, 0 }; // of a point, by color_format
 
 // Colours of three bytes, gathered as words: byte offsets fit a signed index.
 static inline int pt_gathers_bytes(const struct instance_args *instance)
@@ -25,10 +25,21 @@ static inline void pt_decode_srgb(vi rgb, vf linear[3])
         linear[k] = vf_look_up(pt_srgb_table, 256, vi_and(vi_shr(rgb, 8 * k), vi_set(255)));
 }
 
+static inline int pt_colors_of_plane(const struct instance_args *instance)
+{
+    return instance->color_format == PT_COLOR_OF_PLANE || instance->color_format == PT_COLOR_OF_PIXEL;
+}
+
+// The pixels in the plane of colours that PT_LANES pixels from `at` on show, given those where their surfaces were measured.
+static inline vi pt_color_pixels(const struct instance_args *instance, vi source, size_t at)
+{
+    return instance->color_format == PT_COLOR_OF_PIXEL ? vi_add(vi_set((uint32_t)at), vi_lanes()) : source;
+}
+
 // The points' own colours, before light; source: the pixels in the plane where they were blended.
 static inline void pt_albedo(const struct instance_args *instance, const void *colors, vi id, vi source, vm ours, vf albedo[3])
 {
-    if (instance->color_format == PT_COLOR_OF_PLANE) {
+    if (pt_colors_of_plane(instance)) {
         vf pixels[4];
         vf_gather4(colors, source, ours, pixels);
         for (int k = 0; k < 3; k++)
@@ -66,7 +77,7 @@ static inline vf pt_opacity(const struct instance_args *instance, const void *co
     vf opacity = vf_set(instance->opacity);
     if (!instance->has_opacities)
         return opacity;
-    if (instance->color_format == PT_COLOR_OF_PLANE) {
+    if (pt_colors_of_plane(instance)) {
         vf pixels[4];
         vf_gather4(colors, source, ours, pixels);
         return pixels[3];

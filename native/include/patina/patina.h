@@ -531,6 +531,11 @@ typedef struct patina_settings {
                                  // it. What comes in the end is the same to the bit
     float pixel_noise;           // > 0: samples end once stats.pixel_error is at most this; of a region by its own pixels. Asked at
                                  // certain numbers of samples, which neither threads nor steps change. 0 = pixel_samples as set
+    uint32_t average;            // 1: pixels of clouds that are filled show the mean of the points about their surface, each weighted
+                                 // by how near their middle it fell, in place of the nearest point alone: colours, and normals where
+                                 // points have them. Truer where several points fall into a pixel, steadier where a camera or an
+                                 // object moves. Not where colours come from a ramp or points have opacities of their own; discs
+                                 // show means either way
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
