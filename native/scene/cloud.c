@@ -103,7 +103,7 @@ struct build {
     double cell[3], cell_min[3]; // of the Morton grid being coded
 };
 
-enum { BLOCK_POINTS = 1 << 16, LEAST_POINTS = 16 };
+enum { BLOCK_POINTS = 1 << 16, LEAST_POINTS = 16, SMALL_CLOUD = 1 << 15 };
 
 static void position(const struct build *build, uint64_t index, double p[3])
 {
@@ -196,7 +196,9 @@ static double side(const double box_min[3], const double box_max[3])
     return fmax(box_max[0] - box_min[0], fmax(box_max[1] - box_min[1], box_max[2] - box_min[2]));
 }
 
-// Does an eighth of these Morton-ordered points lie in a box 32 times smaller than that of all? Told by at most 16 of each.
+// Does an eighth of these Morton-ordered points lie in a box 32 times smaller than that of all? Told by at most 16 of each, of small
+// clouds by all: a single stray, 100 radii away and not looked at, made one chunk of a thousand points that seemed to lie where
+// its middle is, and their gaps stayed open.
 static int is_uneven(const struct build *build, uint32_t begin, uint32_t count)
 {
     double box_min[3], box_max[3], least = INFINITY;
@@ -205,7 +207,7 @@ static int is_uneven(const struct build *build, uint32_t begin, uint32_t count)
         uint32_t first = (uint32_t)((uint64_t)count * part / 8), last = (uint32_t)((uint64_t)count * (part + 1) / 8);
         double low[3], high[3], p[3];
         box_reset(low, high);
-        for (uint32_t i = first; i < last; i += (last - first + 15) / 16) {
+        for (uint32_t i = first; i < last; i += build->drawn <= SMALL_CLOUD ? 1 : (last - first + 15) / 16) {
             position(build, (uint32_t)build->words[begin + i], p);
             box_add(low, high, p, p);
         }

@@ -98,9 +98,54 @@ static void test_density(void **state)
     patina_device_destroy(device);
 }
 
+// Of a ball of so few points, with one stray far away or without: how much of the picture it covers.
+static double covered(patina_device *device, uint64_t count, int stray, int analysed)
+{
+    const double eye[3] = {0.3, -3.0, 0.4}, target[3] = {0.0, 0.0, 0.0};
+    struct points ball = points_sphere(count, 1.0, POINTS_NORMALS, 5), points = points_create(count + 1, POINTS_NORMALS);
+    for (uint64_t i = 0; i < 3 * count; i++) {
+        points.position[i] = ball.position[i];
+        points.normal[i] = ball.normal[i];
+    }
+    points.normal[3 * count + 2] = 1.0f;
+    for (int k = 0; k < 3; k++)
+        points.position[3 * count + (uint64_t)k] = 58.0f; // 100 radii away
+    points.count -= !stray;
+    patina_cloud *cloud = points_upload(&points);
+    if (analysed)
+        CHECK(patina_cloud_analyse(cloud, NULL, NULL), cloud);
+    patina_scene *scene = scene_of(cloud, NULL);
+    patina_camera camera = camera_perspective(eye, target, 45.8, 160, 160, 0.1, 1000.0);
+    patina_settings settings = settings_default(160, 160);
+    struct picture picture = picture_render(device, scene, &camera, &settings);
+    const double share = (double)picture_count(&picture) / (160.0 * 160.0);
+    picture_free(&picture);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+    points_free(&points);
+    points_free(&ball);
+    return share;
+}
+
+// One stray does not decide how wide gaps are closed: of such clouds it did, and 1 to 10 % were left of what is covered without.
+static void test_stray(void **state)
+{
+    (void)state;
+    static const uint64_t counts[] = {300, 500, 1000, 2000, 5000};
+    patina_device *device = support_device_first();
+    for (int analysed = 0; analysed < 2; analysed++)
+        for (uint32_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+            const double without = covered(device, counts[i], 0, analysed), with = covered(device, counts[i], 1, analysed);
+            print_message("  %s%4u points: %.1f %% covered, %.1f %% with a stray\n", analysed ? "analysed, " : "", (unsigned)counts[i],
+                          100.0 * without, 100.0 * with);
+            assert_true(without > 0.4 && fabs(with / without - 1.0) < 0.05);
+        }
+    patina_device_destroy(device);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_density)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_density), cmocka_unit_test(test_stray)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
