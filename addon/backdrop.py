@@ -36,6 +36,11 @@ def over(color: np.ndarray, behind: np.ndarray) -> np.ndarray:
     return out
 
 
+def _turned(view: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """float32. Sum by sum: a product of matrices may round by how its rows lie in memory, and borders would differ from crops."""
+    return (view[..., 0:1] * axes[:, 0] + view[..., 1:2] * axes[:, 1] + view[..., 2:3] * axes[:, 2]).astype(np.float32)
+
+
 def directions(description: SceneDescription, low: int, high: int) -> np.ndarray:
     """(high - low, width, 3) float32, unit, in the world: of rows of the full picture."""
     camera = description.camera
@@ -48,7 +53,7 @@ def directions(description: SceneDescription, low: int, high: int) -> np.ndarray
         x = (left + (np.arange(x0, x1) + 0.5) * (right - left) / around.width)[None]
         y = (bottom + (np.arange(low, high) + 0.5) * (top - bottom) / around.height)[:, None]
         view = np.stack(np.broadcast_arrays(np.cos(y) * np.sin(x), np.sin(y), -np.cos(y) * np.cos(x)), 2)
-        return (view @ axes.T).astype(np.float32)
+        return _turned(view, axes)
     settings = description.settings
     x0, _, x1, _ = settings.region
     if camera.orthographic:
@@ -57,4 +62,4 @@ def directions(description: SceneDescription, low: int, high: int) -> np.ndarray
     y = (camera.bottom + (np.arange(low, high) + 0.5) * (camera.top - camera.bottom) / settings.height)[:, None]
     view = np.stack(np.broadcast_arrays(x, y, np.float64(-1.0)), 2)
     view /= np.sqrt(x * x + y * y + 1.0)[..., None]
-    return (view @ axes.T).astype(np.float32)
+    return _turned(view, axes)

@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import native, passes, render, sync, viewport
+from . import cryptomatte, native, passes, render, sync, viewport
 from .importers import told
 from .sync import losses, motion
 from .sync.kept import CHECKS
@@ -75,7 +75,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     def _render_eye(self, depsgraph: bpy.types.Depsgraph, eye: str) -> None:
         """One picture, the mean of its moments where motion is blurred."""
         frame, moments = depsgraph.scene_eval.frame_current_final, motion.moments(depsgraph.scene_eval)
-        done, color, ms, told = 0, 0.0, 0.0, set()
+        done, color, ms, told, ranks = 0, 0.0, 0.0, set(), {}
         data: tuple[sync.SceneDescription, render.Picture] | None = None
         with passes.Shown(self, depsgraph.view_layer_eval, eye) as shown:
             show = None if bpy.app.background else shown.put
@@ -92,6 +92,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
                             raise
                         break  # those that there are stay
                     done, color, ms = done + 1, color + picture.planes["COMBINED"], ms + picture.stats["ms"]
+                    cryptomatte.gather(ranks, picture.ranks)
                     if moment.gives_data or not data:
                         data = description, picture
                     if show and 1 < done < len(moments):
@@ -101,7 +102,9 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
                     self._go_to(frame)
         description, picture = data
         picture.planes["COMBINED"] = color / np.float32(done) if done > 1 else color
-        passes.write(self, depsgraph.view_layer_eval, description, picture.planes, eye)
+        layer, size = depsgraph.view_layer_eval, picture.planes["COMBINED"].shape[:2]
+        picture.planes.update(cryptomatte.planes(ranks, (item.plane for item in passes.enabled(layer)), size, 1.0 / done))
+        passes.write(self, layer, description, picture.planes, eye)
         self._status(_summary(picture, ms, done < len(moments)), 1.0)
 
     def _render_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment, frame: int, told: set[str],

@@ -22,7 +22,7 @@ from .sync.roles import CATCHER, HOLDOUT
 UNLIT = 1  # PATINA_LIGHTING_UNLIT
 NO_SELF = 4  # PATINA_SHADOW_NO_SELF
 BLACK, WHITE = (NOTHING,) * 3, (1.0,) * 3
-RED, GREEN = (1.0, NOTHING, NOTHING), (NOTHING, 1.0, NOTHING)
+CHANNELS = RED, GREEN, BLUE = (1.0, NOTHING, NOTHING), (NOTHING, 1.0, NOTHING), (NOTHING, NOTHING, 1.0)
 
 Item = CloudItem | MeshItem
 
@@ -38,13 +38,9 @@ def picture(description: SceneDescription) -> SceneDescription:
 
 def needed(description: SceneDescription) -> list[SceneDescription]:
     """The other pictures that a picture needs; finish() takes their planes COMBINED in this order."""
-    plain = replace(description, lines=None, effects=_focus_alone(description.effects), shadow_file="", clips=[
-        replace(clip, tint_strength=0.0) for clip in description.clips])
-    plain = replace(plain, settings=replace(plain.settings, film_transparent=1))
-    unlit = replace(plain, lights=[], headlight=None, settings=replace(
-        plain.settings, world_color=(1.0,) * 3, world_directed=0))
+    plain = _plain(description)
     colors = {HOLDOUT: RED, CATCHER: GREEN}
-    found = [_painted(unlit, lambda item: _flat(item, colors.get(item.role, BLACK)))]
+    found = [unlit(description, lambda item: colors.get(item.role, BLACK))]
     if any(item.role == CATCHER for item in (*description.clouds, *description.meshes)):
         lit = _painted(plain, lambda item: _lit(item) if item.role == CATCHER else _flat(item, BLACK))
         dark = [replace(light, shadows=0) for light in lit.lights]
@@ -73,6 +69,19 @@ def finish(color: np.ndarray, description: SceneDescription, planes: list[np.nda
         out[..., 3] = np.clip(out[..., 3] - held, 0.0, 1.0)
         out[..., :3] *= (held < 1.0 - 1e-4)[..., None]
     return out
+
+
+def unlit(description: SceneDescription, color_of: Callable[[Item], tuple[float, float, float]]) -> SceneDescription:
+    """The scene with each thing in one color, without light, on a transparent film; by the same filters."""
+    plain = _plain(description)
+    dark = replace(plain, lights=[], headlight=None, settings=replace(plain.settings, world_color=WHITE, world_directed=0))
+    return _painted(dark, lambda item: _flat(item, color_of(item)))
+
+
+def _plain(description: SceneDescription) -> SceneDescription:
+    plain = replace(description, lines=None, effects=_focus_alone(description.effects), shadow_file="", clips=[
+        replace(clip, tint_strength=0.0) for clip in description.clips])
+    return replace(plain, settings=replace(plain.settings, film_transparent=1))
 
 
 def _painted(description: SceneDescription, paint: Callable[[Item], Item]) -> SceneDescription:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from . import cryptomatte
 from .native import MOST_LAYERS
 from .sync import SceneDescription
 
@@ -89,11 +90,22 @@ def _mist(plane: np.ndarray, scene: SceneDescription) -> np.ndarray:
 
 def _object_index(keys: np.ndarray, scene: SceneDescription) -> np.ndarray:
     """The pass index of the object that each pixel shows."""
-    ids = (keys[..., 0] & np.uint64(0xFFFFFFFF)).astype(np.int64)
-    bases = np.cumsum([0, *(item.cloud.count for item in scene.clouds), *(item.mesh.count for item in scene.meshes)])
     indices = np.array([*(item.pass_index for item in (*scene.clouds, *scene.meshes)), 0], np.float32)
-    found = np.searchsorted(bases, ids, side='right') - 1
-    return indices[np.minimum(found, len(indices) - 1)][..., None]
+    return indices[cryptomatte.shown_items(keys, scene)][..., None]
+
+
+def _mattes(kind: str, number: int) -> RenderPass:
+    """Names and shares of the ranks 2 number and 2 number + 1."""
+    def wanted(layer: bpy.types.ViewLayer) -> bool:
+        return getattr(layer, f"use_pass_cryptomatte_{kind.lower()}") and number < _matte_passes(layer)
+
+    # lowercase where Cycles writes it so, for readers of files
+    return RenderPass(f"Crypto{kind}{number:02d}", 4, "RGBA" if bpy.app.version < (4, 2, 0) else "rgba", 'COLOR',
+                      f"{cryptomatte.PLANE} {kind} {number}", wanted)
+
+
+def _matte_passes(layer: bpy.types.ViewLayer) -> int:
+    return (min(layer.pass_cryptomatte_depth, cryptomatte.MOST_RANKS) + 1) // 2
 
 
 def _of_layer(number: int) -> tuple[RenderPass, ...]:
@@ -121,6 +133,7 @@ PASSES = (
     RenderPass("Certainty", 1, "X", 'VALUE', "CERTAINTY", lambda layer: layer.patina.use_pass_certainty),
     RenderPass("Thickness", 1, "X", 'VALUE', "THICKNESS", lambda layer: layer.patina.use_pass_thickness),
     *(item for number in range(1, MOST_LAYERS + 1) for item in _of_layer(number)),
+    *(_mattes(kind, number) for kind in cryptomatte.KINDS for number in range(cryptomatte.MOST_RANKS // 2)),
 )
 
 
@@ -192,6 +205,10 @@ class Shown:
 def write(engine: bpy.types.RenderEngine, layer: bpy.types.ViewLayer, scene: SceneDescription,
           planes: dict[str, np.ndarray], eye: str = "") -> None:
     """Hands the planes of a finished picture to Blender."""
+    for kind in cryptomatte.KINDS:
+        if getattr(layer, f"use_pass_cryptomatte_{kind.lower()}"):
+            for name, value in cryptomatte.metadata(layer.name, kind, cryptomatte.names(scene, kind)).items():
+                engine.get_result().stamp_data_add_field(name, value)
     with Shown(engine, layer, eye) as shown:
         shown.put(scene, planes, show=False)
 

@@ -8,12 +8,12 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from . import backdrop, jobs, mattes, memory, native
+from . import backdrop, cryptomatte, jobs, mattes, memory, native
 from .sync import Camera, DeviceChoice, SceneDescription
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
@@ -38,6 +38,7 @@ class Picture:
     stats: dict[str, Any]
     device: str
     notice: str = ""  # what the artist should know about how it came to be
+    ranks: dict[str, cryptomatte.Ranks] = field(default_factory=dict)  # by kind of Cryptomatte
 
 
 # The device outlives frames: starting threads or a GL context costs more than many a picture.
@@ -65,6 +66,34 @@ def draw(description: SceneDescription, planes: Iterable[str], poll: Callable[[f
     """Renders on a worker thread; poll(progress) is called on this one and returns True to cancel. show: is given what there is
     of a picture of several samples, on this thread too, all planes first and then those that changed. Cancelled once it is
     there, such a picture keeps the samples that it has: its stats tell how many are pending."""
+    wanted = set(planes)
+    kinds = [kind for kind in cryptomatte.KINDS if any(plane.startswith(f"{cryptomatte.PLANE} {kind}") for plane in wanted)]
+    native_planes = {plane for plane in wanted if not plane.startswith(cryptomatte.PLANE)}
+    if not kinds:
+        return _draw_seen(description, native_planes, poll, tile_size, show)
+    picture = _draw_seen(description, native_planes | {"KEYS"}, lambda share: poll(0.5 * share), tile_size, show)
+    made = cryptomatte.plan(description, picture.planes["KEYS"] if _is_hard(description) else None)
+
+    def part(number: int) -> Callable[[float], bool]:
+        return lambda share: poll(0.5 + 0.5 * (number + share) / len(made.scenes))
+
+    try:
+        found = [_draw_seen(scene, ["COMBINED"], part(number), tile_size).planes["COMBINED"]
+                 for number, scene in enumerate(made.scenes)]
+    except native.PatinaCancelled:  # the picture itself stays
+        return picture
+    return replace(picture, ranks={kind: cryptomatte.ranks(made, found, kind) for kind in kinds} if found else {})
+
+
+def _is_hard(description: SceneDescription) -> bool:
+    """Whether nothing shows but the nearest surface, beside thin edges."""
+    return description.effects.focus_aperture <= 0.0 and not any(
+        item.style.transparency > 0.0 or item.cloud.has_opacities for item in description.clouds)
+
+
+def _draw_seen(description: SceneDescription, planes: Iterable[str], poll: Callable[[float], bool], tile_size: int,
+               show: Show | None = None) -> Picture:
+    """With what lies behind, and what is held out."""
     wanted = list(planes)
     behind = backdrop.pixels(description, lambda: poll(0.0)) if description.behind else None
     if mattes.are_needed(description):

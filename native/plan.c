@@ -377,6 +377,14 @@ static struct compose_args compose_args(const struct pt_plan *plan)
                                  .crop_height = plan->crop[3]};
 }
 
+static int draws_discs(const struct pt_plan *plan)
+{
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        if (plan->instances[i].chunk_count && plan->instances[i].discs)
+            return 1;
+    return 0;
+}
+
 static struct extract_args extract_args(const struct pt_builder *builder, uint32_t passes)
 {
     const struct pt_plan *plan = builder->plan;
@@ -390,7 +398,8 @@ static struct extract_args extract_args(const struct pt_builder *builder, uint32
                                 .source = passes >> PATINA_PASS_SOURCE & 1u,
                                 .shadow = plan->light_count && (passes >> PATINA_PASS_SHADOW & 1u),
                                 .discs_first = plan->discs_first,
-                                .discs_count = plan->layers > 1 ? 0 : plan->discs_count}; // of layers only the last is there still
+                                // of layers only the last is there still; where no disc is drawn nothing says where one fell
+                                .discs_count = plan->layers > 1 || !draws_discs(plan) ? 0 : plan->discs_count};
     double axes[9], position[3];
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)

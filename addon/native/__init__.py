@@ -215,6 +215,7 @@ class Cloud(_Handle):
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
         self.has_scalars = bool(info.has_scalars)
+        self.has_opacities = bool(info.has_opacities)
         self.has_shapes = bool(info.has_shapes)  # analysed
         self.normals_oriented = bool(info.normals_oriented)
         self.kinds = tuple(info.kinds)  # points of each of KINDS

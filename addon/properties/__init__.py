@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 from bpy.props import PointerProperty, StringProperty
-from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume
+from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume, World
 
 from .. import styles
 from ..native import MOST_LAYERS
@@ -21,6 +21,7 @@ from .lines import PatinaLinesProperties
 from .sequence import PatinaSequenceProperties
 from .studio import PatinaStudioProperties
 from .style import PatinaStyleProperties
+from .world import PatinaWorldProperties
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 _PATH = {'ANIMATABLE', *({'PATH_SUPPORTS_BLEND_RELATIVE'} if bpy.app.version >= (4, 5, 0) else ())}  # which warns without
@@ -235,7 +236,7 @@ class PatinaObjectProperties(PropertyGroup):
     use_radius: switch("radius", _known_distance, "One radius for all points; else each point's own where an attribute says so, else what "
                                                   "its neighbors or 1.75 times the spacing of the points say", "Set Disc Radius")
     radius_attribute: StringProperty(
-        name="Disc Radius Attribute", override=_OVERRIDE,
+        name="Disc Radius Attribute", override=_OVERRIDE, search=_numbers, search_options={'SUGGESTION'},
         description="Point attribute of numbers, or vertex group: the radius of each point's disc; empty: where all points are "
                     "discs, the own radius of point clouds")
     largest_gap: FloatProperty(
@@ -338,8 +339,9 @@ class PatinaViewLayerProperties(PropertyGroup):
 
 _CLASSES = (PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
             PatinaLinesProperties, PatinaColorProperties, PatinaClipProperties, PatinaSceneProperties,
-            PatinaObjectProperties, PatinaViewLayerProperties)
-_OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties))
+            PatinaObjectProperties, PatinaViewLayerProperties, PatinaWorldProperties)
+_OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties),
+           (World, PatinaWorldProperties))
 
 
 def register() -> None:

@@ -138,6 +138,8 @@ class CloudItem:
     style: CloudStyle
     pass_index: int  # of the object
     role: str = roles.SEEN
+    name: str = ""  # of the object
+    asset: str = ""  # of its topmost parent
 
 
 class CloudCache:
@@ -241,7 +243,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     taken: dict[tuple, native.Cloud | Pending | native.Mesh | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
-    triangles = meshes.BARE if roles.are_used(depsgraph) else meshes.TRIANGLES
+    triangles = meshes.BARE if roles.are_used(depsgraph) or _wants_mattes(depsgraph.view_layer_eval) else meshes.TRIANGLES
     unknown = roles.Unknown(depsgraph.view_layer_eval)
     scales: list[tuple[str, float, native.Cloud | Pending]] = []
     for instance in depsgraph.object_instances:
@@ -268,18 +270,18 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         radius = _radius_name(obj, patina.surface)
         place = link.identity() if link else (obj.data.as_pointer(), radius, faces_as, *_attribute_names(obj), analysis.wanted(obj))
         if place not in taken:
-            identity = place if link else (*_identity(obj, used), radius, faces_as)
+            identity = place if link else _identity(obj, used, radius, faces_as)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
         unknown.look(instance)
         if isinstance(cloud, native.Mesh):
-            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index, role))
+            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index, role, *_names(obj)))
         elif cloud:
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
-            items.append(CloudItem(cloud, style, obj.pass_index, role))
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj)))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
@@ -295,6 +297,18 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
         notices.append(f"{len(faces)} mesh object{'s' * (len(faces) > 1)} with faces not drawn: "
                        "Render Properties > Surface > Meshes draws them")
     return items
+
+
+def _wants_mattes(layer: bpy.types.ViewLayer) -> bool:
+    return layer.use_pass_cryptomatte_object or layer.use_pass_cryptomatte_asset
+
+
+def _names(obj: bpy.types.Object) -> tuple[str, str]:
+    """By which Cryptomatte knows an object, and what it is a part of."""
+    top = obj
+    while top.parent:
+        top = top.parent
+    return obj.name, top.name
 
 
 class TakingNow:
@@ -322,7 +336,7 @@ class TakingNow:
         if identity[-1] in {meshes.TRIANGLES, meshes.BARE}:
             pause()
             return meshes.CACHE.obtain(identity, obj)
-        arrays = None if link else _read(obj, self._notices, *identity[-2:], pause)
+        arrays = None if link else _read(obj, self._notices, identity[0], identity[-1], pause)
         if arrays is None and link is None:
             return None
         if arrays and len(arrays.positions) < SMALL:
@@ -430,7 +444,7 @@ class Trusted:
                     self._known[key] = (meshes.CACHE.obtain(identity, obj), said)
                 else:
                     self.reads += 1
-                    arrays = _read(obj, said, *identity[-2:])
+                    arrays = _read(obj, said, identity[0], identity[-1])
                     self._known[key] = (Pending(obj.name, identity, arrays) if arrays else None, said)
             pending, said = self._known[key]
             notices.extend(said)
@@ -456,7 +470,7 @@ def changed_owners(depsgraph: bpy.types.Depsgraph) -> set[tuple[str, str]]:
     return owners
 
 
-def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:
+def _identity(obj: bpy.types.Object, used: set[tuple], radius: str, faces_as: int | str) -> tuple:
     """Names the data for this session. Geometry that modifiers made has no original: its object stands for it,
     counted where there are several."""
     original = obj.data.original
@@ -465,9 +479,9 @@ def _identity(obj: bpy.types.Object, used: set[tuple]) -> tuple:
     base = (type(owner).__name__, getattr(owner, "session_uid", None) or owner.name_full, obj.type,
             *_attribute_names(obj), analysis.wanted(obj))
     number = 0
-    while (*base, number) in used:
+    while (radius, *base, number, faces_as) in used:
         number += 1
-    return (*base, number)
+    return (radius, *base, number, faces_as)
 
 
 def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:

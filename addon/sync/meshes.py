@@ -39,6 +39,8 @@ class MeshItem:
     style: MeshStyle
     pass_index: int  # of the object
     role: str = roles.SEEN
+    name: str = ""  # of the object
+    asset: str = ""  # of its topmost parent
 
 
 class MeshCache:

@@ -57,8 +57,9 @@ class World:
         """What is seen, as one picture for the graphics processor: the world's own image, or one of it all around."""
         known = picture_of(self.behind)
         if known:
-            step = -(-known.image.pixels.shape[1] // MOST_WIDTH)
-            return known if step == 1 else replace(known, image=replace(known.image, pixels=world_image.means(known.image.pixels, step)))
+            pixels = known.image.pixels
+            step = -(-pixels.shape[1] // MOST_WIDTH)
+            return known if step == 1 else replace(known, image=replace(known.image, pixels=world_image.means(pixels, step)))
         directions, _ = _sphere(SEEN_WIDTH, SEEN_WIDTH // 2)
         pixels = self.seen(directions).reshape(SEEN_WIDTH // 2, SEEN_WIDTH, 3)
         return Picture(world_image.Image("", (), pixels, pixels), np.eye(3), np.zeros(3), np.ones(3), False, False)
@@ -83,11 +84,13 @@ def read(world: bpy.types.World | None, notices: list[str]) -> World:
     if output is None:
         return NONE
     reader = Reader()
-    expression = reader.value(output.inputs["Surface"])
+    baked = world.patina.picture if world.patina.use_picture else None
+    expression = reader.picture(baked) if baked else reader.value(output.inputs["Surface"])
     if reader.unknown:
         notices.append(f"the world's nodes are drawn without what is not known to Patina: "
                        f"{', '.join(repr(name) for name in reader.unknown[:3])}"
-                       f"{f' and {len(reader.unknown) - 3} more' if len(reader.unknown) > 3 else ''}")
+                       f"{f' and {len(reader.unknown) - 3} more' if len(reader.unknown) > 3 else ''}. "
+                       "World Properties > Baked Picture > Bake World makes a picture of them")
     for image in reader.images:
         if image.lost:
             notices.append(Loss(f"the world's image '{image.name}' cannot be read: the world is pink there"))

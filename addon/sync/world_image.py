@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import count
 
 import bpy
 import numpy as np
@@ -58,6 +59,7 @@ def sample(pixels: np.ndarray, u: np.ndarray, v: np.ndarray, closest: bool = Fal
     return below * (1 - t) + above * t
 
 
+_changes = count(1)
 _known: dict[str, Image] = {}  # by name: the images of the last worlds
 
 
@@ -67,7 +69,7 @@ def forget(names: set[str] | None = None) -> None:
         _known.pop(name, None)
 
 
-def read_image(image: bpy.types.Image | None, user: bpy.types.ImageUser) -> Image:
+def read_image(image: bpy.types.Image | None, user: bpy.types.ImageUser | None = None) -> Image:
     """An image's pixels as they are now. Kept until its file, size, or frame changes."""
     if image is None:
         return Image("", (), MISSING, MISSING, lost=True)
@@ -79,11 +81,16 @@ def read_image(image: bpy.types.Image | None, user: bpy.types.ImageUser) -> Imag
     except OSError:
         stamp = 0
     token = (image.name_full, path, stamp, tuple(image.size), image.colorspace_settings.name, image.source,
-             tuple(image.generated_color), image.generated_type, user.frame_current if moving else 0)
+             tuple(image.generated_color), image.generated_type, user.frame_current if moving and user else 0)
     known = _known.get(image.name_full)
-    if known and known.token == token and not image.is_dirty and not moving:
+    painted = image.is_dirty or moving  # then nothing but the pixels tells
+    if known and known.token[:len(token)] == token and not painted:
         return known
     found = _read(image, token)
+    if painted and known and np.array_equal(known.pixels, found.pixels):
+        return known
+    if painted:
+        found = replace(found, token=(*token, next(_changes)))
     _known[image.name_full] = found
     return found
 
@@ -99,8 +106,6 @@ def _read(image: bpy.types.Image, token: tuple) -> Image:
     if not image.is_float and not _is_data(image):  # bytes are as they are stored
         pixels = np.where(pixels <= 0.04045, pixels / np.float32(12.92), ((pixels + np.float32(0.055)) / np.float32(1.055)) ** 2.4)
     pixels = np.nan_to_num(pixels.astype(np.float32, copy=False), posinf=65504.0, neginf=0.0)
-    if image.is_dirty:  # painted: the next look reads again, as another one
-        token = (*token, hash(pixels.tobytes()))
     return Image(image.name, token, pixels, _coarse(pixels))
 
 
@@ -118,5 +123,5 @@ def means(pixels: np.ndarray, step: int) -> np.ndarray:
     """One pixel for step x step."""
     height, width = pixels.shape[:2]
     blocks = pixels[:height // step * step, :width // step * step]
-    return np.ascontiguousarray(blocks.reshape(height // step, step, width // step, step, 3).mean((1, 3), dtype=np.float64),
-                                np.float32)
+    parts = blocks.reshape(height // step, step, width // step, step, 3)
+    return np.ascontiguousarray(parts.mean((1, 3), dtype=np.float64), np.float32)

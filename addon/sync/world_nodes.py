@@ -65,6 +65,11 @@ def _unit(a: Values) -> Values:
     return _quotient(a, _length(a))
 
 
+def _turned(a: Values, turn: np.ndarray) -> Values:
+    """Sum by sum: a product of matrices may round by how its rows lie in memory."""
+    return a[:, 0:1] * turn[:, 0] + a[:, 1:2] * turn[:, 1] + a[:, 2:3] * turn[:, 2]
+
+
 def _as(expression: Expression, kind: str, wanted: str) -> Expression:
     """Between kinds of sockets, as Blender converts: VALUE, VECTOR, RGBA."""
     kind, wanted = ('VALUE' if one in {'INT', 'BOOLEAN'} else one for one in (kind, wanted))
@@ -158,9 +163,15 @@ class Reader:
 
     # ---- shaders
 
-    def _ShaderNodeBackground(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
-        color, strength = self.value(node.inputs["Color"]), self.value(node.inputs["Strength"])
+    def picture(self, found: bpy.types.Image) -> Expression:
+        """A world that is one image all around."""
+        return self._shone(self.image(found, lambda rays: rays.directions), constant(1.0))
 
+    def _ShaderNodeBackground(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
+        return self._shone(self.value(node.inputs["Color"]), self.value(node.inputs["Strength"]))
+
+    @staticmethod
+    def _shone(color: Expression, strength: Expression) -> Expression:
         def shine(rays: Rays) -> Values:
             return np.maximum(color(rays) * strength(rays), 0)
 
@@ -226,16 +237,20 @@ class Reader:
         if not (any(euler) or any(move) or scale != (1.0, 1.0, 1.0)):
             return place
         turn = np.array(euler.to_matrix(), np.float32)
-        return lambda rays: (place(rays) * np.float32(scale)) @ turn.T + np.float32(move)
+        return lambda rays: _turned(place(rays) * np.float32(scale), turn) + np.float32(move)
 
     def _ShaderNodeTexEnvironment(self, node: bpy.types.Node, socket: bpy.types.NodeSocket) -> Expression | None:
-        place = self._place(node)
-        image = read_image(node.image, node.image_user)
-        self._take(image.token, node.projection, node.interpolation)
         if socket.name == "Alpha":
             return constant(1.0)
+        return self.image(node.image, self._place(node), node.image_user, node.projection == 'MIRROR_BALL',
+                          node.interpolation == 'Closest')
+
+    def image(self, found: bpy.types.Image | None, place: Expression, user: bpy.types.ImageUser | None = None, ball: bool = False,
+              closest: bool = False) -> Expression:
+        """What an image shows at a place."""
+        image = read_image(found, user)
+        self._take(image.token, ball, closest)
         self.images.append(image)
-        ball, closest = node.projection == 'MIRROR_BALL', node.interpolation == 'Closest'
 
         def look(rays: Rays) -> Values:
             return image.look(place(rays), ball=ball, closest=closest, fine=rays.seen)
@@ -261,7 +276,7 @@ class Reader:
                 t = t * t * (3 - 2 * t) if kind == 'EASING' else t * t if kind == 'QUADRATIC' else t
             return np.clip(t, 0, 1)
 
-        return gradient if socket.name == "Fac" or socket.type == 'VALUE' else lambda rays: np.repeat(gradient(rays), 3, 1)
+        return gradient if socket.type == 'VALUE' else lambda rays: np.repeat(gradient(rays), 3, 1)
 
     # ---- vectors
 
@@ -277,10 +292,10 @@ class Reader:
         def mapped(rays: Rays) -> Values:  # a turn that differs by direction counts as that of the first
             turn = np.array(Euler(euler(rays)[0].tolist()).to_matrix(), np.float32)
             if kind == 'TEXTURE':
-                return _quotient((place(rays) - move(rays)) @ turn, scale(rays))
+                return _quotient(_turned(place(rays) - move(rays), turn.T), scale(rays))
             if kind == 'NORMAL':
-                return _unit(_quotient(place(rays), scale(rays)) @ turn.T)
-            return (place(rays) * scale(rays)) @ turn.T + move(rays)
+                return _unit(_turned(_quotient(place(rays), scale(rays)), turn))
+            return _turned(place(rays) * scale(rays), turn) + move(rays)
 
         return mapped
 
@@ -333,7 +348,7 @@ class Reader:
         return done
 
     def _ShaderNodeValToRGB(self, node: bpy.types.Node, socket: bpy.types.NodeSocket) -> Expression:
-        fac, ramp = self.value(node.inputs["Fac"]), node.color_ramp
+        fac, ramp = self.value(node.inputs[0]), node.color_ramp
         self._take(ramp.interpolation, ramp.color_mode, ramp.hue_interpolation,
                    tuple((one.position, tuple(one.color)) for one in ramp.elements))
         entries = 4096 if ramp.interpolation == 'CONSTANT' else 1024
@@ -389,7 +404,7 @@ class Reader:
         return lambda rays: np.maximum((1 + contrast(rays)) * color(rays) + bright(rays) - np.float32(0.5) * contrast(rays), 0)
 
     def _ShaderNodeInvert(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
-        share, color = self.value(node.inputs["Fac"]), self.value(node.inputs["Color"])
+        share, color = self.value(node.inputs[0]), self.value(node.inputs[1])
         return lambda rays: (c := color(rays)) * (1 - share(rays)) + (1 - c) * share(rays)
 
     def _ShaderNodeRGBToBW(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
@@ -397,8 +412,7 @@ class Reader:
         return lambda rays: color(rays) @ GRAY[:, None]
 
     def _ShaderNodeHueSaturation(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
-        names = ("Color", "Hue", "Saturation", "Value", "Fac")
-        parts = [self.value(node.inputs[name]) for name in names]
+        parts = [self.value(node.inputs[at]) for at in (4, 0, 1, 2, 3)]  # by number: Fac is Factor in some versions
 
         def changed(rays: Rays) -> Values:
             color, hue, saturation, value, share = (part(rays) for part in parts)

@@ -223,8 +223,8 @@ class PATINA_PT_attributes(_PatinaObjectPanel, Panel):
         layout.use_property_split = True
         patina, data = context.object.patina, context.object.data
         layout.prop_search(patina, "normal_attribute", data, "attributes", text="Normal")
-        layout.prop(patina, "opacity_attribute", text="Opacity")  # with vertex groups
-        layout.prop_search(patina, "radius_attribute", data, "attributes", text="Disc Radius")
+        layout.prop(patina, "opacity_attribute", text="Opacity")  # vertex groups too
+        layout.prop(patina, "radius_attribute", text="Disc Radius")
 
 
 class PATINA_PT_hidden(_PatinaObjectPanel, Panel):

@@ -63,7 +63,7 @@ def test_final_is_analyzed():
     obj.patina.analysis = 'OFF'
     plain = render()
     check(len(clouds.CACHE) == 2, "Off is another cloud")
-    check(not any(cloud.has_shapes for identity, (_, cloud) in clouds.CACHE._entries.items() if not identity[-4]), "Off")
+    check(not any(cloud.has_shapes for identity, (_, cloud) in clouds.CACHE._entries.items() if not identity[-3]), "Off")
     check(np.abs(plain["Combined"] - picture["Combined"]).max() > 0.01, "the same picture")
     obj.patina.analysis = 'AUTO'
     check((render()["Combined"] == picture["Combined"]).all(), "another picture")

@@ -10,7 +10,7 @@ from harness import REPOSITORY, add_points, check, new_scene
 
 import patina
 
-GROUPS = (bpy.types.Scene, bpy.types.Object, bpy.types.ViewLayer)
+GROUPS = (bpy.types.Scene, bpy.types.Object, bpy.types.ViewLayer, bpy.types.World)
 SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "per", "the", "to", "with"}
 
 

@@ -6,7 +6,9 @@ import numpy as np
 from check_points import pixel
 from harness import (SCRATCH, add_points, check, check_close, drawn, new_scene, render, render_layers, reports, saved,
                      set_world, sphere, stats)
-from mathutils import Matrix
+from mathutils import Matrix, Vector
+
+from patina import sample
 
 
 def dense_scene(width=96, height=72):
@@ -204,4 +206,17 @@ def test_animation():
 def test_statistics_line():
     dense_scene()
     render()
-    check(stats[-1].startswith("6,000 points, ") and " ms, cpu" in stats[-1], f"statistics {stats[-1]!r}")
+    check(stats[-1].startswith("6,000 points, ") and " ms, Processor" in stats[-1], f"statistics {stats[-1]!r}")
+
+
+def test_source_where_all_discs_are_beside_the_view():
+    """Points wide enough to be discs lie just outside the picture: there is none in it to tell of."""
+    scene = new_scene(640, 400)
+    positions, normals, colors = sample.points(300000)
+    add_points(positions, colors, normals)
+    scene.patina.fill, scene.patina.smooth, scene.patina.antialias = 'CLOSED', 'ALLEVIATED', 'LAYERS'
+    scene.camera.location = (2.2, -2.6, 1.4)
+    scene.camera.rotation_euler = (Vector((0, 0, 0.6)) - scene.camera.location).to_track_quat('-Z', 'Y').to_euler()
+    picture = render()
+    shown = picture["Combined"][..., 3] > 0
+    check(shown.mean() > 0.3 and np.abs(picture["Source"][shown]).min() >= 1.0, "every pixel that shows something has a source")

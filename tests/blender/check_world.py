@@ -68,6 +68,7 @@ def cycles_scene(samples=64):
 def both(scene):
     """The picture of Cycles and of Patina. Cycles may show less than nothing, Patina does not."""
     pictures = []
+    scene.world.cycles.sampling_method = 'NONE'  # of light, which takes longer than the picture
     for engine in ('CYCLES', 'PATINA'):
         scene.render.engine = engine
         bpy.context.view_layer.update()
@@ -123,7 +124,9 @@ def test_light_like_cycles():
     scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', 2.2
     scene.patina.fill = 'CLOSED'
     for name, picture, most, mean in (("lobes", sky(), 0.04, 0.008), ("sun", sky(sun=4.0), 0.08, 0.02)):
-        world_with('ShaderNodeTexEnvironment', image=image_of(picture))
+        world = world_with('ShaderNodeTexEnvironment', image=image_of(picture))
+        if name == "lobes":
+            world.cycles.sampling_method, world.cycles.sample_map_resolution = 'MANUAL', 256
         for way in ((1.2, 0.1, 0.7), (2.4, 0.0, 2.6)):
             scene.camera.rotation_euler = Euler(way)
             scene.camera.location = scene.camera.rotation_euler.to_matrix().col[2] * 5
@@ -351,3 +354,41 @@ def test_a_changed_picture_is_read_again():
     check(np.ptp(before[..., 0]) > 0.05, "it was not")
     scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.5
     check_close(render()["Combined"][..., :3], np.full((48, SIZE, 3), 0.5), 1e-5, "half as strong")
+
+
+def test_baked_skies_like_cycles():
+    """Nodes that are not known: a picture of them, rendered once, lights and lies behind as Cycles' own."""
+    scene = cycles_scene()
+    points, mesh = ball()
+    tree = set_world((0, 0, 0)).node_tree
+    node = tree.nodes.new('ShaderNodeTexSky')
+    node.sky_type = next(kind for kind in ('NISHITA', 'MULTIPLE_SCATTERING') if kind in node.bl_rna.properties["sky_type"].enum_items)
+    node.sun_elevation, node.sun_rotation, node.sun_intensity = 0.6, 0.4, 0.02
+    tree.links.new(node.outputs[0], tree.nodes["Background"].inputs["Color"])
+    tree.nodes["Background"].inputs["Strength"].default_value = 0.1
+    before = len(bpy.data.scenes), len(bpy.data.objects), len(bpy.data.cameras)
+    check(bpy.ops.world.patina_bake(width=512, samples=9) == {'FINISHED'}, "not baked")
+    check((len(bpy.data.scenes), len(bpy.data.objects), len(bpy.data.cameras)) == before, "something is left behind")
+    scene.camera.location, scene.patina.fill = scene.camera.rotation_euler.to_matrix().col[2] * 4, 'CLOSED'
+    scene.camera.data.type, scene.camera.data.lens = 'PERSP', 30.0
+    pictures = []
+    for engine in ('CYCLES', 'PATINA'):
+        scene.render.engine, mesh.hide_render, points.hide_render = engine, engine == 'PATINA', engine == 'CYCLES'
+        pictures.append(render() and saved()[..., :3] if engine == 'PATINA' else cycles_picture())
+    y, x = np.mgrid[:SIZE, :SIZE]
+    radius = np.hypot(x + 0.5 - SIZE / 2, y + 0.5 - SIZE / 2)
+    covered = SIZE * 30.0 / 36.0 / np.sqrt(15.0)
+    off, bright = np.abs(pictures[0] - pictures[1]), np.percentile(pictures[0], 99)
+    on, beside = off[radius < 0.8 * covered], off[radius > 1.1 * covered]
+    print(f"    on the ball {on.mean() / bright:.4f}, beside it {beside.mean() / bright:.4f} of {bright:.3f}")
+    check(on.mean() < 0.02 * bright and beside.mean() < 0.005 * bright, f"off by {on.mean() / bright:.4f}, {beside.mean() / bright:.4f}")
+    check(not any("Sky Texture" in text for _, text in reports), f"{reports}")
+    scene.world.patina.use_picture = False
+    render()
+    check(any("Bake World" in text for _, text in reports), f"{reports}")
+
+
+def cycles_picture():
+    bpy.context.view_layer.update()
+    bpy.ops.render.render()
+    return saved()[..., :3]
