@@ -258,6 +258,9 @@ def _colored(pixels: np.ndarray, image: bpy.types.Image, use: ImageUse, raw: boo
     own = image.alpha_mode == 'CHANNEL_PACKED'  # the opacity has nothing to do with the colours
     associated = image.is_float and image.alpha_mode != 'STRAIGHT' and not own
     shown = use.alpha != NONE
+    if not shown and not image.is_float and not own:  # as Cycles: what is transparent is black, by the bytes' codes
+        pixels[..., :3] *= pixels[..., 3:]
+        opaque = True
     if opaque or own and not shown or not image.is_float and shown:
         pixels[..., 3] = pixels[..., 3] if shown else 1.0
         if not image.is_float and use.strength == 1.0:
@@ -265,7 +268,7 @@ def _colored(pixels: np.ndarray, image: bpy.types.Image, use: ImageUse, raw: boo
     linear = pixels if raw else np.concatenate((_linear(pixels[..., :3]), pixels[..., 3:]), axis=2)
     if not opaque and associated and shown:
         np.divide(linear[..., :3], linear[..., 3:], out=linear[..., :3], where=linear[..., 3:] > 0.0)
-    if not opaque and not associated and not own and not shown:  # as Cycles: what is transparent is black
+    if not opaque and not associated and not own and not shown:
         linear[..., :3] *= linear[..., 3:]
     linear[..., :3] *= use.strength
     if not shown:

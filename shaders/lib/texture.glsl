@@ -93,10 +93,18 @@ void add_level(uint level, vec2 at, float weight, inout vec4 sum)
     uint low = first + wrap_texel(int(whole.y), height) * width, high = first + wrap_texel(int(whole.y) + 1, height) * width;
     precise float below = (1.0 - toward.y) * weight, above = toward.y * weight;
     precise float a = (1.0 - toward.x) * below, b = toward.x * below, c = (1.0 - toward.x) * above, d = toward.x * above;
-    add_texel(low + left, a, sum);
-    add_texel(low + right, b, sum);
-    add_texel(high + left, c, sum);
-    add_texel(high + right, d, sum);
+    bvec4 ends = bvec4(true); // left, right, low, high: whether they are on the image
+    if (args.mesh.texture.wrap == PT_WRAP_CLIP)
+        ends = bvec4(uint(int(whole.x)) < width, uint(int(whole.x) + 1) < width, uint(int(whole.y)) < height,
+                     uint(int(whole.y) + 1) < height);
+    if (ends.x && ends.z)
+        add_texel(low + left, a, sum);
+    if (ends.y && ends.z)
+        add_texel(low + right, b, sum);
+    if (ends.x && ends.w)
+        add_texel(high + left, c, sum);
+    if (ends.y && ends.w)
+        add_texel(high + right, d, sum);
 }
 
 // The texel of the finest level that a place lies in.
@@ -108,21 +116,20 @@ void add_nearest(vec2 at, inout vec4 sum)
     add_texel(uint(pt_min(floor(x.y), last.y)) * width + uint(pt_min(floor(x.x), last.x)), 1.0, sum);
 }
 
-// Into 0..1; false where a clipped image does not reach.
-bool wrap_place(inout vec2 at)
+// Into 0..1; of a clipped image into -1..2, where its border fades out over half a texel.
+vec2 wrap_place(vec2 at)
 {
-    bool reached = true;
+    bool clips = args.mesh.texture.wrap == PT_WRAP_CLIP;
+    float low = clips ? -1.0 : 0.0, high = clips ? 2.0 : 1.0;
     for (int k = 0; k < 2; k++) {
-        if (args.mesh.texture.wrap == PT_WRAP_CLIP)
-            reached = reached && 0.0 <= at[k] && at[k] <= 1.0;
         precise float turn = at[k] - floor(at[k]);
         float x = args.mesh.texture.wrap == PT_WRAP_REPEAT ? turn : at[k];
-        at[k] = 0.0 < x ? (x < 1.0 ? x : 1.0) : 0.0;
+        at[k] = low < x ? (x < high ? x : high) : low;
     }
-    return reached;
+    return at;
 }
 
-// 2. and 3.: straight colour and opacity.
+// 2. and 3.: colour and opacity.
 vec4 image_at(on_image place)
 {
     float square[2];
@@ -152,11 +159,9 @@ vec4 image_at(on_image place)
         precise float along = (float(i) + 0.5) * share - 0.5;
         precise vec2 aside = along * (upright ? place.side[1] : place.side[0]);
         precise vec2 at = place.at + (sharp ? vec2(0.0) : aside);
-        vec2 within = at;
-        if (!wrap_place(within))
-            continue;
+        vec2 within = wrap_place(at);
         if (sharp) {
-            if (i == 0u)
+            if (i == 0u && 0.0 <= within.x && within.x <= 1.0 && 0.0 <= within.y && within.y <= 1.0)
                 add_nearest(within, sum);
             continue;
         }
@@ -164,8 +169,9 @@ vec4 image_at(on_image place)
         if (0.0 < beyond)
             add_level(uint(pt_min(whole + 1.0, most)), within, coarser_share, sum);
     }
-    bool some = 1e-6 <= sum.w;
-    float scale = pt_rcp(some ? sum.w : 1.0);
+    bool straight = args.mesh.texture.blend != 0u || args.mesh.texture.cut > 0.0;
+    bool some = (straight ? 1e-6 : 0.0) <= sum.w;
+    float scale = straight ? pt_rcp(some ? sum.w : 1.0) : 1.0;
     precise vec3 color = sum.xyz * scale;
     return vec4(some ? color : vec3(0.0), pt_min(sum.w, 1.0));
 }

@@ -103,7 +103,8 @@ def test_beside_cycles():
         off = np.abs(ours - inner(cycles("DiffCol")))
         print(f"    {name}: off by {off.max():.5f}, {off.mean():.6f} on average")
         # closest: an edge between texels through the middle of a pixel is either's
-        check(np.quantile(off, 0.99) < 1e-3 and off.mean() < 1e-3, f"{name}: off by {off.max()}, {off.mean()} on average")
+        most = 0.01 if "opacity" in name else 1e-3  # a step of a byte, for Cycles cuts the product with the opacity where we round
+        check(np.quantile(off, 0.99) < most and off.mean() < 1e-3, f"{name}: off by {off.max()}, {off.mean()} on average")
         check(ours.std() > 0.1, f"{name}: no image")
 
 

@@ -116,8 +116,6 @@ static size_t check(struct harness *h, struct scene *s, size_t *open)
         compared++;
         for (int k = 0; k < 4; k++) {
             double weight = k < 3 && s->args.mesh.texture.blend ? e.color[3] : 1.0; // what shows
-            if (!s->args.mesh.texture.blend && k < 3)
-                weight = 0.02; // divided by an opacity that is not told
             if (!harness_near(c[k] * weight, e.color[k] * weight, e.error))
                 harness_fail(h, "colour", x, y, "channel %d: got %g, expected %g +- %.2g", k, c[k], e.color[k], e.error / weight);
         }

@@ -40,6 +40,8 @@ static void texel(const struct texture_args *image, const uint32_t *texels, uint
     long at[2] = {x, y};
     for (int k = 0; k < 2; k++) {
         long n = size[k];
+        if (image->wrap == PT_WRAP_CLIP)
+            continue;
         at[k] = image->wrap == PT_WRAP_REPEAT ? (at[k] % n + n) % n : at[k] < 0 ? 0 : at[k] >= n ? n - 1 : at[k];
     }
     size_t index = size[2] + (size_t)at[1] * size[0] + (size_t)at[0];
@@ -69,12 +71,15 @@ static void add_level(const struct texture_args *image, const uint32_t *texels, 
     for (int j = 0; j < 2; j++)
         for (int i = 0; i < 2; i++) {
             double c[4], u = x - floor(x), v = y - floor(y);
-            texel(image, texels, level, (long)floor(x) + i, (long)floor(y) + j, c);
+            long column = (long)floor(x) + i, row = (long)floor(y) + j;
+            if (image->wrap == PT_WRAP_CLIP && (column < 0 || row < 0 || column >= image->sizes[3 * level] || row >= image->sizes[3 * level + 1]))
+                continue;
+            texel(image, texels, level, column, row, c);
             add(c, weight * (i ? u : 1.0 - u) * (j ? v : 1.0 - v), sum);
         }
 }
 
-// Into 0..1; 0 where a clipped image does not reach. *open: it nearly does, or nearly not.
+// Into 0..1, a clipped image's places stay; 0 where it does not reach. *open: it nearly does, or nearly not.
 static int wrap(const struct texture_args *image, double at[2], double error, int *open)
 {
     int reached = 1;
@@ -83,6 +88,8 @@ static int wrap(const struct texture_args *image, double at[2], double error, in
             reached = reached && at[k] >= 0.0 && at[k] <= 1.0;
             *open |= fabs(at[k]) < error || fabs(at[k] - 1.0) < error;
         }
+        if (image->wrap == PT_WRAP_CLIP)
+            continue;
         at[k] = image->wrap == PT_WRAP_REPEAT ? at[k] - floor(at[k]) : fmin(fmax(at[k], 0.0), 1.0);
     }
     return reached;
@@ -108,7 +115,9 @@ static void probe(const struct texture_args *image, const uint32_t *texels, cons
         double at[2];
         for (int k = 0; k < 2; k++)
             at[k] = spot->at[k] + (sharp ? 0.0 : ((i + 0.5) / count - 0.5) * along[k]);
-        if (!wrap(image, at, spot->error + 2.0 * spot->side_error * sqrt(major), &out->open))
+        int near = 0, on = wrap(image, at, spot->error + 2.0 * spot->side_error * sqrt(major), &near);
+        out->open |= sharp && near;
+        if (sharp && !on)
             continue;
         if (sharp) {
             double c[4], u = at[0] * image->sizes[0], v = at[1] * image->sizes[1];
@@ -122,7 +131,7 @@ static void probe(const struct texture_args *image, const uint32_t *texels, cons
             add_level(image, texels, (uint32_t)fmin(level + 1.0, most), at, beyond / count, sum);
     }
     for (int k = 0; k < 3; k++)
-        out->color[k] = sum[3] >= 1e-6 ? sum[k] / sum[3] : 0.0;
+        out->color[k] = !image->blend && !(image->cut > 0.0f) ? sum[k] : sum[3] >= 1e-6 ? sum[k] / sum[3] : 0.0;
     out->color[3] = fmin(sum[3], 1.0);
     // texels differ by at most 1: a place off by a texel of its level, and a level off by one, change no more than that
     double finest = exp2(floor(level)), moved = 2.0 * (size * spot->error + 0.5 * spot->side_error * sqrt(major)) / finest;

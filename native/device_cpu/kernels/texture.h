@@ -90,21 +90,26 @@ static inline void pt_add_level(const struct texture_args *image, const uint32_t
                                 vm lanes, vf sum[4])
 {
     const vi three = vi_mul(level, vi_set(3)), first = vi_gather(image->sizes, vi_add(three, vi_set(2)), lanes);
-    vi near[2], far[2], size[2];
+    vi near[2], far[2], size[2], base[2];
     vf toward[2];
     for (uint32_t k = 0; k < 2; k++) {
         size[k] = vi_gather(image->sizes, vi_add(three, vi_set(k)), lanes);
         const vf x = at[k] * vi_convert(size[k]) - vf_set(0.5f), whole = vf_floor(x);
         toward[k] = x - whole;
-        near[k] = pt_wrap_texel(image, vf_int(whole), size[k]);
-        far[k] = pt_wrap_texel(image, vi_add(vf_int(whole), vi_set(1)), size[k]);
+        base[k] = vf_int(whole);
+        near[k] = pt_wrap_texel(image, base[k], size[k]);
+        far[k] = pt_wrap_texel(image, vi_add(base[k], vi_set(1)), size[k]);
     }
+    vm ends[4] = { lanes, lanes, lanes, lanes }; // left, right, low, high: whether they are on the image
+    if (image->wrap == PT_WRAP_CLIP)
+        for (uint32_t k = 0; k < 4; k++)
+            ends[k] = vm_and(lanes, vi_lt_unsigned(vi_add(base[k / 2], vi_set(k % 2)), size[k / 2]));
     const vf one = vf_set(1.0f), below = (one - toward[1]) * weight, above = toward[1] * weight;
     const vi low = vi_add(first, vi_mul(near[1], size[0])), high = vi_add(first, vi_mul(far[1], size[0]));
-    pt_add_texel(image, texels, vi_add(low, near[0]), (one - toward[0]) * below, lanes, sum);
-    pt_add_texel(image, texels, vi_add(low, far[0]), toward[0] * below, lanes, sum);
-    pt_add_texel(image, texels, vi_add(high, near[0]), (one - toward[0]) * above, lanes, sum);
-    pt_add_texel(image, texels, vi_add(high, far[0]), toward[0] * above, lanes, sum);
+    pt_add_texel(image, texels, vi_add(low, near[0]), (one - toward[0]) * below, vm_and(ends[0], ends[2]), sum);
+    pt_add_texel(image, texels, vi_add(low, far[0]), toward[0] * below, vm_and(ends[1], ends[2]), sum);
+    pt_add_texel(image, texels, vi_add(high, near[0]), (one - toward[0]) * above, vm_and(ends[0], ends[3]), sum);
+    pt_add_texel(image, texels, vi_add(high, far[0]), toward[0] * above, vm_and(ends[1], ends[3]), sum);
 }
 
 // The texel of the finest level that a place lies in.
@@ -118,21 +123,28 @@ static inline void pt_add_nearest(const struct texture_args *image, const uint32
     pt_add_texel(image, texels, vi_add(vi_mul(x[1], vi_set(image->sizes[0])), x[0]), vf_set(1.0f), lanes, sum);
 }
 
-// Into 0..1; *lanes loses those that a clipped image does not reach.
-static inline void pt_wrap_place(const struct texture_args *image, vf at[2], vm *lanes)
+// Into 0..1; of a clipped image into -1..2, where its border fades out over half a texel.
+static inline void pt_wrap_place(const struct texture_args *image, vf at[2])
 {
-    const vf zero = vf_zero(), one = vf_set(1.0f);
+    const int clips = image->wrap == PT_WRAP_CLIP;
+    const vf low = vf_set(clips ? -1.0f : 0.0f), high = vf_set(clips ? 2.0f : 1.0f);
     for (int k = 0; k < 2; k++) {
-        if (image->wrap == PT_WRAP_CLIP)
-            *lanes = vm_and(*lanes, vm_and(vf_le(zero, at[k]), vf_le(at[k], one)));
         vf x = at[k];
         if (image->wrap == PT_WRAP_REPEAT)
             x = x - vf_floor(x);
-        at[k] = vf_select(vf_lt(zero, x), vf_select(vf_lt(x, one), x, one), zero);
+        at[k] = vf_select(vf_lt(low, x), vf_select(vf_lt(x, high), x, high), low);
     }
 }
 
-// 2. and 3.: straight colour and opacity.
+// Which of `lanes` lie on the image.
+static inline vm pt_on_it(const vf at[2], vm lanes)
+{
+    for (int k = 0; k < 2; k++)
+        lanes = vm_and(lanes, vm_and(vf_le(vf_zero(), at[k]), vf_le(at[k], vf_set(1.0f))));
+    return lanes;
+}
+
+// 2. and 3.: colour and opacity.
 static inline void pt_image_at(const struct texture_args *image, const uint32_t *texels, const struct pt_on_image *place, vm lanes,
                                vf out[4])
 {
@@ -156,24 +168,24 @@ static inline void pt_image_at(const struct texture_args *image, const uint32_t 
     const vm sharp = image->nearest ? vm_and(lanes, vf_le(major, one)) : vm_first(0);
     for (uint32_t i = 0; i < PT_PROBES; i++) {
         const vm asked = vm_and(lanes, vf_lt(vf_set((float)i), count));
-        vm some = asked;
         if (!vm_bits(asked))
             break;
         const vf along = vf_set((float)i + 0.5f) * share - half;
         vf at[2];
         for (int k = 0; k < 2; k++)
             at[k] = place->at[k] + vf_select(vm_and(sharp, asked), zero, along * vf_select(upright, place->side[1][k], place->side[0][k]));
-        pt_wrap_place(image, at, &some);
-        const vm mixed = vm_and(some, vm_not(sharp)), between = vm_and(mixed, vf_lt(zero, beyond));
+        pt_wrap_place(image, at);
+        const vm mixed = vm_and(asked, vm_not(sharp)), square_ones = pt_on_it(at, vm_and(asked, sharp)), between = vm_and(mixed, vf_lt(zero, beyond));
         if (vm_bits(mixed))
             pt_add_level(image, texels, finer, at, (one - beyond) * share, mixed, sum);
         if (vm_bits(between))
             pt_add_level(image, texels, coarser, at, beyond * share, between, sum);
-        if (i == 0 && vm_bits(vm_and(some, sharp)))
-            pt_add_nearest(image, texels, at, vm_and(some, sharp), sum);
+        if (i == 0 && vm_bits(square_ones))
+            pt_add_nearest(image, texels, at, square_ones, sum);
     }
-    const vm some = vf_le(vf_set(1e-6f), sum[3]);
-    const vf scale = vf_rcp(vf_select(some, sum[3], one));
+    const int straight = image->blend || image->cut > 0.0f;
+    const vm some = vf_le(vf_set(straight ? 1e-6f : 0.0f), sum[3]);
+    const vf scale = straight ? vf_rcp(vf_select(some, sum[3], one)) : vf_set(1.0f);
     for (int k = 0; k < 3; k++)
         out[k] = vf_select(some, sum[k] * scale, zero);
     out[3] = vf_min(sum[3], one);

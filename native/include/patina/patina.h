@@ -310,7 +310,7 @@ PATINA_API int patina_mesh_get_info(const patina_mesh *mesh, patina_mesh_info *i
 enum patina_wrap { // beyond the image
     PATINA_WRAP_REPEAT = 0,
     PATINA_WRAP_EXTEND = 1, // its border texels
-    PATINA_WRAP_CLIP = 2,   // nothing: black, opacity 0
+    PATINA_WRAP_CLIP = 2,   // nothing: black, opacity 0, from half a texel on
 };
 
 typedef struct patina_texture_desc {
@@ -448,7 +448,7 @@ typedef struct patina_cloud_style {
 } patina_cloud_style;
 
 enum patina_alpha {
-    PATINA_ALPHA_NONE = 0,  // nothing: all is opaque
+    PATINA_ALPHA_NONE = 0,  // nothing: all is opaque, its colours times the opacity
     PATINA_ALPHA_CLIP = 1,  // cuts holes, for light too
     PATINA_ALPHA_BLEND = 2, // lets through what lies behind: layers are peeled, settings.layers at most. Light is stopped where
                             // opacity is at least 0.5
