@@ -15,7 +15,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import engine, migrate, operators, pairs, preferences, properties, render, ui, viewport
-from .sync import clouds, files, meshes
+from .sync import clouds, files, images, meshes
 
 _MODULES = (preferences, properties, files, migrate, pairs, engine, operators, ui)
 _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
@@ -27,6 +27,7 @@ def _forget(*_) -> None:
     viewport.close_all()
     clouds.CACHE.clear()
     meshes.CACHE.clear()
+    images.CACHE.clear()
 
 
 @persistent
@@ -51,4 +52,5 @@ def unregister() -> None:
         module.unregister()
     clouds.CACHE.clear()
     meshes.CACHE.clear()
+    images.CACHE.clear()
     render.forget_device()

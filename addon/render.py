@@ -362,4 +362,4 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
             style = replace(style, color_source=OWN)
         scene.add_cloud(item.cloud, **asdict(style))
     for item in description.meshes:
-        scene.add_mesh(item.mesh, **asdict(item.style))
+        scene.add_mesh(item.mesh, item.texture and item.texture.native, **asdict(item.style))

@@ -130,6 +130,7 @@ struct render {
     struct pt_plan *plan;
     struct pt_resident **clouds; // per instance
     struct pt_resident **meshes; // per mesh
+    struct pt_resident **textures; // likewise; NULL: it has none
     struct pt_buffer *chunks;    // per instance, of the layer at hand
     struct pt_buffer **bound;    // scratch for one pass
     struct chunk_view **behind;  // per instance: those of the layer at hand, behind the first
@@ -146,10 +147,11 @@ static int upload(struct render *render)
         most = plan->passes[i].ref_count > most ? plan->passes[i].ref_count : most;
     render->clouds = calloc(plan->instance_count + 1, sizeof *render->clouds);
     render->meshes = calloc(plan->mesh_count + 1, sizeof *render->meshes);
+    render->textures = calloc(plan->mesh_count + 1, sizeof *render->textures);
     render->chunks = calloc(plan->instance_count + 1, sizeof *render->chunks);
     render->bound = calloc(most, sizeof *render->bound);
     render->behind = calloc(plan->instance_count + 1, sizeof *render->behind);
-    if (!render->clouds || !render->meshes || !render->chunks || !render->bound || !render->behind)
+    if (!render->clouds || !render->meshes || !render->textures || !render->chunks || !render->bound || !render->behind)
         return pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
@@ -165,8 +167,12 @@ static int upload(struct render *render)
             return pt_fail_again(&render->frame->handle, error);
     }
     int error = PATINA_OK;
-    for (uint32_t i = 0; i < plan->mesh_count && plan->triangles && !error; i++)
-        error = pt_residency_take_mesh(&render->frame->residency, device, plan->meshes[i].instance->mesh, &render->meshes[i]);
+    for (uint32_t i = 0; i < plan->mesh_count && plan->triangles && !error; i++) {
+        const struct pt_mesh_instance *instance = plan->meshes[i].instance;
+        error = pt_residency_take_mesh(&render->frame->residency, device, instance->mesh, &render->meshes[i]);
+        if (!error && instance->style.texture)
+            error = pt_residency_take_texture(&render->frame->residency, device, instance->style.texture, &render->textures[i]);
+    }
     if (!error)
         error = pt_clip_buffers_fill(device, plan, &render->frame->clips);
     return error ? pt_fail_again(&render->frame->handle, error) : PATINA_OK;
@@ -174,8 +180,11 @@ static int upload(struct render *render)
 
 static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *ref)
 {
+    static struct pt_buffer none; // never written: kernels that bind it do not touch it
     if (ref->of == PT_OF_FRAME)
         return &render->frame->planes[ref->which][ref->index];
+    if (ref->of == PT_OF_MESH && ref->which == PT_MESH_TEXELS)
+        return render->textures[ref->index] ? &render->textures[ref->index]->buffers[PT_MESH_TEXELS] : &none;
     if (ref->of == PT_OF_MESH)
         return &render->meshes[ref->index]->buffers[ref->which];
     if (ref->which == PT_MARKS || ref->which == PT_SHADOWS)
@@ -203,6 +212,14 @@ int pt_frame_clear_keys(struct patina_frame *frame, struct pt_buffer (*planes)[P
     return PATINA_OK;
 }
 
+enum { NOWHERE = 0x7FC00000 }; // the bits of a NaN
+
+static int fill_plane(struct patina_frame *frame, enum pt_plane which, uint32_t word)
+{
+    struct pt_buffer *plane = &frame->planes[which][0];
+    return frame->device->ops->buffer_fill(frame->device, plane, 0, plane->size, word, 4);
+}
+
 // Before a layer: `which` are its keys.
 static int clear_keys(struct patina_frame *frame, const struct pt_plan *plan, enum pt_plane which)
 {
@@ -211,16 +228,14 @@ static int clear_keys(struct patina_frame *frame, const struct pt_plan *plan, en
         error = pt_frame_clear_keys(frame, frame->planes, plan, PT_PLANE_MESH_KEYS);
     if (!error && plan->triangles)
         error = pt_frame_clear_keys(frame, frame->planes, plan, PT_PLANE_MESH_SHOWN);
+    if (!error && plan->mesh_shadows) // pixels without a mesh lie nowhere
+        error = pt_frame_ensure_plane(frame, frame->planes, plan, PT_PLANE_MESH_PLACES, 0);
+    if (!error && plan->mesh_shadows)
+        error = fill_plane(frame, PT_PLANE_MESH_PLACES, NOWHERE);
     return error;
 }
 
 // ---- layers --------------------------------------------------------------------------------------------------------------
-
-static int fill_plane(struct patina_frame *frame, enum pt_plane which, uint32_t word)
-{
-    struct pt_buffer *plane = &frame->planes[which][0];
-    return frame->device->ops->buffer_fill(frame->device, plane, 0, plane->size, word, 4);
-}
 
 // Before the first layer: all light comes through, outside the points' rectangle too, and lines find nothing before them.
 static int begin_peeling(struct render *render)
@@ -383,7 +398,8 @@ static int run_plan(struct render *render)
         error = begin_peeling(render);
     uint32_t ended = 0; // from this layer on there are none
     int writing = 0;    // the picture: from then on nothing stops it
-    int shadows = 0, marking = pt_shadows_stale(frame, render->scene, plan);
+    uint32_t shadows = 0; // layer whose shadows are known
+    int marking = pt_shadows_stale(frame, render->scene, plan);
     for (uint32_t i = 0; i < plan->pass_count && !error; i++) {
         int run;
         if ((error = turn_to_layer(render, &plan->passes[i], &ended, &run)))
@@ -392,9 +408,12 @@ static int run_plan(struct render *render)
             continue;
         if (plan->passes[i].kernel == PT_KERNEL_mark && !marking)
             continue; // every texture is at hand
-        if (plan->passes[i].kernel == PT_KERNEL_shade && !shadows++) {
-            if ((error = pt_shadows_update(frame, render->scene, render->plan)))
+        if (plan->passes[i].kernel == PT_KERNEL_shade && shadows < plan->passes[i].layer) {
+            error = shadows ? pt_shadows_behind(frame, render->scene, render->plan)
+                            : pt_shadows_update(frame, render->scene, render->plan);
+            if (error)
                 return error;
+            shadows = plan->passes[i].layer;
             before = pt_milliseconds();
         }
         if (!writing && atomic_load(&frame->cancel))
@@ -456,8 +475,11 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
     frame->light_count = plan->light_count;
     for (uint32_t i = 0; i < plan->light_count; i++) {
         const struct pt_shadow_light *light = &frame->shadows.lights[i];
-        shown->stats.shadow_pending += light->samples < plan->lights[i].samples && !light->settled;
-        shown->stats.shadow_samples = light->samples > shown->stats.shadow_samples ? light->samples : shown->stats.shadow_samples;
+        const int refined = plan->mesh_shadows && frame->shadows.pixels.pending; // at once with the points
+        shown->stats.shadow_pending += (light->samples < plan->lights[i].samples && !light->settled) || refined;
+        const uint32_t of_pixels = plan->mesh_shadows ? frame->shadows.pixels.samples[i] : 0;
+        const uint32_t samples = light->samples > of_pixels ? light->samples : of_pixels;
+        shown->stats.shadow_samples = samples > shown->stats.shadow_samples ? samples : shown->stats.shadow_samples;
         shown->stats.shadow_error = fmaxf(shown->stats.shadow_error, light->error);
     }
     memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
@@ -494,6 +516,7 @@ int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
         frame->device->ops->buffer_destroy(frame->device, &render.chunks[i]);
     free(render.clouds);
     free(render.meshes);
+    free(render.textures);
     free(render.chunks);
     free(render.bound);
     for (uint32_t i = 0; i < plan.instance_count && render.behind; i++)

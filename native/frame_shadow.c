@@ -48,12 +48,15 @@ void pt_shadows_release(struct patina_frame *frame)
     frame->device->ops->buffer_destroy(frame->device, &shadows->differs);
     frame->device->ops->buffer_destroy(frame->device, &shadows->some);
     pt_clip_buffers_release(frame->device, &shadows->clips);
+    pt_pixels_release(frame);
 }
 
 struct pt_buffer *pt_shadows_buffer(struct patina_frame *frame, uint32_t which, uint32_t instance)
 {
     static struct pt_buffer none; // never written: kernels that bind it do not touch it
     struct pt_shadows *shadows = &frame->shadows;
+    if (instance == PT_PIXELS && which == PT_SHADOWS)
+        return &shadows->pixels.words;
     if (instance >= shadows->instance_count)
         return &none;
     return which == PT_MARKS ? &shadows->marks[instance] : &shadows->words[instance];
@@ -79,9 +82,9 @@ int pt_shadows_make_places(struct patina_frame *frame, const struct patina_scene
     const struct pt_device_ops *ops = frame->device->ops;
     forget_lights(shadows);
     forget_instances(frame);
-    shadows->words = calloc(scene->instance_count, sizeof *shadows->words);
-    shadows->marks = calloc(scene->instance_count, sizeof *shadows->marks);
-    shadows->fingerprints = calloc(scene->instance_count, sizeof *shadows->fingerprints);
+    shadows->words = calloc((size_t)scene->instance_count + 1, sizeof *shadows->words);
+    shadows->marks = calloc((size_t)scene->instance_count + 1, sizeof *shadows->marks);
+    shadows->fingerprints = calloc((size_t)scene->instance_count + 1, sizeof *shadows->fingerprints);
     if (!shadows->words || !shadows->marks || !shadows->fingerprints) {
         forget_instances(frame);
         return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
@@ -131,11 +134,13 @@ int pt_shadows_stale(const struct patina_frame *frame, const struct patina_scene
 int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan)
 {
     struct pt_shadows *shadows = &frame->shadows;
-    int error = PATINA_OK;
+    int error = PATINA_OK, changed = 0;
     if (!plan->light_count)
         return PATINA_OK;
-    if (!same_places(shadows, scene, plan))
+    if (!same_places(shadows, scene, plan)) {
         error = pt_shadows_make_places(frame, scene, plan->light_count);
+        changed = 1;
+    }
     for (uint32_t i = 0; i < plan->light_count && !error; i++) {
         struct pt_shadow_light *light = &shadows->lights[i];
         size_t count = pt_light_key(scene, &plan->lights[i], NULL, 0);
@@ -144,12 +149,15 @@ int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene
             return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
         pt_light_key(scene, &plan->lights[i], key, count);
         int known = light->key && light->key_count == count && pt_same_key(light->key, key, count);
+        changed |= !known;
         if (!known || light->partial || (light->samples > plan->lights[i].samples && !light->settled))
             light->samples = light->settled = 0;
         free(light->key);
         light->key = key;
         light->key_count = count;
     }
+    if (!error)
+        error = pt_pixels_open(frame, scene, plan, changed);
     if (error || !pt_plan_lazy(scene, plan) || !pt_shadows_stale(frame, scene, plan))
         return error;
     for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
@@ -174,14 +182,25 @@ struct update {
     struct pt_instance *instances; // scratch: casters
     struct pt_mesh_instance *meshes; // likewise
     const struct pt_buffer *opacities; // of the group's caster
+    const struct pt_instance *pixels;  // that show meshes; NULL: none do
+    int points_too; // points are tested, not these pixels alone
+    int pixels_too;
 };
+
+// Whether an instance, or PT_PIXELS, is tested against the group's maps.
+static int receives(const struct update *update, const struct pt_shadow_group *group, uint32_t instance)
+{
+    if (instance == PT_PIXELS)
+        return update->pixels_too && group->without == PT_NO_INSTANCE;
+    return update->points_too && pt_group_receives(update->scene, group, instance);
+}
 
 // How many maps of a sample the instance is tested against.
 static uint32_t maps_of(const struct update *update, const struct pt_plan_light *planned, uint32_t instance)
 {
     uint32_t count = 0;
     for (uint32_t g = 0; g < update->group_count; g++)
-        if (pt_group_receives(update->scene, &update->groups[g], instance))
+        if (receives(update, &update->groups[g], instance))
             count += update->groups[g].faint ? FAINT_LAYERS : 1;
     return planned->cube ? 6 * count : count;
 }
@@ -202,7 +221,7 @@ static int map_buffer(struct update *update, const struct pt_plan *map, struct p
     else if (ref->of == PT_OF_INSTANCE && (ref->which == PT_CLIPS || ref->which == PT_DRAWN))
         *out = pt_clip_buffer(&frame->shadows.clips, ref->which);
     else if (ref->of == PT_OF_MESH)
-        error = pt_residency_take_mesh(&frame->residency, frame->device, map->meshes[ref->index].instance->mesh, &resident);
+        error = pt_residency_mesh_buffer(&frame->residency, frame->device, map->meshes[ref->index].instance, ref->which, out);
     else
         error = pt_residency_take(&frame->residency, frame->device, map->instances[ref->index].instance->cloud, &resident);
     if (!error && resident)
@@ -318,6 +337,32 @@ static int test_instance(struct update *update, const struct patina_scene *view,
     return error ? error : device->ops->finish(device);
 }
 
+// The same of pixels that show meshes.
+static int test_pixels(struct update *update, const struct patina_scene *view, struct pt_plan *map, const struct lit_args *given)
+{
+    struct patina_frame *frame = update->frame;
+    struct patina_device *device = frame->device;
+    const struct patina_cloud *cloud = update->pixels->cloud;
+    struct pt_buffer(*planes)[PT_SLOTS] = frame->shadows.planes, chunk_buffer = { 0 };
+    struct chunk_view *chunks;
+    struct lit_args args = *given;
+    int error = pt_plan_chunks(view, map, update->pixels, &args.instance, &chunks);
+    if (!error)
+        error = device->ops->buffer_create(device, cloud->chunk_count * sizeof *chunks, chunks, 1, &chunk_buffer);
+    if (error)
+        return error;
+    struct pt_buffer *const bound[] = { &planes[PT_PLANE_KEYS][0], &planes[PT_PLANE_FROM][0], &planes[PT_PLANE_DEFF][0],
+                                        &chunk_buffer, &frame->planes[PT_PLANE_MESH_PLACES][0],
+                                        &frame->planes[PT_PLANE_MESH_WORDS][0], pt_shadows_buffer(frame, PT_MARKS, PT_PIXELS),
+                                        &frame->shadows.pixels.words, &frame->shadows.differs,
+                                        (struct pt_buffer *)update->opacities };
+    args.base = given->base * (uint32_t)cloud->slots;
+    args.marked = args.compare = 0;
+    error = device->ops->run(device, PT_KERNEL_lit, &args, sizeof args, bound, sizeof bound / sizeof *bound, &frame->cancel);
+    device->ops->buffer_destroy(device, &chunk_buffer);
+    return error ? error : device->ops->finish(device);
+}
+
 // The group's caster, as kernels need it where its points have opacities of their own.
 static int take_caster(struct update *update, const struct pt_shadow_group *group, struct lit_args *args)
 {
@@ -380,10 +425,13 @@ static int test_layer(struct update *update, const struct pt_plan_light *planned
         args->view = map.view;
         set_window(&map, window, args->window);
         for (uint32_t i = 0; i < update->scene->instance_count && !error; i++)
-            if (pt_group_receives(update->scene, group, i)) {
+            if (receives(update, group, i)) {
                 args->alone = maps_of(update, planned, i) == 1;
                 error = test_instance(update, view, &map, i, args);
             }
+        args->alone = maps_of(update, planned, PT_PIXELS) == 1;
+        if (!error && receives(update, group, PT_PIXELS))
+            error = test_pixels(update, view, &map, args);
         pt_frame_note_time(frame, "lit", pt_milliseconds() - drawn);
         if (!error && group->faint)
             error = limit_map(update, &map, group, some);
@@ -427,18 +475,35 @@ static int close_sample(struct update *update, const struct pt_plan_light *plann
             error = test_instance(update, &nothing, &scratch, i, args);
         pt_plan_destroy(&scratch);
     }
+    struct pt_plan scratch = { 0 };
+    if (!error && maps_of(update, planned, PT_PIXELS) > 1)
+        error = test_pixels(update, &nothing, &scratch, args);
+    pt_plan_destroy(&scratch);
     pt_frame_note_time(update->frame, "lit", pt_milliseconds() - start);
     return error;
 }
 
-static int take_sample(struct update *update, uint32_t index, uint32_t sample, int compare)
+static int some_tested(const struct update *update, const struct pt_shadow_group *group)
+{
+    int some = receives(update, group, PT_PIXELS);
+    for (uint32_t i = 0; i < update->scene->instance_count && !some; i++)
+        some = receives(update, group, i);
+    return some;
+}
+
+// points: they are tested; pixels are, as far as they want so many samples.
+static int take_sample(struct update *update, uint32_t index, uint32_t sample, int points, int compare)
 {
     const struct pt_plan_light *planned = &update->plan->lights[index];
+    update->points_too = points;
+    update->pixels_too = update->pixels && sample < update->frame->shadows.pixels.samples[index];
+    if (!update->points_too && !update->pixels_too)
+        return PATINA_OK;
     uint32_t faces = planned->cube ? 6 : 1;
     struct lit_args args = { .base = index, .samples = sample + 1, .compare = (uint32_t)compare };
     args.marked = (uint32_t)pt_plan_lazy(update->scene, update->plan);
     for (uint32_t g = 0; g < update->group_count; g++)
-        for (uint32_t face = 0; face < faces; face++) {
+        for (uint32_t face = 0; face < faces && some_tested(update, &update->groups[g]); face++) {
             int error = test_map(update, planned, &update->groups[g], sample, face, &args);
             if (error)
                 return error;
@@ -494,20 +559,14 @@ static int measure_error(struct update *update, uint32_t index, struct pt_shadow
     return error;
 }
 
-static int test_light(struct update *update, uint32_t index)
+// Samples of a light's points from `done` on, as many as are wanted; *end: where they stopped.
+static int test_points(struct update *update, uint32_t index, uint32_t done, uint32_t wanted, uint32_t *end)
 {
     struct patina_frame *frame = update->frame;
     struct pt_shadow_light *light = &frame->shadows.lights[index];
     struct pt_shadow_sums before = { 0 };
-    uint32_t wanted = samples_wanted(update->scene, update->plan, index, light), done = light->samples;
-    double start = pt_milliseconds();
-    if (done == wanted)
-        return PATINA_OK;
-    int error = pt_plan_light_map(update->scene, update->plan, index);
-    pt_frame_note_time(frame, "light map", pt_milliseconds() - start);
-    if (!error && !done)
-        error = clear_words(update, index);
-    if (!error && done < wanted && measures_at(update, index, done))
+    int error = done ? PATINA_OK : clear_words(update, index);
+    if (!error && measures_at(update, index, done))
         error = measure_error(update, index, &before);
     if (!done)
         light->error = 0.0f;
@@ -522,7 +581,7 @@ static int test_light(struct update *update, uint32_t index)
         if (!error && compare)
             error = frame->device->ops->buffer_write(frame->device, &frame->shadows.differs, 0, &differs, sizeof differs);
         if (!error)
-            error = take_sample(update, index, done, compare);
+            error = take_sample(update, index, done, 1, compare);
         if (!error && compare)
             error = frame->device->ops->buffer_read(frame->device, &frame->shadows.differs, 0, &differs, sizeof differs);
         if (!error) {
@@ -534,51 +593,117 @@ static int test_light(struct update *update, uint32_t index)
             error = measure_error(update, index, &before);
     }
     pt_shadow_sums_free(&before);
+    *end = done;
+    return error;
+}
+
+static int some_receives(const struct patina_scene *scene)
+{
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (pt_receives(&scene->instances[i]))
+            return 1;
+    return 0;
+}
+
+// points: they are brought up to the samples that they want; pixels that show meshes get theirs in any case.
+static int test_light(struct update *update, uint32_t index, int points)
+{
+    struct patina_frame *frame = update->frame;
+    struct pt_shadow_light *light = &frame->shadows.lights[index];
+    const uint32_t first = light->samples, wanted = points ? samples_wanted(update->scene, update->plan, index, light) : first;
+    const uint32_t of_pixels = update->pixels ? frame->shadows.pixels.samples[index] : 0;
+    uint32_t end = first;
+    double start = pt_milliseconds();
+    if (first < wanted && !some_receives(update->scene))
+        light->samples = end = wanted;
+    if (end == wanted && !of_pixels)
+        return PATINA_OK;
+    int error = pt_plan_light_map(update->scene, update->plan, index);
+    pt_frame_note_time(frame, "light map", pt_milliseconds() - start);
+    if (!error && end < wanted)
+        error = test_points(update, index, first, wanted, &end);
+    for (uint32_t sample = 0; sample < of_pixels && !error; sample++) {
+        if (atomic_load(&frame->cancel))
+            error = PATINA_ERROR_CANCELLED;
+        else if (sample < first || sample >= end || !some_receives(update->scene)) // else with the points
+            error = take_sample(update, index, sample, 0, 0);
+    }
     return error;
 }
 
 // Tells the shade passes how many samples the words hold.
 static void set_scales(const struct pt_shadows *shadows, struct pt_plan *plan)
 {
+    enum { WORDS = 8 }; // of a shade pass's buffers
     for (uint32_t p = 0; p < plan->pass_count; p++) {
         if (plan->passes[p].kernel != PT_KERNEL_shade)
             continue;
         struct shade_args *args = (struct shade_args *)plan->passes[p].arguments; // the plan's own memory
+        const int pixels = plan->passes[p].refs[WORDS].index == PT_PIXELS;
         for (uint32_t i = 0; i < args->light_count; i++)
-            if (args->lights[i].shadow)
-                args->lights[i].shadow_scale = 1.0f / (255.0f * (float)shadows->lights[args->lights[i].shadow - 1].samples);
+            if (args->lights[i].shadow) {
+                const uint32_t light = args->lights[i].shadow - 1;
+                const uint32_t samples = pixels ? shadows->pixels.samples[light] : shadows->lights[light].samples;
+                args->lights[i].shadow_scale = 1.0f / (255.0f * (float)samples);
+            }
     }
+}
+
+// points: all of the plan's lights are brought up to date; else pixels alone.
+static int update_lights(struct update *update, int points)
+{
+    struct patina_frame *frame = update->frame;
+    const struct patina_scene *scene = update->scene;
+    const struct pt_device_ops *ops = frame->device->ops;
+    int error = PATINA_OK;
+    update->groups = calloc(2 * (size_t)scene->instance_count + 1, sizeof *update->groups);
+    update->instances = calloc((size_t)scene->instance_count + 1, sizeof *update->instances);
+    update->meshes = calloc((size_t)scene->mesh_count + 1, sizeof *update->meshes);
+    if (!update->groups || !update->instances || !update->meshes)
+        error = pt_fail(&frame->device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+    else
+        update->group_count = pt_shadow_groups(scene, update->groups);
+    if (!error && !frame->shadows.differs.size)
+        error = ops->buffer_create(frame->device, sizeof(uint32_t), NULL, 0, &frame->shadows.differs);
+    if (!error && !frame->shadows.some.size)
+        error = ops->buffer_create(frame->device, sizeof(uint32_t), NULL, 0, &frame->shadows.some);
+    for (uint32_t i = 0; i < update->plan->light_count && !error; i++)
+        error = test_light(update, i, points);
+    free(update->groups);
+    free(update->instances);
+    free(update->meshes);
+    return error;
+}
+
+// Tests the pixels of the layer at hand that show meshes, and with `points` what else is to be tested.
+static int update_layer(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan, int points)
+{
+    struct update update = { .frame = frame, .scene = scene, .plan = plan };
+    struct pt_pixel_receiver receiver;
+    int error = pt_pixels_begin(frame, scene, plan, &receiver);
+    if (receiver.chunks)
+        update.pixels = &receiver.instance;
+    if (!error && (update.pixels || (points && pt_shadows_stale(frame, scene, plan))))
+        error = update_lights(&update, points);
+    pt_pixels_end(&receiver);
+    return error;
 }
 
 int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan)
 {
-    struct update update = { .frame = frame, .scene = scene, .plan = plan };
-    const struct pt_device_ops *ops = frame->device->ops;
     int error = PATINA_OK;
     if (!plan->light_count)
         return PATINA_OK;
     pt_frame_note_time(frame, "lit", 0.0); // also where every texture is at hand
-    if (pt_shadows_stale(frame, scene, plan)) {
-        update.groups = calloc(2 * (size_t)scene->instance_count + 1, sizeof *update.groups);
-        update.instances = calloc((size_t)scene->instance_count + 1, sizeof *update.instances);
-        update.meshes = calloc((size_t)scene->mesh_count + 1, sizeof *update.meshes);
-        if (!update.groups || !update.instances || !update.meshes)
-            error = pt_fail(&frame->device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
-        else
-            update.group_count = pt_shadow_groups(scene, update.groups);
-        if (!error && !frame->shadows.differs.size)
-            error = ops->buffer_create(frame->device, sizeof(uint32_t), NULL, 0, &frame->shadows.differs);
-        if (!error && !frame->shadows.some.size)
-            error = ops->buffer_create(frame->device, sizeof(uint32_t), NULL, 0, &frame->shadows.some);
-        for (uint32_t i = 0; i < plan->light_count && !error; i++)
-            error = test_light(&update, i);
-        free(update.groups);
-        free(update.instances);
-        free(update.meshes);
-    }
+    error = update_layer(frame, scene, plan, 1);
     if (!error)
         set_scales(&frame->shadows, plan);
     return error;
+}
+
+int pt_shadows_behind(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan)
+{
+    return plan->light_count && plan->mesh_shadows ? update_layer(frame, scene, plan, 0) : PATINA_OK;
 }
 
 int pt_shadows_bake(struct patina_frame *frame, const struct patina_scene *scene)

@@ -17,6 +17,21 @@ struct pt_shadow_light {
     uint32_t partial; // lazy: only points that one picture showed; the next tests anew
 };
 
+// Pixels that show meshes: shadow words of theirs, light by light, as of a cloud's points. PT_PLANE_MESH_PLACES are its positions.
+struct pt_shadow_pixels {
+    struct pt_buffer words;
+    uint32_t samples[PT_MAX_LIGHTS]; // of each of the plan's lights, in this picture
+    uint32_t pending;                // lights that further renders still refine
+    uint64_t view;                   // of what picture that is
+};
+
+// These pixels as a cloud in view space, for the tests of one layer; chunks NULL: no pixel shows a mesh.
+struct pt_pixel_receiver {
+    struct patina_cloud cloud;
+    struct pt_instance instance;
+    struct pt_chunk *chunks;
+};
+
 struct pt_shadows {
     struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS]; // of the maps
     struct pt_buffer *words, *marks; // per instance of the scene; empty where it receives none
@@ -26,6 +41,7 @@ struct pt_shadows {
     uint32_t light_count;
     struct pt_buffer differs, some; // one word each: see lit, limit
     struct pt_clip_buffers clips; // of the map at hand
+    struct pt_shadow_pixels pixels;
 };
 
 // Compares what the plan asks for with what is at hand and makes room. Afterwards pt_shadows_stale says whether any light
@@ -34,6 +50,15 @@ int pt_shadows_open(struct patina_frame *frame, const struct patina_scene *scene
 int pt_shadows_stale(const struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan);
 // Tests what is to be tested, and tells the plan's shade passes what the words mean. With shadow_lazy the marks are set.
 int pt_shadows_update(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan);
+// The same of a layer behind the first, for the meshes that it shows.
+int pt_shadows_behind(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan);
+// frame_shadow_pixels.c: room for the picture's words and how many samples they get; changed: some light is not as it was.
+int pt_pixels_open(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan, int changed);
+// Of a layer whose pixels are covered: who is to be tested, all words at zero.
+int pt_pixels_begin(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan,
+                    struct pt_pixel_receiver *out);
+void pt_pixels_end(struct pt_pixel_receiver *receiver);
+void pt_pixels_release(struct patina_frame *frame);
 // What a light's samples took from each point, instance after instance; all zero before the first reading.
 struct pt_shadow_sums {
     uint32_t *words;

@@ -267,7 +267,7 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
     *args = (struct shade_args){.view = builder->plan->view};
     memcpy(args->world, scene->settings.world_color, sizeof args->world);
     set_ambient(scene, args);
-    args->eye_z = scene->camera.orthographic ? (float)scene->camera.near_clip : 0.0f;
+    args->eye_z = pt_eye_z(scene);
     args->arrived =
         builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
     set_lights(builder->plan, scene, receives, args);
@@ -485,10 +485,12 @@ static const char *no_shadows(const struct patina_scene *scene)
         receiving += (uint32_t)pt_receives(&scene->instances[i]);
         objects += !(scene->instances[i].style.shadow_off & PATINA_SHADOW_NO_CAST);
     }
-    for (uint32_t i = 0; i < scene->mesh_count; i++)
+    for (uint32_t i = 0; i < scene->mesh_count; i++) {
+        receiving += (uint32_t)pt_mesh_receives(&scene->meshes[i]);
         objects += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
+    }
     return !casting     ? "no light casts shadows"
-           : !receiving ? "no lit cloud receives shadows"
+           : !receiving ? "no lit cloud and no mesh receives shadows"
            : !objects   ? "nothing casts shadows"
                         : NULL;
 }
@@ -656,7 +658,7 @@ static void plan_points(struct pt_builder *builder)
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    static const char *const others[] = {"raster", "cover",  "mark",  "lit", "limit", "shade",     "obscure", "edl",
+    static const char *const others[] = {"raster", "cover",  "paint", "locate", "mark",  "lit", "limit", "shade", "obscure", "edl",
                                          "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel", "average",
                                          "lines",  "ink",    "assess"};
     builder->plan->light_count = 0;

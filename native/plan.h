@@ -37,7 +37,9 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(MESH_KEYS, 8, 0)      \
     X(MESH_SHOWN, 8, 0)     \
     X(MESH_NORMAL, 16, 0)   \
-    X(MESH_ALBEDO, 12, 0)   \
+    X(MESH_ALBEDO, 16, 0)   \
+    X(MESH_PLACES, 12, 0)   \
+    X(MESH_WORDS, 4, 0)     \
     X(LINE, 4, 0)           \
     X(NEAREST, 4, 0)        \
     X(LINE_BEHIND, 4, 0)    \
@@ -72,7 +74,7 @@ enum pt_instance_buffer {
     PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN
 };
 
-enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_BUFFERS };
+enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
 
 // What a pass binds: a plane at a level, or a buffer of an instance or a mesh.
 enum pt_ref_of { PT_OF_FRAME, PT_OF_INSTANCE, PT_OF_MESH };
@@ -154,6 +156,7 @@ struct pt_plan {
     struct pt_plan_mesh *meshes;
     uint32_t mesh_count;
     uint64_t triangles; // of meshes in view; 0: none is
+    int mesh_shadows;   // some of these receive shadows: their pixels are tested
     struct pt_pass *passes;
     uint32_t pass_count;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
@@ -209,6 +212,8 @@ size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
 // No more than the spacings on screen.
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
+// plan_mesh.c: the image of a mesh, as a picture or a light sees it.
+void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out);
 // plan_window.c, once the spacings are known: how holes are closed; how many layers; which pixels the planes hold, with a picture
 // that is `guard` pixels wider on each side.
 void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan);
@@ -249,6 +254,7 @@ int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, ui
 int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i); // the same, told in its reason
 int pt_receives(const struct pt_instance *instance); // shadows, at all
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
+int pt_mesh_receives(const struct pt_mesh_instance *instance);
 int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: its points have opacities of their own
 // Only points that the picture shows are tested. Not of several layers: which points the second shows is known too late. Not
 // with an error target: a part of the picture would stop at other samples than the whole.
@@ -261,7 +267,7 @@ struct pt_shadow_group {
     uint32_t loss;          // 1..255
     int faint;              // its points have opacities of their own
 };
-enum { PT_NO_INSTANCE = 0xFFFFFFFFu };
+enum { PT_NO_INSTANCE = 0xFFFFFFFFu, PT_PIXELS = 0xFFFFFFFEu }; // PT_PIXELS: those that show meshes, of which shadows are kept, too
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 2 instances + 1
 int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);

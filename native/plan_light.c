@@ -21,7 +21,7 @@
 // at 1.8.
 static const double coarseness = 1.2, coarseness_bare = 1.8;
 static const double widest = 1.7320508075688772; // tangent of 60 degrees
-enum { LEAST_TEXELS = 16, SURVEY_TEXELS = 1024 };
+enum { LEAST_TEXELS = 16, SURVEY_TEXELS = 1024, MESH_TEXELS = 2048 };
 
 // ---- casters and receivers ---------------------------------------------------------------------------------------------
 
@@ -33,6 +33,11 @@ static int casts(const struct pt_instance *instance)
 int pt_mesh_casts(const struct pt_mesh_instance *instance)
 {
     return !(instance->style.shadow_off & PATINA_SHADOW_NO_CAST) && pt_mesh_drawn(instance->mesh);
+}
+
+int pt_mesh_receives(const struct pt_mesh_instance *instance)
+{
+    return !(instance->style.shadow_off & PATINA_SHADOW_NO_RECEIVE) && !instance->style.unlit && pt_mesh_drawn(instance->mesh);
 }
 
 // Meshes are opaque, and among the opaque casters of everyone.
@@ -417,6 +422,14 @@ static void aim(const struct patina_scene *scene, struct pt_plan_light *planned)
     }
 }
 
+static int some_mesh_receives(const struct patina_scene *scene)
+{
+    for (uint32_t i = 0; i < scene->mesh_count; i++)
+        if (pt_mesh_receives(&scene->meshes[i]))
+            return 1;
+    return 0;
+}
+
 // How wide a texel is, from the casters' spacing as a survey with square texels sees it.
 static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *planned)
 {
@@ -459,7 +472,10 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
     int bare = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         bare |= casts(&scene->instances[i]) && !scene->instances[i].cloud->info.has_normals;
+    // On triangles the edge of a shadow shows as it is: texels of a 2048th are half a pixel where the picture shows all of it.
+    const double finest = some_mesh_receives(scene) ? size / MESH_TEXELS : INFINITY;
     double wanted = spacing > 0.0 ? (parallel ? coarseness : bare ? coarseness_bare : 1.0) * spacing : size / SURVEY_TEXELS;
+    wanted = fmin(wanted, finest);
     double least = size / fmax(scene->settings.shadow_resolution - 3.0, LEAST_TEXELS);
     planned->capped = wanted < least;
     planned->texel = fmin(fmax(wanted, least), fmax(size / LEAST_TEXELS, least));
@@ -559,11 +575,14 @@ static void put_cuts(struct key *key, const struct patina_scene *scene, const st
     }
 }
 
-// Its matrix as the light sees it: the same when light and cloud move together. A sun is everywhere: where the first cloud is.
+// Its matrix as the light sees it: the same when light and cloud move together. A sun is everywhere: where the first
+// cloud or mesh is.
 static void put_matrix(struct key *key, const struct patina_scene *scene, const struct pt_plan_light *planned,
                        const double matrix[16])
 {
-    const double *from = planned->light->position, *first = scene->instances[0].style.world_from_object;
+    const double *first = scene->instance_count ? scene->instances[0].style.world_from_object
+                                                : scene->meshes[0].style.world_from_object;
+    const double *from = planned->light->position;
     double linear[9], translation[3], turned[9], moved[3], frame[9];
     frame_of(planned->light->direction, planned->light->side, frame);
     pt_split_matrix(matrix, linear, translation);
@@ -609,6 +628,11 @@ size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light
         if (pt_mesh_casts(&scene->meshes[i])) {
             put_word(&key, atomic_load(&scene->meshes[i].mesh->alive->fingerprint));
             put_matrix(&key, scene, planned, scene->meshes[i].style.world_from_object);
+            put(&key, (double)scene->meshes[i].style.alpha);
+            if (scene->meshes[i].style.alpha) { // its holes
+                put(&key, (double)scene->meshes[i].style.alpha_least);
+                put_word(&key, atomic_load(&scene->meshes[i].style.texture->alive->fingerprint));
+            }
         }
     return key.count;
 }

@@ -5,13 +5,36 @@
 
 #include <string.h>
 
+static const float spent = 1.0f / 512.0f; // less opacity does not show
+
+void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out)
+{
+    const struct patina_texture *texture = instance->style.texture;
+    const uint32_t alpha = instance->style.alpha;
+    if (!texture)
+        return;
+    out->levels = texture->levels;
+    out->uv = instance->mesh->stride - 2;
+    out->format = texture->format;
+    out->nearest = texture->nearest;
+    out->wrap = texture->wrap;
+    out->blend = alpha == PATINA_ALPHA_BLEND;
+    out->cut = alpha == PATINA_ALPHA_CLIP ? instance->style.alpha_least : !out->blend ? 0.0f : plan->map ? 0.5f : spent;
+    memcpy(out->sizes, texture->sizes, sizeof out->sizes);
+}
+
+static uint32_t pixels_of(const struct pt_plan *plan) { return plan->view.width * plan->view.height; }
+
+static int in_view(const struct pt_plan_mesh *mesh) { return mesh->rect[0] < mesh->rect[2]; }
+
 static void plan_raster(struct pt_builder *builder, uint32_t i)
 {
     const struct pt_plan *plan = builder->plan;
     struct raster_args args = {.view = plan->view, .mesh = plan->meshes[i].args, .behind = builder->layer > 1};
     const struct pt_ref refs[] = {pt_plane_at(PT_PLANE_MESH_KEYS, 0), pt_mesh_buffer_of(PT_MESH_VERTICES, i),
-                                  pt_mesh_buffer_of(PT_MESH_INDICES, i), pt_plane_at(PT_PLANE_LIMIT, 0)};
-    struct pt_pass *pass = pt_add(builder, PT_KERNEL_raster, "raster", &args, sizeof args, refs, args.behind ? 4 : 3);
+                                  pt_mesh_buffer_of(PT_MESH_INDICES, i), pt_mesh_buffer_of(PT_MESH_TEXELS, i),
+                                  pt_plane_at(PT_PLANE_LIMIT, 0)};
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_raster, "raster", &args, sizeof args, refs, args.behind ? 5 : 4);
     PT_REASON(pass, "%u triangles of mesh %u", args.mesh.id_count, i);
 }
 
@@ -21,7 +44,8 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
     struct cover_args args = {.view = plan->view,
                               .mesh = plan->meshes[i].args,
                               .behind = builder->layer > 1,
-                              .shown = (uint32_t)shown};
+                              .shown = (uint32_t)shown,
+                              .first = plan->meshes[i].instance->style.unlit ? pixels_of(plan) : 0};
     memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
     // where nothing is shown the keys stand in and are not touched
     const struct pt_ref refs[] = {pt_keys_of(builder, 0),
@@ -39,6 +63,60 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
     PT_REASON(pass, "mesh %u over what lies behind it", i);
 }
 
+static void plan_paint(struct pt_builder *builder, uint32_t i)
+{
+    const struct pt_plan *plan = builder->plan;
+    struct paint_args args = {.view = plan->view, .mesh = plan->meshes[i].args};
+    memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
+    PT_REASON(PT_ADD(builder, paint, args,
+                     {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_plane_at(PT_PLANE_MESH_KEYS, 0),
+                      pt_mesh_buffer_of(PT_MESH_VERTICES, i), pt_mesh_buffer_of(PT_MESH_INDICES, i),
+                      pt_mesh_buffer_of(PT_MESH_TEXELS, i), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0)}),
+              "mesh %u has an image of %u x %u texels", i, args.mesh.texture.sizes[0], args.mesh.texture.sizes[1]);
+}
+
+static void plan_images(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    int some = 0;
+    for (uint32_t i = 0; i < plan->mesh_count; i++)
+        if (in_view(&plan->meshes[i]) && plan->meshes[i].args.texture.levels) {
+            plan_paint(builder, i);
+            some = 1;
+        }
+    if (!some)
+        pt_skip(builder, "paint", plan->triangles ? "no mesh in view has an image" : "no mesh is in view");
+}
+
+static void plan_locate(struct pt_builder *builder, uint32_t i)
+{
+    const struct pt_plan *plan = builder->plan;
+    struct locate_args args = {.view = plan->view, .mesh = plan->meshes[i].args, .eye_z = pt_eye_z(builder->scene)};
+    memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
+    PT_REASON(PT_ADD(builder, locate, args,
+                     {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_plane_at(PT_PLANE_MESH_KEYS, 0),
+                      pt_mesh_buffer_of(PT_MESH_VERTICES, i), pt_mesh_buffer_of(PT_MESH_INDICES, i),
+                      pt_plane_at(PT_PLANE_MESH_PLACES, 0), pt_plane_at(PT_PLANE_MESH_WORDS, 0)}),
+              "mesh %u receives shadows", i);
+}
+
+// Before pixels are tested: where they lie.
+static void plan_places(struct pt_builder *builder)
+{
+    struct pt_plan *plan = builder->plan;
+    plan->mesh_shadows = 0;
+    for (uint32_t i = 0; i < plan->mesh_count && plan->light_count; i++)
+        if (in_view(&plan->meshes[i]) && pt_mesh_receives(plan->meshes[i].instance)) {
+            plan_locate(builder, i);
+            plan->mesh_shadows = 1;
+        }
+    if (!plan->mesh_shadows)
+        pt_skip(builder, "locate",
+                !plan->triangles     ? "no mesh is in view"
+                : plan->light_count ? "no mesh in view receives shadows"
+                                    : "no light shadows anything");
+}
+
 void pt_plan_meshes(struct pt_builder *builder, int shown)
 {
     const struct pt_plan *plan = builder->plan;
@@ -48,25 +126,35 @@ void pt_plan_meshes(struct pt_builder *builder, int shown)
         pt_skip(builder, "cover", reason);
     }
     for (uint32_t i = 0; i < plan->mesh_count; i++)
-        if (plan->meshes[i].rect[0] < plan->meshes[i].rect[2])
+        if (in_view(&plan->meshes[i]))
             plan_raster(builder, i);
     for (uint32_t i = 0; i < plan->mesh_count; i++)
-        if (plan->meshes[i].rect[0] < plan->meshes[i].rect[2])
+        if (in_view(&plan->meshes[i]))
             plan_cover(builder, i, shown);
+    if (shown) {
+        plan_images(builder);
+        plan_places(builder);
+    }
 }
 
-void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)
+// unlit: those that light does not change.
+static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unlit)
 {
     const struct pt_plan *plan = builder->plan;
     struct shade_args args;
-    if (!plan->triangles)
-        return;
-    pt_shade_lights(builder, 0, &args);
+    int blended = 0;
+    for (uint32_t i = 0; i < plan->mesh_count; i++)
+        blended |= in_view(&plan->meshes[i]) && plan->meshes[i].args.texture.blend;
+    pt_shade_lights(builder, plan->mesh_shadows && !unlit, &args);
+    if (unlit)
+        args.light_count = 0;
     // a point for each pixel, with its index as id
-    args.instance = (struct instance_args){.id_count = plan->view.width * plan->view.height,
+    args.instance = (struct instance_args){.id_base = unlit ? pixels_of(plan) : 0,
+                                           .id_count = pixels_of(plan),
                                            .has_normals = 1,
-                                           .color_format = PT_COLOR_FLOAT,
-                                           .lit = 1,
+                                           .color_format = PT_COLOR_OF_PLANE,
+                                           .has_opacities = (uint32_t)blended,
+                                           .lit = !unlit,
                                            .shininess = 1,
                                            .ambient = 1.0f,
                                            .diffuse = 1.0f,
@@ -77,6 +165,18 @@ void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
                       pt_plane_at(color, 0), pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE),
-                      pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE), pt_plane_at(PT_PLANE_ARRIVED, 0)}),
-              "meshes, %u lights", args.light_count);
+                      pt_buffer_of(PT_SHADOWS, unlit ? PT_NO_INSTANCE : PT_PIXELS), pt_plane_at(PT_PLANE_ARRIVED, 0)}),
+              "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
+}
+
+void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)
+{
+    const struct pt_plan *plan = builder->plan;
+    int some[2] = {0, 0};
+    for (uint32_t i = 0; i < plan->mesh_count; i++)
+        if (in_view(&plan->meshes[i]))
+            some[plan->meshes[i].instance->style.unlit] = 1;
+    for (int unlit = 0; unlit < 2; unlit++)
+        if (some[unlit])
+            plan_shade(builder, color, unlit);
 }

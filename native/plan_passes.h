@@ -53,6 +53,12 @@ static inline void pt_own_colors(enum pt_plane color, struct shade_args *args)
         args->instance.lit = args->light_count = args->blend = args->arrived = 0;
 }
 
+// Orthographic views see z = 0 so far before the camera's plane; view z = -(z + this).
+static inline float pt_eye_z(const struct patina_scene *scene)
+{
+    return scene->camera.orthographic ? (float)scene->camera.near_clip : 0.0f;
+}
+
 // What lies behind the points.
 static inline const float *pt_background(const patina_settings *settings)
 {

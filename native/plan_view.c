@@ -691,6 +691,7 @@ static void place_mesh(struct pt_plan *plan, const struct camera *camera, const 
     args->has_normals = mesh->has_normals;
     args->has_colors = mesh->has_colors;
     memcpy(args->color, instance->style.color, sizeof args->color);
+    pt_plan_texture(plan, instance, &args->texture);
     join_rect(plan->view.rect, out->rect);
     plan->triangles += mesh->info.triangle_count;
 }
@@ -710,6 +711,8 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     pad_camera(&survey->camera, AROUND);
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = look_at_instance(scene, plan, survey, i);
+    for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
+        plan->transparent |= scene->meshes[i].style.alpha == PATINA_ALPHA_BLEND && pt_mesh_drawn(scene->meshes[i].mesh);
     survey->camera = bare;
     return error ? error : spacing_on_screen(plan, survey);
 }

@@ -179,6 +179,32 @@ int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device 
     return end(residency, device, resident, error, out);
 }
 
+int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device, const struct patina_texture *texture,
+                              struct pt_resident **out)
+{
+    struct pt_resident *resident = *out = find(residency, device, texture->alive);
+    if (resident)
+        return PATINA_OK;
+    if (!(resident = begin(device, texture->alive)))
+        return PATINA_ERROR_MEMORY;
+    int error = device->ops->buffer_create(device, texture->bytes, texture->texels, 1, &resident->buffers[PT_MESH_TEXELS]);
+    return end(residency, device, resident, error, out);
+}
+
+int pt_residency_mesh_buffer(struct pt_residency *residency, struct patina_device *device, const struct pt_mesh_instance *instance,
+                             uint32_t which, struct pt_buffer **out)
+{
+    static struct pt_buffer none; // never written: kernels that bind it do not touch it
+    struct pt_resident *resident = NULL;
+    int error = PATINA_OK;
+    if (which != PT_MESH_TEXELS)
+        error = pt_residency_take_mesh(residency, device, instance->mesh, &resident);
+    else if (instance->style.texture)
+        error = pt_residency_take_texture(residency, device, instance->style.texture, &resident);
+    *out = resident ? &resident->buffers[which] : &none;
+    return error;
+}
+
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device)
 {
     while (residency->first) {

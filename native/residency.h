@@ -11,7 +11,7 @@ struct pt_resident {
     uint32_t colors, shapes; // the states of alive->colors and alive->shapes that the buffers hold
     struct pt_buffer marked; // colours with what stations saw through in magenta; made when first asked for
     uint32_t marked_colors, marked_shapes; // the states that it holds
-    struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh by pt_mesh_buffer; PT_CHUNKS is unused
+    struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh or texture by pt_mesh_buffer; PT_CHUNKS is unused
 };
 
 // The cloud's buffers on the device, uploaded at the first call; forgets dead clouds on the way.
@@ -22,6 +22,11 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
 // Likewise of a mesh.
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
                            struct pt_resident **out);
+int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device, const struct patina_texture *texture,
+                              struct pt_resident **out);
+// The buffer of a mesh or its texture that a pass binds; of no texture, an empty one.
+int pt_residency_mesh_buffer(struct pt_residency *residency, struct patina_device *device, const struct pt_mesh_instance *instance,
+                             uint32_t which, struct pt_buffer **out);
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device);
 
 #endif

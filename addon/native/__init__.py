@@ -27,11 +27,12 @@ from .loader import (CANCELLED, FORMAT, INTERNAL, MEMORY, NEIGHBOURHOODS, TYPES,
                       forget_library, library, library_path, log_lines, split_plane)
 
 __all__ = ["CANCELLED", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
-           "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "forget_library",
+           "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "Texture", "WRAPS", "forget_library",
            "library", "library_path", "log_lines", "ramp", "split_plane", "start_fingerprint", "start_grid_normals"]
 
 
 KINDS = tuple(abi.KIND)  # patina_kind
+WRAPS = tuple(abi.WRAP)  # patina_wrap
 
 
 def _destroy(destroy: Callable[[c_void_p], None], handle: c_void_p, _keep: Any) -> None:
@@ -291,18 +292,31 @@ class Cloud(_Handle):
 
 
 class Mesh(_Handle):
-    """Triangles, three corners each: positions (3 n, 3), normals (3 n, 3) or None, linear colors (3 n, 3|4) or None, all
-    float32."""
+    """Triangles, three corners each: positions (3 n, 3), normals (3 n, 3) or None, linear colors (3 n, 3|4) or None, where each
+    lies on an image (3 n, 2) or None, all float32."""
 
     _kind = "mesh"
 
-    def __init__(self, positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None) -> None:
+    def __init__(self, positions: np.ndarray, normals: np.ndarray | None, colors: np.ndarray | None,
+                 uv: np.ndarray | None = None) -> None:
         corners = len(positions)
         super().__init__(byref(abi.MeshDesc(vertex_count=corners, position=_view(positions, corners),
                                          normal=_view(normals, corners), color=_view(colors, corners),
-                                         triangle_count=corners // 3)))
+                                         triangle_count=corners // 3, uv=_view(uv, corners))))
         self.count = corners // 3
         self.bare: Mesh | None = None  # the same without colors, where somebody asked for it
+
+
+class Texture(_Handle):
+    """An image for meshes: pixels (height, width, 4), uint8 or float32, rows from the bottom, opacity last. raw: bytes are linear,
+    not sRGB. wrap: of WRAPS."""
+
+    _kind = "texture"
+
+    def __init__(self, pixels: np.ndarray, raw: bool, nearest: bool, wrap: str) -> None:
+        height, width = pixels.shape[:2]
+        super().__init__(byref(abi.TextureDesc(width=width, height=height, pixels=_view(pixels.reshape(-1, 4), height * width),
+                                            raw=raw, nearest=nearest, wrap=WRAPS.index(wrap))))
 
 
 class File(_Handle):
@@ -374,7 +388,7 @@ class Scene(_Handle):
 
     def __init__(self) -> None:
         super().__init__()
-        self._clouds: list[Cloud | Mesh] = []  # the native scene points to them
+        self._clouds: list[Cloud | Mesh | Texture] = []  # the native scene points to them
 
     def add_cloud(self, cloud: Cloud, ramp: bytes = b"", **style: Any) -> None:
         """ramp: linear RGB, float32, two colours or more; empty: black to white."""
@@ -385,9 +399,9 @@ class Scene(_Handle):
         self._call("add_cloud", cloud._handle, byref(fields))
         self._clouds.append(cloud)
 
-    def add_mesh(self, mesh: Mesh, **style: Any) -> None:
-        self._call("add_mesh", mesh._handle, byref(abi.MeshStyle(**style)))
-        self._clouds.append(mesh)
+    def add_mesh(self, mesh: Mesh, texture: Texture | None = None, **style: Any) -> None:
+        self._call("add_mesh", mesh._handle, byref(abi.MeshStyle(texture=texture._handle if texture else None, **style)))
+        self._clouds += [mesh, texture] if texture else [mesh]
 
     def add_clip(self, **clip: Any) -> None:
         self._call("add_clip", byref(abi.Clip(**clip)))

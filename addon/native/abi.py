@@ -22,10 +22,12 @@ ERROR = {"OK": 0, "ERROR_ARGUMENT": -1, "ERROR_MEMORY": -2, "ERROR_FILE": -3, "E
          "ERROR_DEVICE": -6, "ERROR_CANCELLED": -7, "ERROR_TOO_MANY_POINTS": -8, "ERROR_EMPTY": -9, "ERROR_INTERNAL": -10}
 TYPE = {"NONE": 0, "FLOAT32": 1, "FLOAT64": 2, "UINT8": 3, "UINT16": 4, "UINT32": 5, "INT8": 6, "INT16": 7, "INT32": 8}
 KIND = {"UNKNOWN": 0, "SURFACE": 1, "BORDER": 2, "LINE": 3, "VOLUME": 4, "STRAY": 5}
+WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
 LIGHTING = {"AUTO": 0, "UNLIT": 1, "LIT": 2}
 COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5}
 FREE_SPACE = {"OFF": 0, "SHOW": 1, "USE": 2}
 SHADOW_OFF = {"NO_CAST": 1, "NO_RECEIVE": 2, "NO_SELF": 4}
+ALPHA = {"NONE": 0, "CLIP": 1, "BLEND": 2}
 CLIP_SHAPE = {"BOX": 0, "PLANE": 1}
 LIGHT_TYPE = {"SUN": 1, "POINT": 2, "SPOT": 3, "AREA": 4}
 AREA_SHAPE = {"RECTANGLE": 0, "ELLIPSE": 1}
@@ -97,12 +99,17 @@ class Neighbourhoods(Descriptor):
 
 class MeshDesc(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", Array), ("normal", Array),
-                ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p)]
+                ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p), ("uv", Array)]
 
 
 class MeshInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("triangle_count", c_uint64), ("bytes", c_uint64),
                 ("box_min", c_double * 3), ("box_max", c_double * 3)]
+
+
+class TextureDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("pixels", Array), ("raw", c_uint32),
+                ("nearest", c_uint32), ("wrap", c_uint32)]
 
 
 class FileInfo(Descriptor):
@@ -133,7 +140,8 @@ class CloudStyle(Descriptor):
 
 class MeshStyle(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("color", c_float * 3),
-                ("shadow_off", c_uint32)]
+                ("shadow_off", c_uint32), ("unlit", c_uint32), ("texture", c_void_p), ("alpha", c_uint32),
+                ("alpha_least", c_float)]
 
 
 class Clip(Descriptor):
@@ -235,6 +243,8 @@ CALLS = {
     "patina_mesh_create": (POINTER(MeshDesc), POINTER(c_void_p)),
     "patina_mesh_destroy": (c_void_p,),
     "patina_mesh_get_info": (c_void_p, POINTER(MeshInfo)),
+    "patina_texture_create": (POINTER(TextureDesc), POINTER(c_void_p)),
+    "patina_texture_destroy": (c_void_p,),
     "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_file_destroy": (c_void_p,),
@@ -303,6 +313,7 @@ CALLS = {
 RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_message": c_size_t,
            "patina_log_next": c_size_t, "patina_progress_destroy": None, "patina_progress_cancel": None,
            "patina_progress_value": c_float, "patina_device_destroy": None, "patina_cloud_destroy": None,
-           "patina_mesh_destroy": None, "patina_file_destroy": None, "patina_scene_destroy": None,
-           "patina_frame_destroy": None, "patina_frame_cancel": None, "patina_frame_progress": c_float,
-           "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t, "patina_task_destroy": None}
+           "patina_mesh_destroy": None, "patina_texture_destroy": None, "patina_file_destroy": None,
+           "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
+           "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
+           "patina_task_destroy": None}

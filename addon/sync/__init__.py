@@ -68,7 +68,8 @@ def describe_viewport(depsgraph: bpy.types.Depsgraph, view: View, trusted: Trust
         obj = instance.parent if instance.is_instance else instance.object
         return obj.visible_in_viewport_get(space)
 
-    found = describe_items(depsgraph, view, notices, clouds.collect(depsgraph, trusted.take(notices), notices, visible))
+    found = describe_items(depsgraph, view, notices, clouds.collect(depsgraph, trusted.take(notices), notices, visible,
+                                                                    trusting=True))
     samples, noise = settings.viewport_samples(depsgraph.scene_eval)
     return replace(found, settings=replace(found.settings, pixel_samples=samples, pixel_noise=noise))
 

@@ -18,7 +18,7 @@ from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, linked, losses, materials, meshes, roles
+from . import analysis, attributes, clips, colors, estimates, images, linked, losses, materials, meshes, roles
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -231,16 +231,18 @@ CACHE = CloudCache()
 
 
 # What collect() asks for each object with points or faces: (object, identity, linked file) → its cloud or mesh, or None without.
-Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | native.Mesh | None"]
+Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | meshes.Faces | None"]
 
 
 def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             visible: Callable[[bpy.types.DepsgraphObjectInstance], bool] = lambda instance: True,
-            frame: int | None = None, settle: Callable[[], None] = lambda: None) -> list[CloudItem | meshes.MeshItem]:
+            frame: int | None = None, settle: Callable[[], None] = lambda: None,
+            trusting: bool = False) -> list[CloudItem | meshes.MeshItem]:
     """Every visible cloud and mesh, instances too. Iterates the depsgraph only; keeps no reference into it. frame: whose
-    files sequences show; None: of the scene's. settle: builds what take left for later."""
+    files sequences show; None: of the scene's. settle: builds what take left for later. trusting: images are as they were unless
+    Blender said that they changed."""
     items: list[CloudItem | meshes.MeshItem] = []
-    taken: dict[tuple, native.Cloud | Pending | native.Mesh | None] = {}  # by place in memory: it holds while the depsgraph does
+    taken: dict[tuple, native.Cloud | Pending | meshes.Faces | None] = {}  # by place in memory: it holds while the depsgraph does
     used: set[tuple] = set()
     faces: set[str] = set()
     triangles = meshes.BARE if roles.are_used(depsgraph) or _wants_mattes(depsgraph.view_layer_eval) else meshes.TRIANGLES
@@ -264,19 +266,23 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
                 continue
         patina = depsgraph.scene_eval.patina
         role = roles.role_of(instance, depsgraph.view_layer_eval)
-        # the library's triangles receive no shadows, its points do
-        as_triangles = patina.meshes == 'TRIANGLES' and role != roles.CATCHER
-        faces_as = 0 if not solid else triangles if as_triangles else patina.mesh_points
+        faces_as = 0 if not solid else triangles if patina.meshes == 'TRIANGLES' else patina.mesh_points
         radius = _radius_name(obj, patina.surface)
         place = link.identity() if link else (obj.data.as_pointer(), radius, faces_as, *_attribute_names(obj), analysis.wanted(obj))
+        place = (*place, *meshes.names_of(obj)) if solid else place
         if place not in taken:
             identity = place if link else _identity(obj, used, radius, faces_as)
             used.add(identity)
             taken[place] = take(obj, identity, link)
         cloud = taken[place]
         unknown.look(instance)
-        if isinstance(cloud, native.Mesh):
-            items.append(meshes.MeshItem(cloud, _mesh_style(obj, instance.matrix_world), obj.pass_index, role, *_names(obj)))
+        if isinstance(cloud, meshes.Faces):
+            notices += [text for text in cloud.notices if text not in notices]
+            for part in cloud.parts:
+                use = part.surface.use
+                texture = images.CACHE.obtain(use, notices, trusting) if use else None
+                style = _mesh_style(obj, instance.matrix_world, part.surface)
+                items.append(meshes.MeshItem(part.mesh, style, obj.pass_index, role, *_names(obj), texture))
         elif cloud:
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
@@ -288,6 +294,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
              for item in items]
     CACHE.trim(used)
     meshes.CACHE.trim(used)
+    images.CACHE.trim()
     estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
                     if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
     notices += unknown.notices()
@@ -322,7 +329,7 @@ class TakingNow:
         self._waiting: list[_Soon] = []
 
     def __call__(self, obj: bpy.types.Object, identity: tuple, link: linked.Source | None
-                 ) -> native.Cloud | Pending | native.Mesh | None:
+                 ) -> native.Cloud | Pending | meshes.Faces | None:
         name = obj.name
         progress = Progress()
 
@@ -417,7 +424,7 @@ class Trusted:
     """Clouds of a viewport, read again only after Blender said that their data changed."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple, tuple[Pending | native.Mesh | None, list[str]]] = {}
+        self._known: dict[tuple, tuple[Pending | meshes.Faces | None, list[str]]] = {}
         self._used: set[tuple] = set()
         self.reads = 0  # how often points were read, for tests
 
@@ -430,7 +437,7 @@ class Trusted:
         self._known = {key: known for key, known in self._known.items() if key in self._used}  # objects go
         self._used = set()
 
-        def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | native.Mesh | None:
+        def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | meshes.Faces | None:
             owners = {item: None for item in (obj, obj.data, *(slot.material for slot in obj.material_slots),
                                               *getattr(obj.data, "materials", ())) if item}  # each once
             key = (*identity, tuple((_kind(owner), owner.original.name_full) for owner in owners))
@@ -462,9 +469,13 @@ def changed_owners(depsgraph: bpy.types.Depsgraph) -> set[tuple[str, str]]:
     owners = set()
     for update in depsgraph.updates:
         item = update.id.original
+        if isinstance(item, bpy.types.Material):  # all that Blender says where an image was loaded anew
+            images.CACHE.forget(images.names_in(item))
         if isinstance(item, bpy.types.Object):
             if update.is_updated_geometry:
                 owners.add((_kind(item), item.name_full))
+        elif isinstance(item, bpy.types.Image):
+            images.CACHE.forget({item.name_full})
         elif update.is_updated_geometry or isinstance(item, (bpy.types.Mesh, bpy.types.PointCloud, bpy.types.Material)):
             owners.add((_kind(item), item.name_full))
     return owners
@@ -572,10 +583,11 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         **colors.style_fields(obj))
 
 
-def _mesh_style(obj: bpy.types.Object, matrix: Matrix) -> meshes.MeshStyle:
-    color = meshes.first_color(obj)
+def _mesh_style(obj: bpy.types.Object, matrix: Matrix, surface: images.Surface) -> meshes.MeshStyle:
+    color, use = surface.color[:3], surface.use
     return meshes.MeshStyle(world_from_object=row_major(matrix), color=color if any(color) else (NOTHING,) * 3,
-                            shadow_off=_shadow_off(obj) & 3)
+                            shadow_off=_shadow_off(obj) & 3, unlit=int(surface.unlit), alpha=use.alpha if use else images.NONE,
+                            alpha_least=use.alpha_least if use else 0.0)
 
 
 def _shadow_off(obj: bpy.types.Object) -> int:

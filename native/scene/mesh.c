@@ -19,7 +19,8 @@ static int check_desc(patina_mesh_desc *desc)
         return fail("more than 2^27 vertices or 2^29 triangles: split the mesh");
     if ((error = pt_check_array(&desc->position, "position", floats, 3, 3)) ||
         (error = pt_check_array(&desc->normal, "normal", floats, 3, 3)) ||
-        (error = pt_check_array(&desc->color, "color", 1u << PATINA_FLOAT32, 3, 4)))
+        (error = pt_check_array(&desc->color, "color", 1u << PATINA_FLOAT32, 3, 4)) ||
+        (error = pt_check_array(&desc->uv, "uv", floats, 2, 2)))
         return error;
     if (!desc->indices && 3 * desc->triangle_count > desc->vertex_count)
         return fail("fewer vertices than three a triangle, and no indices");
@@ -63,6 +64,19 @@ static void put3(const patina_array *array, uint64_t index, float *out)
         out[k] = finite3(v) ? (float)v[k] : 0.0f;
 }
 
+static void put_uv(const patina_array *array, uint64_t index, float *out)
+{
+    const char *from = (const char *)array->data + index * array->stride;
+    for (int k = 0; k < 2; k++) {
+        double v;
+        float f;
+        memcpy(&v, from + 8 * k * (array->type == PATINA_FLOAT64), array->type == PATINA_FLOAT64 ? 8 : 4);
+        memcpy(&f, from + 4 * k, 4);
+        f = array->type == PATINA_FLOAT64 ? (float)v : f;
+        out[k] = isfinite(f) ? f : 0.0f;
+    }
+}
+
 static void take_vertices(const patina_mesh_desc *desc, struct patina_mesh *mesh)
 {
     for (uint64_t i = 0; i < desc->vertex_count; i++) {
@@ -75,6 +89,8 @@ static void take_vertices(const patina_mesh_desc *desc, struct patina_mesh *mesh
             put3(&desc->normal, i, out + 3);
         if (mesh->has_colors)
             put3(&desc->color, i, out + 3 + 3 * mesh->has_normals);
+        if (mesh->has_uv)
+            put_uv(&desc->uv, i, out + mesh->stride - 2);
     }
     for (uint64_t i = 0; i < 3 * desc->triangle_count; i++)
         mesh->indices[i] = desc->indices ? desc->indices[i] : (uint32_t)i;
@@ -84,7 +100,8 @@ static int build(const patina_mesh_desc *desc, struct patina_mesh *mesh)
 {
     mesh->has_normals = desc->normal.data != NULL;
     mesh->has_colors = desc->color.data != NULL;
-    mesh->stride = 3 + 3 * mesh->has_normals + 3 * mesh->has_colors;
+    mesh->has_uv = desc->uv.data != NULL;
+    mesh->stride = 3 + 3 * mesh->has_normals + 3 * mesh->has_colors + 2 * mesh->has_uv;
     size_t vertex_bytes = desc->vertex_count * mesh->stride * sizeof *mesh->vertices;
     size_t index_bytes = 3 * desc->triangle_count * sizeof *mesh->indices;
     mesh->alive = calloc(1, sizeof *mesh->alive);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A mesh: triangles over vertices, each its position, normal and colour in one place.
+// A mesh: triangles over vertices, each its position, normal, colour and uv in one place.
 #ifndef PT_MESH_H
 #define PT_MESH_H
 
@@ -10,8 +10,8 @@ struct patina_mesh {
     patina_mesh_info info;
     struct pt_alive *alive;
     struct pt_chunk box; // origin and box alone: what the vertices are relative to, and span
-    uint32_t stride;     // floats a vertex: 3, and 3 more each for normals and colours
-    uint32_t has_normals, has_colors;
+    uint32_t stride;     // floats a vertex: 3, and 3 more each for normals and colours, 2 for uv
+    uint32_t has_normals, has_colors, has_uv;
     float *vertices;
     uint32_t *indices;
 };

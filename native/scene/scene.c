@@ -221,6 +221,15 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
         return fail(scene, "mesh style: colour must be finite");
     if (checked.shadow_off & ~(uint32_t)(PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE))
         return fail(scene, "mesh style: shadow_off has unknown bits");
+    if (checked.unlit > 1 || checked.alpha > PATINA_ALPHA_BLEND || !(checked.alpha_least >= 0.0f && checked.alpha_least <= 1.0f))
+        return fail(scene, "mesh style: unlit is 0 or 1, alpha is a patina_alpha, alpha_least within 0..1");
+    if (checked.texture && checked.texture->handle.magic != PT_MAGIC)
+        return fail(scene, "mesh style: texture was destroyed");
+    if (checked.texture && !mesh->has_uv)
+        return fail(scene, "mesh style: a texture, but the mesh has no uv");
+    checked.alpha_least = checked.alpha_least > 0.0f ? checked.alpha_least : 0.5f;
+    if (!checked.texture || checked.texture->opaque)
+        checked.alpha = PATINA_ALPHA_NONE;
     default_grey(checked.color);
     int error = too_many(scene, mesh->info.triangle_count, mesh->info.triangle_count);
     if (error)

@@ -5,6 +5,7 @@
 
 #include "cloud.h"
 #include "mesh.h"
+#include "texture.h"
 
 struct pt_instance {
     const struct patina_cloud *cloud;

@@ -15,9 +15,10 @@ layout(std430, binding = 0) readonly buffer arguments_block { raster_args args; 
 layout(std430, binding = 1) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
 layout(std430, binding = 2) readonly buffer vertices_block { float vertices[]; };
 layout(std430, binding = 3) readonly buffer indices_block { uint indices[]; };
-layout(std430, binding = 4) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = 4) readonly buffer texels_block { uint texels[]; };
+layout(std430, binding = 5) readonly buffer limit_block { float limit[]; };
 
-#include "lib/mesh.glsl"
+#include "lib/texture.glsl"
 
 layout(location = 0) uniform uint first_triangle; // of this dispatch
 
@@ -46,6 +47,11 @@ void draw_pixel(facet f, int x, int y, uint id)
     uint pixel = uint(y - args.view.origin_y) * args.view.width + uint(x - args.view.origin_x);
     if (!(args.view.z_near <= z && z <= args.view.z_far) || (args.behind != 0u && !(limit[pixel] < z)))
         return;
+    if (args.mesh.texture.cut > 0.0) {
+        triangle t = find_triangle(id - args.mesh.id_base, uint(x - args.view.origin_x), uint(y - args.view.origin_y));
+        if (!(args.mesh.texture.cut <= image_at(place_on_image(t)).w))
+            return;
+    }
     uint z_bits = pt_bits(z) & 0x7FFFFFFFu;
 #if PASS == 0
     atomicMin(keys[2u * pixel + 1u], z_bits);

@@ -69,7 +69,7 @@ static void check(struct harness *h, struct scene *s)
     struct pt_buffer *keys = harness_buffer(h, s->picture.keys, count * 8), *from = harness_buffer(h, s->picture.from, count * 4);
     struct pt_buffer *normal = harness_buffer(h, s->picture.normal, count * 16), *deff = harness_buffer(h, s->picture.deff, count * 4);
     struct pt_buffer *shown = harness_buffer(h, empty, count * 8), *smooth = harness_buffer(h, s->picture.normal, count * 16);
-    struct pt_buffer *albedo = harness_buffer(h, harness_alloc(h, count * 12), count * 12);
+    struct pt_buffer *albedo = harness_buffer(h, harness_alloc(h, count * 16), count * 16);
     HARNESS_RUN(h, cover, &s->args, keys, from, normal, deff, harness_buffer(h, s->mesh_keys, count * 8),
                 harness_buffer(h, s->vertices, (size_t)s->args.mesh.id_count * 3 * s->args.mesh.stride * 4),
                 harness_buffer(h, s->indices, (size_t)s->args.mesh.id_count * 12), shown, smooth, albedo,
@@ -84,7 +84,7 @@ static void check(struct harness *h, struct scene *s)
     harness_same(h, "deff", got_deff, count, 4, 1, width);
     harness_same(h, "shown", got_shown, count, 8, 1, width);
     harness_same(h, "smooth", got_smooth, count * 4, 4, 4, width);
-    harness_same(h, "albedo", got_albedo, count * 3, 4, 3, width);
+    harness_same(h, "albedo", got_albedo, count * 4, 4, 4, width);
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % width), y = (int)(i / width);
         struct ref_cover e = ref_cover(&s->args, s->vertices, s->indices, s->picture.keys[i], s->mesh_keys[i], s->limit[i], x, y);
@@ -109,7 +109,7 @@ static void check(struct harness *h, struct scene *s)
         near3(h, "smooth", x, y, got_smooth + 4 * i, e.smooth, e.smooth_error);
         if (!harness_near(got_smooth[4 * i + 3], e.inverse, e.inverse_error) || !harness_near(got_deff[i], e.deff, e.deff_error))
             harness_fail(h, "deff", x, y, "got %.9g, expected %.9g +- %.2g", got_deff[i], e.deff, e.deff_error);
-        near3(h, "albedo", x, y, got_albedo + 3 * i, ref_vec(e.albedo[0], e.albedo[1], e.albedo[2]), e.albedo_error);
+        near3(h, "albedo", x, y, got_albedo + 4 * i, ref_vec(e.albedo[0], e.albedo[1], e.albedo[2]), e.albedo_error);
     }
     harness_note(h, "%zu pixels in front, %zu of them too thin to compare", front, rough);
     HARNESS_CHECK(h, front > count / 20 && rough < front / 4);

@@ -48,9 +48,9 @@ static uint64_t *run(struct harness *h, const struct soup *s, const float *limit
     struct pt_buffer *vertices = harness_buffer(h, s->vertices, corners * 12);
     struct pt_buffer *indices = harness_buffer(h, s->indices, corners * 4);
     if (limit)
-        HARNESS_RUN(h, raster, &s->args, keys, vertices, indices, harness_buffer(h, limit, pixels * 4));
+        HARNESS_RUN(h, raster, &s->args, keys, vertices, indices, harness_buffer(h, NULL, 0), harness_buffer(h, limit, pixels * 4));
     else
-        HARNESS_RUN(h, raster, &s->args, keys, vertices, indices);
+        HARNESS_RUN(h, raster, &s->args, keys, vertices, indices, harness_buffer(h, NULL, 0));
     return harness_read(h, keys);
 }
 

@@ -226,6 +226,24 @@ struct ref_cover {
 struct ref_cover ref_cover(const struct cover_args *args, const float *vertices, const uint32_t *indices, uint64_t key,
                            uint64_t mesh_key, float limit, int x, int y);
 
+// Where a pixel that shows a triangle lies, and its plane's normal (as ref_cover has it) in the steps of a surface word.
+struct ref_locate {
+    struct ref_vec p, n; // view space
+    double error, normal_error;
+    int ours;
+};
+struct ref_locate ref_locate(const struct locate_args *args, const float *vertices, const uint32_t *indices, uint64_t shown,
+                             uint64_t mesh_key, int x, int y);
+
+// What a pixel shows of an image; straight colour and opacity.
+struct ref_paint {
+    double color[4], error; // error: in premultiplied colour and in opacity
+    int ours;
+    int open; // float32 may take another number of probes, another texel, or the other side of a clipped border
+};
+struct ref_paint ref_paint(const struct paint_args *args, const float *vertices, const uint32_t *indices, const uint32_t *texels,
+                           uint64_t shown, uint64_t mesh_key, int x, int y);
+
 void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y,
               uint64_t *key, uint32_t *from);
 

@@ -4,13 +4,28 @@
 // Which centres a row of a triangle covers is solved for, in 64-bit integers; depths along it go in vectors. Threads share the
 // plane as in scatter.
 #include "mesh.h"
+#include "texture.h"
 
 enum { BATCH = 128 }; // triangles
 
 struct target {
     uint64_t *keys;
     const float *limit; // only what lies beyond counts; NULL: everything
+    const struct pt_cpu_call *cut; // by the opacity of the mesh's image; NULL: nothing is
 };
+
+// Which of PT_LANES pixels of a triangle, in the planes from (x, y) on, the image leaves.
+static vm left_by_image(const struct pt_cpu_call *call, uint32_t index, uint32_t x, uint32_t y, vm lanes)
+{
+    const struct raster_args *args = call->arguments;
+    struct pt_triangle t;
+    struct pt_on_image place;
+    vf color[4];
+    pt_find_triangle(&args->view, &args->mesh, pt_cpu_data(call, 1), pt_cpu_data(call, 2), vi_set(index), x, y, lanes, &t);
+    pt_place_on_image(&t, &args->mesh.texture, pt_cpu_data(call, 1), lanes, &place);
+    pt_image_at(&args->mesh.texture, pt_cpu_data(call, 3), &place, lanes, color);
+    return vm_and(lanes, vf_le(vf_set(args->mesh.texture.cut), color[3]));
+}
 
 static int64_t divide_down(int64_t a, int64_t b) // b > 0; towards -inf
 {
@@ -64,6 +79,11 @@ static void draw_row(const struct view_args *view, const struct pt_facet *facet,
             draw = vm_and(draw, vf_lt(vf_load(target.limit + at), z));
         vi bits = vi_and(vf_bits(z), vi_set(0x7FFFFFFFu));
         uint32_t nearer = vm_bits(vm_and(draw, vm_not(vi_lt_unsigned(vi_load_z(target.keys + at), bits))));
+        if (nearer && target.cut) {
+            const struct raster_args *args = target.cut->arguments;
+            nearer &= vm_bits(left_by_image(target.cut, id - args->mesh.id_base, (uint32_t)(x - view->origin_x),
+                                            (uint32_t)(y - view->origin_y), draw));
+        }
         if (!nearer)
             continue;
         uint32_t zs[PT_LANES];
@@ -106,7 +126,8 @@ static void raster_range(void *context, uint32_t begin, uint32_t end, uint32_t t
 {
     const struct pt_cpu_call *call = context;
     const struct raster_args *args = call->arguments;
-    const struct target target = { pt_cpu_data(call, 0), args->behind ? pt_cpu_data(call, 3) : NULL };
+    const struct target target = { pt_cpu_data(call, 0), args->behind ? pt_cpu_data(call, 4) : NULL,
+                                   args->mesh.texture.cut > 0.0f ? call : NULL };
     (void)thread;
     for (uint32_t batch = begin; batch < end && !pt_cpu_cancelled(call); batch++) {
         uint32_t first = batch * BATCH, left = args->mesh.id_count - first;

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// paint: pixels that show a mesh take its image's colour; twin of shaders/kernels/paint.comp
+#include "texture.h"
+
+static void paint_row(void *context, uint32_t y)
+{
+    const struct pt_cpu_call *call = context;
+    const struct paint_args *args = call->arguments;
+    const struct view_args *view = &args->view;
+    const uint64_t *shown = pt_cpu_data(call, 0), *mesh_keys = pt_cpu_data(call, 1);
+    const float *vertices = pt_cpu_data(call, 2);
+    float *albedo = pt_cpu_data(call, 5);
+    for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
+        const size_t at = (size_t)y * view->width + x;
+        vi index = vi_sub(vi_load_id(mesh_keys + at), vi_set(args->mesh.id_base));
+        vm ours = vm_and(vm_first(pt_lanes_left(x, view->rect[2])), vi_lt_unsigned(index, vi_set(args->mesh.id_count)));
+        ours = vm_and(ours, vm_not(vi_eq(vi_load_z(shown + at), vi_set(PT_KEY_EMPTY_Z))));
+        if (!vm_bits(ours))
+            continue;
+        struct pt_triangle t;
+        struct pt_on_image place;
+        vf color[4];
+        pt_find_triangle(view, &args->mesh, vertices, pt_cpu_data(call, 3), index, x, y, ours, &t);
+        pt_place_on_image(&t, &args->mesh.texture, vertices, ours, &place);
+        pt_image_at(&args->mesh.texture, pt_cpu_data(call, 4), &place, ours, color);
+        if (!args->mesh.texture.blend)
+            color[3] = vf_set(1.0f);
+        vf_store4(albedo + 4 * at, color, vm_bits(ours));
+    }
+}
+
+int PT_KERNEL_ENTRY(paint)(const struct pt_cpu_call *call)
+{
+    const struct paint_args *args = call->arguments;
+    return pt_rows(call, &args->view, paint_row);
+}
