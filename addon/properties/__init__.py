@@ -153,8 +153,9 @@ class PatinaSceneProperties(PropertyGroup):
     average: BoolProperty(
         name="Average Points", override=_OVERRIDE, default=False,
         description="A pixel shows the mean of all points about its surface, in place of the nearest one alone: truer where "
-                    "several fall into a pixel, as in far ground, and steadier in animations. A picture takes about twice as "
-                    "long. Not of color ramps, nor of points with opacities of their own")
+                    "several fall into a pixel, as in far ground, and steadier in animations. A picture takes two to three times as "
+                    "long, and surfaces nearer to each other than two spacings mix. Not of color ramps, nor of points with opacities "
+                    "of their own")
     samples: IntProperty(
         name="Samples", override=_OVERRIDE, default=1, min=1, soft_max=64, max=1024,
         description="Of each pixel: a final render takes the mean of about so many finer or shifted ones, each anti-aliased as "

@@ -25,7 +25,7 @@ class PATINA_OT_preset_add(AddPresetBase, Operator):
     preset_menu = "PATINA_PT_presets"
     preset_defines = ["patina = bpy.context.scene.patina"]
     preset_values = [f"patina.{name}" for name in ("surface", "error_target", "quality", "fill", "fill_iterations",
-                                                  "antialias", "samples", "noise")]
+                                                  "antialias", "average", "samples", "noise")]
     preset_subdir = FOLDER
 
 

@@ -310,11 +310,11 @@ def test_shipped_presets():
     from patina.ui import presets
     names = [value.partition(".")[2] for value in presets.PATINA_OT_preset_add.preset_values]
     shipped = sorted(presets.SHIPPED.glob("*.py"))
-    check(len(shipped) == 5, f"{shipped}")
+    check(len(shipped) == 6, f"{shipped}")
     for path in shipped:
         settings = new_scene().patina
         settings.error_target, settings.quality, settings.fill, settings.fill_iterations = 50.0, 'PAPER', 'OFF', 9
-        settings.antialias, settings.samples = 'OFF', 77
+        settings.antialias, settings.samples, settings.average = 'OFF', 77, True
         lines = [line.split(" = ")[0] for line in path.read_text().splitlines() if line.startswith("patina.")]
         check(lines == [f"patina.{name}" for name in names], f"{path.name} sets {lines}")
         bpy.ops.script.execute_preset(filepath=str(path), menu_idname="PATINA_PT_presets")
@@ -323,7 +323,9 @@ def test_shipped_presets():
             wanted = {name: settings.bl_rna.properties[name].default for name in names}
             check(found == wanted, f"{found} is not {wanted}")
         if path.stem == "Final":
-            check(found["samples"] == 16 and found["quality"] == 'REFINED', f"{found}")
+            check(found["samples"] == 16 and found["quality"] == 'REFINED' and not found["average"], f"{found}")
+        if path.stem == "Animation":
+            check(found["samples"] == 16 and found["average"], f"{found}")
 
 
 def test_american_spelling():

@@ -153,6 +153,24 @@ static void formats(struct harness *h)
         }
 }
 
+// Colours that blended discs and averages left in a plane: of the pixel where a surface was measured, and of each that shows it.
+static void planes_of_colors(struct harness *h)
+{
+    static const uint32_t of_planes[] = {PT_COLOR_OF_PLANE, PT_COLOR_OF_PIXEL};
+    for (int i = 0; i < 2; i++)
+        for (uint32_t blend = 0; blend < 3; blend++) {
+            struct rng rng = {12};
+            struct setup s = make(h, &rng, 1, PICTURE_SURFACES, 0);
+            s.args.instance.color_format = of_planes[i];
+            s.args.blend = blend;
+            s.colors_size = s.picture.count * 16;
+            s.colors = harness_alloc(h, s.colors_size);
+            for (size_t k = 0; k < 4 * s.picture.count; k++)
+                ((float *)s.colors)[k] = (float)rng_range(&rng, 0.0, 1.5);
+            check(h, &s, TOL_UNSURE_SHARE);
+        }
+}
+
 static void kinds(struct harness *h)
 {
     for (int p = 0; p < 2; p++)
@@ -360,6 +378,7 @@ int main(int argc, char **argv)
     static const struct harness_case cases[] = {
         {"sanity", sanity, 1},
         {"colour formats, lit and unlit", formats, 0},
+        {"colours of a plane", planes_of_colors, 0},
         {"pictures of all kinds, paper and refined", kinds, 0},
         {"estimated normals", estimated, 0},
         {"opacities", opacities, 0},

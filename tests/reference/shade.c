@@ -11,10 +11,16 @@
 
 enum { SUN_LIGHT = 1, SPOT_LIGHT = 3, AREA_LIGHT = 4 }; // patina_light_type
 
-static void albedo_of(const struct instance_args *instance, const struct ref_planes *planes, uint32_t id,
+// pixel: that is shaded, for colours that lie in a plane.
+static void albedo_of(const struct instance_args *instance, const struct ref_planes *planes, uint32_t id, size_t pixel,
                       double albedo[3])
 {
+    const size_t of_plane = instance->color_format == PT_COLOR_OF_PLANE ? planes->from[pixel] & ~PT_FROM_MIXED : pixel;
     for (size_t c = 0; c < 3; c++) {
+        if (instance->color_format == PT_COLOR_OF_PLANE || instance->color_format == PT_COLOR_OF_PIXEL) {
+            albedo[c] = ((const float *)planes->colors)[4 * of_plane + c];
+            continue;
+        }
         albedo[c] = instance->color[c];
         if (instance->color_format == 1)
             albedo[c] = ref_srgb(((const uint8_t *)planes->colors)[3 * (size_t)id + c]);
@@ -259,7 +265,7 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     struct ref_ray ray = ref_ray(view, x, y);
     struct ref_vec viewer = ref_viewer(view, ray);
     double albedo[3], recolored[3], z = ref_key_z(key);
-    albedo_of(instance, planes, ref_key_id(key) - instance->id_base, albedo);
+    albedo_of(instance, planes, ref_key_id(key) - instance->id_base, pixel, albedo);
     recolor(args, planes, ref_key_id(key) - instance->id_base, ray, z, albedo, recolored);
     normal_of(args, planes, x, y, &out);
     out.opacity = instance->opacity;

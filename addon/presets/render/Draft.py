@@ -9,5 +9,6 @@ patina.quality = 'PAPER'
 patina.fill = 'PAPER'
 patina.fill_iterations = 0
 patina.antialias = 'BACKGROUND'
+patina.average = False
 patina.samples = 1
 patina.noise = 0.0

@@ -9,5 +9,6 @@ patina.quality = 'REFINED'
 patina.fill = 'OFF'
 patina.fill_iterations = 0
 patina.antialias = 'OFF'
+patina.average = False
 patina.samples = 1
 patina.noise = 0.0

@@ -9,5 +9,6 @@ patina.quality = 'REFINED'
 patina.fill = 'CLOSED'
 patina.fill_iterations = 0
 patina.antialias = 'LAYERS'
+patina.average = False
 patina.samples = 1
 patina.noise = 0.0

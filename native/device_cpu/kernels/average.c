@@ -44,7 +44,7 @@ struct block { // of a chunk: its points in view that do not face away and may r
 };
 
 struct blocks {
-    struct block narrow, wide; // points whose tents cover four pixels, and more
+    struct block narrow, middle, wide; // points whose tents cover 2 x 2 pixels, 3 x 3, and more
 };
 
 // What points add at weight 1.
@@ -128,7 +128,7 @@ static void project(const struct average *average, const struct band *band, cons
     const vf one = vf_set(1.0f), left = vf_set((float)view->origin_x), right = vf_set((float)(view->origin_x + (int32_t)view->width));
     const float bottom = (float)view->origin_y, top = (float)(view->origin_y + (int32_t)view->height);
     const vf low = vf_set(below > bottom ? below : bottom), high = vf_set(above < top ? above : top);
-    out->narrow.count = out->wide.count = 0;
+    out->narrow.count = out->middle.count = out->wide.count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
         const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
                           vf_load(positions + 2 * (size_t)chunk->padded + i) };
@@ -154,8 +154,12 @@ static void project(const struct average *average, const struct band *band, cons
         const vf spacing = vf_gather(average->args->instance.spacing, vi_shr(word, PT_SPACING_SHIFT), some);
         const vf footprint = vf_select(some, vf_footprint(view, z), one), place[3] = { x, y, z };
         const vf h = vf_max(vf_min((vf_set(PT_AVERAGE_TENT) * spacing) * vf_rcp(footprint), vf_set(PT_AVERAGE_WIDEST)), one);
-        const vm narrow = vm_and(some, vf_le(h, one)), wide = vm_and(some, vf_lt(one, h));
-        keep(&out->narrow, chunk, i, place, h, word, vm_bits(narrow));
+        const vm narrow = vm_and(some, vf_le(h, one)), wide = vm_and(some, vf_lt(vf_set(1.5f), h));
+        const vm middle = vm_and(some, vm_not(vm_or(narrow, wide)));
+        if (vm_bits(narrow))
+            keep(&out->narrow, chunk, i, place, h, word, vm_bits(narrow));
+        if (vm_bits(middle))
+            keep(&out->middle, chunk, i, place, h, word, vm_bits(middle));
         if (vm_bits(wide))
             keep(&out->wide, chunk, i, place, h, word, vm_bits(wide));
     }
@@ -240,12 +244,13 @@ static inline vf tent(vf beside, vf share)
 
 // Pixels and weights, packed, so that no branch waits for how many of each point count.
 struct counted {
-    uint32_t count, pixel[5 * PT_LANES], lane[5 * PT_LANES];
-    float weight[5 * PT_LANES];
+    uint32_t count, pixel[10 * PT_LANES], lane[10 * PT_LANES];
+    float weight[10 * PT_LANES];
 };
 
-// 3. To the four pixels around whose surface is as deep.
-static void add_narrow(const struct average *average, struct band *band, const struct block *block)
+// 3. To those of `side` x `side` pixels around whose surface is as deep.
+static inline __attribute__((always_inline)) void add_few(const struct average *average, struct band *band,
+                                                          const struct block *block, uint32_t side)
 {
     const struct view_args *view = &average->args->view;
     const vi width = vi_set(view->width), rows = vi_set(band->end - band->first), stride = vi_set((uint32_t)average->stride);
@@ -256,17 +261,19 @@ static void add_narrow(const struct average *average, struct band *band, const s
     for (uint32_t i = 0; i < block->count; i += PT_LANES) {
         const vm lanes = vm_first(pt_lanes_left(i, block->count));
         const vf x = vf_load(block->x + i), y = vf_load(block->y + i), z = vf_load(block->z + i);
-        const vi left = vi_add(vf_int(vf_floor((x - half) - one)), vi_set(1)), low = vi_add(vf_int(vf_floor((y - half) - one)), vi_set(1));
+        const vf h = side == 2 ? one : vf_load(block->half + i), share = side == 2 ? one : vf_rcp(vf_select(lanes, h, one));
+        const vi left = vi_add(vf_int(vf_floor((x - half) - h)), vi_set(1)), low = vi_add(vf_int(vf_floor((y - half) - h)), vi_set(1));
         vm any = vm_of_bits(0);
         counted.count = 0;
-        for (uint32_t k = 0; k < 4; k++) {
-            const vi px = vi_add(left, vi_set(k & 1u)), py = vi_add(low, vi_set(k >> 1));
+        for (uint32_t k = 0; k < side * side; k++) {
+            const vi px = vi_add(left, vi_set(k % side)), py = vi_add(low, vi_set(k / side));
             const vi column = vi_sub(px, vi_set((uint32_t)view->origin_x));
             const vi row = vi_sub(py, vi_set((uint32_t)view->origin_y + band->first));
             vm some = vm_and(lanes, vm_and(vi_lt_unsigned(column, width), vi_lt_unsigned(row, rows)));
             const vi at = vi_add(vi_mul(row, stride), column), twice = vi_add(at, at);
             some = vm_and(some, vm_and(vf_le(vf_gather(depths, twice, some), z), vf_le(z, vf_gather(depths + 1, twice, some))));
-            const vf weight = tent((vi_convert(py) + half) - y, one) * tent((vi_convert(px) + half) - x, one);
+            const vf weight = tent((vi_convert(py) + half) - y, share) * tent((vi_convert(px) + half) - x, share);
+            some = vm_and(some, vf_lt(vf_zero(), weight));
             const uint32_t bits = vm_bits(some);
             vi_pack(counted.pixel + counted.count, at, bits);
             vi_pack(counted.lane + counted.count, vi_lanes(), bits);
@@ -424,7 +431,8 @@ static void average_bands(void *context, uint32_t begin, uint32_t end, uint32_t 
                 continue;
             for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
                 project(average, &band, chunk, first, chunk->count - first < BLOCK ? chunk->count : first + BLOCK, &blocks);
-                add_narrow(average, &band, &blocks.narrow);
+                add_few(average, &band, &blocks.narrow, 2);
+                add_few(average, &band, &blocks.middle, 3);
                 add_wide(average, &band, &blocks.wide);
             }
         }
