@@ -161,6 +161,8 @@ static int upload(struct render *render)
         if (!error)
             error = device->ops->buffer_create(device, instance->chunk_count * sizeof *instance->chunks,
                                                instance->chunks, 1, &render->chunks[i]);
+        if (!error && pt_reopen_asked(instance->instance))
+            error = pt_residency_see(device, instance->instance->cloud, render->clouds[i]);
         if (!error && instance->marked)
             error = pt_residency_mark(device, instance->instance->cloud, render->clouds[i]);
         if (error)

@@ -56,6 +56,8 @@ static void plan_scatter(struct pt_builder *builder)
     struct pt_pass *pass = pt_add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
     if (builder->layer > 1)
         PT_REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
+    else if (builder->again)
+        PT_REASON(pass, "points behind what is drawn already, %u instances", args.instances);
     else
         PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view", (unsigned long long)points,
                   (unsigned long long)chunks, args.instances);
@@ -531,7 +533,7 @@ static void plan_center(struct pt_builder *builder, uint32_t i)
               "depth of instance %u's surface in the middle of each pixel", i);
 }
 
-static const char *const of_points[] = {"sift", "scatter", "splat", "normals", "surface", "center", "blend", "pull", "fill", "push"};
+static const char *const of_points[] = {"sift", "scatter", "splat", "normals", "surface", "center", "blend", "pull", "fill", "push", "reopen"};
 
 static void skip_all(struct pt_builder *builder, const char *reason, const char *const *names, size_t count)
 {
@@ -539,16 +541,11 @@ static void skip_all(struct pt_builder *builder, const char *reason, const char 
         pt_skip(builder, names[i], reason);
 }
 
-// Scatter, surfaces, filling: what pictures and light maps have in common.
-static void plan_surfaces(struct pt_builder *builder)
+// Points and discs, with their surfaces.
+static void plan_measured(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
     int estimate = 0, points = 0, discs = 0;
-    if (!plan->points_scattered) {
-        skip_all(builder, "no cloud is in view", of_points, sizeof of_points / sizeof *of_points);
-        return;
-    }
-    pt_plan_sift(builder);
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         points |= plan->instances[i].chunk_count && !plan->instances[i].discs;
         discs |= plan->instances[i].chunk_count && plan->instances[i].discs;
@@ -581,7 +578,32 @@ static void plan_surfaces(struct pt_builder *builder)
         pt_skip(builder, "normals", "every cloud in view has normals");
     if (discs)
         pt_plan_blend(builder);
+}
+
+// Scatter, surfaces, filling: what pictures and light maps have in common.
+static void plan_surfaces(struct pt_builder *builder)
+{
+    if (!builder->plan->points_scattered) {
+        skip_all(builder, "no cloud is in view", of_points, sizeof of_points / sizeof *of_points);
+        return;
+    }
+    pt_plan_sift(builder);
+    plan_measured(builder);
+    if (builder->plan->reopens == 2) {
+        const int behind = builder->behind;
+        plan_filling(builder);
+        if (!pt_plan_reopen_find(builder)) {
+            pt_plan_reopen_take(builder); // says why not
+            return;
+        }
+        builder->again = builder->behind = 1;
+        plan_measured(builder);
+        builder->behind = behind;
+    }
+    pt_plan_reopen_keep(builder);
     plan_filling(builder);
+    builder->again = 0;
+    pt_plan_reopen_take(builder);
 }
 
 // Returns the plane that holds the layer's colour.
@@ -602,6 +624,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
                 plan_shade(builder, i, shaded);
         pt_plan_mesh_shade(builder, shaded);
     }
+    pt_plan_reopen_show(builder, PT_PLANE_COLOR_A);
     pt_plan_tint(builder, PT_PLANE_COLOR_A);
     enum pt_plane color = plan_image_filters(builder);
     if (plan->layers > 1)

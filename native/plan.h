@@ -44,6 +44,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(NEAREST, 4, 0)        \
     X(LINE_BEHIND, 4, 0)    \
     X(NEAREST_BEHIND, 4, 0) \
+    X(KEYS_KEPT, 8, 0)      \
     X(COMBINED, 16, 0)      \
     X(DEPTH, 4, 0)          \
     X(NORMALS, 12, 0)       \
@@ -70,7 +71,7 @@ _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_S
 
 // PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole.
 enum pt_instance_buffer {
-    PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES, PT_SHAPES,
+    PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES, PT_SHAPES, PT_SIGHTS,
     PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN
 };
 
@@ -180,6 +181,7 @@ struct pt_plan {
     uint32_t layers;        // at most so many are peeled; 1: no peeling
     int transparent;        // something in view lets light through
     float line_radius;      // of the widest line, pixels; 0: none
+    uint32_t reopens;       // how often points are drawn where closed pixels are taken back: 2; 0: none are
     uint32_t assessed;      // of PATINA_PASS_CERTAINTY and _THICKNESS, bits 1 << those that are asked for and known of something
     struct pt_arena *arena;
 };
@@ -214,6 +216,9 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
 // plan_mesh.c: the image of a mesh, as a picture or a light sees it.
 void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out);
+// plan_reopen.c, once the layers are known: plan->reopens.
+uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan);
+int pt_reopen_asked(const struct pt_instance *instance); // whether what its stations saw is needed
 // plan_window.c, once the spacings are known: how holes are closed; how many layers; which pixels the planes hold, with a picture
 // that is `guard` pixels wider on each side.
 void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan);

@@ -44,7 +44,7 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
 void pt_skip(struct pt_builder *builder, const char *name, const char *reason)
 {
     struct pt_plan *plan = builder->plan;
-    if (builder->layer > 1 || plan->skipped_count == sizeof plan->skipped / sizeof plan->skipped[0])
+    if (builder->layer > 1 || builder->again || plan->skipped_count == sizeof plan->skipped / sizeof plan->skipped[0])
         return;
     struct pt_skipped *skipped = &plan->skipped[plan->skipped_count++];
     skipped->name = name;

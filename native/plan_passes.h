@@ -13,7 +13,8 @@ struct pt_builder {
     uint32_t room;
     uint32_t layer;  // that passes are added for; 0: the whole picture
     uint32_t finish; // first shading pass of the last layer planned
-    int behind;      // of a light's map: the limit plane holds
+    int behind;      // of a light's map, or where what stations looked through is drawn again: the limit plane holds
+    int again;       // passes that were planned before: what is left out was said
     int failed;      // memory lacked: the plan fails as a whole
     struct pt_pass nowhere; // written to then
 };
@@ -110,6 +111,12 @@ int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance 
 
 // plan_assess.c: certainty and thickness of what the picture shows.
 void pt_plan_assess(struct pt_builder *builder);
+
+// plan_reopen.c: what was closed where stations looked through. Of pictures of one layer, not of light maps.
+int pt_plan_reopen_find(struct pt_builder *builder); // after filling. 0: nothing asks for it; else the layer is planned again, behind
+void pt_plan_reopen_keep(struct pt_builder *builder); // before filling, the last time
+void pt_plan_reopen_take(struct pt_builder *builder); // after it
+void pt_plan_reopen_show(struct pt_builder *builder, enum pt_plane color); // after shading
 
 // plan.c: normal and layer distance of an instance's pixels.
 void pt_plan_surface(struct pt_builder *builder, uint32_t instance);

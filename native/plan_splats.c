@@ -57,6 +57,8 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
                                   head + instances * sizeof *discs, refs, count);
     if (blend)
         PT_REASON(pass, "discs within a layer distance of the nearest, %u instances", instances);
+    else if (last && builder->layer <= 1)
+        PT_REASON(pass, "discs behind what is drawn already, %u instances", instances);
     else if (last)
         PT_REASON(pass, "layer %u: discs behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
     else
@@ -67,7 +69,7 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
 void pt_plan_splat(struct pt_builder *builder)
 {
     const struct pt_ref keys = pt_keys_of(builder, 0), limit = pt_plane_at(PT_PLANE_LIMIT, 0);
-    add_discs(builder, 0, &keys, 1, builder->layer > 1 ? &limit : NULL);
+    add_discs(builder, 0, &keys, 1, builder->layer > 1 || builder->behind ? &limit : NULL);
 }
 
 void pt_plan_blend(struct pt_builder *builder)

@@ -751,6 +751,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     plan->reaches = plan->discs_count && knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
     pt_choose_filling(scene, plan);
     pt_choose_layers(&scene->settings, plan);
+    plan->reopens = pt_reopen_rounds(scene, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;
     // Effects see no farther beyond the picture: a wider guard would fill holes at its border otherwise than without them. Lines

@@ -35,6 +35,7 @@ static int upload_shapes(struct patina_device *device, const struct patina_cloud
     device->ops->buffer_destroy(device, &resident->buffers[PT_SURFACE]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_RADII]);
     device->ops->buffer_destroy(device, &resident->buffers[PT_SHAPES]);
+    device->ops->buffer_destroy(device, &resident->buffers[PT_SIGHTS]);
     resident->shapes = atomic_load(&cloud->alive->shapes);
     int error = device->ops->buffer_create(device, cloud->slots * 4, cloud->surface, 1, &resident->buffers[PT_SURFACE]);
     if (!error && cloud->radii && cloud->shapes)
@@ -161,6 +162,12 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
     resident->marked_colors = colors;
     resident->marked_shapes = shapes;
     return error;
+}
+
+int pt_residency_see(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
+{
+    struct pt_buffer *sights = &resident->buffers[PT_SIGHTS];
+    return sights->size ? PATINA_OK : device->ops->buffer_create(device, cloud->sights.bytes, cloud->sights.words, 1, sights);
 }
 
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,

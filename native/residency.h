@@ -19,6 +19,8 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
                       struct pt_resident **out);
 // Makes resident->marked what it should be: in the cloud's format of colours, PT_COLOR_FLOAT where it has none.
 int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
+// Makes resident->buffers[PT_SIGHTS] what the cloud's stations saw.
+int pt_residency_see(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
 // Likewise of a mesh.
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
                            struct pt_resident **out);

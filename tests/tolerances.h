@@ -73,6 +73,10 @@
 // Certainty: n times the rounded 1 / 15; thickness: one product. Share.
 #define TOL_KNOWN (2.0 * TOL_UNIT)
 
+// Where a station looked through: place on a face, as a share of its edge, and squares of ranges, after a sum of four terms that
+// cancel to no less than a twentieth (else undecided), a reciprocal and a cubic.
+#define TOL_SIGHT (100.0 * TOL_UNIT)
+
 // Our log2: the polynomial 1.5e-7, its last product and the sum; besides, a unit of the result. And our 2^x: 2.3e-7 of the
 // polynomial, three roundings; share.
 #define TOL_LOG 2.5e-7

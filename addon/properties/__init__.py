@@ -248,12 +248,13 @@ class PatinaObjectProperties(PropertyGroup):
                             "Discs have a greatest width; else they are as wide as the neighbors of each point say")
     free_space: EnumProperty(
         name="Free Space", override=_OVERRIDE, default='OFF',
-        description="Points that another scan of the same file saw through: what passed by, reflections, edges that are not there. "
-                    "For clouds that know where their scanners stood",
+        description="Points that another scan of the same file saw through: what passed by, reflections, edges that are not there; "
+                    "and surface closed between points where a scanner looked through. For clouds that know where their scanners stood",
         items=(
             ('OFF', "Off", "They are points as all others", 0),
             ('SHOW', "Show", "They are magenta, where the points have their own colors", 1),
-            ('USE', "Hide", "They are not drawn and cast no shadow", 2)))
+            ('USE', "Hide", "They are not drawn and cast no shadow, and what lies behind closed surface is seen again. A picture takes "
+             "twice as long", 2)))
     hide_stray: BoolProperty(
         name="Stray", override=_OVERRIDE, default=False,
         description="Points that are far from what their neighbors are part of are not drawn and cast no shadow")

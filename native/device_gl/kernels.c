@@ -73,7 +73,7 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     [PT_KERNEL_obscure] = {1, 2, 3, 4}, [PT_KERNEL_toon] = {1, 0, 0, 2},      [PT_KERNEL_hatch] = {1, 0, 0, 2},
     [PT_KERNEL_fog] = {1},              [PT_KERNEL_focus] = {1, 0, 0, 2},             [PT_KERNEL_tint] = {1},
     [PT_KERNEL_lines] = {1, 2, 4, 3},   [PT_KERNEL_ink] = {1},            [PT_KERNEL_limit] = {1, 2, 3},
-    [PT_KERNEL_assess] = {1},
+    [PT_KERNEL_assess] = {1},           [PT_KERNEL_reopen] = {1, 2, 3},
 };
 
 int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane)

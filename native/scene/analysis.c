@@ -140,7 +140,7 @@ static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_ch
 {
     for (uint32_t k = 0; k < 3; k++)
         p[k] = chunk->origin[k] + (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + slot - chunk->first];
-    return walk->beams.count ? &walk->beams.each[pt_beam_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
+    return walk->beams.count ? &walk->beams.each[pt_station_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
 }
 
 // A dot is no wider than points lie apart anywhere; a surface, whose rows may lie farther apart, four times that.
@@ -323,11 +323,13 @@ static int mark_free_space(struct walk *walk, struct pt_pool *pool)
 {
     struct pt_free_space job = { .cloud = walk->cloud,
                                  .desc = walk->desc,
+                                 .beams = &walk->beams,
                                  .spacing_base = walk->out->spacing_base,
                                  .progress = walk->progress,
                                  .begin = 0.8,
                                  .end = 1.0,
-                                 .shapes = walk->out->shapes };
+                                 .shapes = walk->out->shapes,
+                                 .sights = &walk->out->sights };
     const int error = pt_free_space_mark(&job, pool);
     walk->out->seen_through = job.marked;
     return error;
@@ -368,7 +370,7 @@ static int compute(struct walk *walk, struct pt_pool *pool)
     if (cloud->chunk_count)
         memcpy(out->chunks, cloud->chunks, cloud->chunk_count * sizeof *out->chunks);
     out->spacing_base = base_of(cloud);
-    int error = pt_beams_create(cloud, walk->desc, &walk->beams);
+    int error = pt_beams_create(cloud, walk->desc, pool, &walk->beams);
     if (!error)
         error = pt_neighbours_create(&walk->tree, cloud, PT_STRATA, pool, walk->progress, 0.0, 0.04);
     if (!error)
@@ -431,6 +433,7 @@ void pt_analysis_free(struct pt_analysis *analysis)
     pt_pages_free(analysis->surface, analysis->slots * 4);
     pt_pages_free(analysis->shapes, analysis->slots * 4);
     free(analysis->chunks);
+    pt_sights_free(&analysis->sights);
     *analysis = (struct pt_analysis){ 0 };
 }
 
@@ -443,6 +446,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     if (pt_cloud_settle_spacing(&next))
         return pt_fail(&cloud->handle, PATINA_ERROR_MEMORY, "taking an analysis: out of memory");
     cloud->info.bytes += cloud->shapes ? 0 : cloud->slots * 4;
+    cloud->info.bytes += cloud->sights.bytes ? 0 : analysis->sights.bytes;
     cloud->info.spacing = next.info.spacing;
     cloud->info.spacing_min = next.info.spacing_min;
     cloud->info.spacing_max = next.info.spacing_max;
@@ -456,7 +460,9 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->info.seen_through = analysis->seen_through;
     pt_pages_free(cloud->surface, cloud->slots * 4);
     pt_pages_free(cloud->shapes, cloud->slots * 4);
+    pt_sights_free(&cloud->sights);
     free(cloud->chunks);
+    cloud->sights = analysis->sights;
     cloud->surface = analysis->surface;
     cloud->shapes = analysis->shapes;
     cloud->chunks = analysis->chunks;

@@ -5,6 +5,7 @@
 #define PT_ANALYSIS_H
 
 #include "neighbourhood.h"
+#include "sights.h"
 
 struct pt_analysis {
     uint32_t *surface, *shapes; // slots
@@ -13,6 +14,7 @@ struct pt_analysis {
     double spacing_base;
     uint64_t estimated, kinds[6], seen_through;
     int oriented;
+    struct pt_sights sights; // where free space is asked for
 };
 
 int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *desc);

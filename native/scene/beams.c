@@ -6,11 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define PI 3.14159265358979323846
-
-// Directions are counted in bins of equal solid angle: so many of the sine of elevation and of azimuth.
-enum { RISES = 90, TURNS = 180, BINS = RISES * TURNS, LEAST_SAMPLES = 1000, LEAST_IN_BIN = 8 };
-
 // ---- the rule of cells: what is tuned, in one place ---------------------------------------------------------------------------
 
 // Half axes of a surface's ellipse, in intervals: 0.71 reaches a cell's corners; registration and dropped samples ask for more.
@@ -26,112 +21,23 @@ enum { RISES = 90, TURNS = 180, BINS = RISES * TURNS, LEAST_SAMPLES = 1000, LEAS
 #define LEAST_BESIDE 0.3 // intervals: neighbours nearer, or farther than MOST_BESIDE, say nothing; nor do those ASIDE of the row
 #define MOST_BESIDE 1.6
 #define ASIDE 0.8
-#define CLEARLY 0.7 // a grid is an even one, as a depth camera's, where directions then lie so much more alike
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-uint32_t pt_beam_of(const patina_analysis_desc *desc, uint32_t number, const double p[3])
-{
-    if (desc->station.data) {
-        const char *at = (const char *)desc->station.data + number * desc->station.stride;
-        uint16_t wide;
-        uint32_t index = *(const uint8_t *)at;
-        if (desc->station.type == PATINA_UINT16) {
-            memcpy(&wide, at, sizeof wide);
-            index = wide;
-        }
-        if (index < desc->station_count)
-            return index;
-    }
-    uint32_t nearest = 0;
-    double least = INFINITY;
-    for (uint32_t s = 0; s < desc->station_count; s++) {
-        double square = 0.0;
-        for (int k = 0; k < 3; k++)
-            square += (desc->stations[3 * s + k] - p[k]) * (desc->stations[3 * s + k] - p[k]);
-        nearest = square < least ? s : nearest;
-        least = fmin(least, square);
-    }
-    return nearest;
-}
-
-// ---- intervals ---------------------------------------------------------------------------------------------------------------
-
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-// On a grid of equal steps d in elevation and azimuth, N samples in the solid angle W at elevation e: d^2 = W / (N cos(e));
-// on an even one d^2 = W / N. Bins that hold an edge of what was seen, or dropped samples, tell too wide a step: the lower quartile
-// counts. spread: of the squares, from quartile to quartile.
-static double step_on(const uint32_t *bins, int even, double *squares, double *spread)
-{
-    uint32_t count = 0;
-    for (uint32_t b = 0; b < BINS; b++) {
-        const double sine = (b / TURNS + 0.5) * 2.0 / RISES - 1.0;
-        if (bins[b] >= LEAST_IN_BIN)
-            squares[count++] = 4.0 * PI / BINS / (bins[b] * (even ? 1.0 : sqrt(1.0 - sine * sine)));
-    }
-    *spread = 1.0;
-    if (!count)
-        return 0.0;
-    qsort(squares, count, sizeof *squares, compare_doubles);
-    *spread = squares[3 * (size_t)count / 4] / squares[count / 4];
-    return sqrt(squares[count / 4]);
-}
-
-static void set_step(const uint32_t *bins, double *squares, struct pt_beam *beam)
-{
-    double spread, spread_even;
-    const double step = step_on(bins, 0, squares, &spread), step_even = step_on(bins, 1, squares, &spread_even);
-    beam->even = spread_even < CLEARLY * spread;
-    beam->step = beam->even ? step_even : step;
-}
-
-static void count_directions(const struct patina_cloud *cloud, const patina_analysis_desc *desc, uint32_t *bins)
-{
-    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
-        const struct pt_chunk *chunk = &cloud->chunks[c];
-        for (uint32_t i = 0; i < chunk->count; i++) {
-            double p[3], d[3];
-            for (uint32_t k = 0; k < 3; k++)
-                p[k] = chunk->origin[k] + (double)cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + i];
-            const uint32_t s = pt_beam_of(desc, cloud->order[chunk->first + i], p);
-            for (int k = 0; k < 3; k++)
-                d[k] = p[k] - desc->stations[3 * s + k];
-            const double length = sqrt(dot(d, d));
-            if (!(length > 0.0))
-                continue;
-            const double rise = 0.5 * RISES * (d[2] / length + 1.0), turn = TURNS * (0.5 + atan2(d[1], d[0]) / (2.0 * PI));
-            const uint32_t row = (uint32_t)fmin(rise, RISES - 1.0), column = (uint32_t)fmin(turn, TURNS - 1.0);
-            bins[(size_t)s * BINS + row * TURNS + column]++;
-        }
-    }
-}
-
-int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_beams *out)
+int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_pool *pool,
+                    struct pt_beams *out)
 {
     *out = (struct pt_beams){ .count = desc->station_count };
     if (!desc->station_count)
         return PATINA_OK;
-    uint32_t *bins = calloc((size_t)desc->station_count * BINS, sizeof *bins);
-    double *squares = malloc(BINS * sizeof *squares);
+    struct pt_interval *intervals = calloc(desc->station_count, sizeof *intervals);
     out->each = calloc(desc->station_count, sizeof *out->each);
-    int error = bins && squares && out->each ? PATINA_OK : PATINA_ERROR_MEMORY;
-    if (!error)
-        count_directions(cloud, desc, bins);
+    int error = intervals && out->each ? pt_intervals_find(cloud, desc, pool, intervals) : PATINA_ERROR_MEMORY;
     for (uint32_t s = 0; s < desc->station_count && !error; s++) {
-        uint64_t samples = 0;
-        for (uint32_t b = 0; b < BINS; b++)
-            samples += bins[(size_t)s * BINS + b];
         memcpy(out->each[s].place, desc->stations + 3 * s, sizeof out->each[s].place);
-        if (samples >= LEAST_SAMPLES)
-            set_step(bins + (size_t)s * BINS, squares, &out->each[s]);
+        out->each[s].interval = intervals[s];
     }
-    free(bins);
-    free(squares);
+    free(intervals);
     if (error)
         pt_beams_destroy(out);
     return error;
@@ -195,7 +101,9 @@ void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct p
     int beside[2];
     for (int k = 0; k < 3; k++)
         ray[k] = p[k] - beam->place[k];
-    const double range = sqrt(dot(ray, ray)), level = sqrt(ray[0] * ray[0] + ray[1] * ray[1]), width = range * beam->step;
+    const double range = sqrt(dot(ray, ray)), level = sqrt(ray[0] * ray[0] + ray[1] * ray[1]);
+    const struct pt_interval *interval = &beam->interval;
+    const double width = range * sqrt(interval->azimuth * interval->elevation);
     if (!(width > 0.0))
         return;
     if (!hood->has_normal || hood->certainty < CERTAIN) {
@@ -215,15 +123,15 @@ void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct p
     double facing = dot(ray, hood->normal);
     facing = fabs(facing) < FLATTEST ? (facing < 0.0 ? -FLATTEST : FLATTEST) : facing;
     for (int k = 0; k < 3; k++) {
-        across[k] *= width * (beam->even ? 1.0 : fmax(level / range, 0.1));
-        up[k] *= width;
+        across[k] *= range * interval->azimuth * (interval->even ? 1.0 : fmax(level / range, 0.1));
+        up[k] *= range * interval->elevation;
     }
     carry(across, ray, hood->normal, facing, a); // whole intervals
     carry(up, ray, hood->normal, facing, b);
     look_beside(sample, ray, hood->normal, facing, a, b, fmax(3.0 * hood->sigma, NEAR * width), beside);
     for (int k = 0; k < 3; k++) {
-        a[k] *= beam->even ? CELL_CAMERA : beside[0] ? CELL : CELL_BORDER;
-        b[k] *= beam->even ? CELL_CAMERA : beside[1] ? CELL : CELL_BORDER;
+        a[k] *= interval->even ? CELL_CAMERA : beside[0] ? CELL : CELL_BORDER;
+        b[k] *= interval->even ? CELL_CAMERA : beside[1] ? CELL : CELL_BORDER;
     }
     ellipse_of(a, b, axis, &major, &minor);
     if (!(major * minor < hood->major * hood->minor))

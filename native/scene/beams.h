@@ -4,23 +4,21 @@
 #ifndef PT_BEAMS_H
 #define PT_BEAMS_H
 
+#include "interval.h"
 #include "neighbourhood.h"
 
 struct pt_beams {
     uint32_t count;
     struct pt_beam {
         double place[3]; // object units
-        double step;     // radians between rows, and between columns at elevation 0; 0: not known
-        int even;        // 1: columns lie as far apart anywhere, as of a camera or a scanner that does not stand upright
+        struct pt_interval interval;
     } *each;
 };
 
 // Of the descriptor's stations and the drawn points that it gives to each. 0 or PATINA_ERROR_MEMORY.
-int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_beams *out);
+int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_pool *pool,
+                    struct pt_beams *out);
 void pt_beams_destroy(struct pt_beams *beams);
-
-// The station of a point by its number in the caller's order; without the caller's word the nearest to p.
-uint32_t pt_beam_of(const patina_analysis_desc *desc, uint32_t number, const double p[3]);
 
 // Shrinks the footprint at p to the beam's cell where that is smaller; what is not a surface becomes a dot of its width.
 void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct pt_sample *sample, struct pt_neighbourhood *hood);

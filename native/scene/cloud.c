@@ -762,6 +762,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
     pt_pages_free(cloud->shapes, cloud->slots * 4);
     pt_pages_free(cloud->scalars, pt_scalar_bytes(cloud));
     pt_pages_free(cloud->classes, pt_class_bytes(cloud));
+    pt_sights_free(&cloud->sights);
     free(cloud->chunks);
     atomic_store(&cloud->alive->alive, 0); // devices drop their copies at their next render
     pt_alive_release(cloud->alive);

@@ -6,6 +6,7 @@
 
 #include "error.h"
 #include "pool.h"
+#include "sights.h"
 
 #include <stdatomic.h>
 
@@ -59,6 +60,7 @@ struct patina_cloud {
     uint64_t class_hash;
     enum pt_color_format color_format;
     uint32_t threads;    // at most, as the caller said; 0: not said
+    struct pt_sights sights; // what its stations saw; empty where nobody asked for free space
     double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 

@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SECTION = 1 << 16, VERSION = 7, SECTIONS = 10, PIECE = 1 << 22 };
+enum { SECTION = 1 << 16, VERSION = 8, SECTIONS = 12, PIECE = 1 << 22 };
 static const char magic[8] = "patina\n\x1a";
 
 struct header {
@@ -26,6 +26,7 @@ struct header {
     uint64_t slots, size; // of the file
     double spacing_base;
     uint64_t class_hash;
+    uint64_t sight_count, sight_room, sight_bytes; // of stations, and what they saw
     patina_cloud_info info;
     uint64_t sums[SECTIONS]; // of what each section holds, see sum_of
     uint64_t check;          // of all before it, and of the chunks
@@ -72,6 +73,8 @@ static void list_sections(struct patina_cloud *cloud, struct section sections[SE
         {(void **)&cloud->scalars, cloud->info.has_scalars ? pt_scalar_bytes(cloud) : 0},
         {(void **)&cloud->classes, cloud->info.has_classes ? pt_class_bytes(cloud) : 0},
         {(void **)&cloud->shapes, cloud->info.has_shapes ? slots * 4 : 0},
+        {(void **)&cloud->sights.each, cloud->sights.room * sizeof *cloud->sights.each},
+        {(void **)&cloud->sights.words, cloud->sights.bytes},
     };
     memcpy(sections, list, sizeof list);
 }
@@ -118,6 +121,9 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
                             .slots = cloud->slots,
                             .spacing_base = cloud->spacing_base,
                             .class_hash = cloud->class_hash,
+                            .sight_count = cloud->sights.count,
+                            .sight_room = cloud->sights.room,
+                            .sight_bytes = cloud->sights.bytes,
                             .info = cloud->info};
     list_sections(&copy, sections);
     memcpy(header.magic, magic, sizeof magic);
@@ -176,7 +182,7 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
         most = cloud->order[i] > most ? cloud->order[i] : most;
     if (next != cloud->slots || drawn != cloud->info.drawn || (cloud->slots && most >= cloud->info.count))
         return refuse(path, "its chunks do not hold its points");
-    return PATINA_OK;
+    return pt_sights_good(&cloud->sights) ? PATINA_OK : refuse(path, "what its stations saw is damaged");
 }
 
 static int check_header(const char *path, const struct header *header, uint64_t size)
@@ -194,6 +200,7 @@ static int check_header(const char *path, const struct header *header, uint64_t 
         header->chunk_count > header->info.count || header->info.drawn > header->info.count ||
         header->info.has_colors != (header->color_format != PT_COLOR_NONE) || header->info.has_opacities > 1 ||
         header->info.has_normals > 1 || header->info.has_radii > 1 || !isfinite(header->info.radius_most) ||
+        header->sight_count > header->sight_room || header->sight_room > 1u << 16 || header->sight_bytes > 2u * PT_SIGHT_BYTES ||
         header->info.has_scalars > 1 || header->info.has_shapes > 1 || header->info.has_classes > 1 || !isfinite(header->spacing_base))
         return refuse(path, "its header is damaged");
     return PATINA_OK;
@@ -231,6 +238,8 @@ static int read_header(const char *path, int descriptor, struct patina_cloud *cl
     cloud->color_format = header->color_format;
     cloud->spacing_base = header->spacing_base;
     cloud->class_hash = header->class_hash;
+    cloud->sights = (struct pt_sights){.count = (uint32_t)header->sight_count, .room = (uint32_t)header->sight_room,
+                                       .bytes = header->sight_bytes};
     list_sections(cloud, sections);
     return file_size(sections) == header->size ? PATINA_OK : refuse(path, "its header is damaged");
 }

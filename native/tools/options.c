@@ -269,6 +269,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_word(value, "refined|paper", &s->quality);
     else if (!strcmp(name, "--fill"))
         bad = parse_word(value, "closed|paper|off", &s->fill);
+    else if (!strcmp(name, "--pass"))
+        bad = tool_parse_pass(value, o);
     else if (!strcmp(name, "--surface"))
         bad = parse_word(value, "auto|splats|fill", &s->surface);
     else if (!strcmp(name, "--analysis"))
@@ -350,7 +352,9 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     }
     options->settings.film_transparent = options->transparent ? 1 : 0;
     if (!options->planes)
-        options->settings.passes = 1u << PATINA_PASS_COMBINED; // a PNG shows no other
+        options->settings.passes = 1u << PATINA_PASS_COMBINED; // a PNG shows no other, but for
+    if (options->pass != PATINA_PASS_COMBINED)
+        options->settings.passes |= 1u << options->pass | 1u << PATINA_PASS_DEPTH;
     if (options->settings.own_background) {
         memcpy(options->settings.background, options->settings.world_color, sizeof options->ambient);
         memcpy(options->settings.world_color, options->ambient, sizeof options->ambient);
@@ -370,6 +374,12 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)
         return tool_misuse("render: nothing to do; name the picture with -o OUT.png");
+    if (options->pass != PATINA_PASS_COMBINED && (options->panorama[0] || !options->output))
+        return tool_misuse("--pass makes a picture, without --panorama: -o OUT.png");
+    if (options->pass == PATINA_PASS_CERTAINTY || options->pass == PATINA_PASS_THICKNESS) {
+        if (options->analysis)
+            return tool_misuse("--pass certainty and thickness need the analysis");
+    }
     if (options->panorama[0] && (options->repeat || options->json || options->planes || options->load_shadows ||
                                  options->save_shadows || options->ortho_width > 0))
         return tool_misuse("--panorama makes a picture, without --repeat, --stats, --dump-planes, --ortho or kept shadows");

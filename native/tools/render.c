@@ -217,6 +217,8 @@ static int draw(struct job *job, double *ms)
         job->pixels = malloc(size);
         code = job->pixels ? patina_frame_read(job->frame, PATINA_PASS_COMBINED, job->pixels, size)
                            : PATINA_ERROR_MEMORY;
+        if (!code && job->options.pass != PATINA_PASS_COMBINED)
+            code = tool_color_pass(&job->options, job->frame, (size_t)job->stats.width * job->stats.height, job->pixels);
     }
     return code ? tool_failed("render", job->frame, code) : TOOL_OK;
 }

@@ -80,6 +80,9 @@ struct tool_options {
     patina_effects effects;
     struct tool_color color;
     int has_lines, line_options; // asked for; shaped
+    uint32_t pass;               // patina_pass that the picture shows
+    double pass_range[2];        // of its numbers, at the ramp's ends
+    int has_pass_range;
     patina_lines lines;
 };
 
@@ -87,6 +90,9 @@ struct tool_options {
 int parse_numbers(const char *text, double *numbers, int least, int most);
 // Options of effects (effects.c): 0 good, -1 a bad value, 1 no such option.
 int tool_parse_effect(const char *name, const char *value, patina_effects *effects);
+
+// NAME[,MIN,MAX] of a pass. 0, or -1 for a bad value.
+int tool_parse_pass(const char *value, struct tool_options *options);
 
 // Fills options from the arguments of `render`; files point into the vector, which is reordered. Returns a tool_exit.
 int tool_parse_render(int count, char **arguments, struct tool_options *options);
@@ -122,6 +128,10 @@ int tool_add_clips(const struct tool_color *color, patina_scene *scene);
 
 // Writes premultiplied linear RGBA, row 0 at the bottom, as an 8-bit sRGB PNG; alpha: keep it. 0, or -1 after a message.
 int tool_write_png(const char *path, const float *pixels, uint32_t width, uint32_t height, int alpha);
+
+// The pass that the options ask for, in place of colours in `count` pixels of premultiplied RGBA: where something is. Says the range
+// of the ramp. A patina_error.
+int tool_color_pass(const struct tool_options *options, const patina_frame *frame, size_t count, float *pixels);
 
 // Times of several frames, whole and by pass.
 struct tool_times;

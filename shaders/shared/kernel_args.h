@@ -701,6 +701,49 @@ struct assess_args {
     float sigma_scale;             // times instance.spacing of its class: a thickness
 };
 
+#define PT_SIGHT_BEND 1.25f // a tangent u lies at (1.25 - 0.25 u^2) u on its face: cells are 0.75 to 1 of a face's mean angle wide
+#define PT_SIGHT_SHIFT 12   // 11 bits of mantissa and 5 of exponent are kept of a range: 0.05 %
+#define PT_SIGHT_LEAST 1e-18f // a place nearer to a station than this, or farther than PT_SIGHT_FARTHEST, was not looked through
+#define PT_SIGHT_FARTHEST 1e18f
+// Pixels from its measured point, beyond which a pixel counts as closed. Four virtual scans, two cameras each: at 1.5 a third more of
+// false surface goes, and twice as much of the true one.
+#define PT_REOPEN_AWAY 4.0f
+#define PT_REOPEN_FIND 0u  // phases of reopen
+#define PT_REOPEN_KEEP 1u
+#define PT_REOPEN_TAKE 2u
+#define PT_REOPEN_SHOW 3u
+
+// reopen: pixels that were closed, and not measured, where a station of the instance looked through the place that they show. SPEC 11
+//   1. Closed: a disc whose point fell farther off than PT_REOPEN_AWAY, or filled from a pixel that lies, and whose own disc's point
+//      fell, so far off together.
+//   2. The place, seen from a station in its object: q = eye + z ((m.x u + m.y v) - m.z), rows m; orthographic: the first product
+//      by itself, and m.z (z + near). On the face of the axis where |q| is greatest, x before y before z, the other two over it, in
+//      the order of the axes from there on, are bent (PT_SIGHT_BEND); the cell there says how far the station looked.
+//   3. Looked through: q^2 grow < range^2.
+//   FIND: limit = z + deff[from] there, -1 elsewhere (`first`: written for all); with `last` all keys become empty: what lies
+//         behind is drawn next.
+//   KEEP: kept = keys, before filling.
+//   TAKE: they become what was kept, empty where that is looked through as well, or was no other.
+//   SHOW: their colours become magenta.
+struct reopen_args {
+    struct view_args view;
+    uint32_t id_base, id_count; // pixels of this instance
+    uint32_t phase;             // PT_REOPEN_*
+    uint32_t first, last;
+    uint32_t discs;             // 1: the away plane holds
+    uint32_t stations;          // so many struct station_args stand behind these
+    float rows[9];              // view space -> object, without translation
+    float eye_z;                // orthographic: near
+};
+
+struct station_args {
+    float eye[3];    // of the camera, from the station, in the instance's object
+    float grow;      // (1 + share of the range by which what was seen lies farther)^2
+    uint32_t first;  // of its cells: in the lower half of words[first / 2] where it is even
+    uint32_t across; // cells along an edge of a face; 6 x across x across of them: +x, -x, +y, -y, +z, -z
+    uint32_t base;   // cell << PT_SIGHT_SHIFT, and this added: bits of a range; a cell of 0: nothing is known
+};
+
 #define PT_CERTAINTY_STEP 0.0666666701f // 1 / 15
 
 #endif

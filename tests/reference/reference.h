@@ -351,4 +351,9 @@ struct ref_assess {
 // x, y: in the planes, within view.rect; shapes: by id - id_base.
 struct ref_assess ref_assess(const struct assess_args *args, const struct ref_planes *planes, const uint32_t *shapes, int x, int y);
 
+// Whether some station looked through the place at z on the pixel's ray; and whether the pixel is the instance's and was closed.
+enum ref_truth ref_seen_through(const struct reopen_args *args, const struct station_args *stations, const uint32_t *words, int x,
+                                int y, double z);
+int ref_closed(const struct reopen_args *args, const struct ref_planes *planes, int x, int y);
+
 #endif

@@ -59,9 +59,9 @@ static void test_interval(void **state)
     patina_cloud *cloud = cloud_of(scan);
     const patina_analysis_desc desc = {.struct_size = sizeof desc, .station_count = 1, .stations = station};
     struct pt_beams beams;
-    assert_int_equal(pt_beams_create(cloud, &desc, &beams), PATINA_OK);
+    assert_int_equal(pt_beams_create(cloud, &desc, NULL, &beams), PATINA_OK);
     assert_int_equal(beams.count, 1);
-    assert_true(fabs(beams.each[0].step / step - 1.0) < 0.06);
+    assert_true(fabs(beams.each[0].interval.elevation / step - 1.0) < 0.06);
     pt_beams_destroy(&beams);
     patina_cloud_destroy(cloud);
     free(scan);
@@ -83,9 +83,9 @@ static void test_steep(void **state)
     patina_cloud *cloud = cloud_of(scan);
     const patina_analysis_desc desc = {.struct_size = sizeof desc, .station_count = 1, .stations = station};
     struct pt_beams beams;
-    assert_int_equal(pt_beams_create(cloud, &desc, &beams), PATINA_OK);
-    assert_true(fabs(beams.each[0].step / step - 1.0) < 0.04);
-    assert_int_equal(beams.each[0].even, 0);
+    assert_int_equal(pt_beams_create(cloud, &desc, NULL, &beams), PATINA_OK);
+    assert_true(fabs(beams.each[0].interval.elevation / step - 1.0) < 0.04);
+    assert_int_equal(beams.each[0].interval.even, 0);
     pt_beams_destroy(&beams);
     patina_cloud_destroy(cloud);
     free(scan);
@@ -109,8 +109,8 @@ static void test_camera(void **state)
         patina_cloud *cloud = cloud_of(scan);
         const patina_analysis_desc desc = {.struct_size = sizeof desc, .station_count = 1, .stations = station};
         struct pt_beams beams;
-        assert_int_equal(pt_beams_create(cloud, &desc, &beams), PATINA_OK);
-        assert_true(beams.each[0].step * focal > 0.7 && beams.each[0].step * focal < 1.1);
+        assert_int_equal(pt_beams_create(cloud, &desc, NULL, &beams), PATINA_OK);
+        assert_true(beams.each[0].interval.elevation * focal > 0.7 && beams.each[0].interval.elevation * focal < 1.1);
         pt_beams_destroy(&beams);
         assert_int_equal(patina_cloud_analyse(cloud, &desc, NULL), PATINA_OK);
         float *axes = calloc(scan->count, 2 * sizeof *axes);
@@ -166,15 +166,15 @@ static void test_unknown(void **state)
     (void)state;
     const double p[3] = {0.0, 0.0, 0.0};
     const struct pt_sample none = {.count = 0};
-    struct pt_beam beam = {.place = {0.0, 0.0, 0.0}, .step = step};
+    struct pt_beam beam = {.place = {0.0, 0.0, 0.0}, .interval = {step, step, 0}};
     struct pt_neighbourhood hood = {.has_normal = 1, .normal = {0, 0, 1}, .axis = {1, 0, 0}, .major = 2.0, .minor = 1.0, .certainty = 1.0};
     pt_beam_limit(&beam, p, &none, &hood);
     assert_true(hood.major == 2.0 && hood.minor == 1.0);
     beam.place[0] = 10.0;
-    beam.step = 0.0;
+    beam.interval.azimuth = beam.interval.elevation = 0.0;
     pt_beam_limit(&beam, p, &none, &hood);
     assert_true(hood.major == 2.0 && hood.minor == 1.0);
-    beam.step = step; // seen edge-on: finite, and along the beam
+    beam.interval.azimuth = beam.interval.elevation = step; // seen edge-on: finite, and along the beam
     pt_beam_limit(&beam, p, &none, &hood);
     assert_true(isfinite(hood.major) && hood.major < 2.1 && hood.minor > 0.0);
 }

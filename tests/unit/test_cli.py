@@ -150,6 +150,35 @@ def test_free_space():
         run("render", "alone.ply", *FRONT, "-o", "x.png", *arguments, code=2)
 
 
+def test_passes():
+    """A pass takes the colours' place where something is; the background stays."""
+    two_stations("stations.ptx")
+    view = ("--size", "96x64", "--look", "-0.8,0,0,-0.8,3,0,40", "--smooth", "off", "--antialias", "off")
+
+    def at(*arguments):
+        done = run("render", "stations.ptx", "-o", "pass.png", *view, *arguments)
+        return done.stderr, [pixel for row in read_png("pass.png")[3] for pixel in row]
+
+    _, color = at("--transparent")
+    pictures = {}
+    for name in ("depth", "normal", "source", "certainty", "thickness"):
+        said, pictures[name] = at("--transparent", "--pass", name)
+        assert ("from" in said) == (name != "normal"), said
+        assert [p[3] == 0 for p in pictures[name]] == [p[3] == 0 for p in color] and any(p[3] for p in color)
+    assert "from 0 to 1" in at("--pass", "certainty")[0]
+    shown = [k for k, p in enumerate(color) if p[3]]
+    assert len({tuple(pictures[name][k] for k in shown) for name in pictures}) == len(pictures)
+    facing = sum(pictures["normal"][k][:3] == (128, 0, 128) for k in shown)  # a wall across y
+    assert facing > len(shown) // 2, (facing, len(shown))
+    assert len({pictures["certainty"][k] for k in shown}) > 1
+    narrow = at("--pass", "certainty,0,0.01", "--ramp-colors", "grey")[1]
+    assert sum(narrow[k] == (255, 255, 255) for k in shown) > len(shown) // 2
+    for arguments in (["--pass", "cheese"], ["--pass", "certainty,1,0"], ["--pass", "normal,0,1"], ["--pass", "certainty,1"],
+                      ["--pass", "thickness", "--analysis", "off"]):
+        run("render", "stations.ptx", "-o", "x.png", *arguments, code=2)
+    run("render", "stations.ptx", "--pass", "depth", "--repeat", "1", code=2)
+
+
 # ---- wrong use -----------------------------------------------------------------------------------------------------
 
 def test_help_and_version():

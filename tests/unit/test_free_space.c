@@ -167,13 +167,14 @@ static void test_interval(void **state)
         patina_analysis_desc desc = describe(&scan, stations, grid);
         desc.station.stride = 1;
         desc.row.stride = desc.column.stride = 2;
-        struct pt_free_space job = {.cloud = cloud, .desc = &desc};
+        struct pt_beams beams; // footprints and free space ask the same
+        assert_int_equal(pt_beams_create(cloud, &desc, NULL, &beams), PATINA_OK);
         for (uint32_t s = 0; s < STATIONS; s++) {
-            struct pt_interval interval;
-            assert_true(pt_free_space_interval(&job, NULL, s, &interval));
+            const struct pt_interval *interval = &beams.each[s].interval;
             const double slack = grid ? 0.001 : 0.05;
-            assert_true(fabs(interval.azimuth / step - 1) < slack && fabs(interval.elevation / step - 1) < slack);
+            assert_true(fabs(interval->azimuth / step - 1) < slack && fabs(interval->elevation / step - 1) < slack);
         }
+        pt_beams_destroy(&beams);
     }
     patina_cloud_destroy(cloud);
     free_scan(&scan);

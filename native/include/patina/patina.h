@@ -232,9 +232,10 @@ typedef struct patina_analysis_desc {
     patina_array station;    // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
     uint32_t free_space;     // 1 = points that a station, not their own, saw through are marked: its samples around the
                              // direction to the point lie farther. Needs stations and station. 4 bytes meanwhile for each of
-                             // a station's directions, 128 MiB at most
-    patina_array row, column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell free space how
-                             // far apart the directions are. Optional: else found from how dense they are
+                             // a station's directions, 128 MiB at most; what all stations saw stays
+                             // with the cloud, 64 MiB at most
+    patina_array row, column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell footprints and free
+                             // space how far apart the directions are. Optional: else found from how dense they are
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -407,7 +408,9 @@ enum patina_color_source {
 // A ramp by name: grey, viridis, heat, spectrum, relief, diverging; classes: of LAS classes, for a range of 0 to 255.
 PATINA_API int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3]);
 
-// SHOW: magenta in place of their own colour (with color_source OWN). USE: they are not drawn and cast no shadow.
+// Of points that a station saw through, and of surface that was closed between points where one looked through. SHOW: magenta in
+// place of their own colour (with color_source OWN). USE: the points are not drawn and cast no shadow; what was closed is open again
+// and shows what lies behind, which takes such a picture twice the time (light maps, and pictures of several layers, close it all the same).
 enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, PATINA_FREE_SPACE_USE = 2 };
 
 // What a cloud leaves out of shadows [D 6].
@@ -441,7 +444,7 @@ typedef struct patina_cloud_style {
     uint32_t hidden_classes[8];   // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
     uint32_t clip_off;            // 1 = clips leave this cloud whole
     // Of clouds that were analysed; nothing for others:
-    uint32_t free_space;          // patina_free_space: what becomes of points that a station saw through
+    uint32_t free_space;          // patina_free_space: what becomes of what a station saw through
     uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
     float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
     float largest_gap;            // world units; no disc is wider, whatever its radius; 0 = as wide as it is
