@@ -459,6 +459,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     free(cloud->chunks);
     cloud->surface = analysis->surface;
     cloud->shapes = analysis->shapes;
+    cloud->beside = pt_shapes_beside(cloud->shapes, cloud->slots);
     cloud->chunks = analysis->chunks;
     cloud->spacing_base = analysis->spacing_base;
     *analysis = (struct pt_analysis){ 0 };
