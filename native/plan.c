@@ -63,6 +63,11 @@ static void plan_scatter(struct pt_builder *builder)
                   (unsigned long long)chunks, args.instances);
 }
 
+static int knows_sigmas(const struct pt_plan *plan, const struct pt_plan_instance *instance)
+{
+    return plan->sigmas && instance->instance->cloud->shapes != NULL;
+}
+
 void pt_plan_surface(struct pt_builder *builder, uint32_t i)
 {
     struct pt_plan *plan = builder->plan;
@@ -79,11 +84,16 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
                   "instance %u has no normals: estimated from the depth of at most %u x %u pixels", i, 2 * args.radius + 1,
                   2 * args.radius + 1);
     }
-    struct surface_args args = {.view = pt_view_of(plan, instance, 0), .instance = instance->args};
+    const int thick = knows_sigmas(plan, instance);
+    struct surface_args args = {.view = pt_view_of(plan, instance, 0),
+                                .instance = instance->args,
+                                .sigma_scale = thick ? pt_sigma_scale(builder->scene) : 0.0f,
+                                .with_span = plan->sigmas != 0};
     PT_REASON(PT_ADD(builder, surface, args,
                      {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0)}),
-              "layer distance and normal of instance %u's pixels", i);
+                      pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0), thick ? pt_shapes_of(instance, i) : pt_buffer_of(PT_SURFACE, i),
+                      pt_span_of(plan)}),
+              "layer distance%s and normal of instance %u's pixels", thick ? " by sigma" : "", i);
 }
 
 // What no pixel's layer distance is below, whatever the rounding; world units.
@@ -94,9 +104,16 @@ static float least_distance(const struct pt_plan *plan)
         const struct instance_args *args = &plan->instances[i].args;
         const patina_cloud_info *info = &plan->instances[i].instance->cloud->info;
         int known = info->spacing_min > 0.0 && isfinite(info->spacing_max); // no chunk is of class 0
-        least = fminf(least, fmaxf(args->d_min, PT_SPACING_FACTOR * args->spacing[known]));
+        const float spacings = knows_sigmas(plan, &plan->instances[i]) ? PT_SPACING_SURE : PT_SPACING_FACTOR;
+        least = fminf(least, fmaxf(args->d_min, spacings * args->spacing[known]));
     }
     return 0.999f * least;
+}
+
+// What share of a pixel's footprint at a level no layer distance is below, whatever the rounding.
+static float least_share(const struct pt_plan *plan, uint32_t level)
+{
+    return 0.999f * (plan->sigmas && !level ? PT_FOOTPRINT_SURE : 1.0f);
 }
 
 // How far an analysed cloud's points close holes beside them, in d_eff (two spacings); discs cover what is theirs already. With
@@ -112,7 +129,8 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
                              .iterations = level ? plan->iterations : plan->finest,
                              .unfills = plan->fill != PATINA_FILL_CLOSED ? 0 : level ? plan->iterations : plan->finest,
                              .refined = plan->quality == PATINA_QUALITY_REFINED,
-                             .least = least_distance(plan)};
+                             .least = least_distance(plan),
+                             .least_share = least_share(plan, level)};
     if (plan->reaches) {
         args.reach = REACH;
         args.disc_reach = DISC_REACH;
@@ -121,7 +139,7 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
     }
     PT_REASON(PT_ADD(builder, fill, args,
                      {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0)}),
+                      pt_plane_at(PT_PLANE_DEFF, 0), pt_span_of(plan)}),
               "level %u: %u fills, at most %u un-fills of background, then of occluded pixels", level, args.iterations, args.unfills);
 }
 
@@ -151,11 +169,13 @@ static void plan_pyramid(struct pt_builder *builder)
                                  .coarse_height = coarse.height,
                                  .refined = plan->quality == PATINA_QUALITY_REFINED,
                                  .least = least_distance(plan),
+                                 .least_share = least_share(plan, level - 1),
                                  .background = plan->discs_count > 0};
         PT_REASON(
             PT_ADD(builder, push, args,
                    {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),
-                    pt_from_of(builder, level - 1), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0)}),
+                    pt_from_of(builder, level - 1), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                    pt_span_of(plan)}),
             "level %u to level %u", level, level - 1);
     }
 }
@@ -306,7 +326,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     enum pt_instance_buffer colors = args.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0),
+                      pt_span_of(plan),
                       of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i), pt_shading_of(builder),
                       pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, instance->of),
                       pt_plane_at(PT_PLANE_ARRIVED, 0)}),
@@ -328,7 +348,7 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
         struct smooth_args args = {
             .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2], .translucent = plan->transparent != 0};
         PT_REASON(PT_ADD(builder, smooth, args,
-                         {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                         {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan),
                           pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COLOR_B, 0)}),
                   "%s, 3 x 3", names[settings->smooth]);
         color = PT_PLANE_COLOR_B;
@@ -347,7 +367,7 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
                                   .mesh_count = (uint32_t)builder->scene->triangles,
                                   .inked = plan->line_radius > 0.0f};
     const struct pt_ref line = pt_line_of(builder); // stands in for what only layers behind have
-    const struct pt_ref refs[] = {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+    const struct pt_ref refs[] = {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan),
                                   pt_plane_at(color, 0), args.behind ? pt_plane_at(PT_PLANE_THROUGH, 0) : line, line};
     PT_REASON(pt_add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.inked ? 6 : args.behind ? 5 : 4),
               args.layers ? "edges of background and layers" : "edges of background");
@@ -364,7 +384,7 @@ static void plan_peel(struct pt_builder *builder, enum pt_plane color)
         .inked = plan->line_radius > 0.0f};
     PT_REASON(
         PT_ADD(builder, peel, args,
-               {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_shading_of(builder),
+               {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan), pt_shading_of(builder),
                 pt_plane_at(color, 0), pt_plane_at(PT_PLANE_LIMIT, 0), pt_plane_at(PT_PLANE_THROUGH, 0),
                 pt_plane_at(PT_PLANE_OVER, 0), pt_plane_at(PT_PLANE_TILES, PT_TILE_LEVEL)}),
         "layer %u of at most %u is blended, what may lie behind it is marked", builder->layer, plan->layers);
@@ -528,7 +548,7 @@ static void plan_center(struct pt_builder *builder, uint32_t i)
 {
     const struct center_args args = {.view = builder->plan->view};
     PT_REASON(PT_ADD(builder, center, args,
-                     {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                     {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0), pt_span_of(builder->plan),
                       pt_plane_at(PT_PLANE_OFFSET, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i)}),
               "depth of instance %u's surface in the middle of each pixel", i);
 }

@@ -18,6 +18,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(FROM, 4, 1)           \
     X(NORMAL, 16, 0)        \
     X(DEFF, 4, 0)           \
+    X(SPAN, 4, 0)           \
     X(SHADING, 16, 0)       \
     X(ARRIVED, 4, 0)        \
     X(ALBEDO, 16, 0)        \
@@ -153,6 +154,7 @@ struct pt_plan {
     struct pt_plan_instance *instances;
     uint32_t instance_count;
     uint32_t discs_first, discs_count; // ids whose points are discs
+    int sigmas;  // some points know how thick their surface is: d_eff follows it, and the span plane holds
     int reaches; // points know how far they spread: holes are closed no farther
     struct pt_plan_mesh *meshes;
     uint32_t mesh_count;
@@ -196,6 +198,9 @@ static inline uint32_t pt_disc_ids(const struct patina_scene *scene)
 
 // How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2. (plan_view.c)
 double pt_thinning(const struct patina_scene *scene);
+
+// Times an instance's spacing of a class of sigma: a thickness, world units. Strata that are left out make nothing thicker.
+static inline float pt_sigma_scale(const struct patina_scene *scene) { return (float)(1.0 / (16.0 * pt_thinning(scene))); }
 
 // Is there anything in view?
 static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->triangles; }

@@ -26,7 +26,7 @@ void pt_plan_assess(struct pt_builder *builder)
                                .first = 1,
                                .certainty = asked >> PATINA_PASS_CERTAINTY & 1u,
                                .thickness = asked >> PATINA_PASS_THICKNESS & 1u,
-                               .sigma_scale = (float)(1.0 / (16.0 * pt_thinning(builder->scene)))};
+                               .sigma_scale = pt_sigma_scale(builder->scene)};
     for (uint32_t i = 0; i < plan->instance_count && asked; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         const patina_cloud_info *info = &instance->instance->cloud->info;
@@ -38,7 +38,7 @@ void pt_plan_assess(struct pt_builder *builder)
         memcpy(args.view.rect, args.first ? whole : part, sizeof part);
         args.instance = instance->args;
         PT_REASON(PT_ADD(builder, assess, args,
-                         {pt_plane_at(PT_PLANE_KEYS, 0), pt_buffer_of(info->has_radii ? PT_SHAPES : PT_RADII, i),
+                         {pt_plane_at(PT_PLANE_KEYS, 0), pt_shapes_of(instance, i),
                           pt_plane_at(args.certainty ? PT_PLANE_CERTAINTY : PT_PLANE_THICKNESS, 0),
                           pt_plane_at(args.thickness ? PT_PLANE_THICKNESS : PT_PLANE_CERTAINTY, 0)}),
                   "of instance %u are asked for:%s%s", i, args.certainty ? " certainty" : "", args.thickness ? " thickness" : "");

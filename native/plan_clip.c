@@ -58,14 +58,13 @@ void pt_plan_sift(struct pt_builder *builder)
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunks_cut)
             continue;
-        const struct patina_cloud *cloud = instance->instance->cloud;
         struct sift_args args = { .by_class = instance->by_class != 0, .by_shape = instance->by_shape != 0 };
         memcpy(args.hidden, instance->instance->style.hidden_classes, sizeof args.hidden);
         pt_hidden_shapes(instance->instance, args.hidden_shapes);
         PT_REASON(PT_ADD(builder, sift, args,
                          { pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_CLASSES, i),
                            pt_buffer_of(PT_CLIPS, i), pt_buffer_of(PT_DRAWN, i),
-                           pt_buffer_of(cloud->radii ? PT_SHAPES : PT_RADII, i) }),
+                           pt_shapes_of(instance, i) }),
                   "clips, classes or shapes divide %u chunks of instance %u", instance->chunks_cut, i);
     }
 }

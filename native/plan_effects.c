@@ -99,7 +99,7 @@ static void plan_obscure(struct pt_builder *builder, enum pt_plane color)
         args.turns[2 * i + 1] = (float)sin(angle);
     }
     PT_REASON(PT_ADD(builder, obscure, args,
-                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(builder->plan),
                       pt_shading_of(builder), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_OBSCURED, 0)}),
               "ambient obscurance, strength %.2f, within %.4g", (double)args.strength, radius);
 }

@@ -207,7 +207,7 @@ void pt_plan_lines(struct pt_builder *builder)
     widen(plan, args.view.rect, pt_line_reach(plan));
     pt_line_taps(&args);
     const struct pt_ref refs[] = {pt_keys_of(builder, 0),           pt_from_of(builder, 0),
-                                  pt_plane_at(PT_PLANE_NORMAL, 0),  pt_plane_at(PT_PLANE_DEFF, 0),
+                                  pt_plane_at(PT_PLANE_NORMAL, 0),  pt_span_of(builder->plan),
                                   pt_line_of(builder),              nearest_of(builder),
                                   pt_plane_at(PT_PLANE_LIMIT, 0),   pt_plane_at(PT_PLANE_THROUGH, 0)};
     PT_REASON(pt_add(builder, PT_KERNEL_lines, "lines", &args, sizeof args, refs, args.behind ? 8 : 6),

@@ -51,7 +51,7 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
     const struct pt_ref refs[] = {pt_keys_of(builder, 0),
                                   pt_from_of(builder, 0),
                                   pt_plane_at(PT_PLANE_NORMAL, 0),
-                                  pt_plane_at(PT_PLANE_DEFF, 0),
+                                  pt_span_of(plan),
                                   pt_plane_at(PT_PLANE_MESH_KEYS, 0),
                                   pt_mesh_buffer_of(PT_MESH_VERTICES, i),
                                   pt_mesh_buffer_of(PT_MESH_INDICES, i),
@@ -163,7 +163,7 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
     pt_line_surface(builder, &args.instance);
     PT_REASON(PT_ADD(builder, shade, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
+                      pt_span_of(plan), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
                       pt_plane_at(color, 0), pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE),
                       pt_buffer_of(PT_SHADOWS, unlit ? PT_NO_INSTANCE : PT_PIXELS), pt_plane_at(PT_PLANE_ARRIVED, 0)}),
               "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);

@@ -42,6 +42,16 @@ static inline struct pt_ref pt_buffer_of(enum pt_instance_buffer which, uint32_t
 {
     return (struct pt_ref){PT_OF_INSTANCE, which, instance};
 }
+// Where nothing is known but spacings, d_eff is the span.
+static inline struct pt_ref pt_span_of(const struct pt_plan *plan)
+{
+    return pt_plane_at(plan->sigmas ? PT_PLANE_SPAN : PT_PLANE_DEFF, 0);
+}
+// Of an analysed cloud: its shape words. They lie where radii would, unless it has its own.
+static inline struct pt_ref pt_shapes_of(const struct pt_plan_instance *instance, uint32_t i)
+{
+    return pt_buffer_of(instance->instance->cloud->radii ? PT_SHAPES : PT_RADII, i);
+}
 static inline struct pt_ref pt_mesh_buffer_of(enum pt_mesh_buffer which, uint32_t mesh)
 {
     return (struct pt_ref){PT_OF_MESH, which, mesh};

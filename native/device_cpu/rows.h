@@ -90,9 +90,9 @@ static inline vm pt_filled(vi source, size_t at, vm some)
 }
 
 // What d_eff is not below at z: most pixels need not know their own. A cosine may be an ulp above 1.
-static inline vf pt_least_distance(const struct view_args *view, float least, vf z)
+static inline vf pt_least_distance(const struct view_args *view, float least, float share, vf z)
 {
-    return vf_max(vf_set(least), vf_footprint(view, z) * vf_set(0.999f));
+    return vf_max(vf_set(least), vf_footprint(view, z) * vf_set(share));
 }
 
 // The measured pixels whose surfaces PT_LANES pixels from `at` on show.

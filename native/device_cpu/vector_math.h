@@ -134,13 +134,27 @@ static inline vf vf_footprint(const struct view_args *view, vf z)
     return width;
 }
 
-// SPEC 1, effective layer distance, given 1 / max(|n.v|, C).
-static inline vf vf_layer_distance(const struct view_args *view, float d_min, vf spacing, vf z, vf inverse)
+// max(d_min, thick, footprint, 4 ulp(z)) / max(|n.v|, C), given 1 / max(|n.v|, C).
+static inline vf vf_distance_of(float d_min, vf thick, vf footprint, vf z, vf inverse)
 {
-    vf d = vf_max(vf_set(d_min), vf_set(PT_SPACING_FACTOR) * spacing);
-    d = vf_max(d, vf_footprint(view, z));
+    vf d = vf_max(vf_set(d_min), thick);
+    d = vf_max(d, footprint);
     d = vf_max(d, vf_ulp4(z));
     return d * inverse;
+}
+
+// SPEC 1, effective layer distance of points of which the spacing alone is known.
+static inline vf vf_layer_distance(const struct view_args *view, float d_min, vf spacing, vf z, vf inverse)
+{
+    return vf_distance_of(d_min, vf_set(PT_SPACING_FACTOR) * spacing, vf_footprint(view, z), z, inverse);
+}
+
+// The same where sigma is known.
+static inline vf vf_sure_distance(const struct view_args *view, float d_min, vf sigma, vf spacing, vf z, vf inverse)
+{
+    const vf most = vf_set(PT_SPACING_FACTOR) * spacing, sure = vf_set(PT_SPACING_SURE) * spacing;
+    const vf thick = vf_min(vf_max(vf_set(PT_SIGMAS) * sigma, sure), most);
+    return vf_distance_of(d_min, thick, vf_footprint(view, z) * vf_set(PT_FOOTPRINT_SURE), z, inverse);
 }
 
 // 1 / max(|n.v|, C) of pixels.

@@ -64,9 +64,9 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 
 // Planes that shaders read as buffer textures (lib/planes.glsl): numbers of buffers in kernels.def, from 1; 0: none.
 static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
-    // keys, from, deff, float4, float4; words: by their runners
+    // keys, from, deff, float4, float4, words (of points: by their runners; of others: span)
     [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
-    [PT_KERNEL_fill] = {1, 2, 4, 3},    [PT_KERNEL_push] = {1, 2, 6, 5},      [PT_KERNEL_shade] = {1, 2, 4, 3},
+    [PT_KERNEL_fill] = {1, 2, 4, 3, 0, 5}, [PT_KERNEL_push] = {1, 2, 6, 5, 0, 7}, [PT_KERNEL_shade] = {1, 2, 4, 3},
     [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
     [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},   [PT_KERNEL_mark] = {1},
     [PT_KERNEL_lit] = {1, 2, 3},        [PT_KERNEL_edl] = {1},
@@ -145,14 +145,17 @@ static int run_extract(struct pt_gl_device *d, const struct extract_args *args)
 
 static int run_surface(struct pt_gl_device *d, const struct surface_args *args, const struct pt_buffer *words)
 {
-    const uint32_t normals = args->instance.has_normals != 0;
-    int result = pt_gl_kernel_program(d, PT_KERNEL_surface, normals, normals ? "#define NORMALS 1\n" : "#define NORMALS 0\n");
+    const uint32_t normals = args->instance.has_normals != 0, sigmas = args->sigma_scale > 0.0f, span = args->with_span != 0;
+    const uint32_t variant = normals + 2 * sigmas + 4 * span;
+    char definitions[64];
+    snprintf(definitions, sizeof definitions, "#define NORMALS %u\n#define SIGMAS %u\n#define SPAN %u\n", normals, sigmas, span);
+    int result = pt_gl_kernel_program(d, PT_KERNEL_surface, variant, definitions);
     if (result == PATINA_OK && !d->base.info.hardware)
         result = pt_gl_bind_texture(d, 5, words);
     if (result != PATINA_OK)
         return result;
-    d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_surface][normals], 16, PT_SPACINGS, args->instance.spacing);
-    return pt_gl_dispatch_tiles(d, PT_KERNEL_surface, normals, PT_GL_TILES_POINTS);
+    d->gl.ProgramUniform1fv(d->programs[PT_KERNEL_surface][variant], 16, PT_SPACINGS, args->instance.spacing);
+    return pt_gl_dispatch_tiles(d, PT_KERNEL_surface, variant, PT_GL_TILES_POINTS);
 }
 
 // Every pixel is gathered before any is blurred.

@@ -465,6 +465,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->sights = analysis->sights;
     cloud->surface = analysis->surface;
     cloud->shapes = analysis->shapes;
+    cloud->beside = pt_shapes_beside(cloud->shapes, cloud->slots);
     cloud->chunks = analysis->chunks;
     cloud->spacing_base = analysis->spacing_base;
     *analysis = (struct pt_analysis){ 0 };

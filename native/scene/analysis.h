@@ -24,6 +24,12 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
 int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis); // takes its arrays
 void pt_analysis_free(struct pt_analysis *analysis);
 
+// Bit of shape words that no kernel reads: another surface lies beside the point's own, not farther than its neighbours reach.
+#define PT_SHAPE_BESIDE (1u << 30)
+
+// Whether some of a cloud's points, one in a hundred, have another surface beside theirs. One slot in 16 is asked.
+int pt_shapes_beside(const uint32_t *shapes, uint64_t slots);
+
 // Shape words. base: the cloud's spacing_base.
 uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base);
 // Half axes, sigma and certainty of a word; out->axis where normal_bits are a normal.

@@ -2,6 +2,7 @@
 // A built cloud as a file (DESIGN rule 5): its arrays as they lie in memory, each from a multiple of SECTION bytes on, so
 // that opening it maps them and reads nothing but chunks and their order. A cache for this machine's kind: another byte order,
 // version or struct is another file, and the caller builds it anew.
+#include "analysis.h"
 #include "cloud.h"
 #include "fingerprint.h"
 #include "memory.h"
@@ -264,6 +265,7 @@ static int open_descriptor(const char *path, int descriptor, struct patina_cloud
     if (check_of(&header, chunks) != header.check)
         return refuse(path, "its header or chunks are damaged");
     cloud->info.bytes = sections[0].size;
+    cloud->beside = cloud->shapes && pt_shapes_beside(cloud->shapes, cloud->slots);
     return check_cloud(path, cloud);
 }
 

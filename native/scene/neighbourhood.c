@@ -256,7 +256,7 @@ static void be_surface(const struct pt_sample *sample, const struct pt_plane *pl
     set_axis(plane, major, out);
     if (offset_of(&flat) > BORDER_OFFSET && widest_gap(&flat, gap) < BORDER_GAP)
         end_at_border(plane, major, gap, out);
-    out->sigma = pt_plane_sigma(sample, plane);
+    out->sigma = pt_plane_sigma(sample, plane, &out->beside);
     const double thick = 2.0 * sqrt(plane->value[0] / plane->value[1]), share = (plane->count - 1.0) / sample->count;
     out->certainty = fmax(1.0 - thick, 0.0) * share * (out->kind == PT_KIND_BORDER ? 0.9 : 1.0);
 }

@@ -28,6 +28,7 @@ struct pt_neighbourhood {
     double spacing, sigma;     // 0: unknown
     double sampled;            // the spacing before bounds: what a picture's levels are counted with
     double certainty;          // 0..1
+    int beside;                // another surface lies that near
     double uneven;             // spacing along the greater axis in those across, as measured; 1: not told
 };
 
@@ -42,8 +43,8 @@ int pt_plane_prefers_wide(const struct pt_plane *narrow, const struct pt_plane *
 // 0 where there is none.
 int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane *plane, double within, struct pt_plane *out);
 // RMS distance of the marked neighbours from the plane, or from the quadric where that explains more; of all where the others
-// are sheets beside it.
-double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane);
+// are sheets beside it, nearer than surfaces are told apart; beside: they are farther.
+double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane, int *beside);
 
 // From a sample of every `thinning`-th point, where the point's nearest make it a volume: noise that is wider than they reach
 // apart is flat from farther off. 1: out is a surface now.

@@ -11,6 +11,7 @@
 #define BENT 7e-4     // a quadric may explain it: at less, sigma is below a thirtieth of the spacing
 #define TIGHT 0.4     // RMS in parts of a slab's half thickness; of points spread over it, 0.58
 #define TIGHTER 0.1   // nobody's noise: two in five are enough then
+#define APART 1.1     // of the neighbours' mean spacing: sheets of one surface lie nearer; from about 0.9 of their own on they are two
 #define SHEET 0.3     // spread of their distances from the plane in parts of the mean: at a crease 0.58
 #define LINEAR 0.1    // narrowness squared: 16 neighbours on one row of a scan
 
@@ -187,8 +188,9 @@ static double quadric_residual(const struct pt_sample *sample, const struct pt_p
 }
 
 // Neighbours off the plane that lie on sheets beside it, as another scan's do: the variance of all of them. Those of a crease
-// spread from the plane on. 0 where there are none.
-static double sheet_variance(const struct pt_sample *sample, const struct pt_plane *plane)
+// spread from the plane on. 0 where there are none, or they are
+// too far to be of the same surface: beside.
+static double sheet_variance(const struct pt_sample *sample, const struct pt_plane *plane, int *beside)
 {
     double off = 0.0, off_squares = 0.0, sum = 0.0, squares = 0.0;
     uint32_t outside = 0;
@@ -205,14 +207,19 @@ static double sheet_variance(const struct pt_sample *sample, const struct pt_pla
     if (8 * outside < sample->count)
         return 0.0;
     off /= outside;
+    const double pi = 3.14159265358979323846, apart = APART * sqrt(pi * sample->square[sample->count - 1] / sample->count);
     if (off_squares / outside - off * off > SHEET * SHEET * off * off)
+        return 0.0;
+    *beside = off > apart;
+    if (*beside)
         return 0.0;
     return fmax(squares - sum * sum / (sample->count + 1.0), 0.0) / sample->count;
 }
 
-double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane)
+double pt_plane_sigma(const struct pt_sample *sample, const struct pt_plane *plane, int *beside)
 {
-    const double sheets = sheet_variance(sample, plane);
+    *beside = 0;
+    const double sheets = sheet_variance(sample, plane, beside);
     if (sheets > 0.0)
         return sqrt(sheets);
     const double n = plane->count;

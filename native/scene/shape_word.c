@@ -30,7 +30,7 @@ static uint32_t class_of(double length, double base)
 uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits, double base)
 {
     uint32_t word = class_of(hood->major, base) | class_of(hood->sigma, base / 16.0) << PT_SHAPE_SIGMA_SHIFT;
-    word |= hood->kind << PT_SHAPE_KIND_SHIFT;
+    word |= hood->kind << PT_SHAPE_KIND_SHIFT | (hood->beside ? PT_SHAPE_BESIDE : 0u);
     word |= (uint32_t)(15.0 * fmin(fmax(hood->certainty, 0.0), 1.0) + 0.5) << PT_SHAPE_CERTAINTY_SHIFT;
     if (!(hood->major > 0.0) || !(hood->minor > 0.0))
         return word;
@@ -58,6 +58,7 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
     out->minor = out->major * exp2(-(double)(shape >> PT_SHAPE_RATIO_SHIFT & 15u) / 4.0);
     out->sigma = base / 16.0 * pt_spacing_of_class(shape >> PT_SHAPE_SIGMA_SHIFT & 63u);
     out->certainty = (shape >> PT_SHAPE_CERTAINTY_SHIFT & 15u) / 15.0;
+    out->beside = (shape & PT_SHAPE_BESIDE) != 0;
     if (normal_bits == PT_NORMAL_NONE)
         return;
     double t1[3], t2[3];
@@ -67,4 +68,12 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
     frame_of(out->normal, t1, t2);
     for (int k = 0; k < 3; k++)
         out->axis[k] = cos(angle) * t1[k] + sin(angle) * t2[k];
+}
+
+int pt_shapes_beside(const uint32_t *shapes, uint64_t slots)
+{
+    uint64_t asked = 0, found = 0;
+    for (uint64_t i = 0; i < slots; i += 16, asked++)
+        found += (shapes[i] & PT_SHAPE_BESIDE) != 0;
+    return 100 * found > asked;
 }

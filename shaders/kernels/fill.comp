@@ -155,7 +155,7 @@ bool reaches(view_args view, ivec2 place, uvec2 key, uint source)
     float share = key.x >= args.discs_first ? args.disc_reach : args.reach;
     vec2 ray = abs(pt_ray(view, place.x, place.y)); // how much wider than in the middle the picture shows what faces the eye
     float stretch = view.perspective != 0u ? pt_max(pt_max(ray.x, ray.y), 1.0) : 1.0;
-    precise float way = (read_deff(source) * share) * pt_rcp(width * read_float4(source).w);
+    precise float way = (read_span(source) * share) * pt_rcp(width * read_float4(source).w);
     precise float most = way * stretch + PT_FILL_SLACK * scale;
     uvec2 at = pt_pixel(source, args.from_width);
     precise float dx = (float(place.x) + 0.5) * scale - (float(at.x) + 0.5);
@@ -211,7 +211,8 @@ void main()
     if (refined && taken) {
         float z = pt_float(key.y);
         z = pt_plane_depth(view, read_float4(source).xyz, pt_ray(view, best.x, best.y), z,
-                           pt_ray(view, place.x, place.y), own_distance(view, source, z));
+                           pt_ray(view, place.x, place.y),
+                           pt_level_distance(view, read_span(source), read_float4(source).w, z));
         key.y = pt_bits(z);
     }
     changed[index] = change(taken ? pixel : NO_PIXEL, key.x, key.y, source);

@@ -74,7 +74,7 @@ void main()
         for (uint upper = 0u; upper < 2u; upper++) {
             bool inside = y + upper >= view.rect[1] && y + upper < end;
             float z = inside ? pt_float(keys[(y + upper) * view.width + x].y) : 0.0;
-            precise float least = z - pt_least_distance(view, least_distance, z);
+            precise float least = z - pt_least_distance(view, least_distance, args.least_share, z);
             bool some = z < empty;
             found |= uint(!some && is_covered(level, upper == 0u ? below : above, empty)) << (y + upper - corner.y);
             asked |= uint(some && inside && level.x < least && args.background == 0u) << (y + upper - corner.y);
@@ -114,12 +114,12 @@ void take(view_args view, uint coarse_width, bool refined, uint at)
     vec4 normal = read_float4(source);
     float z = pt_float(key.y);
     precise float dense = (PT_DENSE * pt_footprint(view, z)) * normal.w;
-    if (read_deff(source) < dense)
+    if (read_span(source) < dense)
         return;
     if (refined) {
         view_args coarse = view;
         coarse.level++;
-        float limit = pt_level_distance(coarse, read_deff(source), normal.w, z);
+        float limit = pt_level_distance(coarse, read_span(source), normal.w, z);
         z = pt_plane_depth(view, normal.xyz, pt_ray(coarse, cell.x, cell.y), z, pt_ray(view, place.x, place.y), limit);
         key.y = pt_bits(z);
     }

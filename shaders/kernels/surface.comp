@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff (SPEC 1); twin of native/device_cpu/kernels/surface.c
-//   NORMALS: whether the cloud has normals
+//   NORMALS: whether the cloud has normals; SIGMAS: whether it was analysed; SPAN: whether that plane is written
 #version 430 core
 #include "lib/math.glsl"
 #include "lib/planes.glsl"
@@ -17,10 +17,16 @@ layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
 layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
 layout(std430, binding = 4) writeonly buffer deff_block { float deff[]; };
 layout(std430, binding = 5) writeonly buffer from_block { uint from[]; };
+#if SIGMAS
+layout(std430, binding = 6) readonly buffer shapes_block { uint shapes[]; };
+#endif
+#if SPAN
+layout(std430, binding = 7) writeonly buffer span_block { float span[]; };
+#endif
 
 struct instance_part {
     uint id_base, id_count;
-    float d_min;
+    float d_min, sigma_scale;
     vec3 rows[3]; // of the normal matrix
 };
 
@@ -57,7 +63,17 @@ void surface_pixel(view_args view, instance_part instance, uint x, uint y)
     float inverse = pt_rcp(pt_max(pt_cosine(view, unit, ray), PT_COSINE_FLOOR));
     inverse = none ? 1.0 : inverse;
     normals[at] = vec4(unit, inverse);
-    deff[at] = pt_layer_distance(view, instance.d_min, spacing, z, inverse);
+    float by_spacing = pt_layer_distance(view, instance.d_min, spacing, z, inverse), distance_of = by_spacing;
+#if SIGMAS
+    uint sigma_class = (shapes[id] >> PT_SHAPE_SIGMA_SHIFT) & PT_SHAPE_CLASS_BITS;
+    precise float sigma = spacings[sigma_class] * instance.sigma_scale;
+    if (sigma_class != 0u)
+        distance_of = pt_sure_distance(view, instance.d_min, sigma, spacing, z, inverse);
+#endif
+    deff[at] = distance_of;
+#if SPAN
+    span[at] = by_spacing;
+#endif
     from[at] = at;
 }
 
@@ -68,6 +84,7 @@ void main()
     instance.id_base = args.instance.id_base;
     instance.id_count = args.instance.id_count;
     instance.d_min = args.instance.d_min;
+    instance.sigma_scale = args.sigma_scale;
     for (int i = 0; i < 3; i++)
         instance.rows[i] = vec3(args.instance.normal_matrix[3 * i], args.instance.normal_matrix[3 * i + 1],
                                 args.instance.normal_matrix[3 * i + 2]);

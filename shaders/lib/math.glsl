@@ -130,19 +130,37 @@ float pt_footprint(view_args view, float z)
     return view.perspective != 0u ? scaled : width;
 }
 
-// SPEC 1, effective layer distance, given 1 / max(|n.v|, C).
-float pt_layer_distance(view_args view, float d_min, float spacing, float z, float inverse)
+// max(d_min, thick, footprint, 4 ulp(z)) / max(|n.v|, C), given 1 / max(|n.v|, C).
+float pt_distance_of(view_args view, float d_min, float thick, float footprint, float z, float inverse)
 {
-    precise float apart = PT_SPACING_FACTOR * spacing;
-    precise float d = pt_max(d_min, apart);
-    d = pt_max(d, pt_footprint(view, z));
+    precise float d = pt_max(d_min, thick);
+    d = pt_max(d, footprint);
     d = pt_max(d, pt_ulp4(z));
     precise float scaled = d * inverse;
     return scaled;
 }
 
+// SPEC 1, effective layer distance of a point of which the spacing alone is known.
+float pt_layer_distance(view_args view, float d_min, float spacing, float z, float inverse)
+{
+    precise float apart = PT_SPACING_FACTOR * spacing;
+    return pt_distance_of(view, d_min, apart, pt_footprint(view, z), z, inverse);
+}
+
+// The same where sigma is known.
+float pt_sure_distance(view_args view, float d_min, float sigma, float spacing, float z, float inverse)
+{
+    precise float most = PT_SPACING_FACTOR * spacing, sure = PT_SPACING_SURE * spacing, thick = PT_SIGMAS * sigma;
+    precise float footprint = pt_footprint(view, z) * PT_FOOTPRINT_SURE;
+    return pt_distance_of(view, d_min, pt_min(pt_max(thick, sure), most), footprint, z, inverse);
+}
+
 // What d_eff is not below at z. A cosine may be an ulp above 1.
-float pt_least_distance(view_args view, float least, float z) { return pt_max(least, pt_footprint(view, z) * 0.999); }
+float pt_least_distance(view_args view, float least, float share, float z)
+{
+    precise float footprint = pt_footprint(view, z) * share;
+    return pt_max(least, footprint);
+}
 
 // d_eff at this view's level of the pixel whose surface comes from the measured pixel with these values.
 float pt_level_distance(view_args view, float deff, float inverse, float z)

@@ -28,6 +28,7 @@ uint read_word(uint i) { return texelFetch(word_plane, int(i)).x; }
 float read_float(uint i) { return texelFetch(deff_plane, int(i)).x; } // of kernels that read no deff plane
 uint read_from(uint pixel) { return texelFetch(from_plane, int(pixel)).x & ~PT_FROM_MIXED; }
 float read_deff(uint pixel) { return texelFetch(deff_plane, int(pixel)).x; }
+float read_span(uint pixel) { return uintBitsToFloat(texelFetch(word_plane, int(pixel)).x); } // of kernels that read no words
 vec4 read_float4(uint pixel) { return texelFetch(float4_plane, int(pixel)); }
 
 // Of kernels that visit every pixel, 32 invocations a workgroup: 64 x 4 pixels a workgroup, as in native/device_gl/kernels.c,

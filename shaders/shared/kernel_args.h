@@ -14,6 +14,12 @@
 // Effective layer distance (SPEC 1): d_eff = max(d_min, K spacing, footprint, 4 ulp(z)) / max(|n.v|, C).
 #define PT_SPACING_FACTOR 2.0f // K: a hole's rim lies up to two spacings from a neighbour that is on the same layer
 #define PT_DENSE 2.4f // K times 1.2 pixels: see push
+// Where sigma is known, max(PT_SIGMAS sigma, PT_SPACING_SURE spacing) stands in place of K spacing, as far as it is less, and
+// PT_FOOTPRINT_SURE footprint for the footprint. Spheres 1.5 spacings apart show through in 1.4% of pixels at 1 to 1.5 points a
+// pixel, with whole footprints in 5 to 7.5%.
+#define PT_SIGMAS 4.0f
+#define PT_SPACING_SURE 0.7f
+#define PT_FOOTPRINT_SURE 0.7f
 #define PT_COSINE_FLOOR 0.05f  // C: 87 degrees; beyond it a surface is narrower than a pixel's jitter
 
 // The surface word of a point: octahedral normal 2 x 13 bits (at most 0.03 degrees off), spacing class 6 bits.
@@ -340,10 +346,12 @@ struct normals_args {
     uint32_t steep;  // 1: of a light's map, where a low sun sees the ground at a few degrees
 };
 
-// surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff; from = the pixel itself.
+// surface: key -> view-space normal, 1 / max(|n.v|, C), d_eff; from = the pixel itself. span: d_eff as if no sigma were known.
 struct surface_args {
     struct view_args view;
     struct instance_args instance;
+    float sigma_scale;  // times instance.spacing of its class: sigma, as in assess_args; 0: shapes are not read
+    uint32_t with_span; // 1: span is written
 };
 
 // pull: 2 x 2 -> 1, the least key (what a scatter at half the resolution gives).
@@ -359,6 +367,7 @@ struct push_args {
     uint32_t coarse_width, coarse_height;
     uint32_t refined;
     float least; // no layer distance in view is below this
+    float least_share; // nor below this share of a pixel's footprint
     uint32_t background; // 1: empty pixels alone
 };
 
@@ -375,6 +384,7 @@ struct fill_args {
     uint32_t unfills;    // at most so many un-fills; 0 = as in the paper
     uint32_t refined;    // 1: depth of the source's tangent plane
     float least;         // no layer distance in view is below this
+    float least_share;   // nor below this share of a pixel's footprint
     float reach, disc_reach; // of points, and of discs beyond themselves; reach 0: as far as may be
     uint32_t discs_first;    // ids from here on are discs'
     uint32_t from_width;     // of the planes at level 0

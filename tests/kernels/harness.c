@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-enum { MOST_BUFFERS = 2048, MOST_BLOCKS = 8192, MOST_SAVED = 1024, MOST_PRINTED = 6 };
+enum { MOST_BUFFERS = 4096, MOST_BLOCKS = 8192, MOST_SAVED = 1024, MOST_PRINTED = 6 };
 
 // The devices of `all`. Threads, batches and lack of memory must not show: the CPU devices differ in all of them.
 static const struct device_choice {

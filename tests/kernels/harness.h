@@ -88,7 +88,7 @@ struct picture {
     uint32_t id_base;
     uint64_t *keys;
     uint32_t *from;
-    float *normal, *deff, *color;
+    float *normal, *deff, *span, *color;
 };
 struct picture picture_random(struct harness *h, struct rng *rng, struct view_args view, enum picture_kind kind,
                               double density);

@@ -138,6 +138,7 @@ struct picture picture_random(struct harness *h, struct rng *rng, struct view_ar
     out.from = harness_alloc(h, count * 4);
     out.normal = harness_alloc(h, count * 16);
     out.deff = harness_alloc(h, count * 4);
+    out.span = harness_alloc(h, count * 4);
     out.color = harness_alloc(h, count * 16);
     uint32_t *ids = harness_alloc(h, count * 4); // each id once, in disorder
     for (size_t i = 0; i < count; i++) {
@@ -159,6 +160,7 @@ struct picture picture_random(struct harness *h, struct rng *rng, struct view_ar
             out.deff[i] = 0.25f;
             z = rng_below(rng, 2) ? 5.0f : float_step(5.25f, (int)rng_below(rng, 17) - 8);
         }
+        out.span[i] = out.deff[i] * (1.0f + 0.5f * (float)(i % 3));
         out.keys[i] = ref_key(z, out.id_base + ids[i]);
         out.from[i] = (uint32_t)i;
         memcpy(out.normal + 4 * i, point.n, 12);
@@ -222,6 +224,7 @@ struct ref_planes picture_planes(const struct picture *picture)
         .from = picture->from,
         .normal = picture->normal,
         .deff = picture->deff,
+        .span = picture->span,
         .color = picture->color,
     };
     return planes;

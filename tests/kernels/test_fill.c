@@ -18,7 +18,8 @@ static struct planes run(struct harness *h, const struct picture *picture, const
     struct pt_buffer *from_buffer = harness_buffer(h, from, count * 4);
     struct pt_buffer *normal = harness_buffer(h, picture->normal, picture->count * 16);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, picture->count * 4);
-    HARNESS_RUN(h, fill, args, keys_buffer, from_buffer, normal, deff);
+    struct pt_buffer *span = harness_buffer(h, picture->span, picture->count * 4);
+    HARNESS_RUN(h, fill, args, keys_buffer, from_buffer, normal, deff, span);
     struct planes out = {harness_read(h, keys_buffer), harness_read(h, from_buffer)};
     for (size_t i = 0; i < count; i++)
         if (out.keys[i] == REF_EMPTY_KEY)
@@ -37,7 +38,7 @@ static struct planes check(struct harness *h, const struct picture *picture, con
     struct ref_pixel *pixels = harness_alloc(h, count * sizeof *pixels);
     for (size_t i = 0; i < count; i++)
         pixels[i] = ref_pixel(keys[i], from[i]);
-    HARNESS_CHECK(h, ref_fill(args, picture->normal, picture->deff, pixels));
+    HARNESS_CHECK(h, ref_fill(args, picture->normal, picture->deff, picture->span, pixels));
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % args->view.width), y = (int)(i / args->view.width);
         open += (size_t)pixels[i].unsure;
@@ -240,7 +241,7 @@ static void sanity(struct harness *h)
         for (int i = 0; i < 8; i++)
             if (ring >> i & 1)
                 pixels[order[i]] = ref_pixel(ref_key(1.0f + (float)i, (uint32_t)i), (uint32_t)order[i]);
-        HARNESS_CHECK(h, ref_fill(&args, normal, deff, pixels));
+        HARNESS_CHECK(h, ref_fill(&args, normal, deff, deff, pixels));
         int is_filled = pixels[4].id != PT_KEY_EMPTY_ID;
         filled += is_filled;
         if (is_filled) { // the lowest bit is the nearest

@@ -27,7 +27,8 @@ static size_t check(struct harness *h, const struct picture *picture, const stru
     struct pt_buffer *from = harness_buffer(h, fine->from, count * 4);
     struct pt_buffer *normal = harness_buffer(h, picture->normal, picture->count * 16);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, picture->count * 4);
-    HARNESS_RUN(h, push, &args, coarse_keys, coarse_from, keys, from, normal, deff);
+    struct pt_buffer *span = harness_buffer(h, picture->span, picture->count * 4);
+    HARNESS_RUN(h, push, &args, coarse_keys, coarse_from, keys, from, normal, deff, span);
     uint64_t *got_keys = harness_read(h, keys);
     uint32_t *got_from = harness_read(h, from);
     struct ref_planes planes = picture_planes(picture);
@@ -63,7 +64,7 @@ static void pyramid(struct harness *h, uint32_t width, uint32_t height, int pers
     struct rng rng = {width * 1000u + (uint64_t)kind * 10 + refined};
     struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind, density);
     for (size_t i = 0; i < picture.count; i++) // sparse surfaces, which are pushed, beside dense ones, which are not
-        picture.deff[i] *= i % 3 ? 8.0f : 1.0f;
+        picture.span[i] *= i % 3 ? 8.0f : 1.0f;
     struct level levels[4] = {{picture.view, picture.keys, picture.from}};
     for (int l = 1; l < 4; l++) {
         levels[l] = levels[l - 1];
@@ -110,7 +111,7 @@ static void sanity(struct harness *h)
             if (cells >> i & 1)
                 coarse[at[i]] = ref_key(2.0f, 7);
         struct push_args args = {.view = {.width = 6, .height = 6, .footprint = 0.1f}, .coarse_width = 3, .coarse_height = 3};
-        struct ref_planes planes = {.keys = fine, .from = from, .normal = normal, .deff = deff};
+        struct ref_planes planes = {.keys = fine, .from = from, .normal = normal, .deff = deff, .span = deff};
         struct ref_pixel pixel = ref_push(&args, coarse, coarse_from, &planes, 3, 3);
         int sides = (cells >> 1 & 1) + (cells >> 2 & 1) + (cells >> 3 & 1);
         HARNESS_CHECK(h, (pixel.id == 7) == ((cells & 1) && sides >= 2 && !(cells & 16)));

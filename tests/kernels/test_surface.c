@@ -36,14 +36,15 @@ static void compare(struct harness *h, const char *label, int x, int y, double g
         harness_fail(h, label, x, y, "got %.9g, expected %.9g +- %.2g", got, expected, error);
 }
 
-static void check(struct harness *h, const struct picture *picture, const struct surface_args *args,
-                  const uint32_t *words, const float *estimate)
+// shapes: NULL where the cloud was not analysed.
+static void check_shapes(struct harness *h, const struct picture *picture, const struct surface_args *args,
+                         const uint32_t *words, const uint32_t *shapes, const float *estimate)
 {
     size_t count = picture->count;
-    float *deff = harness_alloc(h, count * 4);
+    float *deff = harness_alloc(h, count * 4), *span = harness_alloc(h, count * 4);
     uint32_t *from = harness_alloc(h, count * 4);
     for (size_t i = 0; i < count; i++) {
-        deff[i] = -7.0f;
+        deff[i] = span[i] = -7.0f;
         from[i] = 0xABCDEF01u;
     }
     struct pt_buffer *keys_buffer = harness_buffer(h, picture->keys, count * 8);
@@ -51,21 +52,26 @@ static void check(struct harness *h, const struct picture *picture, const struct
     struct pt_buffer *normal_buffer = harness_buffer(h, estimate, count * 16);
     struct pt_buffer *deff_buffer = harness_buffer(h, deff, count * 4);
     struct pt_buffer *from_buffer = harness_buffer(h, from, count * 4);
-    HARNESS_RUN(h, surface, args, keys_buffer, words_buffer, normal_buffer, deff_buffer, from_buffer);
+    struct pt_buffer *shapes_buffer = harness_buffer(h, shapes ? shapes : words, (size_t)args->instance.id_count * 4);
+    struct pt_buffer *span_buffer = harness_buffer(h, span, count * 4);
+    HARNESS_RUN(h, surface, args, keys_buffer, words_buffer, normal_buffer, deff_buffer, from_buffer, shapes_buffer, span_buffer);
     const float *got_normal = harness_read(h, normal_buffer), *got_deff = harness_read(h, deff_buffer);
+    const float *got_span = harness_read(h, span_buffer);
     const uint32_t *got_from = harness_read(h, from_buffer);
     uint32_t width = args->view.width;
     harness_same(h, "normal", got_normal, 4 * count, 4, 4, width);
     harness_same(h, "deff", got_deff, count, 4, 1, width);
     harness_same(h, "from", got_from, count, 4, 1, width);
+    harness_same(h, "span", got_span, count, 4, 1, width);
 
-    struct ref_planes planes = {.keys = picture->keys, .normal = estimate, .surface = words};
+    struct ref_planes planes = {.keys = picture->keys, .normal = estimate, .surface = words, .shapes = shapes};
     const uint32_t *rect = args->view.rect;
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % width), y = (int)(i / width);
         int inside = (uint32_t)x >= rect[0] && (uint32_t)x < rect[2] && (uint32_t)y >= rect[1] && (uint32_t)y < rect[3];
         if (!inside || !ref_is_of(&args->instance, picture->keys[i])) {
-            if (memcmp(got_normal + 4 * i, estimate + 4 * i, 16) || got_deff[i] != -7.0f || got_from[i] != 0xABCDEF01u)
+            if (memcmp(got_normal + 4 * i, estimate + 4 * i, 16) || got_deff[i] != -7.0f || got_span[i] != -7.0f ||
+                got_from[i] != 0xABCDEF01u)
                 harness_fail(h, "untouched", x, y, "was written: d_eff %g, from %u", got_deff[i], got_from[i]);
             continue;
         }
@@ -75,9 +81,19 @@ static void check(struct harness *h, const struct picture *picture, const struct
         compare(h, "normal.z", x, y, got_normal[4 * i + 2], expected.n.z, expected.normal_error);
         compare(h, "normal.w", x, y, got_normal[4 * i + 3], expected.inverse, expected.inverse_error);
         compare(h, "deff", x, y, got_deff[i], expected.deff, expected.deff_error);
+        if (args->with_span)
+            compare(h, "span", x, y, got_span[i], expected.span, expected.span_error);
+        else if (got_span[i] != -7.0f)
+            harness_fail(h, "span", x, y, "was written: %g", got_span[i]);
         if (got_from[i] != expected.from)
             harness_fail(h, "from", x, y, "got %u, expected %u", got_from[i], expected.from);
     }
+}
+
+static void check(struct harness *h, const struct picture *picture, const struct surface_args *args,
+                  const uint32_t *words, const float *estimate)
+{
+    check_shapes(h, picture, args, words, NULL, estimate);
 }
 
 static void random_normals(struct harness *h)
@@ -148,6 +164,24 @@ static void distances(struct harness *h)
         }
 }
 
+// What is known of sigma takes the place of the spacing, and never more; the span plane is as if nothing were.
+static void sigmas(struct harness *h)
+{
+    struct rng rng = {6};
+    for (int p = 0; p < 2; p++)
+        for (int spans = 0; spans < 2; spans++) {
+            struct picture picture = picture_random(h, &rng, picture_view(67, 45, p), PICTURE_SURFACES, 0.9);
+            struct surface_args args = arguments(&picture, &rng);
+            args.instance.has_normals = (uint32_t)spans;
+            args.sigma_scale = 0.0625f;
+            args.with_span = (uint32_t)spans;
+            uint32_t *shapes = random_words(h, &rng, args.instance.id_count, 0);
+            for (size_t i = 0; i < args.instance.id_count; i += 3)
+                shapes[i] &= ~(63u << PT_SHAPE_SIGMA_SHIFT); // not known
+            check_shapes(h, &picture, &args, random_words(h, &rng, args.instance.id_count, !spans), shapes, picture.normal);
+        }
+}
+
 static void rectangle(struct harness *h)
 {
     struct rng rng = {5};
@@ -186,6 +220,15 @@ static void sanity(struct harness *h)
     struct ref_planes planes = {.keys = &key, .normal = normal, .surface = words};
     struct ref_surface out = ref_surface(&args, &planes, 0, 0);
     HARNESS_CHECK(h, fabs(out.inverse - 2.0) < 1e-6 && fabs(out.deff - 2.0) < 1e-6);
+    const uint32_t thin[4] = {0, 0, 0, 1u << PT_SHAPE_SIGMA_SHIFT}; // a sigma of 0.01: 0.7 spacings decide
+    planes.shapes = thin;
+    args.sigma_scale = 0.02f;
+    out = ref_surface(&args, &planes, 0, 0);
+    HARNESS_CHECK(h, fabs(out.deff - 0.7) < 1e-6 && fabs(out.span - 2.0) < 1e-6);
+    args.sigma_scale = 0.4f; // 0.2: four of it
+    HARNESS_CHECK(h, fabs(ref_surface(&args, &planes, 0, 0).deff - 1.6) < 1e-6);
+    args.sigma_scale = 4.0f; // no more than two spacings
+    HARNESS_CHECK(h, fabs(ref_surface(&args, &planes, 0, 0).deff - 2.0) < 1e-6);
 }
 
 int main(int argc, char **argv)
@@ -196,6 +239,7 @@ int main(int argc, char **argv)
         {"estimated normals", estimated, 0},
         {"zero, mirrored, tiny, huge and flat matrices", matrices, 0},
         {"what d_eff consists of", distances, 0},
+        {"sigmas", sigmas, 0},
         {"rectangle", rectangle, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);

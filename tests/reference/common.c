@@ -139,6 +139,12 @@ double ref_layer_minimum(const struct view_args *view, double d_min, double spac
     return fmax(fmax(d, ref_footprint(view, z)), ref_ulp4(z));
 }
 
+double ref_sure_minimum(const struct view_args *view, double d_min, double sigma, double spacing, double z)
+{
+    const double thick = fmin(fmax((double)PT_SIGMAS * sigma, (double)PT_SPACING_SURE * spacing), (double)PT_SPACING_FACTOR * spacing);
+    return fmax(fmax(fmax(d_min, thick), (double)PT_FOOTPRINT_SURE * ref_footprint(view, z)), ref_ulp4(z));
+}
+
 struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff, uint32_t from,
                                     struct ref_range z)
 {

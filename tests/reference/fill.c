@@ -13,7 +13,7 @@ static const int ring_y[8] = {0, 1, 1, 1, 0, -1, -1, -1};
 
 struct phase {
     const struct fill_args *args;
-    const float *normal, *deff;
+    const float *normal, *deff, *span;
     int occluded;
     struct ref_range *threshold; // by pixel: as it was before its first fill
     unsigned char *filled;       // 0 no, 1 yes, 2 perhaps
@@ -84,7 +84,8 @@ static struct ref_range taken_depth(const struct phase *phase, const struct ref_
     if (!phase->args->refined)
         return source->z;
     return ref_plane_depth(view, phase->normal + 4 * (size_t)source->from, ref_ray(view, qx, qy), source->z,
-                           ref_ray(view, x, y), distance(phase, source));
+                           ref_ray(view, x, y),
+                           ref_level_distance(view, phase->normal, phase->span, source->from, source->z));
 }
 
 // Whether the neighbour's surface reaches the pixel: its own pixel lies near enough.
@@ -96,7 +97,7 @@ static enum ref_truth reaches(const struct phase *phase, const struct ref_pixel 
     const double share = (double)(neighbour->id >= args->discs_first ? args->disc_reach : args->reach);
     const struct ref_ray ray = ref_ray(view, x, y);
     const double stretch = view->perspective ? fmax(fmax(fabs(ray.u), fabs(ray.v)), 1.0) : 1.0;
-    const double d = (double)phase->deff[neighbour->from] * share * stretch / ((double)view->footprint * inverse);
+    const double d = (double)phase->span[neighbour->from] * share * stretch / ((double)view->footprint * inverse);
     const double slack = (double)PT_FILL_SLACK * scale, sx = neighbour->from % args->from_width, sy = neighbour->from / args->from_width;
     const double way = hypot((x + 0.5) * scale - (sx + 0.5), (y + 0.5) * scale - (sy + 0.5));
     const double least = d / (view->perspective ? neighbour->z.hi : 1.0), most = d / (view->perspective ? neighbour->z.lo : 1.0);
@@ -262,11 +263,11 @@ static void run_phase(struct phase *phase, struct ref_pixel *original, struct re
     }
 }
 
-int ref_fill(const struct fill_args *args, const float *normal, const float *deff, struct ref_pixel *pixels)
+int ref_fill(const struct fill_args *args, const float *normal, const float *deff, const float *span, struct ref_pixel *pixels)
 {
     size_t count = (size_t)args->view.width * args->view.height;
     struct ref_pixel *original = malloc(count * sizeof *original), *after = malloc(count * sizeof *after);
-    struct phase phase = {args, normal, deff, 0, malloc(count * sizeof(struct ref_range)), malloc(count)};
+    struct phase phase = {args, normal, deff, span, 0, malloc(count * sizeof(struct ref_range)), malloc(count)};
     int ok = original && after && phase.threshold && phase.filled;
     for (phase.occluded = 0; phase.occluded < 2 && ok; phase.occluded++)
         if (args->phases & (phase.occluded ? PT_FILL_OCCLUDED : PT_FILL_BACKGROUND))

@@ -25,16 +25,16 @@ static enum ref_truth two_of(const enum ref_truth truth[3])
     return yes >= 2 ? REF_YES : maybe >= 2 ? REF_UNSURE : REF_NO;
 }
 
-// Whether points of the surface lie closer than 1.2 pixels of this level: d_eff without its cosine is K spacing, or more.
+// Whether points of the surface lie closer than 1.2 pixels of this level: the span without its cosine is K spacing, or more.
 static enum ref_truth is_dense(const struct view_args *view, const struct ref_planes *planes, struct ref_pixel taken)
 {
     double width = (double)view->footprint * (double)(1u << view->level);
     double z = view->perspective ? taken.z.lo : 1.0; // a key's: exact
     double limit = (double)PT_DENSE * width * z * (double)planes->normal[4 * (size_t)taken.from + 3];
-    double deff = (double)planes->deff[taken.from];
-    if (fabs(deff - limit) <= (TOL_LEVEL + TOL_UNIT) * limit) // one product more than a level distance
+    double span = (double)planes->span[taken.from];
+    if (fabs(span - limit) <= (TOL_LEVEL + TOL_UNIT) * limit) // one product more than a level distance
         return REF_UNSURE;
-    return deff < limit ? REF_YES : REF_NO;
+    return span < limit ? REF_YES : REF_NO;
 }
 
 struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_keys, const uint32_t *coarse_from,
@@ -77,7 +77,7 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
     if (args->refined) {
         struct view_args above = *view;
         above.level++;
-        struct ref_range limit = ref_level_distance(&above, planes->normal, planes->deff, taken.from, taken.z);
+        struct ref_range limit = ref_level_distance(&above, planes->normal, planes->span, taken.from, taken.z);
         taken.z = ref_plane_depth(view, planes->normal + 4 * (size_t)taken.from, ref_ray(&above, px, py), taken.z,
                                   ref_ray(view, x, y), limit);
     }

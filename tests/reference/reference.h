@@ -56,6 +56,8 @@ double ref_footprint(const struct view_args *view, double z); // width of a pixe
 double ref_ulp4(double z);                                    // 4 ulp of the float32 z
 // max(d_min, K spacing, footprint, 4 ulp): d_eff without its division by the cosine.
 double ref_layer_minimum(const struct view_args *view, double d_min, double spacing, double z);
+// The same where sigma is known.
+double ref_sure_minimum(const struct view_args *view, double d_min, double sigma, double spacing, double z);
 // A pixel's own d_eff at the view's level, from the level-0 planes at its `from`.
 struct ref_range ref_level_distance(const struct view_args *view, const float *normal, const float *deff, uint32_t from,
                                     struct ref_range z);
@@ -158,8 +160,9 @@ struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *
 struct ref_planes {
     const uint64_t *keys;
     const uint32_t *from;
-    const float *normal, *deff, *color, *shading;
+    const float *normal, *deff, *span, *color, *shading;
     const uint32_t *surface; // by id - id_base
+    const uint32_t *shapes;  // likewise
     const void *colors;      // by id - id_base
     const uint8_t *opacities; // by id - id_base
     const float *through;    // light that earlier layers let through
@@ -211,6 +214,7 @@ struct ref_surface {
     double inverse; // 1 / max(|n.v|, C)
     double inverse_error;
     double deff, deff_error;
+    double span, span_error;
     uint32_t from;
 };
 struct ref_surface ref_surface(const struct surface_args *args, const struct ref_planes *planes, int x, int y);
@@ -258,7 +262,7 @@ struct ref_pixel ref_pixel(uint64_t key, uint32_t from);
 struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_keys, const uint32_t *coarse_from,
                           const struct ref_planes *planes, int x, int y);
 // A whole phase; pixels: width x height, read as the state before it, left as the state after it. 0: out of memory.
-int ref_fill(const struct fill_args *args, const float *normal, const float *deff, struct ref_pixel *pixels);
+int ref_fill(const struct fill_args *args, const float *normal, const float *deff, const float *span, struct ref_pixel *pixels);
 
 // Does the picture show the point `id` of the instance somewhere in its rectangle?
 int ref_mark(const struct mark_args *args, const struct ref_planes *planes, uint32_t id);

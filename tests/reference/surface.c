@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// SPEC 1, effective layer distance: d_eff = max(d_min, K spacing, footprint, 4 ulp) / max(|n.v|, C).
+// SPEC 1, effective layer distance: d_eff = max(d_min, K spacing, footprint, 4 ulp) / max(|n.v|, C), and what sigma makes of it.
 #include "reference.h"
 #include "tolerances.h"
 
@@ -50,7 +50,16 @@ struct ref_surface ref_surface(const struct surface_args *args, const struct ref
     double share = TOL_LAYER + (cosine + cosine_error > (double)PT_COSINE_FLOOR ? cosine_error / floored : 0.0);
     out.inverse = 1.0 / floored;
     out.inverse_error = out.inverse * share;
-    out.deff = ref_layer_minimum(view, instance->d_min, instance->spacing[word >> PT_SPACING_SHIFT], z) * out.inverse;
+    const double spacing = instance->spacing[word >> PT_SPACING_SHIFT];
+    out.span = ref_layer_minimum(view, instance->d_min, spacing, z) * out.inverse;
+    out.deff = out.span;
+    if (args->sigma_scale > 0.0f) {
+        const uint32_t class = planes->shapes[ref_key_id(key) - instance->id_base] / 65536 % 64;
+        const double sigma = (double)instance->spacing[class] * (double)args->sigma_scale;
+        if (class)
+            out.deff = ref_sure_minimum(view, instance->d_min, sigma, spacing, z) * out.inverse;
+    }
+    out.span_error = out.span * share;
     out.deff_error = out.deff * share;
     return out;
 }

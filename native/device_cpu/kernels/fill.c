@@ -49,7 +49,7 @@ static void take_least(const struct fill *fill, size_t at, size_t end)
     vi_store_keys(e->key + at, z, id, vm_bits(lanes));
     for (size_t i = at; i < end && i < at + PT_LANES; i++) {
         __builtin_prefetch(fill->normals + 4 * (size_t)e->from[i]);
-        __builtin_prefetch(fill->deff + e->from[i]);
+        __builtin_prefetch(fill->span + e->from[i]);
     }
 }
 
@@ -64,7 +64,7 @@ static void refine(const struct fill *fill, size_t at, size_t end)
     vf_gather4(fill->normals, source, lanes, n);
     vf_ray_of(view, vi_load(e->x + at), vi_load(e->y + at), ray_p);
     vf_ray_of(view, vi_load(e->qx + at), vi_load(e->qy + at), ray_q);
-    z = vf_plane_depth(view, n, ray_q, z, ray_p, vf_level_distance(view, vf_gather(fill->deff, source, lanes), n[3], z));
+    z = vf_plane_depth(view, n, ray_q, z, ray_p, vf_level_distance(view, vf_gather(fill->span, source, lanes), n[3], z));
     vi_store_keys(e->key + at, vf_bits(z), vi_load_id(e->key + at), vm_bits(lanes));
 }
 
@@ -88,7 +88,7 @@ static int reaches(const struct fill *fill, uint32_t x, uint32_t y, uint64_t key
     const float scale = (float)(1u << view->level), z = pt_float((uint32_t)(key >> 32));
     const float width = view->perspective ? view->footprint * z : view->footprint;
     const float share = (uint32_t)key >= args->discs_first ? args->disc_reach : args->reach;
-    const float way = (fill->deff[source] * share) * pt_rcp(width * fill->normals[4 * (size_t)source + 3]);
+    const float way = (fill->span[source] * share) * pt_rcp(width * fill->normals[4 * (size_t)source + 3]);
     const float most = way * stretch(view, x, y) + PT_FILL_SLACK * scale;
     const float dx = ((float)x + 0.5f) * scale - ((float)(source % args->from_width) + 0.5f);
     const float dy = ((float)y + 0.5f) * scale - ((float)(source / args->from_width) + 0.5f);
@@ -363,7 +363,8 @@ int PT_KERNEL_ENTRY(fill)(const struct pt_cpu_call *call)
                          .keys = pt_cpu_data(call, 0),
                          .from = pt_cpu_data(call, 1),
                          .normals = pt_cpu_data(call, 2),
-                         .deff = pt_cpu_data(call, 3) };
+                         .deff = pt_cpu_data(call, 3),
+                         .span = pt_cpu_data(call, 4) };
     if (args->view.rect[0] >= args->view.rect[2] || args->view.rect[1] >= args->view.rect[3])
         return PATINA_OK;
     int error = allocate(&fill);

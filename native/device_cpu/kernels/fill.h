@@ -24,7 +24,7 @@ struct fill {
     const struct view_args *view;
     uint64_t *keys;
     uint32_t *from;
-    const float *normals, *deff;
+    const float *normals, *deff, *span;
     // Planes of bits, a word 64 pixels of a row. Two bits or more of a row are to spare and 0, as is a row beyond the rectangle
     // or the plane: words that follow each other are neighbours, whatever the row.
     uint64_t *covered, *suspect; // not empty; maybe occluded: as the planes were before, or filled since

@@ -47,13 +47,13 @@ static inline __attribute__((always_inline)) size_t list_columns(const struct fi
 {
     const struct view_args view = *fill->view; // of our own: what is listed does not change it
     const uint64_t *keys = fill->keys;
-    const float least = fill->args->least;
+    const float least = fill->args->least, share = fill->args->least_share;
     const size_t words = fill->words;
     struct row below = load_row(keys, &view, x, y - 1, edge), row = load_row(keys, &view, x, y, edge), above;
     for (uint32_t k = 0; k < rows; k++, below = row, row = above) {
         above = load_row(keys, &view, x, y + k + 1, edge);
         // one of the two is beside, or one is above and one is below: not so of most pixels
-        const vf most = row.own - pt_least_distance(&view, least, row.own);
+        const vf most = row.own - pt_least_distance(&view, least, share, row.own);
         uint32_t bits = (uint32_t)((asked[k * words] & within) >> x % 64);
         bits &= vm_bits(vf_lt(vf_min(row.beside, vf_max(below.all, above.all)), most));
         if (!bits)

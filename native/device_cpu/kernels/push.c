@@ -29,7 +29,7 @@ static uint32_t asked(const struct push *push, uint32_t x, uint32_t y, vf parent
     const vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(push->call, 2) + (size_t)y * push->args->view.width + x));
     *p = (struct pixels){ x, y, z, parent };
     vm some = vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
-    vf t = vf_select(some, z - pt_least_distance(&push->args->view, push->args->least, z), z); // what is nearer covers it
+    vf t = vf_select(some, z - pt_least_distance(&push->args->view, push->args->least, push->args->least_share, z), z); // what is nearer covers it
     uint32_t bits = vm_bits(vm_and(lanes, vf_lt(parent, t)));
     if (push->args->background)
         bits &= ~vm_bits(some);
@@ -95,7 +95,7 @@ static void load_parents(const struct push *push, uint32_t x, uint32_t y, vf z, 
     vf normal[4], ray[2];
     vf_gather4(normals, p->source, some, normal);
     vf inverse = normal[3];
-    vf distance = vf_gather(pt_cpu_data(push->call, 5), p->source, some); // at level 0
+    vf distance = vf_gather(pt_cpu_data(push->call, 6), p->source, some); // at level 0
     p->give = vm_bits(vm_and(some, vm_not(vf_lt(distance, (vf_set(PT_DENSE) * vf_footprint(view, z)) * inverse))));
     for (uint32_t k = 0; k < 3; k++)
         p->n[k] = normal[k];
@@ -158,7 +158,7 @@ static inline __attribute__((always_inline)) void fetch_surfaces(const struct pu
     const uint32_t *source = (const uint32_t *)pt_cpu_data(push->call, 1) + (size_t)y * push->args->coarse_width + x;
     for (uint32_t i = 0; y < push->args->coarse_height && i < PT_LANES; i++) {
         __builtin_prefetch((const float *)pt_cpu_data(push->call, 4) + 4 * (size_t)source[i]);
-        __builtin_prefetch((const float *)pt_cpu_data(push->call, 5) + source[i]);
+        __builtin_prefetch((const float *)pt_cpu_data(push->call, 6) + source[i]);
     }
 }
 

@@ -10,6 +10,7 @@ enum { BLOCK = 256 };
 
 struct measured {
     uint32_t x[BLOCK + PT_LANES], z[BLOCK + PT_LANES], word[BLOCK + PT_LANES]; // before it, the point
+    uint32_t shape[BLOCK + PT_LANES];
 };
 
 // count <= PT_LANES pixels from the i-th on.
@@ -21,6 +22,7 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     const uint32_t *x = measured->x + i;
     const size_t row = (size_t)y * view->width;
     float *normals = (float *)pt_cpu_data(call, 2) + 4 * row, *deff = (float *)pt_cpu_data(call, 3) + row;
+    float *span = args->with_span ? (float *)pt_cpu_data(call, 6) + row : NULL;
     const vm some = vm_first(count);
     const vf one = vf_set(1.0f);
 
@@ -56,12 +58,23 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     }
     // 4. cosine and layer distance
     n[3] = vf_select(none, one, vf_rcp(vf_max(vf_cosine(view, n, ray), vf_set(PT_COSINE_FLOOR))));
-    float pixels[4 * PT_LANES], distances[PT_LANES];
+    float pixels[4 * PT_LANES], distances[PT_LANES], spans[PT_LANES];
+    const vf by_spacing = vf_layer_distance(view, instance->d_min, spacing, z, n[3]);
+    vf distance = by_spacing;
+    if (args->sigma_scale > 0.0f) {
+        const vi class = vi_and(vi_shr(vi_load(measured->shape + i), PT_SHAPE_SIGMA_SHIFT), vi_set(PT_SHAPE_CLASS_BITS));
+        const vf sigma = vf_look_up(instance->spacing, PT_SPACINGS, class) * vf_set(args->sigma_scale);
+        const vf sure = vf_sure_distance(view, instance->d_min, sigma, spacing, z, n[3]);
+        distance = vf_select(vi_eq(class, vi_set(0)), by_spacing, sure);
+    }
     vf_store4(pixels, n, PT_ALL);
-    vf_store(distances, vf_layer_distance(view, instance->d_min, spacing, z, n[3]));
+    vf_store(distances, distance);
+    vf_store(spans, by_spacing);
     for (uint32_t k = 0; k < count; k++) {
         memcpy(normals + 4 * (size_t)x[k], pixels + 4 * k, 16);
         deff[x[k]] = distances[k];
+        if (args->with_span)
+            span[x[k]] = spans[k];
     }
 }
 
@@ -73,7 +86,7 @@ static void surface_row(void *context, uint32_t y)
     const size_t row = (size_t)y * args->view.width;
     const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
     uint32_t *from = (uint32_t *)pt_cpu_data(call, 4) + row;
-    const uint32_t *words = pt_cpu_data(call, 1);
+    const uint32_t *words = pt_cpu_data(call, 1), *shapes = args->sigma_scale > 0.0f ? pt_cpu_data(call, 5) : NULL;
     struct measured measured;
     for (uint32_t first = rect[0]; first < rect[2]; first += BLOCK) {
         const uint32_t end = rect[2] - first < BLOCK ? rect[2] : first + BLOCK;
@@ -91,6 +104,9 @@ static void surface_row(void *context, uint32_t y)
             pt_row_put(from, args->view.width, x, vi_add(vi_set((uint32_t)row), at), ours);
         }
         // words are fetched at random: a tight loop gathers those of a block, so that many are under way at a time
+        if (args->sigma_scale > 0.0f)
+            for (uint32_t i = 0; i < count; i++)
+                measured.shape[i] = shapes[measured.word[i]];
         for (uint32_t i = 0; i < count; i++)
             measured.word[i] = words[measured.word[i]];
         for (uint32_t i = 0; i < count; i += PT_LANES)
