@@ -179,6 +179,17 @@ int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device 
     return end(residency, device, resident, error, out);
 }
 
+int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive, const void *data,
+                            size_t size, struct pt_resident **out)
+{
+    struct pt_resident *resident = *out = find(residency, device, alive);
+    if (resident)
+        return PATINA_OK;
+    if (!(resident = begin(device, alive)))
+        return PATINA_ERROR_MEMORY;
+    return end(residency, device, resident, device->ops->buffer_create(device, size, data, 1, &resident->buffers[0]), out);
+}
+
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device)
 {
     while (residency->first) {

@@ -19,6 +19,9 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
                       struct pt_resident **out);
 // Makes resident->marked what it should be: in the cloud's format of colours, PT_COLOR_FLOAT where it has none.
 int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
+// Likewise of what a mask or a grade holds: `size` bytes that live as long as `alive` says, in buffers[0].
+int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive, const void *data,
+                            size_t size, struct pt_resident **out);
 // Likewise of a mesh.
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
                            struct pt_resident **out);
