@@ -12,6 +12,8 @@
 
 enum { MOST_CORNERS = 1 << 14 };
 
+#define BORDER 0.01 // pixels
+
 // The edges by the rows of pixels that they pass: those of row y are edges[first[y]] to edges[first[y + 1] - 1].
 struct outline {
     const double *corners;
@@ -142,17 +144,29 @@ static int project(const struct pick *pick, const double v[3], double out[3])
     return out[0] >= 0.0 && out[1] >= 0.0 && out[0] < settings->width && out[1] < settings->height;
 }
 
-// By the frame's keys. spacing: of the point's chunk.
-static int is_shown(const struct pick *pick, double spacing, const double place[3])
+// By the frame's key at a pixel. spacing: of the point's chunk.
+static int is_shown_at(const struct pick *pick, double spacing, const double place[3], double px, double py)
 {
-    const uint32_t x = (uint32_t)place[0], y = (uint32_t)place[1], *region = pick->region;
-    if (x < region[0] || y < region[1] || x >= region[2] || y >= region[3])
+    const uint32_t *region = pick->region;
+    if (px < region[0] || py < region[1] || px >= region[2] || py >= region[3])
         return 0;
+    const uint32_t x = (uint32_t)px, y = (uint32_t)py;
     const uint32_t word = (uint32_t)(pick->keys[(size_t)(y - region[1]) * (region[2] - region[0]) + x - region[0]] >> 32);
     float z;
     memcpy(&z, &word, sizeof z);
     const double footprint = pick->pixel * (pick->scene->camera.orthographic ? 1.0 : place[2]);
     return word != PT_KEY_EMPTY_Z && place[2] <= (double)z + fmax(2.0 * spacing * pick->scale, 4.0 * footprint);
+}
+
+// A point within BORDER of its pixel's border may have fallen into the pixel beyond it: scattering is float32.
+static int is_shown(const struct pick *pick, double spacing, const double place[3])
+{
+    for (int k = 0; k < 4; k++) {
+        const double x = place[0] + (k & 1 ? BORDER : -BORDER), y = place[1] + (k & 2 ? BORDER : -BORDER);
+        if (is_shown_at(pick, spacing, place, x, y))
+            return 1;
+    }
+    return 0;
 }
 
 static int of_class(const struct pick *pick, uint64_t slot)

@@ -18,7 +18,7 @@ from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, linked, losses, materials, meshes, roles
+from . import analysis, attributes, clips, colors, edits, estimates, linked, losses, materials, meshes, roles
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -138,6 +138,8 @@ class CloudItem:
     style: CloudStyle
     pass_index: int  # of the object
     role: str = roles.SEEN
+    name: str = ""  # of the object
+    edits: edits.State = edits.State()
 
 
 class CloudCache:
@@ -279,13 +281,16 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
-            items.append(CloudItem(cloud, style, obj.pass_index, role))
+            edited = edits.state_of(obj) if link else edits.State()
+            items.append(CloudItem(cloud, style, obj.pass_index, role, obj.original.name_full, edited))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
              for item in items]
     CACHE.trim(used)
     meshes.CACHE.trim(used)
+    notices += filter(None, [edits.notice(item.name, item.edits, item.cloud) for item in items
+                             if isinstance(item, CloudItem) and item.edits and isinstance(item.cloud, native.Cloud)])
     estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
                     if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
     notices += unknown.notices()

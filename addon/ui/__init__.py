@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from . import (colors, combine, effects, lines, materials, motion, panels, panorama, points, presets, sampling, sequence, standard,
-               statistics, styles)
+from . import (colors, combine, effects, lines, materials, motion, panels, panorama, points, presets, sampling, scan_points, sequence,
+               standard, statistics, styles)
 
 # What makes the look comes first, then how it is drawn.
-_MODULES = (presets, styles, lines, effects, panels, sampling, points, colors, motion, combine, panorama, sequence, materials, statistics,
-            standard)
+_MODULES = (presets, styles, lines, effects, panels, sampling, points, colors, scan_points, motion, combine, panorama, sequence, materials,
+            statistics, standard)
 
 
 def register() -> None:

@@ -50,8 +50,9 @@ typedef struct patina_pick {
 // Sets the bits (as a mask's; size: (count + 7) / 8 bytes) of an instance's points that the scene draws: hidden by no class, kind, mask
 // or clip, and with a polygon, whose projection by the scene's camera is in the picture, inside of the polygon and between the clip
 // distances; the other bits are cleared. frame: the scene was rendered in it last, and only points are picked that its first
-// layer shows: those that lie at most two spacings, or four pixels' width, behind what it has at their pixel. NULL = whatever stands before them. Float64;
-// blocks; progress may be NULL, and stops it from any thread. 30 million points take about half a second on two cores.
+// layer shows: those that lie at most two spacings, or four pixels' width, behind what it has at their pixel, or one that is within a
+// hundredth of a pixel. NULL = whatever stands before them. Float64;
+// blocks; progress may be NULL, and stops it from any thread. About 13 ns a point of one core, in chunks that the outline may hold.
 PATINA_API int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, const patina_pick *pick,
                                  patina_progress *progress, uint8_t *bits, size_t size);
 // Mixes a colour into the pixels of a COMBINED pass whose nearest point is selected by its instance's mask, filled ones too: for
