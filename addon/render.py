@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import backdrop, cryptomatte, jobs, mattes, memory, native
-from .sync import Camera, DeviceChoice, SceneDescription
+from .sync import Camera, DeviceChoice, SceneDescription, edits
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
 
@@ -360,6 +360,7 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
         style = item.style
         if style.color_source == SCALAR and not item.cloud.has_scalars:  # a notice has said so
             style = replace(style, color_source=OWN)
-        scene.add_cloud(item.cloud, **asdict(style))
+        scene.add_cloud(item.cloud, mask=edits.mask_of(item.cloud, item.edits), grade=edits.grade_of(item.cloud, item.edits),
+                        **asdict(style))
     for item in description.meshes:
         scene.add_mesh(item.mesh, item.texture and item.texture.native, **asdict(item.style))

@@ -22,7 +22,8 @@ from gpu_extras.batch import batch_for_shader
 
 from . import backdrop, mattes, native, pace, render, sky, sync
 from .jobs import Pause, Steps
-from .sync import analysis
+from .native.points import highlight
+from .sync import analysis, edits
 from .sync.analyzing import ANALYSES
 from .sync.clouds import CACHE
 from .sync.kept import CHECKS
@@ -32,6 +33,9 @@ STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it star
 HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that overlays' depth is nearer than the surface: Blender's dots of vertices are hidden, or not
 REST = 0.12  # seconds without motion after which the whole picture is drawn
 BETTER = 200.0  # milliseconds of further samples between two pictures of a view at rest
+
+SELECTED = (1.0, 0.35, 0.02)  # linear, and its share of the pixel: of selected points
+SELECTED_SHARE = 0.65
 
 
 @dataclass(frozen=True)
@@ -335,6 +339,9 @@ class Viewport:
                     cloud = yield from item.cloud.resolve(self._progress)
                     if cloud:
                         clouds.append(replace(item, cloud=cloud))
+                        said = edits.notice(item.name, item.edits, cloud)
+                        if said and said not in self.notices:
+                            self.notices = [*self.notices, said]
                     elif item.cloud.lost not in self.notices:
                         self.notices = [*self.notices, item.cloud.lost]
             finally:
@@ -376,7 +383,7 @@ class Viewport:
             spare = []
         else:
             self._others = []
-        color, depth = yield from self._draw_frame(*parts[0], ("COMBINED", "DEPTH"), spare)
+        color, depth = yield from self._draw_frame(*parts[0], ("COMBINED", "DEPTH"), spare, selected=True)
         colors = [color]
         for beside, other in parts[1:]:
             colors += yield from self._draw_frame(beside, other, ("COMBINED",), [])
@@ -400,7 +407,8 @@ class Viewport:
         colors = []
         for (frame, description), color in zip(bettered.parts, bettered.colors, strict=True):
             if frame.stats()["pixel_pending"]:
-                color, = yield from self._draw_frame(frame, description, ("COMBINED",), [], BETTER / len(bettered.parts))
+                color, = yield from self._draw_frame(frame, description, ("COMBINED",), [], BETTER / len(bettered.parts),
+                                                     selected=frame is bettered.parts[0][0])
             colors.append(color)
         bettered = replace(bettered, colors=colors)
         self._keep_bettering(bettered)
@@ -408,7 +416,9 @@ class Viewport:
         return replace(self.shown, color=bettered.picture(), stats=frame.stats(), passes=frame.pass_stats(), first=False)
 
     def _draw_frame(self, frame: native.Frame, description: sync.SceneDescription, planes: tuple[str, ...],
-                    spare: list[np.ndarray], better_ms: float | None = None) -> Steps[list[np.ndarray]]:
+                    spare: list[np.ndarray], better_ms: float | None = None,
+                    selected: bool = False) -> Steps[list[np.ndarray]]:
+        """selected: selected points are to be seen as such in the first plane."""
         x0, y0, x1, y1 = description.settings.region
         with native.Scene() as scene:
             render.describe(scene, description, planes)
@@ -422,7 +432,10 @@ class Viewport:
             try:
                 yield task
                 ANALYSES.end_frame(task)
-                return task.result()
+                found = task.result()
+                if selected and any(edits.has_selection(item.cloud, item.edits) for item in description.clouds):
+                    highlight(frame, scene, found[0], SELECTED, SELECTED_SHARE)
+                return found
             finally:
                 self._rendering = None
                 ANALYSES.end_frame(task)

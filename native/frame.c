@@ -5,6 +5,7 @@
 #include "frame_samples.h"
 #include "layers.h"
 #include "residency.h"
+#include "scene/mask.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -131,6 +132,7 @@ struct render {
     struct pt_resident **clouds; // per instance
     struct pt_resident **meshes; // per mesh
     struct pt_resident **textures; // likewise; NULL: it has none
+    struct pt_resident **masks, **grades; // per instance, or NULL
     struct pt_buffer *chunks;    // per instance, of the layer at hand
     struct pt_buffer **bound;    // scratch for one pass
     struct chunk_view **behind;  // per instance: those of the layer at hand, behind the first
@@ -148,10 +150,13 @@ static int upload(struct render *render)
     render->clouds = calloc(plan->instance_count + 1, sizeof *render->clouds);
     render->meshes = calloc(plan->mesh_count + 1, sizeof *render->meshes);
     render->textures = calloc(plan->mesh_count + 1, sizeof *render->textures);
+    render->masks = calloc(plan->instance_count + 1, sizeof *render->masks);
+    render->grades = calloc(plan->instance_count + 1, sizeof *render->grades);
     render->chunks = calloc(plan->instance_count + 1, sizeof *render->chunks);
     render->bound = calloc(most, sizeof *render->bound);
     render->behind = calloc(plan->instance_count + 1, sizeof *render->behind);
-    if (!render->clouds || !render->meshes || !render->textures || !render->chunks || !render->bound || !render->behind)
+    if (!render->clouds || !render->meshes || !render->textures || !render->masks || !render->grades || !render->chunks ||
+        !render->bound || !render->behind)
         return pt_fail(&render->frame->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
@@ -165,6 +170,14 @@ static int upload(struct render *render)
             error = pt_residency_see(device, instance->instance->cloud, render->clouds[i]);
         if (!error && instance->marked)
             error = pt_residency_mark(device, instance->instance->cloud, render->clouds[i]);
+        const struct patina_mask *mask = pt_mask_of(instance->instance);
+        const struct patina_grade *grade = instance->instance->style.grade;
+        if (!error && mask)
+            error = pt_residency_take_bytes(&render->frame->residency, device, mask->alive, mask->words,
+                                            mask->word_count * sizeof *mask->words, &render->masks[i]);
+        if (!error && grade)
+            error = pt_residency_take_bytes(&render->frame->residency, device, grade->alive, grade->colors, grade->size,
+                                            &render->grades[i]);
         if (error)
             return pt_fail_again(&render->frame->handle, error);
     }
@@ -186,7 +199,7 @@ static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *r
     if (ref->of == PT_OF_FRAME)
         return &render->frame->planes[ref->which][ref->index];
     if (ref->of == PT_OF_MESH && ref->which == PT_MESH_TEXELS)
-        return render->textures[ref->index] ? &render->textures[ref->index]->buffers[PT_MESH_TEXELS] : &none;
+        return render->textures[ref->index] ? &render->textures[ref->index]->buffers[0] : &none;
     if (ref->of == PT_OF_MESH)
         return &render->meshes[ref->index]->buffers[ref->which];
     if (ref->which == PT_MARKS || ref->which == PT_SHADOWS)
@@ -195,6 +208,10 @@ static struct pt_buffer *buffer_of(struct render *render, const struct pt_ref *r
         return pt_clip_buffer(&render->frame->clips, ref->which);
     if (ref->which == PT_COLORS && render->plan->instances[ref->index].marked)
         return &render->clouds[ref->index]->marked;
+    if (ref->which == PT_COLORS && render->grades[ref->index])
+        return &render->grades[ref->index]->buffers[0];
+    if (ref->which == PT_MASK)
+        return &render->masks[ref->index]->buffers[0];
     return ref->which == PT_CHUNKS ? &render->chunks[ref->index] : &render->clouds[ref->index]->buffers[ref->which];
 }
 
@@ -519,6 +536,8 @@ int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
     free(render.clouds);
     free(render.meshes);
     free(render.textures);
+    free(render.masks);
+    free(render.grades);
     free(render.chunks);
     free(render.bound);
     for (uint32_t i = 0; i < plan.instance_count && render.behind; i++)
@@ -611,7 +630,8 @@ int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32
     return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
 }
 
-int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
+// Keys as they lie in the plane, where points have numbers of slots.
+static int read_slots(const struct patina_frame *frame, uint64_t *keys, size_t size)
 {
     if (!frame->keys_valid)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: no finished render");
@@ -626,9 +646,31 @@ int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t 
         if (error)
             return pt_fail_again(&frame->handle, error);
     }
+    return PATINA_OK;
+}
+
+int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
+{
+    int error = read_slots(frame, keys, size);
+    if (error)
+        return error;
     return pt_numbering_keys(&frame->numbering, keys, size / sizeof *keys)
                ? pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: a cloud in view was destroyed since")
                : PATINA_OK;
+}
+
+int pt_frame_read_slots(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size)
+{
+    int same = frame->numbering.count == scene->instance_count;
+    for (uint32_t i = 0; same && i < scene->instance_count; i++)
+        same = frame->numbering.clouds[i].alive == scene->instances[i].cloud->alive;
+    if (!same)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "the frame's last picture is of another scene");
+    int error = read_slots(frame, keys, size);
+    for (size_t i = 0; i < size / sizeof *keys && !error && frame->numbering.discs < UINT32_MAX; i++)
+        if (keys[i] >> 32 != PT_KEY_EMPTY_Z && (uint32_t)keys[i] >= frame->numbering.discs)
+            keys[i] -= frame->numbering.discs;
+    return error;
 }
 
 int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene)

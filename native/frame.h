@@ -69,6 +69,9 @@ int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene);
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);
+// The same with numbers of slots for points, discs or not; ids of triangles are not to be relied on. PATINA_ERROR_ARGUMENT where the
+// frame's last picture has not the scene's clouds.
+int pt_frame_read_slots(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size);
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size);
 int pt_frame_dump(const struct patina_frame *frame, const char *folder);
 // For its parts (frame_shadow.c).

@@ -4,6 +4,7 @@
 #include "frame.h"
 
 #include "residency.h"
+#include "scene/mask.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -220,12 +221,16 @@ static int map_buffer(struct update *update, const struct pt_plan *map, struct p
         *out = &chunks[ref->index];
     else if (ref->of == PT_OF_INSTANCE && (ref->which == PT_CLIPS || ref->which == PT_DRAWN))
         *out = pt_clip_buffer(&frame->shadows.clips, ref->which);
-    else if (ref->of == PT_OF_MESH)
+    else if (ref->of == PT_OF_INSTANCE && ref->which == PT_MASK) {
+        const struct patina_mask *mask = pt_mask_of(map->instances[ref->index].instance);
+        error = pt_residency_take_bytes(&frame->residency, frame->device, mask->alive, mask->words,
+                                        mask->word_count * sizeof *mask->words, &resident);
+    } else if (ref->of == PT_OF_MESH)
         error = pt_residency_mesh_buffer(&frame->residency, frame->device, map->meshes[ref->index].instance, ref->which, out);
     else
         error = pt_residency_take(&frame->residency, frame->device, map->instances[ref->index].instance->cloud, &resident);
     if (!error && resident)
-        *out = &resident->buffers[ref->which];
+        *out = &resident->buffers[ref->of == PT_OF_INSTANCE && ref->which == PT_MASK ? 0 : ref->which];
     return error;
 }
 

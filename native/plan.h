@@ -70,10 +70,11 @@ enum pt_plane {
 enum { PT_SLOTS = 16 }; // levels or layers that a plane may have
 _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_SLOTS, "planes have too few slots");
 
-// PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole.
+// PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole; PT_MASK to
+// the instance's mask.
 enum pt_instance_buffer {
     PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES, PT_SHAPES, PT_SIGHTS,
-    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN
+    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN, PT_MASK
 };
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
@@ -135,7 +136,7 @@ struct pt_plan_instance {
     uint64_t points;        // of these chunks, drawn ones
     uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
     uint32_t chunks_cut; // of its chunks, those that are sifted
-    int by_class, by_shape; // some of them by class, by shape
+    int by_class, by_shape, by_mask; // some of them by class, by shape, by mask
     int marked;             // shown with what stations saw through in magenta
 };
 

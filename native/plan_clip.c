@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Clips, hidden classes and hidden shapes. Chunks that they take whole are culled, chunks that they leave whole cost nothing; the points of
+// Clips, hidden classes, hidden shapes and masks. Chunks that they take whole are culled, chunks that they leave whole cost nothing; the points of
 // divided ones are sifted before scatter, into a word of bits for every PT_SLOTS_A_WORD of them. The cut may be tinted.
 #include "plan_passes.h"
 #include "scene/clip.h"
@@ -43,6 +43,7 @@ int pt_plan_divide(struct pt_plan *plan, struct pt_plan_instance *instance, cons
     instance->chunks_cut++;
     instance->by_class |= division.by_class;
     instance->by_shape |= division.by_shape;
+    instance->by_mask |= division.by_mask;
     return PATINA_OK;
 }
 
@@ -50,22 +51,24 @@ void pt_plan_sift(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     if (!plan->drawn_words) {
-        pt_skip(builder, "sift", plan->chunks_clipped ? "clips, classes and shapes take chunks whole"
-                                                      : "no clip, hidden class or hidden shape in view");
+        pt_skip(builder, "sift", plan->chunks_clipped ? "clips, classes, shapes and masks take chunks whole"
+                                                      : "no clip, hidden class, hidden shape or mask in view");
         return;
     }
     for (uint32_t i = 0; i < plan->instance_count && builder->layer <= 1; i++) { // the words serve every layer
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunks_cut)
             continue;
-        struct sift_args args = { .by_class = instance->by_class != 0, .by_shape = instance->by_shape != 0 };
+        struct sift_args args = { .by_class = instance->by_class != 0,
+                                  .by_shape = instance->by_shape != 0,
+                                  .by_mask = instance->by_mask != 0 };
         memcpy(args.hidden, instance->instance->style.hidden_classes, sizeof args.hidden);
         pt_hidden_shapes(instance->instance, args.hidden_shapes);
         PT_REASON(PT_ADD(builder, sift, args,
                          { pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_CLASSES, i),
                            pt_buffer_of(PT_CLIPS, i), pt_buffer_of(PT_DRAWN, i),
-                           pt_shapes_of(instance, i) }),
-                  "clips, classes or shapes divide %u chunks of instance %u", instance->chunks_cut, i);
+                           pt_shapes_of(instance, i), pt_buffer_of(args.by_mask ? PT_MASK : PT_CLASSES, i) }),
+                  "clips, classes, shapes or a mask divide %u chunks of instance %u", instance->chunks_cut, i);
     }
 }
 

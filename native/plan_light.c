@@ -6,6 +6,7 @@
 // (beyond that the texels in the middle shrink to a quarter of those at the edge), else through the six faces of a cube.
 #include "plan.h"
 #include "scene/clip.h"
+#include "scene/mask.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -540,7 +541,7 @@ static void put_word(struct key *key, uint64_t word)
     put(key, (double)(word & 0xFFFFFFFFu));
 }
 
-// What is cut out of the instance: clips in its own frame, hidden classes and hidden shapes.
+// What is cut out of the instance: clips in its own frame, hidden classes, hidden shapes and masked points.
 static void put_cuts(struct key *key, const struct patina_scene *scene, const struct pt_instance *instance)
 {
     const uint32_t clips = instance->style.clip_off || scene->settings.shadow_uncut ? 0 : scene->clip_count;
@@ -556,6 +557,8 @@ static void put_cuts(struct key *key, const struct patina_scene *scene, const st
     hiding = pt_hidden_shapes(instance, shapes);
     for (int k = 0; k < 8 && hiding; k++)
         put(key, (double)shapes[k]);
+    if (pt_mask_of(instance))
+        put_word(key, pt_mask_of(instance)->hash);
     for (uint32_t i = 0; i < clips; i++) {
         const patina_clip *clip = &scene->clips[i];
         double turned[9], across[9], from[3], product[9];

@@ -186,16 +186,21 @@ int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device 
     return end(residency, device, resident, error, out);
 }
 
+int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive, const void *data,
+                            size_t size, struct pt_resident **out)
+{
+    struct pt_resident *resident = *out = find(residency, device, alive);
+    if (resident)
+        return PATINA_OK;
+    if (!(resident = begin(device, alive)))
+        return PATINA_ERROR_MEMORY;
+    return end(residency, device, resident, device->ops->buffer_create(device, size, data, 1, &resident->buffers[0]), out);
+}
+
 int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device, const struct patina_texture *texture,
                               struct pt_resident **out)
 {
-    struct pt_resident *resident = *out = find(residency, device, texture->alive);
-    if (resident)
-        return PATINA_OK;
-    if (!(resident = begin(device, texture->alive)))
-        return PATINA_ERROR_MEMORY;
-    int error = device->ops->buffer_create(device, texture->bytes, texture->texels, 1, &resident->buffers[PT_MESH_TEXELS]);
-    return end(residency, device, resident, error, out);
+    return pt_residency_take_bytes(residency, device, texture->alive, texture->texels, texture->bytes, out);
 }
 
 int pt_residency_mesh_buffer(struct pt_residency *residency, struct patina_device *device, const struct pt_mesh_instance *instance,
@@ -208,7 +213,7 @@ int pt_residency_mesh_buffer(struct pt_residency *residency, struct patina_devic
         error = pt_residency_take_mesh(residency, device, instance->mesh, &resident);
     else if (instance->style.texture)
         error = pt_residency_take_texture(residency, device, instance->style.texture, &resident);
-    *out = resident ? &resident->buffers[which] : &none;
+    *out = resident ? &resident->buffers[which == PT_MESH_TEXELS ? 0 : which] : &none;
     return error;
 }
 

@@ -21,6 +21,9 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
 int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
 // Makes resident->buffers[PT_SIGHTS] what the cloud's stations saw.
 int pt_residency_see(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
+// Likewise of what a mask or a grade holds: `size` bytes that live as long as `alive` says, in buffers[0].
+int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive, const void *data,
+                            size_t size, struct pt_resident **out);
 // Likewise of a mesh.
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
                            struct pt_resident **out);

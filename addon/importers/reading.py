@@ -57,7 +57,10 @@ class PointFile:
     def filtered(self, wanted: Filter) -> PointFile:
         if wanted.keeps_all():
             return self
-        keep = wanted.mask(0, self.positions, self.origin)
+        return self.only(wanted.mask(0, self.positions, self.origin))
+
+    def only(self, keep: np.ndarray) -> PointFile:
+        """(n,) bool."""
         return replace(
             self, positions=self.positions[keep],
             normals=None if self.normals is None else self.normals[keep],

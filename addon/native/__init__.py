@@ -167,6 +167,11 @@ class Cloud(_Handle):
 
     _kind = "cloud"
 
+    # Of a linked one of several scans: where a uint16 for each point says which it is of, the attribute that named them, and as what.
+    scan_file: Path | None = None
+    scan_name: str = ""
+    scan_numbers: tuple[int, ...] = ()
+
     def __init__(self, positions: np.ndarray, normals: np.ndarray | None = None, colors: np.ndarray | None = None,
                  progress: Progress | None = None, threads: int = 0, opacities: np.ndarray | None = None,
                  origin: tuple[float, ...] = (0.0,) * 3, radii: np.ndarray | None = None,
@@ -215,6 +220,8 @@ class Cloud(_Handle):
         self.footprint = max(info.bytes, 23 * info.count)  # with what of a mapped file may be in memory
         self.invalid_positions = info.invalid_positions
         self.has_normals = bool(info.has_normals)
+        self.has_colors = bool(info.has_colors)
+        self.class_bits = tuple(info.class_bits)  # classes that drawn points have
         self.has_scalars = bool(info.has_scalars)
         self.has_opacities = bool(info.has_opacities)
         self.has_shapes = bool(info.has_shapes)  # analysed
@@ -388,20 +395,23 @@ class Scene(_Handle):
 
     def __init__(self) -> None:
         super().__init__()
-        self._clouds: list[Cloud | Mesh | Texture] = []  # the native scene points to them
+        self.clouds: list[Cloud] = []  # by instance; the native scene points to them and what is kept
+        self._kept: list[_Handle] = []
 
-    def add_cloud(self, cloud: Cloud, ramp: bytes = b"", **style: Any) -> None:
+    def add_cloud(self, cloud: Cloud, ramp: bytes = b"", mask: points.Mask | None = None, grade: points.Grade | None = None,
+                  **style: Any) -> None:
         """ramp: linear RGB, float32, two colours or more; empty: black to white."""
-        fields = abi.CloudStyle(**style)
+        fields = abi.CloudStyle(**style, mask=mask and mask._handle, grade=grade and grade._handle)
         if ramp:
             colors = np.frombuffer(ramp, np.float32)  # the library copies it
             fields.ramp, fields.ramp_count = colors.ctypes.data, len(colors) // 3
         self._call("add_cloud", cloud._handle, byref(fields))
-        self._clouds.append(cloud)
+        self.clouds.append(cloud)
+        self._kept += [handle for handle in (mask, grade) if handle]
 
     def add_mesh(self, mesh: Mesh, texture: Texture | None = None, **style: Any) -> None:
         self._call("add_mesh", mesh._handle, byref(abi.MeshStyle(texture=texture._handle if texture else None, **style)))
-        self._clouds += [mesh, texture] if texture else [mesh]
+        self._kept += [mesh, texture] if texture else [mesh]
 
     def add_clip(self, **clip: Any) -> None:
         self._call("add_clip", byref(abi.Clip(**clip)))
@@ -544,3 +554,6 @@ class Panorama:
             check(library().patina_panorama_join(byref(self._panorama), PLANES[name][0], pointers, pixels.ctypes.data,
                                                   pixels.nbytes))
         return pixels
+
+
+from . import points  # noqa: E402  which builds on these

@@ -135,7 +135,8 @@ class CloudStyle(Descriptor):
                 ("shadow_off", c_uint32), ("radius", c_float), ("color_source", c_uint32), ("ramp", c_void_p),
                 ("ramp_count", c_uint32), ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
                 ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
-                ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float)]
+                ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float), ("mask", c_void_p),
+                ("grade", c_void_p)]
 
 
 class MeshStyle(Descriptor):
@@ -213,6 +214,15 @@ class Panorama(Descriptor):
 
 class Read(Structure):
     _fields_ = [("pass_", c_uint32), ("pixels", c_void_p), ("size", c_size_t)]
+
+
+class ScanGrade(Structure):
+    _fields_ = [("gain", c_float), ("gamma", c_float), ("saturation", c_float), ("temperature", c_float)]
+
+
+class Pick(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("instance", c_uint32), ("polygon", c_void_p), ("corners", c_uint32),
+                ("classes", c_uint32 * 8), ("threads", c_uint32)]
 
 
 # name → types of arguments; what returns anything but int stands in RESULTS
@@ -309,6 +319,12 @@ CALLS = {
     "patina_task_take_cloud": (c_void_p, POINTER(c_void_p)),
     "patina_task_take_file": (c_void_p, POINTER(c_void_p)),
     "patina_task_destroy": (c_void_p,),
+    "patina_mask_create": (c_void_p, c_void_p, c_void_p, c_size_t, POINTER(c_void_p)),
+    "patina_mask_destroy": (c_void_p,),
+    "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),
+    "patina_grade_destroy": (c_void_p,),
+    "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
+    "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),
 }
 RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_message": c_size_t,
            "patina_log_next": c_size_t, "patina_progress_destroy": None, "patina_progress_cancel": None,
@@ -316,4 +332,4 @@ RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_me
            "patina_mesh_destroy": None, "patina_texture_destroy": None, "patina_file_destroy": None,
            "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
            "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
-           "patina_task_destroy": None}
+           "patina_task_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None}

@@ -11,9 +11,9 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy.types import Context, Operator
 from bpy_extras.io_utils import ExportHelper
 
-from .. import exporters
+from .. import exporters, importers, jobs, native
 from ..importers import origin
-from ..sync import attributes
+from ..sync import attributes, edits, linked
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):
@@ -45,9 +45,12 @@ class PATINA_OT_export_points(Operator, ExportHelper):
                    if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and
                    (obj.select_get() or not self.selected)]
         parts = []
-        for obj in objects:
-            with attributes.readable(obj) as data:
-                parts.append(_read(obj, data, context.scene))
+        try:
+            for obj in objects:
+                parts.append(_of_object(obj, context.scene))
+        except native.PatinaError as error:
+            self.report({'ERROR'}, importers.told(f"Patina: {error}"))
+            return {'CANCELLED'}
         points = _join(list(filter(None, parts)))
         if points is None:
             self.report({'ERROR'}, "Patina: no selected object has points" if self.selected
@@ -91,11 +94,47 @@ def _bytes(colors: np.ndarray | None) -> np.ndarray | None:
     return np.rint(np.where(c <= 0.0031308, c * 12.92, 1.055 * c ** (1 / 2.4) - 0.055) * 255).astype(np.uint8)
 
 
-def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> exporters.Points | None:
-    count = len(data.vertices if obj.type == 'MESH' else data.points)
-    local = attributes.positions(data, count) if count else None
-    if local is None:
+def _of_object(obj: bpy.types.Object, scene: bpy.types.Scene) -> exporters.Points | None:
+    if obj.patina.linked_file:
+        return _of_linked(obj, scene)
+    with attributes.readable(obj) as data:
+        return _read(obj, data, scene)
+
+
+def read_linked(obj: bpy.types.Object, frame: int, notices: list[str]) -> importers.PointFile | None:
+    """The file that an object links, without the points that were deleted. None, with a notice, where it is missing."""
+    source = linked.source_of(obj, frame, notices)
+    if source is None:
         return None
+    module = importers.reader(source.path)
+    points = jobs.run(lambda: module.read(source.path, importers.Filter(), importers.Progress()), lambda: None, lambda: False)
+    try:
+        edited = edits.for_cloud(edits.packed_of(obj), len(points.positions))
+    except edits.Damaged as damaged:
+        notices.append(f"'{obj.name}': {damaged}")
+        return points
+    return points.only(~edits.flags(edited.deleted, edited.count)) if edited and edited.totals["deleted"] else points
+
+
+def _of_linked(obj: bpy.types.Object, scene: bpy.types.Scene) -> exporters.Points:
+    notices: list[str] = []
+    points = read_linked(obj, scene.frame_current, notices)
+    if points is None:
+        raise native.PatinaError(notices[0] if notices else f"'{obj.name}': the file is missing")
+    own = np.array(obj.original.get(origin.PROPERTY, points.origin), np.float64)
+    turn, move = _to_file(obj, scene)
+    normals = points.normals if points.normals is None else _turned(points.normals, turn)
+    return exporters.Points((points.positions + (np.array(points.origin) - own)) @ turn.T + move, normals, _bytes(points.colors),
+                            {name: values.astype(np.float32) for name, values in points.scalars.items()},
+                            str(points.notes.get("crs", "")))
+
+
+def _turned(normals: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    return normals @ np.linalg.inv(turn) if np.linalg.det(turn) else normals
+
+
+def _to_file(obj: bpy.types.Object, scene: bpy.types.Scene) -> tuple[np.ndarray, np.ndarray]:
+    """(3, 3) and (3,): an evaluated object's coordinates → those of the file that it came from, or of the world."""
     shared = origin.shared_of(obj.original, scene)
     to_file = np.linalg.inv(origin.axes_of(obj.original))
     own = np.array(obj.original.get(origin.PROPERTY, to_file @ shared), np.float64)
@@ -107,12 +146,20 @@ def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> 
     if at_place and np.allclose(turn, np.eye(3), rtol=0, atol=1e-6):
         turn = np.eye(3)
     together = any(shared) or origin.SHARED in obj.original
-    move = own if at_place else to_file @ (shared + place) if together else own + to_file @ place
+    return turn, own if at_place else to_file @ (shared + place) if together else own + to_file @ place
+
+
+def _read(obj: bpy.types.Object, data: bpy.types.ID, scene: bpy.types.Scene) -> exporters.Points | None:
+    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    local = attributes.positions(data, count) if count else None
+    if local is None:
+        return None
+    turn, move = _to_file(obj, scene)
     positions = local.astype(np.float64) @ turn.T + move
     normals = attributes.normals(data, count, obj.patina.normal_attribute)
     colors = attributes.colors(data, count, obj.patina.color_attribute)
     if normals is not None:
-        normals = normals @ np.linalg.inv(turn) if np.linalg.det(turn) else normals
+        normals = _turned(normals, turn)
     return exporters.Points(positions, normals, _bytes(colors), _scalars(data, count),
                             str(obj.original.data.get("patina_crs", "")))
 

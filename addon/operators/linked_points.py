@@ -12,12 +12,12 @@ from bpy_extras.io_utils import ExportHelper
 
 from .. import exporters, importers, jobs, native
 from ..importers import origin
-from ..sync import files, linked
+from ..sync import edits, files, linked
 from . import export_points
 
 
 class PATINA_OT_linked_to_mesh(Operator):
-    """Read the linked file's points into Blender, to edit them"""
+    """Read the linked file's points into Blender, to edit them; those that were deleted stay out"""
 
     bl_idname = "object.patina_linked_to_mesh"
     bl_label = "Convert to Mesh"
@@ -30,21 +30,20 @@ class PATINA_OT_linked_to_mesh(Operator):
 
     def execute(self, context: Context) -> set[str]:
         obj, notices = context.object, []
-        source = linked.source_of(obj, context.scene.frame_current, notices)
-        for notice in notices:
-            self.report({'WARNING' if source else 'ERROR'}, f"Patina: {notice}")
-        if source is None:
-            return {'CANCELLED'}
         try:
-            module = importers.reader(source.path)
-            points = jobs.run(lambda: module.read(source.path, importers.Filter(), importers.Progress()), lambda: None,
-                              lambda: False)
+            points = export_points.read_linked(obj, context.scene.frame_current, notices)
         except native.PatinaError as error:
             self.report({'ERROR'}, importers.told(f"Patina: {error}"))
+            return {'CANCELLED'}
+        for notice in notices:
+            self.report({'WARNING' if points else 'ERROR'}, f"Patina: {notice}")
+        if points is None:
             return {'CANCELLED'}
         box = obj.data
         obj.data = importers.to_mesh(points)
         files.assign(obj, "")
+        if edits.PROPERTY in obj:
+            del obj[edits.PROPERTY]
         if not box.users:
             bpy.data.meshes.remove(box)
         return {'FINISHED'}

@@ -10,8 +10,9 @@ import bpy
 from bpy.types import Context, Object, Operator, Scene
 from mathutils import Vector
 
+from .. import importers, jobs, native
 from ..engine import PatinaRenderEngine
-from ..sync import attributes
+from ..sync import attributes, clouds, linked
 
 START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender begins with
 LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a cube beside it 1.5
@@ -34,7 +35,7 @@ def _as_it_came(obj: Object) -> bool:
 
 def unlit(scene: Scene, points: Sequence[Object]) -> bool:
     """Whether points without colours, which lights shade, get light of none."""
-    dark = [obj for obj in points if not obj.patina.linked_file and not _colored(obj)]
+    dark = [obj for obj in points if not (_linked_colored(obj, scene) if obj.patina.linked_file else _colored(obj))]
     return bool(dark) and not scene.patina.studio.use_light and not any(_reaches(lamp, obj) for obj in dark for lamp in scene.objects
                                                                        if lamp.type == 'LIGHT' and not lamp.hide_render)
 
@@ -42,6 +43,15 @@ def unlit(scene: Scene, points: Sequence[Object]) -> bool:
 def _colored(obj: Object) -> bool:
     return any(name in obj.data.attributes for name in attributes.COLOR_NAMES) or bool(
         getattr(obj.data, "color_attributes", None) and obj.data.color_attributes.active_color)
+
+
+def _linked_colored(obj: Object, scene: Scene) -> bool:
+    """A file that cannot be read needs no light."""
+    source = linked.source_of(obj, scene.frame_current, [])
+    try:
+        return source is None or jobs.finish(clouds.CACHE.obtain_linked(source, importers.Progress())).has_colors
+    except (native.PatinaError, OSError):
+        return True
 
 
 def _reaches(lamp: Object, obj: Object) -> bool:

@@ -18,6 +18,7 @@ from .clips import PatinaClipProperties
 from .colors import PatinaColorProperties
 from .effects import PatinaEffectsProperties
 from .lines import PatinaLinesProperties
+from .points import PatinaPointsProperties, PatinaScanProperties
 from .sequence import PatinaSequenceProperties
 from .studio import PatinaStudioProperties
 from .style import PatinaStyleProperties
@@ -284,6 +285,7 @@ class PatinaObjectProperties(PropertyGroup):
         description="Point file that is drawn in place of the object's own vertices; its points never become Blender's. "
                     "Number signs in its name stand for digits: scan_####.ply shows a file a frame")
     sequence: PointerProperty(type=PatinaSequenceProperties, override=_OVERRIDE)
+    points: PointerProperty(type=PatinaPointsProperties, override=_OVERRIDE)
     cast_shadows: BoolProperty(
         name="Cast", override=_OVERRIDE, default=True, description="These points throw shadows")
     receive_shadows: BoolProperty(
@@ -339,7 +341,7 @@ class PatinaViewLayerProperties(PropertyGroup):
                     "layers behind opaque surfaces too")
 
 
-_CLASSES = (PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
+_CLASSES = (PatinaScanProperties, PatinaPointsProperties, PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
             PatinaLinesProperties, PatinaColorProperties, PatinaClipProperties, PatinaSceneProperties,
             PatinaObjectProperties, PatinaViewLayerProperties, PatinaWorldProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties),

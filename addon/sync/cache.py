@@ -8,12 +8,12 @@ from pathlib import Path
 
 from . import kept
 
-_KEPT = ("*.cloud", "*.json", "*-packed.*")
+_KEPT = ("*.cloud", "*.json", "*.scan", "*-packed.*")
 
 
 def held() -> tuple[int, int]:
     """Clouds and packed files in it, and the bytes of all."""
-    return sum(path.suffix != ".json" for path in _files()), sum(path.stat().st_size for path in _files())
+    return sum(path.suffix not in {".json", ".scan"} for path in _files()), sum(path.stat().st_size for path in _files())
 
 
 def clear() -> tuple[int, int]:

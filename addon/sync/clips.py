@@ -35,12 +35,17 @@ def collect(depsgraph: bpy.types.Depsgraph) -> list[Clip]:
         obj = instance.object
         if not cuts(obj):
             continue
-        group = obj.patina.clip
-        matrix = instance.matrix_world @ _box(obj) if group.shape == 'BOX' else instance.matrix_world
-        clips.append(Clip(
-            world_from_clip=row_major(matrix), shape=enum_number(group, "shape") - 1, cut=int(group.cut),
-            tint=tuple(group.tint), tint_strength=group.tint_strength, tint_width=group.tint_width))
+        clips.append(of_object(obj, instance.matrix_world))
     return clips
+
+
+def of_object(obj: bpy.types.Object, place: Matrix) -> Clip:
+    """Of an object that cuts, evaluated or not; place: its matrix in the world."""
+    group = obj.patina.clip
+    matrix = place @ _box(obj) if group.shape == 'BOX' else place
+    return Clip(
+        world_from_clip=row_major(matrix), shape=enum_number(group, "shape") - 1, cut=int(group.cut),
+        tint=tuple(group.tint), tint_strength=group.tint_strength, tint_width=group.tint_width)
 
 
 def of_view(region_3d: bpy.types.RegionView3D) -> list[Clip]:

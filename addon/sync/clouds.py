@@ -18,7 +18,7 @@ from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, estimates, images, linked, losses, materials, meshes, roles
+from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, roles
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -140,6 +140,7 @@ class CloudItem:
     role: str = roles.SEEN
     name: str = ""  # of the object
     asset: str = ""  # of its topmost parent
+    edits: edits.State = edits.State()
 
 
 class CloudCache:
@@ -287,7 +288,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
-            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj)))
+            edited = edits.state_of(obj) if link else edits.State()
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
@@ -295,6 +297,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     CACHE.trim(used)
     meshes.CACHE.trim(used)
     images.CACHE.trim()
+    notices += filter(None, [edits.notice(item.name, item.edits, item.cloud) for item in items
+                             if isinstance(item, CloudItem) and item.edits and isinstance(item.cloud, native.Cloud)])
     estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
                     if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
     notices += unknown.notices()

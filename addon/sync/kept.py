@@ -39,8 +39,8 @@ def folder() -> Path:
     return beside
 
 
-def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], list[float]]:
-    """Origin, scanners and units of a kept cloud. ValueError or OSError where they are not there as they were written."""
+def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], list[float], dict[str, Any] | None]:
+    """Origin, scanners, units and scans of a kept cloud. ValueError or OSError where they are not there as they were written."""
     notes = json.loads(path.read_text("utf-8"))
     if not isinstance(notes, dict):
         raise ValueError(f"{path} holds no object")
@@ -48,7 +48,10 @@ def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], lis
     units = _numbers(notes.get("units") or [1.0, 1.0])
     if len(origin) != 3 or len(scanners) % 3 or len(units) != 2:
         raise ValueError(f"{path} lacks what belongs to it")
-    return tuple(origin), scanners, units
+    scans = notes.get("scans", False)
+    if scans is not None and not (isinstance(scans, dict) and isinstance(scans.get("name"), str) and len(_numbers(scans.get("numbers"))) > 1):
+        raise ValueError(f"{path} does not say of which scans its points are")
+    return tuple(origin), scanners, units, scans
 
 
 def _numbers(values: Any) -> list[float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import bpy
@@ -22,6 +22,10 @@ from .colors import scalar_name
 from .losses import Loss
 
 Corner = tuple[float, float, float]
+
+SCAN_ENDING = ".scan"
+SCAN_NAMES = (analysis.SCAN, "point_source_id")  # of the attributes that say which scan a point is of
+MOST_SCANS = 1024  # that the library grades
 
 
 @dataclass(frozen=True)
@@ -40,12 +44,21 @@ class Source:
 
 
 @dataclass(frozen=True)
+class Scans:
+    """Which scan each point is of, by an attribute of the file; written beside the cloud, a uint16 for each point: index into numbers."""
+
+    name: str
+    numbers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class Linked:
     cloud: native.Cloud
     origin: Corner  # float64; the cloud is relative to it
     box: tuple[Corner, Corner]
     scanners: list[float]  # x, y, z of each, relative to origin
     units: tuple[float, float] = (1.0, 1.0)  # metres of the file's, across and up
+    scans: Scans | None = None  # None: one, or it is not said
 
 
 def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
@@ -99,7 +112,9 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     """The same in steps."""
     notes = source.kept.with_suffix(".json")
     try:
-        found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes))
+        found = _linked(native.Cloud.open(source.kept), *kept.read_notes(notes), source.kept)
+        if found.scans and found.cloud.scan_file.stat().st_size != 2 * found.cloud.count:
+            raise ValueError("which scans the points are of is damaged")
         os.utime(source.kept)  # used just now
         kept.CHECKS.start(source.identity(), source.kept)
         return found
@@ -108,6 +123,7 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     parts = 3 if source.analyzed else 2
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
     seen_by = [points.scalars.get(name) for name in (analysis.SCAN, analysis.ROW, analysis.COLUMN)]
+    scans, scan_of = _scans(points.scalars)
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
@@ -135,12 +151,14 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         task = cloud.start_save(source.kept)
         yield task
         task.result()
-        notes.write_text(json.dumps({"origin": origin, "scanners": scanners, "units": units}), "utf-8")
+        if scans:
+            scan_of.tofile(source.kept.with_suffix(SCAN_ENDING))
+        notes.write_text(json.dumps({"origin": origin, "scanners": scanners, "units": units, "scans": scans and asdict(scans)}), "utf-8")
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
-    return _linked(cloud, origin, scanners, units)
+    return _linked(cloud, origin, scanners, units, scans and asdict(scans), source.kept)
 
 
 def _tidy(newest: Path) -> None:
@@ -151,7 +169,8 @@ def _tidy(newest: Path) -> None:
         total += size
         if total > preferences.cache_bytes() and path != newest:
             path.unlink()
-            path.with_suffix(".json").unlink(missing_ok=True)
+            for ending in (".json", SCAN_ENDING):
+                path.with_suffix(ending).unlink(missing_ok=True)
 
 
 def _column(points: importers.PointFile, name: str) -> np.ndarray | None:
@@ -165,8 +184,28 @@ def _classes(points: importers.PointFile) -> np.ndarray | None:
     return None if values is None else attributes.as_classes(values)
 
 
-def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, units: list[float] | None) -> Linked:
-    return Linked(cloud, origin, cloud.box, scanners or [], tuple(units or (1.0, 1.0)))
+def _scans(scalars: dict[str, np.ndarray]) -> tuple[Scans | None, np.ndarray | None]:
+    """What a file says of its points' scans, where it has several."""
+    name = next((name for name in SCAN_NAMES if name in scalars), "")
+    values = scalars.get(name)
+    if values is None or not len(values) or not (values.min() >= 0 and values.max() <= 65535):
+        return None, None
+    whole = values.astype(np.uint16)
+    numbers = np.flatnonzero(np.bincount(whole, minlength=1))
+    if not 1 < len(numbers) <= MOST_SCANS or (whole != values).any():
+        return None, None
+    places = np.zeros(65536, np.uint16)
+    places[numbers] = np.arange(len(numbers))
+    return Scans(name, tuple(numbers.tolist())), places[whole]
+
+
+def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, units: list[float] | None,
+            scans: dict | None, place: Path) -> Linked:
+    known = Scans(scans["name"], tuple(scans["numbers"])) if scans else None
+    if known:
+        cloud.scan_file = place.with_suffix(SCAN_ENDING)
+        cloud.scan_name, cloud.scan_numbers = known.name, known.numbers
+    return Linked(cloud, origin, cloud.box, scanners or [], tuple(units or (1.0, 1.0)), known)
 
 
 def box_mesh(name: str, box: tuple[Corner, Corner]) -> bpy.types.Mesh:

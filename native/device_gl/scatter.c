@@ -360,7 +360,7 @@ int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *c
                const atomic_int *cancel)
 {
     static struct pt_buffer none;
-    struct pt_buffer *rest[] = {buffers[0], &none, buffers[2], buffers[3], buffers[4], buffers[5]};
+    struct pt_buffer *rest[] = {buffers[0], &none, buffers[2], buffers[3], buffers[4], buffers[5], buffers[6]};
     int result = pt_gl_kernel_program(d, PT_KERNEL_sift, 0, "");
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, PT_KERNEL_sift, argument_size, rest, count);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "clip.h"
+#include "mask.h"
 
 #include <math.h>
 #include <string.h>
@@ -82,6 +83,7 @@ struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_
     const patina_cloud_info *info = &instance->cloud->info;
     struct pt_sieve sieve = { .instance = instance, .clips = room };
     sieve.hiding_shapes = pt_hidden_shapes(instance, sieve.hidden_shapes);
+    sieve.mask = pt_mask_of(instance);
     for (int k = 0; k < 8; k++)
         sieve.hiding |= info->has_classes && (instance->style.hidden_classes[k] & info->class_bits[k]);
     for (int keeps = 1; keeps >= 0 && !instance->style.clip_off; keeps--) {
@@ -163,14 +165,16 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
 {
     struct pt_division found = { 0 };
     double linear[9], object[3], origin[3];
-    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes)
+    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes && !sieve->mask)
         return PT_WHOLE; // of most scenes all are
     int by_class = sieve->hiding ? hides(sieve->instance->style.hidden_classes, chunk->classes) : 0;
     int by_shape = sieve->hiding_shapes ? hides(sieve->hidden_shapes, chunk->shapes) : 0, kept = !sieve->keeping;
-    if (by_class == 1 || by_shape == 1)
+    const enum pt_masked masked = sieve->mask ? sieve->mask->chunks[chunk - sieve->instance->cloud->chunks] : PT_MASKED_NONE;
+    if (by_class == 1 || by_shape == 1 || masked == PT_MASKED_ALL)
         return PT_CUT_AWAY;
     found.by_class = by_class != 0;
     found.by_shape = by_shape != 0;
+    found.by_mask = masked == PT_MASKED_SOME;
     pt_split_matrix(sieve->instance->style.world_from_object, linear, object);
     pt_apply(linear, chunk->origin, origin);
     for (int k = 0; k < 3; k++)
@@ -185,7 +189,7 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
             return PT_CUT_AWAY;
     if (division)
         *division = found;
-    return found.count || found.by_class || found.by_shape ? PT_DIVIDED : PT_WHOLE;
+    return found.count || found.by_class || found.by_shape || found.by_mask ? PT_DIVIDED : PT_WHOLE;
 }
 
 void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What clips, hidden classes and hidden shapes leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
+// What clips, hidden classes, hidden shapes and masks leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
 #ifndef PT_CLIP_H
 #define PT_CLIP_H
 
@@ -21,14 +21,15 @@ struct pt_sieve {
     int hiding;  // some class that the cloud has is hidden
     uint32_t hidden_shapes[8]; // what pt_hidden_shapes says
     int hiding_shapes;
+    const struct patina_mask *mask; // that hides some of its points, or NULL
 };
 
 enum pt_side { PT_CUT_AWAY, PT_DIVIDED, PT_WHOLE };
 
-// How a divided chunk is divided: by which of the sieve's clips, and whether by class or shape.
+// How a divided chunk is divided: by which of the sieve's clips, and whether by class, shape or mask.
 struct pt_division {
     uint32_t count, keeps;
-    int by_class, by_shape;
+    int by_class, by_shape, by_mask;
 };
 
 // Which of the bytes from PT_SHAPE_SIGHT_SHIFT on of a shape the style hides, as sift_args has them. 0: none, or the cloud
@@ -40,7 +41,7 @@ int pt_is_marked(const struct pt_instance *instance);
 // The sieve of an instance. room: for the scene's clips, kept by the sieve.
 struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance,
                               struct pt_inverse_clip *room);
-// entries: room for the sieve's clips; may be NULL, as may division. Written where the chunk is divided.
+// chunk: one of the cloud's. entries: room for the sieve's clips; may be NULL, as may division. Written where the chunk is divided.
 enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
                             struct pt_division *division);
 

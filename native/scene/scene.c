@@ -2,6 +2,7 @@
 #include "scene.h"
 
 #include "clip.h"
+#include "mask.h"
 #include "kernel_args.h"
 
 #include <float.h>
@@ -106,6 +107,11 @@ static int check_color(const patina_scene *scene, patina_cloud_style *style, con
     if (!(style->least_certainty >= 0.0f && style->least_certainty <= 1.0f))
         return fail(scene, "cloud style: least_certainty must be within 0 and 1");
     style->contrast = style->contrast == 0.0f ? 1.0f : style->contrast;
+    if (style->mask && (style->mask->handle.magic != PT_MAGIC || style->mask->of != cloud->alive))
+        return fail(scene, "cloud style: the mask is destroyed, or of another cloud");
+    if (style->grade && (style->grade->handle.magic != PT_MAGIC || style->grade->of != cloud->alive ||
+                         style->grade->size != cloud->slots * pt_color_size(cloud->color_format)))
+        return fail(scene, "cloud style: the grade is destroyed, of another cloud, or of other colours");
     return PATINA_OK;
 }
 

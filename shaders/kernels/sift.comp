@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: which points of divided chunks are drawn: those that clips, hidden classes and hidden shapes leave; twin of
+// sift: which points of divided chunks are drawn: those that clips, hidden classes, hidden shapes and masks leave; twin of
 // native/device_cpu/kernels/sift.c
 //
 // A workgroup takes a chunk, an invocation PT_SLOTS_A_WORD of its points at a time.
@@ -15,6 +15,7 @@ layout(std430, binding = 3) readonly buffer classes_block { uint classes[]; }; /
 layout(std430, binding = 4) readonly buffer clips_block { clip_view clips[]; };
 layout(std430, binding = 5) writeonly buffer drawn_block { uint drawn[]; };
 layout(std430, binding = 6) readonly buffer shapes_block { uint shapes[]; };
+layout(std430, binding = 7) readonly buffer mask_block { uint mask[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
@@ -62,6 +63,8 @@ void main()
                 cut = cut || inside(k, p);
             bits |= keep && !cut ? 1u << i : 0u;
         }
+        if (args.by_mask != 0u)
+            bits &= ~mask[chunk.first / PT_SLOTS_A_WORD + w];
         drawn[chunk.sifted - 1u + w] = bits;
     }
 }

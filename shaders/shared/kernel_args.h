@@ -203,13 +203,14 @@ struct clip_view {
     float tint[3], strength, width;
 };
 
-// sift: which points are drawn. A hidden class takes them all, a hidden shape too; of clips: in one that keeps, if there are
+// sift: which points are drawn. A hidden class takes them all, a hidden shape and the mask too; of clips: in one that keeps, if there are
 // any, in none that cuts. Bit-equal everywhere, as scatter is.
 struct sift_args {
     uint32_t by_class;  // 1: classes are there, and some are hidden
     uint32_t hidden[8]; // bit c % 32 of word c / 32: class c
     uint32_t by_shape;  // 1: shapes are there, and some are hidden
     uint32_t hidden_shapes[8]; // likewise, of the byte from PT_SHAPE_SIGHT_SHIFT on
+    uint32_t by_mask;   // 1: the mask is there: a word of each PT_SLOTS_A_WORD slots of the cloud, bit i: slot i is hidden
 };
 
 // scatter: points -> least key a pixel. [D 3.1]; behind a layer only points with z > limit at their pixel count. [D 5]

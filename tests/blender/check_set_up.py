@@ -36,6 +36,22 @@ def test_set_up_after_the_first_import():
     check((picture > 0.2).mean() > 0.1, f"{(picture > 0.2).mean():.0%} of the picture is bright")
 
 
+def test_set_up_lights_linked_scans():
+    """The same survey, linked: its box says nothing of colours, the file does."""
+    scene = start_scene()
+    obj, = import_ply(gray("linked_gray.ply", 100.0), link=True)
+    check(set_up.unlit(scene, [obj]), "a lamp of a kilowatt does not reach")
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'} and scene.patina.studio.use_headlight, "no headlight")
+    scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
+    picture = render()["Combined"][..., :3].max(axis=2)
+    check((picture > 0.2).mean() > 0.1, f"{(picture > 0.2).mean():.0%} of the picture is bright")
+    scene = start_scene()
+    obj, = import_ply(write_ply("linked_colored.ply", columns((500, 500, 0))), link=True)
+    check(not set_up.unlit(scene, [obj]), "colours need no light")
+    (SCRATCH / "linked_colored.ply").unlink()
+    check(not set_up.unlit(scene, [obj]), "a missing file needs none")
+
+
 def test_set_up_leaves_what_is_lit():
     scene = start_scene()
     obj, = import_ply(gray("small_gray.ply", 1.0))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on's tests that need a window:
 
-    xvfb-run -a -s "-screen 0 1280x800x24" blender --factory-startup --python tests/blender/test_window.py [-- NAME ...]
+    xvfb-run -a -s "-screen 0 1280x800x24" blender --enable-event-simulate --factory-startup --python tests/blender/test_window.py [-- NAME ...]
 
 NAME figures measures instead (figures.py); long_session is for long_session.py. A test is a generator: it yields what it
 waits for, a function that says whether it has come.
@@ -24,6 +24,7 @@ def tests():
     import check_drawn
     import check_newcomer
     import check_overlays
+    import check_view_edits
     import check_viewport
     import check_viewport_life
     import check_viewport_samples
@@ -34,7 +35,7 @@ def tests():
     if names == ["figures"]:
         import figures
         yield "figures", figures.orbit_figures
-    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_newcomer)
+    modules = (check_viewport, check_viewport_life, check_viewport_samples, check_overlays, check_drawn, check_view_edits, check_newcomer)
     for name, test in [item for module in modules for item in vars(module).items()]:
         if name.startswith("test_") and (not names or any(part in name for part in names)):
             yield name.removeprefix("test_"), test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: boxes that keep and cut, planes, hidden classes, hidden shapes; degenerate and huge ones. Bits are equal on every device.
+// sift: boxes that keep and cut, planes, hidden classes, hidden shapes, masks; degenerate and huge ones. Bits are equal on every device.
 #include "harness.h"
 
 #include <math.h>
@@ -15,6 +15,7 @@ struct setup {
     float *positions;
     uint8_t *classes;
     uint32_t *shapes;
+    uint32_t *mask; // a word of each 16 slots: the upper half says nothing here
 };
 
 static struct setup make(struct harness *h, struct rng *rng)
@@ -41,6 +42,9 @@ static struct setup make(struct harness *h, struct rng *rng)
         s.classes[i] = (uint8_t)(rng_below(rng, 4) ? rng_below(rng, 8) : rng_below(rng, 256));
     for (uint32_t i = 0; i < s.slots; i++)
         s.shapes[i] = (uint32_t)rng_next(rng); // kinds and bits that no analysis writes as well
+    s.mask = harness_alloc(h, s.slots / 4);
+    for (uint32_t i = 0; i < s.slots / 16; i++)
+        s.mask[i] = (uint32_t)rng_next(rng);
     return s;
 }
 
@@ -80,15 +84,15 @@ static void check(struct harness *h, const struct setup *s)
     struct pt_buffer *classes = harness_buffer(h, s->classes, (s->slots + 3) / 4 * 4);
     struct pt_buffer *clips = harness_buffer(h, s->clips, (s->clip_count ? s->clip_count : 1) * sizeof *s->clips);
     struct pt_buffer *drawn = harness_buffer(h, before, 4 * (size_t)(s->words + 1));
-    struct pt_buffer *shapes = harness_buffer(h, s->shapes, 4 * (size_t)s->slots);
-    HARNESS_RUN(h, sift, &s->args, chunks, positions, classes, clips, drawn, shapes);
+    struct pt_buffer *shapes = harness_buffer(h, s->shapes, 4 * (size_t)s->slots), *mask = harness_buffer(h, s->mask, s->slots / 4);
+    HARNESS_RUN(h, sift, &s->args, chunks, positions, classes, clips, drawn, shapes, mask);
     uint32_t *got = harness_read(h, drawn);
     size_t open = 0, points = 0, kept = 0;
     for (uint32_t c = 0; c < CHUNKS; c++) {
         const struct chunk_view *chunk = &s->chunks[c];
         for (uint32_t i = 0; i < chunk->count && chunk->sifted; i++, points++) {
             int bit = got[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u;
-            enum ref_truth expected = ref_sift(&s->args, chunk, s->positions, s->classes, s->shapes, s->clips, i);
+            enum ref_truth expected = ref_sift(&s->args, chunk, s->positions, s->classes, s->shapes, s->mask, s->clips, i);
             open += expected == REF_UNSURE;
             kept += (size_t)bit;
             if (expected != REF_UNSURE && bit != (expected == REF_YES))
@@ -153,6 +157,28 @@ static void shape_words(struct harness *h)
     }
 }
 
+// Bits at random, none and all of them, by themselves and beside all else.
+static void masks(struct harness *h)
+{
+    for (uint64_t seed = 0; seed < 6; seed++) {
+        struct rng rng = {seed + 60};
+        struct setup s = make(h, &rng);
+        s.args.by_mask = 1;
+        for (uint32_t i = 0; i < s.slots / 16 && seed >= 4; i++)
+            s.mask[i] = seed == 4 ? 0xFFFF0000u : 0xFFFFu; // all selected and none hidden; the reverse
+        if (seed == 2 || seed == 3)
+            add_clips(&s, &rng, 1, 2, 0.7);
+        s.args.by_class = s.args.by_shape = seed == 3;
+        for (int k = 0; k < 8; k++) {
+            s.args.hidden[k] = (uint32_t)rng_next(&rng);
+            s.args.hidden_shapes[k] = (uint32_t)rng_next(&rng);
+        }
+        check(h, &s);
+        s.args.by_mask = 0; // then it does not count
+        check(h, &s);
+    }
+}
+
 // Boxes as small and as large as float32 has them, around points far from the chunk's origin; NaN where infinities meet.
 static void extremes(struct harness *h)
 {
@@ -169,14 +195,15 @@ static void extremes(struct harness *h)
         }
         for (uint32_t k = 0; k < s.clip_count; k++) // sums overflow: no float64 says what; devices agree
             s.clips[k].row[0] = s.clips[k].row[4] = s.clips[k].row[8] = INFINITY;
-        struct pt_buffer *buffers[6] = {harness_buffer(h, s.chunks, sizeof s.chunks),
+        struct pt_buffer *buffers[7] = {harness_buffer(h, s.chunks, sizeof s.chunks),
                                         harness_buffer(h, s.positions, 12 * (size_t)s.slots),
                                         harness_buffer(h, s.classes, (s.slots + 3) / 4 * 4),
                                         harness_buffer(h, s.clips, sizeof s.clips), harness_buffer(h, NULL, 0),
-                                        harness_buffer(h, s.shapes, 4 * (size_t)s.slots)};
+                                        harness_buffer(h, s.shapes, 4 * (size_t)s.slots),
+                                        harness_buffer(h, s.mask, s.slots / 4)};
         uint32_t *zero = harness_alloc(h, 4 * (size_t)s.words);
         buffers[4] = harness_buffer(h, zero, 4 * (size_t)s.words);
-        harness_run(h, PT_KERNEL_sift, &s.args, sizeof s.args, buffers, 6);
+        harness_run(h, PT_KERNEL_sift, &s.args, sizeof s.args, buffers, 7);
         harness_same(h, "infinite", harness_read(h, buffers[4]), s.words, 4, 1, s.words);
     }
 }
@@ -189,27 +216,31 @@ static void sanity(struct harness *h)
     const float points[3 * 16] = {[0] = 2.9f, [1] = 3.1f, [2] = 0.0f, [32 + 2] = 1.5f};
     struct chunk_view chunk = {.count = 3, .padded = 16, .clip_count = 1, .clip_keeps = 1};
     struct sift_args args = {0};
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, clips, 0) == REF_YES);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, clips, 1) == REF_NO);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, clips, 2) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, clips, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, clips, 1) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, clips, 2) == REF_YES);
     chunk.clip_count = 2; // cuts what lies above z = 1
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, clips, 2) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, clips, 2) == REF_NO);
     clips[0].shape = PT_CLIP_CUT;
     chunk.clip_keeps = 0;
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, clips, 1) == REF_YES);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, clips, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, clips, 1) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, clips, 0) == REF_NO);
     const uint32_t shapes[] = {PT_KIND_STRAY << PT_SHAPE_KIND_SHIFT | 15u << PT_SHAPE_CERTAINTY_SHIFT,
                                15u << PT_SHAPE_CERTAINTY_SHIFT | PT_SHAPE_SEEN_THROUGH};
     args = (struct sift_args){.by_shape = 1, .hidden_shapes = {[(5 + 8 * 15) / 32] = 1u << (5 + 8 * 15) % 32}};
     chunk.clip_count = 0;
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, clips, 0) == REF_NO);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, clips, 1) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, NULL, clips, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, NULL, clips, 1) == REF_YES);
+    const uint32_t mask = 1u << 1 | 1u << 16; // hides point 1, selects point 0
+    args = (struct sift_args){.by_mask = 1};
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, &mask, clips, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, &mask, clips, 1) == REF_NO);
 }
 
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
         {"sanity", sanity, 1}, {"boxes and planes", shapes, 0}, {"hidden classes", classes, 0},
-        {"hidden shapes", shape_words, 0}, {"extreme sizes", extremes, 0}};
+        {"hidden shapes", shape_words, 0}, {"masks", masks, 0}, {"extreme sizes", extremes, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

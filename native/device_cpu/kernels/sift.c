@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: which points of divided chunks are drawn: those that clips, hidden classes and hidden shapes leave; twin of
+// sift: which points of divided chunks are drawn: those that clips, hidden classes, hidden shapes and masks leave; twin of
 // shaders/kernels/sift.comp
 //
 // Distances to a clip are sums of products in one written order, as scatter's: what is cut is cut on every device.
@@ -54,16 +54,18 @@ static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 {
     const struct sift *sift = context;
     const struct chunk_view *chunks = pt_cpu_data(sift->call, 0);
+    const struct sift_args *args = sift->call->arguments;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(sift->call); c++) {
         const struct chunk_view *chunk = &chunks[c];
         const float *positions = (const float *)pt_cpu_data(sift->call, 1) + 3 * (size_t)chunk->first;
         uint32_t *words = (uint32_t *)pt_cpu_data(sift->call, 4) + chunk->sifted - 1;
+        const uint32_t *mask = args->by_mask ? (const uint32_t *)pt_cpu_data(sift->call, 6) + chunk->first / PT_SLOTS_A_WORD : NULL;
         for (uint32_t first = 0; first < chunk->count && chunk->sifted; first += PT_SLOTS_A_WORD) {
             uint32_t word = 0;
             for (uint32_t i = 0; i < PT_SLOTS_A_WORD; i += PT_LANES)
                 word |= drawn(sift, chunk, positions, first + i) << i;
-            words[first / PT_SLOTS_A_WORD] = word;
+            words[first / PT_SLOTS_A_WORD] = mask ? word & ~mask[first / PT_SLOTS_A_WORD] : word;
         }
     }
 }

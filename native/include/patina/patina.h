@@ -75,6 +75,8 @@ typedef struct patina_device patina_device;
 typedef struct patina_cloud patina_cloud;
 typedef struct patina_mesh patina_mesh;
 typedef struct patina_texture patina_texture;
+typedef struct patina_mask patina_mask;
+typedef struct patina_grade patina_grade;
 typedef struct patina_scene patina_scene;
 typedef struct patina_frame patina_frame;
 typedef struct patina_file patina_file;
@@ -448,6 +450,9 @@ typedef struct patina_cloud_style {
     uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
     float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
     float largest_gap;            // world units; no disc is wider, whatever its radius; 0 = as wide as it is
+    const patina_mask *mask;      // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
+                                  // the scene or the next patina_scene_clear, as the cloud must; the grade too
+    const patina_grade *grade;    // of this cloud: its colours in place of the cloud's own. NULL = none
 } patina_cloud_style;
 
 enum patina_alpha {
@@ -856,4 +861,6 @@ PATINA_API void patina_task_destroy(patina_task *task); // waits; a cloud or fil
 #ifdef __cplusplus
 }
 #endif
+
+#include "points.h"
 #endif

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Single points of clouds: masks, grades of scans, picking. Bits are (count + 7) // 8 bytes, point i is bit i % 8 of byte i // 8."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from ctypes import byref, c_float
+
+import numpy as np
+
+from . import Cloud, Frame, Progress, Scene, _Handle, _handle_of, abi
+from .loader import PatinaError, check, library
+
+
+class Mask(_Handle):
+    """Which points of a cloud are hidden and which selected; None: none. Of this cloud alone, and never another one."""
+
+    _kind = "mask"
+
+    def __init__(self, cloud: Cloud, hidden: np.ndarray | None, selected: np.ndarray | None) -> None:
+        planes = [None if plane is None else np.ascontiguousarray(plane, np.uint8) for plane in (hidden, selected)]
+        super().__init__(cloud._handle, *(None if plane is None else plane.ctypes.data for plane in planes),
+                         (cloud.count + 7) // 8)
+
+
+class Grade(_Handle):
+    """A cloud's own colors, changed by scan. scans: (count,) uint16, or None: all are of the first. grades: gain, gamma, saturation
+    and temperature of each. PatinaError for a cloud without colors."""
+
+    _kind = "grade"
+
+    def __init__(self, cloud: Cloud, scans: np.ndarray | None, grades: Sequence[Sequence[float]]) -> None:
+        if scans is not None and (scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous):
+            raise PatinaError("scans are a uint16 for each point")
+        values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade) for grade in grades))
+        super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, len(grades),
+                         blame=(cloud._handle,))
+
+
+def pick(scene: Scene, instance: int, polygon: np.ndarray | None, frame: Frame | None = None, classes: Sequence[int] = (0,) * 8,
+         progress: Progress | None = None) -> np.ndarray:
+    """The bits of a scene's cloud that lie in an outline, (n, 2) pixels from the bottom left, or everywhere (None), and are drawn.
+    frame: the scene was rendered in it last, and only what it shows is picked. classes: eight words, all 0: any."""
+    corners = None if polygon is None else np.ascontiguousarray(polygon, np.float64)
+    desc = abi.Pick(instance=instance, polygon=None if corners is None else corners.ctypes.data,
+                    corners=0 if corners is None else len(corners), classes=tuple(classes))
+    bits = np.zeros((scene.clouds[instance].count + 7) // 8, np.uint8)
+    check(library().patina_scene_pick(scene._handle, frame._handle if frame else None, byref(desc), _handle_of(progress),
+                                      bits.ctypes.data, bits.nbytes), scene._handle, *([frame._handle] if frame else []))
+    return bits
+
+
+def highlight(frame: Frame, scene: Scene, pixels: np.ndarray, color: Sequence[float], strength: float) -> None:
+    """Mixes a linear color into those of a COMBINED plane's pixels, (height, width, 4) float32, that show selected points of the scene,
+    which the frame rendered last."""
+    values = (c_float * 3)(*color)
+    check(library().patina_frame_highlight(frame._handle, scene._handle, values, strength, pixels.ctypes.data, pixels.nbytes),
+          frame._handle)

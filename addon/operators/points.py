@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points of a linked cloud: selected, hidden, deleted, restored. All change a custom property of the object (sync/edits.py) and
+can be undone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.types import Context, Object, Operator
+
+from .. import importers, jobs, native
+from ..native.points import pick
+from ..sync import clips, clouds, edits, files, linked, sequence, style_of
+from ..sync.analyzing import ANALYSES
+
+HOW = (('SET', "Set", "Only these", 0), ('ADD', "Extend", "These too", 1), ('SUB', "Subtract", "Not these", 2),
+       ('AND', "Intersect", "Of the selected ones only these", 3))
+
+
+def editable(obj: Object | None) -> str:
+    """Why the points of an object cannot be edited; empty: they can."""
+    if obj is None or not obj.patina.linked_file:
+        return "the active object links no point file"
+    if obj.library or obj.mode != 'OBJECT':
+        return "the object belongs to another file" if obj.library else "only in Object Mode"
+    path = files.path_of(obj)
+    return "points of a sequence are others in every frame" if path and sequence.is_pattern(path) else ""
+
+
+def cloud_of(obj: Object, context: Context) -> native.Cloud:
+    """PatinaError where the file cannot be read."""
+    notices: list[str] = []
+    source = linked.source_of(obj, context.scene.frame_current, notices)
+    if source is None:
+        raise native.PatinaError(notices[0] if notices else "the file is missing")
+    return jobs.finish(clouds.CACHE.obtain_linked(source, importers.Progress()))
+
+
+def combine(how: str, old: edits.Bits, new: edits.Bits) -> edits.Bits:
+    return {'SET': lambda: new, 'ADD': lambda: old | new, 'SUB': lambda: old & ~new, 'AND': lambda: old & new}[how]()
+
+
+def write(obj: Object, changed: edits.Edits) -> None:
+    """Nothing at all where nothing is left of it."""
+    if any(changed.totals.values()):
+        obj[edits.PROPERTY] = changed.packed()
+    elif edits.PROPERTY in obj:
+        del obj[edits.PROPERTY]
+    obj.update_tag()
+
+
+class Editing:
+    """Beside bpy.types.Operator: change() says what becomes of an object's points."""
+
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        why = editable(context.object)
+        if why and hasattr(cls, "poll_message_set"):
+            cls.poll_message_set(why)
+        return not why
+
+    def execute(self, context: Context) -> set[str]:
+        obj = context.object
+        try:
+            with ANALYSES.drawing():
+                cloud = cloud_of(obj, context)
+                old = self._old(obj, cloud)
+                new = self.change(context, obj, cloud, old)
+        except (native.PatinaError, OSError) as error:
+            self.report({'ERROR'}, importers.told(f"Patina: '{obj.name}': {error}"))
+            return {'CANCELLED'}
+        if new is None:
+            return {'CANCELLED'}
+        write(obj, new)
+        self.report({'INFO'}, said(new))
+        return {'FINISHED'}
+
+    def _old(self, obj: Object, cloud: native.Cloud) -> edits.Edits:
+        try:
+            return edits.for_cloud(edits.packed_of(obj), cloud.count) or edits.none(cloud.count)
+        except edits.Damaged as damaged:
+            self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}: begun anew")
+            return edits.none(cloud.count)
+
+    def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits | None:
+        raise NotImplementedError
+
+
+def said(now: edits.Edits) -> str:
+    parts = [f"{total:,} {name}" for name, total in now.totals.items() if total]
+    return f"Of {now.count:,} points {', '.join(parts)}" if parts else f"All {now.count:,} points shown, none selected"
+
+
+def drawn_alone(context: Context, obj: Object, cloud: native.Cloud, work: Callable[[native.Scene], edits.Bits],
+                clip: clips.Clip | None = None) -> edits.Bits:
+    """work() on a scene of the object alone, without clips, or with one."""
+    found = obj.evaluated_get(context.evaluated_depsgraph_get())
+    style = replace(style_of(found, found.matrix_world), color_source=0, ramp=b"", clip_off=int(clip is None))
+    with native.Scene() as scene:
+        scene.add_cloud(cloud, mask=edits.mask_of(cloud, edits.state_of(obj)), **vars(style))
+        if clip:
+            scene.add_clip(**vars(clip))
+        return work(scene)
+
+
+class PATINA_OT_points_select_all(Editing, Operator):
+    """Select all points of a linked cloud that are not hidden, none, or the others"""
+
+    bl_idname = "object.patina_points_select_all"
+    bl_label = "Select All Points"
+
+    action: EnumProperty(name="Action", items=(('SELECT', "All", "", 0), ('DESELECT', "None", "", 1), ('INVERT', "Invert", "", 2)))
+
+    def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
+        if self.action == 'DESELECT':
+            return replace(old, selected=np.zeros_like(old.selected))
+        shown = drawn_alone(context, obj, cloud, lambda scene: pick(scene, 0, None))
+        return replace(old, selected=shown if self.action == 'SELECT' else shown & ~old.selected)
+
+
+def _clip_items(_self: Operator, context: Context | None) -> list[tuple]:
+    names = [obj.name for obj in context.scene.objects if obj.patina.clip.shape != 'NONE'] if context else []
+    _items[:] = [(name, name, "") for name in names] or [("", "None", "The scene has no clip")]
+    return _items
+
+
+_items: list[tuple] = []  # Blender keeps no reference to the texts
+
+
+class PATINA_OT_points_select_by(Editing, Operator):
+    """Select the points of a class, of a scan, or within a clip box or on the kept side of a clip plane"""
+
+    bl_idname = "object.patina_points_select_by"
+    bl_label = "Select Points By"
+
+    by: EnumProperty(name="By", items=(('CLASS', "Class", "", 0), ('SCAN', "Scan", "", 1), ('CLIP', "Clip", "", 2)))
+    how: EnumProperty(name="How", items=HOW)
+    number: IntProperty(name="Number", min=0, max=65535, description="Of the class, or the scan's as the file has it")
+    clip: EnumProperty(name="Clip", items=_clip_items, options={'SKIP_SAVE'})
+
+    def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
+        found = {'CLASS': self._of_class, 'SCAN': self._of_scan, 'CLIP': self._in_clip}[self.by](context, obj, cloud)
+        return replace(old, selected=combine(self.how, old.selected, found))
+
+    def _of_class(self, context: Context, obj: Object, cloud: native.Cloud) -> edits.Bits:
+        if self.number > 255 or not cloud.class_bits[self.number // 32] >> self.number % 32 & 1:
+            raise native.PatinaError(f"no point is of class {self.number}")
+        words = [0] * 8
+        words[self.number // 32] = 1 << self.number % 32
+        return drawn_alone(context, obj, cloud, lambda scene: pick(scene, 0, None, classes=words))
+
+    def _of_scan(self, context: Context, obj: Object, cloud: native.Cloud) -> edits.Bits:
+        scans = edits.scans_of(cloud)
+        if scans is None or self.number not in cloud.scan_numbers:
+            raise native.PatinaError(f"no point is of scan {self.number}" if cloud.scan_numbers else
+                                     "the file does not say which scans its points are of")
+        found = edits.of_flags(scans == cloud.scan_numbers.index(self.number))
+        return found & drawn_alone(context, obj, cloud, lambda scene: pick(scene, 0, None))
+
+    def _in_clip(self, context: Context, obj: Object, cloud: native.Cloud) -> edits.Bits:
+        found = context.scene.objects.get(self.clip)
+        if found is None or found.patina.clip.shape == 'NONE':
+            raise native.PatinaError("the scene has no such clip")
+        clip = clips.of_object(found, found.evaluated_get(context.evaluated_depsgraph_get()).matrix_world)
+        if found.patina.clip.shape == 'BOX':
+            clip = replace(clip, cut=0)
+        return drawn_alone(context, obj, cloud, lambda scene: pick(scene, 0, None), clip)
+
+
+class PATINA_OT_points_hide(Editing, Operator):
+    """Hide the selected points of a linked cloud, in views and final renders"""
+
+    bl_idname = "object.patina_points_hide"
+    bl_label = "Hide Selected Points"
+
+    unselected: BoolProperty(name="Unselected", default=False, description="Hide the others instead")
+
+    def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits | None:
+        which = edits.every(old.count) & ~old.selected if self.unselected else old.selected
+        if not which.any():
+            self.report({'INFO'}, "No point is selected")
+            return None
+        return replace(old, hidden=old.hidden | which & ~old.deleted, selected=old.selected & ~which)
+
+
+class PATINA_OT_points_reveal(Editing, Operator):
+    """Show the hidden points of a linked cloud again, and select them"""
+
+    bl_idname = "object.patina_points_reveal"
+    bl_label = "Reveal Hidden Points"
+
+    select: BoolProperty(name="Select", default=True, description="Select what comes back")
+
+    def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
+        return replace(old, hidden=np.zeros_like(old.hidden), selected=old.hidden & ~old.deleted if self.select else old.selected)
+
+
+class PATINA_OT_points_delete(Editing, Operator):
+    """Delete the selected points of a linked cloud: they are gone from pictures and exports. The file itself stays as it is"""
+
+    bl_idname = "object.patina_points_delete"
+    bl_label = "Delete Selected Points"
+
+    def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits | None:
+        if not old.selected.any():
+            self.report({'INFO'}, "No point is selected")
+            return None
+        return replace(old, deleted=old.deleted | old.selected, selected=np.zeros_like(old.selected))
+
+
+class PATINA_OT_points_restore(Editing, Operator):
+    """Bring the deleted points of a linked cloud back, and select them"""
+
+    bl_idname = "object.patina_points_restore"
+    bl_label = "Restore Deleted Points"
+
+    def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
+        return replace(old, deleted=np.zeros_like(old.deleted), selected=old.deleted & ~old.hidden)
+
+
+class PATINA_OT_points_forget(Operator):
+    """Show all points as the file has them: none is hidden, deleted or selected any more"""
+
+    bl_idname = "object.patina_points_forget"
+    bl_label = "Forget All Edits"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.object is not None and edits.PROPERTY in context.object and not context.object.library
+
+    def execute(self, context: Context) -> set[str]:
+        del context.object[edits.PROPERTY]
+        context.object.update_tag()
+        return {'FINISHED'}
+
+
+_CLASSES = (PATINA_OT_points_select_all, PATINA_OT_points_select_by, PATINA_OT_points_hide, PATINA_OT_points_reveal,
+            PATINA_OT_points_delete, PATINA_OT_points_restore, PATINA_OT_points_forget)
+
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Select points of linked clouds in a view, by box or lasso: an operator that draws its outline, and two tools that begin it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import gpu
+import numpy as np
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty
+from bpy.types import Context, Event, Object, Operator, OperatorMousePath, WorkSpaceTool
+from gpu_extras.batch import batch_for_shader
+
+from .. import native, render, sync, viewport
+from ..native.points import pick
+from ..sync import clouds, edits
+from . import points
+from .points import HOW, Editing
+
+STEP = 3.0  # pixels between two corners of a lasso
+MOST = 4000  # corners
+_HOW = {(False, False): 'SET', (True, False): 'ADD', (False, True): 'SUB', (True, True): 'AND'}  # by Shift and Ctrl
+LINE = (1.0, 1.0, 1.0, 0.9)
+FILL = (1.0, 1.0, 1.0, 0.06)
+
+
+def _view(context: Context) -> sync.View:
+    """What the picture is that outlines are drawn on: the 3D view's; without one, as scripts have none, the final render's."""
+    if context.region_data and context.space_data and context.space_data.type == 'VIEW_3D':
+        return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
+    depsgraph = context.evaluated_depsgraph_get()
+    camera = context.scene.camera
+    return sync.final_view(camera and camera.evaluated_get(depsgraph), depsgraph)
+
+
+def _describe(context: Context) -> sync.SceneDescription:
+    """The scene as the view shows it, its clouds built, light and lines left out: what stands where is all that is asked."""
+    depsgraph, view, notices = context.evaluated_depsgraph_get(), _view(context), []
+    drawing = viewport.of_area(context.area)
+    trusted = drawing.trusted if drawing else sync.Trusted()
+    space = context.space_data if context.region_data else None
+
+    def visible(instance: bpy.types.DepsgraphObjectInstance) -> bool:
+        obj = instance.parent if instance.is_instance else instance.object
+        return space is None or obj.visible_in_viewport_get(space)
+
+    items = clouds.collect(depsgraph, trusted.take(notices), notices, visible)
+    description = sync.describe_items(depsgraph, view, notices, items)
+    with native.Progress() as progress:
+        built = [replace(item, cloud=cloud) for item in description.clouds
+                 if (cloud := points.jobs.finish(item.cloud.resolve(progress)))]
+    clips = sync.view_clips(context.region_data) if space else []
+    return replace(description, clouds=built, clips=[*description.clips, *clips], lights=[], headlight=None, lines=None, shadow_file="",
+                   panorama=None, settings=replace(description.settings, pixel_samples=1))
+
+
+def points_in(context: Context, names: set[str], outline: np.ndarray, through: bool) -> dict[str, edits.Bits]:
+    """Of the objects of these names that the view shows: which points an outline, (n, 2) pixels of the view, holds. PatinaError."""
+    description = _describe(context)
+    found: dict[str, edits.Bits] = {}
+    device = render.device_for(description.device)
+    with native.Scene() as scene:
+        render.describe(scene, description, ["COMBINED"])
+        frame = None if through else native.Frame(device)
+        try:
+            if frame:
+                frame.render(scene)
+            for index, item in enumerate(description.clouds):
+                if item.name in names:
+                    bits = pick(scene, index, outline, frame)
+                    found[item.name] = found[item.name] | bits if item.name in found else bits  # of instances each
+        finally:
+            if frame:
+                frame.close()
+    return found
+
+
+def targets(context: Context) -> list[Object]:
+    """The selected objects whose points can be edited, or the active one."""
+    chosen = {obj.name_full: obj for obj in [context.object, *context.selected_objects] if obj and not points.editable(obj)}
+    return list(chosen.values())
+
+
+class PATINA_OT_points_select(Operator):
+    """Select points of linked clouds by drawing a box or a lasso around them. Shift extends the selection, Ctrl subtracts from it, \
+both intersect"""
+
+    bl_idname = "object.patina_points_select"
+    bl_label = "Select Points"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    shape: EnumProperty(name="Shape", items=(('BOX', "Box", "", 0), ('LASSO', "Lasso", "", 1)))
+    # not of the last time: keys and the panel say them
+    how: EnumProperty(name="How", items=HOW, options={'SKIP_SAVE'})
+    through: BoolProperty(name="Through", default=False, options={'SKIP_SAVE'},
+                          description="Points that others hide too; else only those that the view shows")
+    path: CollectionProperty(type=OperatorMousePath, options={'SKIP_SAVE', 'HIDDEN'})  # corners; of a box two
+
+    poll = Editing.poll
+
+    def execute(self, context: Context) -> set[str]:
+        outline = self._outline()
+        if outline is None:
+            self.report({'ERROR'}, "Patina: an outline has at least three corners, a box two")
+            return {'CANCELLED'}
+        objects = targets(context)
+        try:
+            with points.ANALYSES.drawing():
+                found = points_in(context, {obj.name_full for obj in objects}, outline, self.through)
+        except (native.PatinaError, sync.CameraError) as error:
+            self.report({'ERROR'}, points.importers.told(f"Patina: {error}"))
+            return {'CANCELLED'}
+        told = []
+        for obj in objects:
+            if obj.name_full not in found:
+                continue  # not in this view
+            bits = found[obj.name_full]
+            count = points.cloud_of(obj, context).count
+            try:
+                old = edits.for_cloud(edits.packed_of(obj), count) or edits.none(count)
+            except edits.Damaged as damaged:
+                self.report({'WARNING'}, f"Patina: '{obj.name}': {damaged}: begun anew")
+                old = edits.none(count)
+            new = replace(old, selected=points.combine(self.how, old.selected, bits))
+            points.write(obj, new)
+            told.append(points.said(new))
+        self.report({'INFO'}, "; ".join(told) or "The view shows no points of the object")
+        return {'FINISHED'}
+
+    def _outline(self) -> np.ndarray | None:
+        places = np.array([tuple(item.loc) for item in self.path], np.float64).reshape(-1, 2)
+        if self.shape == 'LASSO':
+            return places if len(places) >= 3 else None
+        if len(places) < 2:
+            return None
+        (x0, y0), (x1, y1) = places.min(axis=0), places.max(axis=0)
+        return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+
+    # ---- in a view
+
+    def invoke(self, context: Context, event: Event) -> set[str]:
+        if context.area is None or context.area.type != 'VIEW_3D' or context.region.type != 'WINDOW':
+            self.report({'ERROR'}, "Patina: points are selected in a 3D view")
+            return {'CANCELLED'}
+        self._corners: list[tuple[float, float]] = []
+        self._place = self._at(context, event)
+        self._asked = self.properties.is_property_set("how")  # by a script
+        self._keys = (event.shift, event.ctrl)
+        if not self.properties.is_property_set("through"):
+            shading = context.space_data.shading
+            self.through = context.object.patina.points.through or getattr(shading, "show_xray", False) and shading.type == 'SOLID'
+        if event.type in {'LEFTMOUSE', 'EVT_TWEAK_L'} and event.value in {'PRESS', 'CLICK_DRAG'}:  # a tool: the button is held
+            start = (event.mouse_prev_press_x - context.region.x, event.mouse_prev_press_y - context.region.y) \
+                if event.value == 'CLICK_DRAG' else self._place
+            self._corners = [start]
+        context.window.cursor_modal_set('CROSSHAIR')
+        context.workspace.status_text_set("Drag around points. Shift: extend, Ctrl: subtract, both: intersect, X: through "
+                                          "what is before them, Esc: end")
+        self._region = context.region
+        self._drawing = context.space_data.draw_handler_add(self._draw, (), 'WINDOW', 'POST_PIXEL')
+        context.window_manager.modal_handler_add(self)
+        context.area.tag_redraw()
+        return {'RUNNING_MODAL'}
+
+    def _at(self, context: Context, event: Event) -> tuple[float, float]:
+        return (float(event.mouse_x - context.region.x), float(event.mouse_y - context.region.y))
+
+    def modal(self, context: Context, event: Event) -> set[str]:
+        context.area.tag_redraw()
+        self._place = self._at(context, event)
+        if event.type in {'ESC', 'RIGHTMOUSE'}:
+            self._end(context)
+            return {'CANCELLED'}
+        if event.type == 'X' and event.value == 'PRESS':
+            self.through = not self.through
+        if event.type == 'LEFTMOUSE' and event.value == 'PRESS':
+            self._corners = [self._place]
+        elif event.type == 'MOUSEMOVE' and self._corners:
+            self._extend()
+        elif event.type == 'LEFTMOUSE' and event.value == 'RELEASE' and self._corners:
+            self._extend(last=True)
+            self._end(context)
+            if not self._asked:  # keys that were held when it began, or are now
+                self.how = _HOW[event.shift or self._keys[0], event.ctrl or self._keys[1]]
+            return self._finish(context)
+        return {'RUNNING_MODAL'}
+
+    def _extend(self, last: bool = False) -> None:
+        far = np.hypot(*np.subtract(self._place, self._corners[-1])) >= STEP
+        if self.shape == 'LASSO' and (far or last) and len(self._corners) < MOST:
+            self._corners.append(self._place)
+
+    def _finish(self, context: Context) -> set[str]:
+        corners = self._corners if self.shape == 'LASSO' else [self._corners[0], self._place]
+        (x0, y0), (x1, y1) = np.min(corners, axis=0), np.max(corners, axis=0)
+        if max(x1 - x0, y1 - y0) < STEP:  # a click: nothing is chosen, and what was stays with Shift and Ctrl
+            corners = [(x0, y0), (x0, y0), (x0, y0)]
+        self.path.clear()
+        for corner in corners:
+            self.path.add().loc = corner
+        return self.execute(context)
+
+    def _end(self, context: Context) -> None:
+        if self._drawing:
+            bpy.types.SpaceView3D.draw_handler_remove(self._drawing, 'WINDOW')
+        self._drawing = None
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+
+    def cancel(self, context: Context) -> None:
+        self._end(context)
+
+    def _draw(self) -> None:
+        if bpy.context.region != self._region or not self._corners:
+            return
+        (x0, y0), (x1, y1) = self._corners[0], self._place
+        corners = [*self._corners, self._place] if self.shape == 'LASSO' else [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+        shader = gpu.shader.from_builtin('UNIFORM_COLOR' if bpy.app.version >= (4, 0, 0) else '2D_UNIFORM_COLOR')
+        shader.bind()
+        gpu.state.blend_set('ALPHA')
+        if self.shape == 'BOX':
+            shader.uniform_float("color", FILL)
+            batch_for_shader(shader, 'TRI_FAN', {"pos": corners}).draw(shader)
+        shader.uniform_float("color", LINE)
+        batch_for_shader(shader, 'LINE_STRIP', {"pos": [*corners, corners[0]]}).draw(shader)
+        gpu.state.blend_set('NONE')
+
+
+# ---- tools -----------------------------------------------------------------------------------------------------------
+
+
+def _keys(shape: str) -> tuple:
+    select = PATINA_OT_points_select.bl_idname
+    held = ({}, {"shift": True}, {"ctrl": True}, {"shift": True, "ctrl": True})
+    return (
+        *((select, {"type": 'LEFTMOUSE', "value": 'CLICK_DRAG', **keys}, {"properties": [("shape", shape)]}) for keys in held),
+        ("object.patina_points_select_all", {"type": 'A', "value": 'PRESS'}, {"properties": [("action", 'SELECT')]}),
+        ("object.patina_points_select_all", {"type": 'A', "value": 'PRESS', "alt": True}, {"properties": [("action", 'DESELECT')]}),
+        ("object.patina_points_select_all", {"type": 'I', "value": 'PRESS', "ctrl": True}, {"properties": [("action", 'INVERT')]}),
+        ("object.patina_points_hide", {"type": 'H', "value": 'PRESS'}, {"properties": [("unselected", False)]}),
+        ("object.patina_points_hide", {"type": 'H', "value": 'PRESS', "shift": True}, {"properties": [("unselected", True)]}),
+        ("object.patina_points_reveal", {"type": 'H', "value": 'PRESS', "alt": True}, None),
+        ("object.patina_points_delete", {"type": 'X', "value": 'PRESS'}, None),
+        ("object.patina_points_delete", {"type": 'DEL', "value": 'PRESS'}, None),
+    )
+
+
+def _tool_settings(context: Context, layout: bpy.types.UILayout, _tool: WorkSpaceTool) -> None:
+    why = points.editable(context.object)
+    if why:
+        layout.label(text=why.capitalize(), icon='INFO')
+    else:
+        layout.prop(context.object.patina.points, "through", icon='XRAY')
+
+
+class PatinaSelectBox(WorkSpaceTool):
+    bl_space_type = 'VIEW_3D'
+    bl_context_mode = 'OBJECT'
+    bl_idname = "patina.points_box"
+    bl_label = "Select Points: Box"
+    bl_description = "Select points of linked clouds by box. Shift extends, Ctrl subtracts; H hides, X deletes"
+    bl_icon = "ops.generic.select_box"
+    bl_keymap = _keys('BOX')
+    draw_settings = staticmethod(_tool_settings)
+
+
+class PatinaSelectLasso(WorkSpaceTool):
+    bl_space_type = 'VIEW_3D'
+    bl_context_mode = 'OBJECT'
+    bl_idname = "patina.points_lasso"
+    bl_label = "Select Points: Lasso"
+    bl_description = "Select points of linked clouds by lasso. Shift extends, Ctrl subtracts; H hides, X deletes"
+    bl_icon = "ops.generic.select_lasso"
+    bl_keymap = _keys('LASSO')
+    draw_settings = staticmethod(_tool_settings)
+
+
+def register() -> None:
+    bpy.utils.register_class(PATINA_OT_points_select)
+    if not bpy.app.background:
+        bpy.utils.register_tool(PatinaSelectBox, separator=True, group=True)
+        bpy.utils.register_tool(PatinaSelectLasso, after={PatinaSelectBox.bl_idname})
+
+
+def unregister() -> None:
+    if not bpy.app.background:
+        bpy.utils.unregister_tool(PatinaSelectLasso)
+        bpy.utils.unregister_tool(PatinaSelectBox)
+    bpy.utils.unregister_class(PATINA_OT_points_select)

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What somebody did with single points of a cloud: which are hidden and which selected (mask.c), and other colours by scan (grade.c).
+// Both belong to instances, not to the cloud: several may show one cloud.
+#ifndef PT_MASK_H
+#define PT_MASK_H
+
+#include "scene.h"
+
+enum pt_masked { PT_MASKED_NONE, PT_MASKED_SOME, PT_MASKED_ALL }; // of a chunk's points: hidden
+
+struct patina_mask {
+    struct pt_handle handle;
+    struct pt_alive *alive; // its own, shared with the devices that hold its words
+    struct pt_alive *of;    // the cloud's
+    uint64_t word_count;    // of PT_SLOTS_A_WORD slots each
+    uint32_t *words;        // in chunk order: bit i: slot i is hidden, bit 16 + i: it is selected. Padding as what it repeats
+    uint8_t *chunks;        // pt_masked of each
+    int hides;              // some point is hidden
+    uint64_t hash;          // of what is hidden
+};
+
+struct patina_grade {
+    struct pt_handle handle;
+    struct pt_alive *alive, *of; // as a mask's
+    size_t size;
+    void *colors; // in chunk order, in the cloud's own format
+};
+
+// The instance's mask where it hides something, else NULL.
+static inline const struct patina_mask *pt_mask_of(const struct pt_instance *instance)
+{
+    const struct patina_mask *mask = instance->style.mask;
+    return mask && mask->hides ? mask : NULL;
+}
+
+// A handle's own pt_alive, counted once; NULL without memory.
+struct pt_alive *pt_alive_create(void);
+// The cloud's, counted once more.
+struct pt_alive *pt_alive_share(const struct patina_cloud *cloud);
+
+#endif
