@@ -18,11 +18,11 @@ class PATINA_PT_sampling(PatinaPanel, Panel):
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
         patina = context.scene.patina
-        for title, prefix in (("Viewport", "viewport_"), ("Render", "")):
+        for title, noise, samples in (("Viewport", "viewport_noise", "viewport_samples"), ("Render", "noise", "samples")):
             column = self.layout.column(align=True)
             column.label(text=title)
-            rows.automatic(column, patina, f"{prefix}noise", "Noise Threshold", "All Samples")
-            column.prop(patina, f"{prefix}samples", text="Most Samples" if getattr(patina, f"{prefix}noise") else "Samples")
+            rows.automatic(column, patina, noise, "Noise Threshold", "All Samples")
+            column.prop(patina, samples, text="Most Samples" if getattr(patina, noise) else "Samples")
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_sampling,))

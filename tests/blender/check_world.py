@@ -336,11 +336,11 @@ def test_what_is_not_known_is_named():
     picture = render()["Combined"]
     check_close(picture[0, 0, :3], (0.1, 0.2, 0.3), 1e-6, "the socket's own color")
     check(sum("Brick Texture" in text for _, text in reports) == 1, f"{reports}")
-    image = bpy.data.images.new("lost", 4, 4)
+    image = bpy.data.images.new("sky that is lost", 4, 4)
     image.source, image.filepath = 'FILE', "//nowhere.exr"
     world_with('ShaderNodeTexEnvironment', image=image)
     check_close(render()["Combined"][0, 0, :3], (1, 0, 1), 1e-6, "pink")
-    check(any("'lost'" in text for _, text in reports), f"{reports}")
+    check(any("'sky that is lost'" in text for _, text in reports), f"{reports}")
 
 
 def test_a_changed_picture_is_read_again():
