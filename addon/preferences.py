@@ -67,13 +67,15 @@ class PatinaPreferences(AddonPreferences):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        column = layout.column(heading="Caches")
+        column = layout.column()
+        column.label(text="Caches")
         column.prop(self, "cache_folder")
         column.prop(self, "cache_limit", text="Size (GB)")
         row = column.row()
         row.label(text=operators.cache_text())
         row.operator("patina.clear_cache")
-        column = layout.column(heading="Defaults")
+        column = layout.column()
+        column.label(text="Defaults")
         column.prop(self, "device")
         rows.automatic(column, self, "threads")
         rows.automatic(column, self, "memory_limit", text="Memory (GB)")

@@ -17,6 +17,8 @@ from .steps import Stepped
 WRITTEN = {NORMAL_NAME: ('FLOAT_VECTOR', "vector"), "spacing": ('FLOAT', "value"), "radius": ('FLOAT', "value"),
            "thickness": ('FLOAT', "value"), "kind": ('INT8', "value"), "certainty": ('FLOAT', "value")}
 
+VIEW_SENSOR = 36.0  # mm, half of what the lens of a 3D view shows the longer side of
+
 
 class PATINA_OT_analyze(Stepped, Operator):
     """Find out from the neighbors of each point how the surface lies there, and keep it in attributes: normal, spacing, \
@@ -89,7 +91,8 @@ def _write(data: bpy.types.ID, name: str, values: np.ndarray) -> None:
 
 
 class PATINA_OT_frame_points(Operator):
-    """Move the scene's camera, without turning it, so that the selected points fill its picture; strays far off do not count"""
+    """Move the scene's camera, and views that do not look through it, without turning them, so that the selected points fill \
+their pictures; strays far off do not count"""
 
     bl_idname = "object.patina_frame_points"
     bl_label = "Frame Points"
@@ -119,6 +122,7 @@ class PATINA_OT_frame_points(Operator):
         if camera.data.type == 'ORTHO':
             camera.data.ortho_scale = scale
         self._see(camera, place, corners)
+        _move_views(context, corners)
         return {'FINISHED'}
 
     def _see(self, camera: bpy.types.Object, place: Vector, corners: list[Vector]) -> None:
@@ -127,6 +131,22 @@ class PATINA_OT_frame_points(Operator):
         if camera.data.clip_end < far:
             camera.data.clip_end = 1.2 * far
             self.report({'INFO'}, f"Patina: the camera sees as far as {camera.data.clip_end:.4g} now")
+
+
+def _move_views(context: Context, corners: list[Vector]) -> None:
+    """The window's 3D views look at the corners' middle, from so far that they see all and as far as that takes."""
+    middle = sum(corners, Vector()) / len(corners)
+    radius = max((corner - middle).length for corner in corners)
+    for area in context.screen.areas if context.screen else ():
+        if area.type != 'VIEW_3D' or not radius:
+            continue
+        space = area.spaces.active
+        view = space.region_3d
+        if view.view_perspective == 'CAMERA':
+            continue
+        view.view_location = middle
+        view.view_distance = radius * max(space.lens / VIEW_SENSOR, 0.5) * 1.7
+        space.clip_end = max(space.clip_end, 2.0 * (view.view_distance + radius))
 
 
 def _has_points(obj: bpy.types.Object) -> bool:

@@ -329,6 +329,11 @@ def test_frame_points():
         picture = render()["Combined"][..., 3] > 0
         rows, columns = np.nonzero(picture)
         check(np.ptp(rows) > 0.7 * 120 and picture.any(), f"{np.ptp(rows)} of 120 rows")
+        views = [area.spaces.active.region_3d for area in bpy.context.screen.areas if area.type == 'VIEW_3D'] \
+            if bpy.context.screen else []
+        for view in views:
+            off = np.linalg.norm(np.array(view.view_location) - [3, 5, -7])
+            check(off < 0.1 and 1.5 < view.view_distance < 6, f"a view at {view.view_location[:]}, {view.view_distance:.1f} away")
         bpy.data.objects.remove(obj)
     clouds.CACHE.clear()
 
