@@ -143,6 +143,7 @@ def test_final_shows_each_step():
 
     put, stopped, write = passes.Shown.put, engine.PatinaRenderEngine._stopped, passes.write
     every = drawing.SHOWN_EVERY
+    bpy.context.preferences.view.render_display_type = 'NONE'  # a window of its own shows this scene: Blender 3.4 crashes when it goes
     drawing.SHOWN_EVERY = 0.0
 
     def watch(self, described, planes, show=True):
