@@ -143,7 +143,8 @@ def test_final_shows_each_step():
 
     put, stopped, write = passes.Shown.put, engine.PatinaRenderEngine._stopped, passes.write
     every = drawing.SHOWN_EVERY
-    bpy.context.preferences.view.render_display_type = 'NONE'  # a window of its own shows this scene: Blender 3.4 crashes when it goes
+    # without a window of its own: Blender 3.4 crashes when the scene that one shows is removed
+    bpy.context.preferences.view.render_display_type = 'NONE'
     drawing.SHOWN_EVERY = 0.0
 
     def watch(self, described, planes, show=True):
