@@ -52,6 +52,8 @@ def material_of(image, shader='ShaderNodeBsdfPrincipled', name="material", alpha
     for key, value in settings.items():
         setattr(texture, key, value)
     color = node.inputs["Base Color" if "Base Color" in node.inputs else "Color"]
+    if "Specular IOR Level" in node.inputs:  # from 4.0 on what shines takes its share of Cycles' diffuse color
+        node.inputs["Specular IOR Level"].default_value = 0.0
     tree.links.new(texture.outputs["Color"], color)
     tree.links.new(node.outputs[0], output.inputs["Surface"])
     if alpha:
