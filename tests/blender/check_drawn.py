@@ -14,7 +14,8 @@ from patina import viewport
 from patina.sync.analysis import SCANNERS
 from patina.ui import rows
 
-TABS = {"render": 'RENDER', "view_layer": 'VIEW_LAYER', "object": 'OBJECT', "data": 'DATA', "material": 'MATERIAL'}
+TABS = {"render": 'RENDER', "view_layer": 'VIEW_LAYER', "object": 'OBJECT', "data": 'DATA', "material": 'MATERIAL',
+        "world": 'WORLD'}
 DECORATOR, ARROW, PAD = 20, 20, 8  # beside a menu's text
 
 
@@ -75,6 +76,7 @@ def select(obj):
 def test_panels_are_drawn_without_errors():
     """Every panel of ours, in its tab or the sidebar, for objects of every kind, as they come and with every switch on."""
     scene = setup()
+    scene.world = bpy.data.worlds.new("drawn")
     held = objects()
     probes = [probe('PROPERTIES', 'WINDOW', tab) for tab in TABS] + [probe('VIEW_3D', 'UI', "", category) for category in ("Item", "Tool", "View")]
     try:
@@ -91,7 +93,7 @@ def test_panels_are_drawn_without_errors():
             for obj in held:
                 select(obj)
                 for tab, name in TABS.items():
-                    if tab in {"render", "view_layer"} and obj != held[0]:
+                    if tab in {"render", "view_layer", "world"} and obj != held[0]:
                         continue  # the same for all
                     try:
                         editor().spaces[0].context = name
@@ -136,6 +138,9 @@ def test_labels_fit_the_sidebar():
         obj.patina.colors.source = source
         for cls in sidebar():
             layout = Row()
+            obj.patina.linked_file = ""
+            if not cls.poll(context):
+                obj.patina.linked_file = "scan.ply"  # some are of linked clouds alone
             check(cls.poll(context), cls.__name__)
             cls.draw(Drawing(cls, layout), context)
             must(cls.bl_label, rows.LEAST - 2 * ARROW, cls.__name__)

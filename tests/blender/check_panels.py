@@ -110,7 +110,7 @@ class Row:
                 check(names[0] in owner.bl_rna.properties, f"{owner} has no {names[0]}")
                 text = options.get("text", owner.bl_rna.properties[names[0]].name)
             self.drawn.append((kind, owner, names[0] if names else "", text))
-            return type("Options", (), {})() if kind == "operator" else Row(self.drawn)
+            return type("Options", (), {})() if kind.startswith("operator") else Row(self.drawn)
         return call
 
 
