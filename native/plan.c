@@ -126,8 +126,8 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
     struct pt_plan *plan = builder->plan;
     struct fill_args args = {.view = pt_view_at(plan, level),
                              .phases = PT_FILL_BACKGROUND | (level && plan->discs_count ? 0 : PT_FILL_OCCLUDED),
-                             .iterations = level ? plan->iterations : plan->finest,
-                             .unfills = plan->fill != PATINA_FILL_CLOSED ? 0 : level ? plan->iterations : plan->finest,
+                             .iterations = plan->iterations,
+                             .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
                              .refined = plan->quality == PATINA_QUALITY_REFINED,
                              .least = least_distance(plan),
                              .least_share = least_share(plan, level)};
@@ -720,7 +720,6 @@ int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behi
     int error = pt_plan_view(scene, plan);
     if (plan->iterations > MAP_ITERATIONS)
         plan->iterations = MAP_ITERATIONS;
-    plan->finest = plan->iterations;
     if (!error && pt_plan_shows(plan)) {
         plan_surfaces(&builder);
         pt_plan_meshes(&builder, 0);

@@ -174,8 +174,6 @@ struct pt_plan {
     double spacing_px;      // local spacing on screen that 95% of the covered area stays below
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
-    uint32_t finest;        // of those at level 0: at least iterations
-    double apart_px;        // spacing of the sparsest points that are no discs, beside discs; 0: none
     int filled;             // some points around the picture are pixels, not discs
     uint32_t quality, fill; // as set, or as the error target chose them
     int map;                // of a light

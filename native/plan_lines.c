@@ -118,7 +118,7 @@ static void plan_ink(struct pt_builder *builder, struct ink_args args, const str
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count)
             continue;
-        args.view = pt_view_of(plan, instance, pt_fill_spread(plan) + pt_line_reach(plan));
+        args.view = pt_view_of(plan, instance, ((plan->iterations + 2) << plan->levels) + pt_line_reach(plan));
         args.instance = instance->args;
         add_ink(builder, &args, pt_buffer_of(PT_COLORS, i), targets);
     }

@@ -84,14 +84,9 @@ struct view_args pt_view_of(const struct pt_plan *plan, const struct pt_plan_ins
     return view;
 }
 
-uint32_t pt_fill_spread(const struct pt_plan *plan)
-{
-    return ((plan->iterations + 2) << plan->levels) + plan->finest - plan->iterations;
-}
-
 struct view_args pt_view_filled(const struct pt_plan *plan, const struct pt_plan_instance *instance)
 {
-    struct view_args view = pt_view_of(plan, instance, pt_fill_spread(plan));
+    struct view_args view = pt_view_of(plan, instance, (plan->iterations + 2) << plan->levels);
     const uint32_t *whole = plan->view.rect;
     for (int k = 0; k < 2; k++) {
         view.rect[k] = view.rect[k] > whole[k] ? view.rect[k] : whole[k];

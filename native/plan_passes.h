@@ -139,8 +139,6 @@ struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level);
 // The instance's rectangle, wider by what filling may carry its points.
 struct view_args pt_view_of(const struct pt_plan *plan, const struct pt_plan_instance *instance, uint32_t margin);
 // Where the instance may show once holes are filled: nothing is filled beyond the plan's rectangle.
-// How many pixels filling takes a surface beyond where it was measured, at most.
-uint32_t pt_fill_spread(const struct pt_plan *plan);
 struct view_args pt_view_filled(const struct pt_plan *plan, const struct pt_plan_instance *instance);
 
 #endif

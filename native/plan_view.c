@@ -350,7 +350,6 @@ struct survey {
     struct object *objects;
     struct seen **seen; // per instance
     uint32_t *seen_count;
-    double apart_px; // spacing of the sparsest chunk whose points are drawn as such
     int points, discs; // some chunk's points are drawn as such
 };
 
@@ -451,8 +450,6 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         seen.wide = scene->settings.surface == PATINA_SURFACE_SPLATS ||
                     disc_reach(scene, instance, object, chunk, apart, 0) * stretch > wide * pixel * rim;
         survey->points |= !seen.wide;
-        if (!seen.wide && !seen.away && seen.spacing_px > survey->apart_px)
-            survey->apart_px = seen.spacing_px;
         survey->discs |= seen.wide;
         list[survey->seen_count[i]++] = seen;
     }
@@ -761,7 +758,6 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     plan->filled = survey.points;
-    plan->apart_px = survey.discs ? survey.apart_px : 0.0;
     plan->reaches = plan->discs_count && knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
     plan->sigmas = knows_sigmas(scene);
     pt_choose_filling(scene, plan);

@@ -11,9 +11,6 @@ enum { DEFAULT_LAYERS = 8 };
 // Coarse levels at most where points that lie wide apart are discs: these have closed what is wider. On four virtual scans more
 // fill sky (34.6 % in place of 22.2) and show nothing truer; one loses 0.5 dB.
 enum { LEVELS_BESIDE_DISCS = 2 }; // of the caller's pixels
-// Coarse levels leave occluded pixels alone there, so that gaps of the sparsest points that are no discs, up to 2.8 pixels apart, are
-// closed by iterations: of a carved relief of 150,000 points 6 % of a patch showed what lies behind it at 4, next to nothing at 8.
-enum { BESIDE_DISCS = 8 };
 
 // Spacing on screen, pixels, from which on coarser levels help to fill. In maps of lights in perspective, which take two
 // iterations, 1.6% of an umbra stays lit at 1.65, where nothing does at 1.2; a sun at 2 degrees gets acne at 1.2.
@@ -33,7 +30,7 @@ void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
     double s = plan->spacing_px;
     plan->quality = settings->quality;
     plan->fill = settings->fill;
-    plan->levels = plan->iterations = plan->finest = 0;
+    plan->levels = plan->iterations = 0;
     if (settings->surface == PATINA_SURFACE_SPLATS) {
         plan->means = PT_MEANS_SPLATS;
         plan->expected = pt_expected_error(plan->means, s);
@@ -44,7 +41,7 @@ void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
     plan->means = pt_means_of(plan->quality, plan->fill);
     plan->expected = pt_expected_error(plan->means, s);
     if (plan->fill == PATINA_FILL_PAPER)
-        plan->iterations = plan->finest = asked ? asked : 1;
+        plan->iterations = asked ? asked : 1;
     if (plan->fill != PATINA_FILL_CLOSED)
         return;
     const double widest = plan->map && !scene->camera.orthographic ? WIDEST_OF_LAMPS : WIDEST;
@@ -52,7 +49,6 @@ void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
         if (++plan->levels >= (uint32_t)(most < PT_LEVELS ? most : PT_LEVELS - 1))
             break;
     plan->iterations = asked ? asked : s < 0.4 ? 1 : s < 0.65 ? 2 : s < 0.8 ? 3 : plan->levels || s < 1.5 ? 4 : 6;
-    plan->finest = asked || plan->apart_px < WIDEST ? plan->iterations : BESIDE_DISCS;
 }
 
 // An opaque scene has one layer, unless all are asked for as passes.
@@ -69,7 +65,7 @@ static uint32_t reach_of(const struct pt_plan *plan, const patina_settings *sett
 {
     uint32_t layer = 16;
     for (uint32_t level = 0; level <= plan->levels; level++)
-        layer += (4 * (level ? plan->iterations : plan->finest) + 3) << level;
+        layer += (4 * plan->iterations + 3) << level;
     return (plan->reopens ? plan->reopens : plan->layers) * layer + (settings->average ? (uint32_t)PT_AVERAGE_WIDEST + 1 : 0) +
            9 + 1 + 1 + pt_line_reach(plan);
 }
