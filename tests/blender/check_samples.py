@@ -58,7 +58,7 @@ def shown_steps(wanted=("COMBINED", "DEPTH")):
 
 def test_shown_from_the_first_on():
     """The first picture that is shown is that of one sample, with all its planes; later ones are nearer to the last."""
-    scene = scene_of(400)
+    scene = scene_of(1600)  # enough to be looked at a few times, on a busy machine too
     found, last = shown_steps()
     check(len(found) > 3, f"{len(found)} pictures were shown")
     check({"COMBINED", "DEPTH"} <= set(found[0]) and all(set(planes) == {"COMBINED"} for planes in found[1:]),
