@@ -198,4 +198,15 @@ static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], con
     return vf_min(vf_max(z, z_q), z_q + limit);
 }
 
+// Which of PT_LANES points face away.
+static inline vm pt_faces_away(const struct chunk_view *chunk, vi word, const vf p[3])
+{
+    vf n[3], v[3];
+    vf_decode_normal(word, n);
+    for (uint32_t k = 0; k < 3; k++)
+        v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * p[k];
+    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
+    return vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))));
+}
+
 #endif

@@ -235,16 +235,32 @@ int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt
 
 enum { ADD = 0, MEAN = 1, BAND_BYTES = 1 << 26, SUM_BYTES = 64 };
 
+// Room for the sums of as many rows as fit, at most `height`; bound.
+static int make_sums(struct pt_gl_device *d, uint32_t width, uint32_t height, const char *what, uint32_t *rows)
+{
+    const size_t most = d->block_size < BAND_BYTES ? d->block_size : BAND_BYTES;
+    *rows = (uint32_t)(most / SUM_BYTES / width);
+    *rows = *rows < 1 ? 1 : *rows < height ? *rows : height;
+    const size_t size = (size_t)*rows * width * SUM_BYTES;
+    const int result = pt_gl_scratch(d, PT_GL_SCRATCH_SUMS, size, 0);
+    return result == PATINA_OK ? pt_gl_bind(d, 1, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, size, what) : result;
+}
+
+static void clear_sums(struct pt_gl_device *d, uint32_t width, uint32_t rows)
+{
+    const uint32_t zero = 0;
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_SUMS].name);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)((size_t)rows * width * SUM_BYTES), GL_RED_INTEGER,
+                             GL_UNSIGNED_INT, &zero);
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+}
+
 static int blend_band(struct pt_gl_device *d, const struct blend_args *args, struct pt_buffer *const *buffers, uint32_t first,
                       uint32_t end, const atomic_int *cancel)
 {
-    const struct pt_gl_scratch *sums = &d->scratch[PT_GL_SCRATCH_SUMS];
-    const uint32_t zero = 0, width = args->view.width;
+    const uint32_t width = args->view.width;
     int result = PATINA_OK;
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, sums->name);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)((size_t)(end - first) * width * SUM_BYTES),
-                             GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    clear_sums(d, width, end - first);
     for (uint32_t step = 0; step < 3; step++) {
         const GLuint program = d->programs[PT_KERNEL_blend][step == 2 ? ADD + LARGE : step];
         d->gl.ProgramUniform1i(program, 3, (GLint)first);
@@ -258,17 +274,13 @@ static int blend_band(struct pt_gl_device *d, const struct blend_args *args, str
 int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt_buffer *const *buffers,
                 const atomic_int *cancel)
 {
-    const size_t most = d->block_size < BAND_BYTES ? d->block_size : BAND_BYTES;
-    const uint32_t width = args->view.width, height = args->view.height;
-    uint32_t rows = (uint32_t)(most / SUM_BYTES / width);
-    rows = rows < 1 ? 1 : rows < height ? rows : height;
+    const uint32_t height = args->view.height;
+    uint32_t rows = height;
     int result = disc_programs(d, PT_KERNEL_blend, ADD, "#define STEP 0\n");
     if (result == PATINA_OK)
         result = pt_gl_kernel_program(d, PT_KERNEL_blend, MEAN, "#define STEP 1\n#define LARGE 1\n");
     if (result == PATINA_OK)
-        result = pt_gl_scratch(d, PT_GL_SCRATCH_SUMS, (size_t)rows * width * SUM_BYTES, 0);
-    if (result == PATINA_OK)
-        result = pt_gl_bind(d, 1, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, (size_t)rows * width * SUM_BYTES, "blend");
+        result = make_sums(d, args->view.width, height, "blend", &rows);
     if (result == PATINA_OK)
         result = pt_gl_bind(d, 8, buffers[2]->name, 0, buffers[2]->size, "blend");
     if (result == PATINA_OK)
@@ -304,11 +316,8 @@ static int bind_average(struct pt_gl_device *d, const struct average_args *args,
 static int average_band(struct pt_gl_device *d, const struct average_args *args, const struct instance_buffers *b, uint32_t first,
                         uint32_t end, const atomic_int *cancel)
 {
-    const uint32_t zero = 0, width = args->view.width;
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_SUMS].name);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)((size_t)(end - first) * width * SUM_BYTES),
-                             GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    const uint32_t width = args->view.width;
+    clear_sums(d, width, end - first);
     for (uint32_t step = ADD; step <= MEAN; step++) {
         d->gl.ProgramUniform1i(d->programs[PT_KERNEL_average][step], 3, (GLint)first);
         d->gl.ProgramUniform1i(d->programs[PT_KERNEL_average][step], 4, (GLint)end);
@@ -320,23 +329,19 @@ static int average_band(struct pt_gl_device *d, const struct average_args *args,
 int pt_gl_average(struct pt_gl_device *d, const struct average_args *args, struct pt_buffer *const *buffers,
                   const atomic_int *cancel)
 {
-    const size_t most = d->block_size < BAND_BYTES ? d->block_size : BAND_BYTES;
-    const uint32_t width = args->view.width, last = args->view.rect[3];
+    const uint32_t begin = args->view.rect[1], last = args->view.rect[3];
     const struct instance_buffers b = {PT_KERNEL_average, 2, buffers[5], buffers[6], buffers[7], 0, 0};
-    uint32_t rows = (uint32_t)(most / SUM_BYTES / width);
-    if (args->view.rect[1] >= last || !buffers[5]->size)
+    uint32_t rows = 1;
+    if (begin >= last || !buffers[5]->size)
         return PATINA_OK;
-    rows = rows < 1 ? 1 : rows < last - args->view.rect[1] ? rows : last - args->view.rect[1];
     int result = pt_gl_kernel_program(d, PT_KERNEL_average, ADD, "#define STEP 0\n");
     if (result == PATINA_OK)
         result = pt_gl_kernel_program(d, PT_KERNEL_average, MEAN, "#define STEP 1\n");
     if (result == PATINA_OK)
-        result = pt_gl_scratch(d, PT_GL_SCRATCH_SUMS, (size_t)rows * width * SUM_BYTES, 0);
-    if (result == PATINA_OK)
-        result = pt_gl_bind(d, 1, d->scratch[PT_GL_SCRATCH_SUMS].name, 0, (size_t)rows * width * SUM_BYTES, "average");
+        result = make_sums(d, args->view.width, last - begin, "average", &rows);
     if (result == PATINA_OK)
         result = bind_average(d, args, buffers);
-    for (uint32_t y = args->view.rect[1]; y < last && result == PATINA_OK; y += rows)
+    for (uint32_t y = begin; y < last && result == PATINA_OK; y += rows)
         result = average_band(d, args, &b, y, y + rows < last ? y + rows : last, cancel);
     return result;
 }

@@ -5,11 +5,12 @@
 // of a chunk that lies across bands more than once, which takes less than sums of the whole picture would. The sums of a pixel lie
 // side by side, 32 bits wide, and are emptied into 64 before they could overflow.
 #include "device_cpu/kernels/shade.h"
+#include "device_cpu/kernels/sums.h"
 #include "device_cpu/rows.h"
 
 enum {
     BLOCK = 256,          // points
-    SUMS = 8,             // colour 3, weight, normal 3, and what none of them is above
+    SUMS = PT_SUMS,       // colour 3, weight, normal 3, and what none of them is above
     ROOM = SUMS - 1,
     FULL = 1 << 30,       // no term is above, so that a sum of more has to be emptied
     BAND_PIXELS = 1 << 16, // about
@@ -92,16 +93,6 @@ static inline int32_t floor_of(float a) { return (int32_t)a - (a < (float)(int32
 static inline int32_t at_least(int32_t a, int32_t least) { return a > least ? a : least; }
 static inline int32_t at_most(int32_t a, int32_t most) { return a < most ? a : most; }
 
-static inline vm faces_away(const struct chunk_view *chunk, vi word, const vf p[3])
-{
-    vf n[3], v[3];
-    vf_decode_normal(word, n);
-    for (uint32_t k = 0; k < 3; k++)
-        v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * p[k];
-    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
-    return vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))));
-}
-
 static inline void keep(struct block *block, const struct chunk_view *chunk, uint32_t i, const vf place[3], vf half, vi word,
                         uint32_t lanes)
 {
@@ -148,7 +139,7 @@ static void project(const struct average *average, const struct band *band, cons
             some = vm_and(some, vm_of_bits(drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
         const vi word = vi_load(surface + i);
         if (chunk->cull)
-            some = vm_and(some, vm_not(faces_away(chunk, word, p)));
+            some = vm_and(some, vm_not(pt_faces_away(chunk, word, p)));
         if (!vm_bits(some))
             continue;
         const vf spacing = vf_gather(average->args->instance.spacing, vi_shr(word, PT_SPACING_SHIFT), some);
@@ -318,34 +309,6 @@ static void add_wide(const struct average *average, struct band *band, const str
 
 // ---- means ----------------------------------------------------------------------------------------------------------------
 
-// A sum as a float, in steps that are the same everywhere.
-static float wide_sum(int64_t sum)
-{
-    const uint64_t size = sum < 0 ? 0 - (uint64_t)sum : (uint64_t)sum;
-    const float value = (float)(uint32_t)(size >> 32) * 4294967296.0f + (float)(uint32_t)size;
-    return sum < 0 ? -value : value;
-}
-
-static void sums_of(const struct band *band, size_t at, vm some, vf sums[SUMS])
-{
-    float lanes[PT_LANES];
-    if (!band->emptied) { // halves of pixels, colour and normal in turn
-        vf low[4], high[4];
-        vf_load4((const float *)(const void *)(band->sums + SUMS * at), low);
-        vf_load4((const float *)(const void *)(band->sums + SUMS * at) + 4 * PT_LANES, high);
-        for (uint32_t k = 0; k < 4; k++) {
-            sums[k] = vi_convert(vi_evens(vf_bits(low[k]), vf_bits(high[k])));
-            sums[4 + k] = vi_convert(vi_odds(vf_bits(low[k]), vf_bits(high[k])));
-        }
-        return;
-    }
-    for (uint32_t k = 0; k < SUMS; k++) {
-        for (uint32_t i = 0; i < PT_LANES; i++)
-            lanes[i] = vm_bits(some) >> i & 1u ? wide_sum(band->wide[SUMS * (at + i) + k] + band->sums[SUMS * (at + i) + k]) : 0.0f;
-        sums[k] = vf_load(lanes);
-    }
-}
-
 // On the side that the pixel's own normal lies on.
 static void mean_normal(const struct view_args *view, const vf sum[3], uint32_t x, uint32_t y, vm with, vf n[4])
 {
@@ -380,7 +343,8 @@ static void close_band(const struct average *average, const struct band *band)
             const vm ours = pt_of_instance(keys + at, &args->instance, pt_lanes_left(x, args->view.width), &id);
             if (!vm_bits(ours))
                 continue;
-            sums_of(band, (y - band->first) * average->stride + x, ours, sums);
+            const size_t first = SUMS * ((y - band->first) * average->stride + x);
+            pt_take_sums(band->sums + first, band->emptied ? band->wide + first : NULL, ours, sums);
             const vm reached = vm_and(ours, vf_le(one, sums[3]));
             const vf share = vf_rcp(vf_select(reached, sums[3], one));
             for (int k = 0; k < 3; k++)

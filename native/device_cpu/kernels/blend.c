@@ -5,8 +5,9 @@
 // Tile by tile. The sums of a pixel lie side by side, one vector whatever the level; they are 32 bits wide and emptied into
 // 64 before they could overflow.
 #include "bins.h"
+#include "sums.h"
 
-enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = 8 }; // colour 3, opacity, normal 3, weight
+enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = PT_SUMS }; // colour 3, opacity, normal 3, weight
 
 // That sums take before they are emptied: 2^31, less what float32 may count wrong.
 #define SUM_ROOM 2147352576.0f
@@ -176,34 +177,6 @@ static int load(struct tile *tile, const uint64_t *keys, const float *deff)
     return any;
 }
 
-// A sum as a float, in steps that are the same everywhere.
-static float wide_sum(int64_t sum)
-{
-    uint64_t size = sum < 0 ? 0 - (uint64_t)sum : (uint64_t)sum;
-    float value = (float)(uint32_t)(size >> 32) * 4294967296.0f + (float)(uint32_t)size;
-    return sum < 0 ? -value : value;
-}
-
-static void sums_of(const struct tile *tile, uint32_t pixel, vm some, vf sums[SUMS])
-{
-    float lanes[PT_LANES];
-    if (!tile->emptied) { // halves of pixels, colour and normal in turn
-        vf low[4], high[4];
-        vf_load4((const float *)(const void *)tile->sums[pixel], low);
-        vf_load4((const float *)(const void *)tile->sums[pixel] + 4 * PT_LANES, high);
-        for (uint32_t k = 0; k < 4; k++) {
-            sums[k] = vi_convert(vi_evens(vf_bits(low[k]), vf_bits(high[k])));
-            sums[4 + k] = vi_convert(vi_odds(vf_bits(low[k]), vf_bits(high[k])));
-        }
-        return;
-    }
-    for (uint32_t k = 0; k < SUMS; k++) {
-        for (uint32_t i = 0; i < PT_LANES; i++)
-            lanes[i] = vm_bits(some) >> i & 1u ? wide_sum(tile->wide[pixel + i][k] + tile->sums[pixel + i][k]) : 0.0f;
-        sums[k] = vf_load(lanes);
-    }
-}
-
 // Those of `some` whose points are discs; or discs of instances with normals.
 static vm of_discs(const struct pt_bins *bins, vi id, vm some, int normals)
 {
@@ -250,7 +223,7 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
             if (!vm_bits(some))
                 continue;
             vf sums[SUMS], color[4], n[4];
-            sums_of(tile, pixel, some, sums);
+            pt_take_sums(tile->sums[pixel], tile->emptied ? tile->wide[pixel] : NULL, some, sums);
             vm colored = vm_and(some, vf_le(one, sums[3]));
             vf share = vf_rcp(vf_select(colored, sums[3], one));
             for (int k = 0; k < 3; k++)

@@ -12,9 +12,8 @@ static void paint_row(void *context, uint32_t y)
     float *albedo = pt_cpu_data(call, 5);
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         const size_t at = (size_t)y * view->width + x;
-        vi index = vi_sub(vi_load_id(mesh_keys + at), vi_set(args->mesh.id_base));
-        vm ours = vm_and(vm_first(pt_lanes_left(x, view->rect[2])), vi_lt_unsigned(index, vi_set(args->mesh.id_count)));
-        ours = vm_and(ours, vm_not(vi_eq(vi_load_z(shown + at), vi_set(PT_KEY_EMPTY_Z))));
+        vi index;
+        const vm ours = pt_pixels_of_mesh(&args->mesh, shown, mesh_keys, at, pt_lanes_left(x, view->rect[2]), &index);
         if (!vm_bits(ours))
             continue;
         struct pt_triangle t;

@@ -71,17 +71,6 @@ static struct window window_of(const struct view_args *view)
                             .width = vi_set(view->width) };
 }
 
-// Which of PT_LANES points face away.
-static inline vm faces_away(const struct chunk_view *chunk, vi word, const vf p[3])
-{
-    vf n[3], v[3];
-    vf_decode_normal(word, n);
-    for (uint32_t k = 0; k < 3; k++)
-        v[k] = vf_set(chunk->eye[k]) - vf_set(chunk->eye[3]) * p[k];
-    vm away = vf_le((n[0] * v[0] + n[1] * v[1]) + n[2] * v[2], vf_zero());
-    return vm_and(away, vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))));
-}
-
 // 1. Pixels and depths of points [first, last). What their pixels hold is asked for: a chunk's first points find it in memory.
 static inline void project(const struct view_args *view, const struct window *w, struct target target,
                            const struct chunk_view *chunk, const float *positions, const uint32_t *surface, uint32_t first,
@@ -104,7 +93,7 @@ static inline void project(const struct view_args *view, const struct window *w,
         if (chunk->sifted)
             inside = vm_and(inside, vm_of_bits(target.drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
         if (chunk->cull)
-            inside = vm_and(inside, vm_not(faces_away(chunk, vi_load(surface + i), p)));
+            inside = vm_and(inside, vm_not(pt_faces_away(chunk, vi_load(surface + i), p)));
         vi column = vi_sub(vf_int(vf_floor(x)), w->origin_x), row = vi_sub(vf_int(vf_floor(y)), w->origin_y);
         uint32_t lanes = vm_bits(inside);
         vi_pack(block->pixel + count, vi_add(vi_mul(row, w->width), column), lanes);

@@ -14,6 +14,15 @@ struct pt_triangle {
     vm turned;           // its corners run clockwise
 };
 
+// Which of PT_LANES pixels from `at` on show the mesh; index: its triangles that they show.
+static inline vm pt_pixels_of_mesh(const struct mesh_args *mesh, const uint64_t *shown, const uint64_t *mesh_keys, size_t at,
+                                   uint32_t lanes, vi *index)
+{
+    *index = vi_sub(vi_load_id(mesh_keys + at), vi_set(mesh->id_base));
+    const vm ours = vm_and(vm_first(lanes), vi_lt_unsigned(*index, vi_set(mesh->id_count)));
+    return vm_and(ours, vm_not(vi_eq(vi_load_z(shown + at), vi_set(PT_KEY_EMPTY_Z))));
+}
+
 static inline vf pt_between(const struct pt_triangle *t, const float *vertices, uint32_t offset, vm lanes)
 {
     vf v[3];
