@@ -120,7 +120,7 @@ void pt_plan_tint(struct pt_builder *builder, enum pt_plane color)
                                   .id_base = instance->args.id_base,
                                   .id_count = instance->args.id_count,
                                   .clip_first = plan->clip_count,
-                                  .eye_z = scene->camera.orthographic ? (float)scene->camera.near_clip : 0.0f };
+                                  .eye_z = pt_eye_z(scene) };
         args.clip_count = clips_in_view(builder, instance->instance);
         if (args.clip_count)
             PT_REASON(PT_ADD(builder, tint, args,

@@ -151,7 +151,7 @@ static void plan_hatch(struct pt_builder *builder, enum pt_plane color)
     }
     struct hatch_args args = {.view = builder->plan->view,
                               .levels = effects->hatch_levels,
-                              .eye_z = scene->camera.orthographic ? (float)scene->camera.near_clip : 0.0f,
+                              .eye_z = pt_eye_z(scene),
                               .spacing = effects->hatch_spacing,
                               .width = 0.6f * effects->hatch_spacing,
                               .opacity = effects->hatch_opacity,

@@ -29,21 +29,17 @@ uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan
 // The camera as the instance's object has it: rows of its turn, and where it stands. 0 where the object is flat.
 static int look_from_object(const struct pt_builder *builder, const struct pt_instance *instance, double rows[9], double eye[3])
 {
-    double axes[9], position[3], linear[9], translation[3], cofactors[9], inverse[9], offset[3], size = 0.0;
+    double axes[9], position[3], linear[9], translation[3], inverse[9], offset[3], size = 0.0;
     pt_camera_axes(&builder->scene->camera, axes, position);
     pt_split_matrix(instance->style.world_from_object, linear, translation);
-    pt_cofactors(linear, cofactors);
-    const double determinant = pt_dot(linear, cofactors);
+    const double determinant = pt_invert(linear, inverse);
     for (int k = 0; k < 9; k++)
         size = fmax(size, fabs(linear[k]));
     if (!(fabs(determinant) > 1e-14 * size * size * size) || !isfinite(determinant))
         return 0;
     for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++)
-            inverse[3 * r + c] = cofactors[3 * c + r] / determinant;
-    for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++) // view to world: the axes' transpose
-            rows[3 * r + c] = inverse[3 * r] * axes[3 * c] + inverse[3 * r + 1] * axes[3 * c + 1] + inverse[3 * r + 2] * axes[3 * c + 2];
+            rows[3 * r + c] = pt_dot(inverse + 3 * r, axes + 3 * c);
     for (int k = 0; k < 3; k++)
         offset[k] = position[k] - translation[k];
     pt_apply(inverse, offset, eye);
@@ -72,7 +68,7 @@ static struct reopen_args *arguments_of(struct pt_builder *builder, uint32_t i, 
                                  .phase = phase,
                                  .discs = instance->discs,
                                  .stations = sights->count,
-                                 .eye_z = builder->scene->camera.orthographic ? (float)builder->scene->camera.near_clip : 0.0f};
+                                 .eye_z = pt_eye_z(builder->scene)};
     for (int k = 0; k < 9; k++)
         args->rows[k] = (float)rows[k];
     for (uint32_t s = 0; s < sights->count; s++) {

@@ -93,9 +93,7 @@ static void set_object(const struct camera *camera, const double world_from_obje
 {
     pt_split_matrix(world_from_object, object->linear, object->translation);
     pt_multiply(camera->axes, object->linear, object->view);
-    double cofactors[9], size = 0.0;
-    pt_cofactors(object->linear, cofactors);
-    double determinant = pt_dot(object->linear, cofactors);
+    double size = 0.0, determinant = pt_invert(object->linear, object->inverse);
     object->scale = 0.0;
     for (int c = 0; c < 3; c++) {
         double column[3] = { object->linear[c], object->linear[3 + c], object->linear[6 + c] };
@@ -103,9 +101,8 @@ static void set_object(const struct camera *camera, const double world_from_obje
     }
     size = object->scale * object->scale * object->scale;
     object->singular = !(fabs(determinant) > 1e-14 * size) || !(size > 0.0);
-    for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++)
-            object->inverse[3 * r + c] = object->singular ? 0.0 : cofactors[3 * c + r] / determinant;
+    if (object->singular)
+        memset(object->inverse, 0, sizeof object->inverse);
     double offset[3];
     for (int k = 0; k < 3; k++)
         offset[k] = camera->position[k] - object->translation[k];

@@ -19,6 +19,17 @@ double pt_determinant(const double m[9])
     return pt_dot(m, cofactors);
 }
 
+double pt_invert(const double m[9], double out[9])
+{
+    double cofactors[9];
+    pt_cofactors(m, cofactors);
+    const double determinant = pt_dot(m, cofactors);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            out[3 * r + c] = cofactors[3 * c + r] / determinant;
+    return determinant;
+}
+
 void pt_multiply(const double a[9], const double b[9], double out[9])
 {
     for (int r = 0; r < 3; r++)

@@ -25,17 +25,10 @@ static int invert_plane(const double linear[9], uint32_t cut, double inverse[9])
 // 0: flat, there is nothing in it.
 static int invert_box(const double linear[9], double inverse[9])
 {
-    double cofactors[9], sizes = 1.0;
-    pt_cofactors(linear, cofactors);
-    double determinant = pt_determinant(linear);
+    double sizes = 1.0, determinant = pt_invert(linear, inverse);
     for (int c = 0; c < 3; c++)
         sizes *= sqrt(linear[c] * linear[c] + linear[3 + c] * linear[3 + c] + linear[6 + c] * linear[6 + c]);
-    if (!(fabs(determinant) > 1e-12 * sizes) || !isfinite(sizes))
-        return 0;
-    for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++)
-            inverse[3 * r + c] = cofactors[3 * c + r] / determinant;
-    return 1;
+    return fabs(determinant) > 1e-12 * sizes && isfinite(sizes);
 }
 
 static int invert_clip(const patina_clip *clip, struct pt_inverse_clip *out)
