@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a device is: buffers, run(kernel, arguments), read back. Devices know kernels and no pipeline; arguments were
-// checked above (api.c, plan.c), kernels trust them.
+// checked above (api/, plan/), kernels trust them.
 #ifndef PT_DEVICE_H
 #define PT_DEVICE_H
 
-#include "error.h"
+#include "base/error.h"
 #include "kernel_args.h"
 
 #include <stdatomic.h>

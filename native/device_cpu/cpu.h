@@ -4,7 +4,7 @@
 #define PT_CPU_H
 
 #include "device.h"
-#include "pool.h"
+#include "base/pool.h"
 
 // Planes may be read this many bytes past their end (never written): vector loads at a row's end need no tail case.
 enum { PT_SLACK = 256 };

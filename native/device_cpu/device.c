@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The CPU device: buffers are memory, kernels are functions of the best level that the processor has.
-#include "color.h"
+#include "base/color.h"
 #include "cpu.h"
-#include "memory.h"
+#include "base/memory.h"
 #include "tables.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "color.h"
+#include "base/color.h"
 #include "device_gl.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // patina_file_*: opens files by mapping them, hands columns out. Formats are told apart by content, not by name.
 #include "file.h"
-#include "../progress.h"
+#include "base/progress.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -3,7 +3,7 @@
 #ifndef PT_FILE_H
 #define PT_FILE_H
 
-#include "../error.h"
+#include "base/error.h"
 
 #include <stdbool.h>
 

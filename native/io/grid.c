@@ -8,7 +8,7 @@
 // grows where sigma is large beside the way from cell to cell, until the slope is known to LOOSE.
 #include "file.h"
 
-#include "../progress.h"
+#include "base/progress.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -7,7 +7,7 @@
 // ushort 0..65535, float and double are linear. A Gaussian splat without colours has the sRGB colour of its base, the
 // constant term of its spherical harmonics (Kerbl et al., 3D Gaussian Splatting, 2023). What is no position, normal or
 // colour becomes an attribute; lists are left out.
-#include "../progress.h"
+#include "base/progress.h"
 #include "ply.h"
 
 #include <stdio.h>

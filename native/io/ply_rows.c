@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the readers of text rows and of byte rows share.
-#include "../progress.h"
+#include "base/progress.h"
 #include "number.h"
 #include "ply.h"
 

@@ -5,7 +5,7 @@
 // What a column is follows from its name, else from how many columns there are and what the first rows hold: 4: x y z
 // intensity; 6: x y z and colour bytes, or unit normals; 7: x y z intensity colour; 9: colour bytes and normals. What is
 // none of these becomes an attribute.
-#include "../progress.h"
+#include "base/progress.h"
 #include "file.h"
 #include "number.h"
 

@@ -3,9 +3,9 @@
 #include "beams.h"
 #include "free_space.h"
 #include "kernel_args.h"
-#include "memory.h"
+#include "base/memory.h"
 #include "orient.h"
-#include "progress.h"
+#include "base/progress.h"
 
 #include <math.h>
 #include <stdlib.h>

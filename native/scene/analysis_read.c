@@ -2,8 +2,8 @@
 // What an analysed cloud knows, back in the caller's order; neighbours themselves, and [S]'s radius and uncertainty from them.
 #include "analysis.h"
 #include "kernel_args.h"
-#include "memory.h"
-#include "progress.h"
+#include "base/memory.h"
+#include "base/progress.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Building a cloud: box -> Morton order -> chunks (strata, boxes, spacing) -> surface words and cones -> colours.
 #include "cloud.h"
-#include "color.h"
+#include "base/color.h"
 #include "kernel_args.h"
-#include "memory.h"
-#include "progress.h"
+#include "base/memory.h"
+#include "base/progress.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -4,8 +4,8 @@
 #ifndef PT_CLOUD_H
 #define PT_CLOUD_H
 
-#include "error.h"
-#include "pool.h"
+#include "base/error.h"
+#include "base/pool.h"
 #include "sights.h"
 
 #include <stdatomic.h>

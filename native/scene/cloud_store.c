@@ -5,8 +5,8 @@
 #include "analysis.h"
 #include "cloud.h"
 #include "fingerprint.h"
-#include "memory.h"
-#include "progress.h"
+#include "base/memory.h"
+#include "base/progress.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -2,7 +2,7 @@
 // What a cloud is, in 64 bits: shadow textures belong to points (SPEC 4), and files of them must know theirs again.
 // What a caller's arrays hold, so that a host can tell whether its points changed.
 #include "cloud.h"
-#include "error.h"
+#include "base/error.h"
 #include "fingerprint.h"
 
 #include <string.h>

@@ -4,8 +4,8 @@
 // of its samples. One grid at a time; every sum and minimum is of integers, so that threads do not show.
 #include "free_space.h"
 #include "kernel_args.h"
-#include "memory.h"
-#include "progress.h"
+#include "base/memory.h"
+#include "base/progress.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #include "mask.h"
 
 #include "kernel_args.h"
-#include "memory.h"
+#include "base/memory.h"
 
 #include <stdlib.h>
 

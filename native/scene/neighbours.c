@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neighbours.h"
-#include "memory.h"
-#include "progress.h"
+#include "base/memory.h"
+#include "base/progress.h"
 
 #include <float.h>
 #include <math.h>

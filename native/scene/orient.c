@@ -5,8 +5,8 @@
 #include "orient.h"
 #include "analysis.h"
 #include "kernel_args.h"
-#include "memory.h"
-#include "progress.h"
+#include "base/memory.h"
+#include "base/progress.h"
 
 #include <math.h>
 #include <stdlib.h>

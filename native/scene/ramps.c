@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Ramps by name: a few stops in sRGB, evenly spaced, straight between in sRGB; and the colours of LAS classes.
-#include "color.h"
-#include "error.h"
+#include "base/color.h"
+#include "base/error.h"
 
 #include <math.h>
 #include <string.h>

@@ -2,9 +2,9 @@
 // Collected are the nearest ranges; kept is, of each cell, the nearest of the 3 x 3 around it: whatever lies clearly before that
 // was looked through, for the beam beside it went on.
 #include "sights.h"
-#include "error.h"
+#include "base/error.h"
 #include "kernel_args.h"
-#include "memory.h"
+#include "base/memory.h"
 
 #include <math.h>
 #include <stdatomic.h>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures native/expected_curves.def: what a picture is off by, against the spacing of points on screen, for each way to
+"""Measures native/plan/expected_curves.def: what a picture is off by, against the spacing of points on screen, for each way to
 close a surface. Sphere and torus, points at random, lit; the worse of the two counts."""
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def curve(frame: native.Frame, means: str) -> list[tuple[float, dict[str, float]
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=ROOT / "native/expected_curves.def")
+    parser.add_argument("--out", type=Path, default=ROOT / "native/plan/expected_curves.def")
     options = parser.parse_args()
     frame = native.Frame(native.Device("cpu", 0))
     lines = [HEAD.format(size=SIZE)]

@@ -8,7 +8,7 @@
 
 #include <stdbool.h>
 
-enum { VERSION = 3, CHECKSUM = 24, BODY = 32 }; // of native/frame_shadow_file.c
+enum { VERSION = 3, CHECKSUM = 24, BODY = 32 }; // of native/run/frame_shadow_file.c
 
 static struct {
     patina_device *device;

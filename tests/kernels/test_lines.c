@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // lines: shares within the table, and bit by bit between devices; the pixel that each line belongs to, exactly.
 #include "harness.h"
-#include "plan_lines.h"
+#include "plan/lines.h"
 
 #include <math.h>
 #include <string.h>

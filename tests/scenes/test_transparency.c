@@ -2,9 +2,9 @@
 // Depth peeling and transparency against exact truth [D 4, 5], SPEC 3: three nested tori whose layers are known ray by ray,
 // parallel planes, opacities of exactly 0 and 1, and chunks that are left out for nothing to be missed.
 #include "clouds.h"
-#include "frame.h"
-#include "layers.h"
-#include "residency.h"
+#include "run/frame.h"
+#include "run/layers.h"
+#include "run/residency.h"
 #include "support.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Expected errors: the table is whole, what lies between its points lies between their values, and a target gets the
 // cheapest means that meets it.
-#include "expected.h"
-#include "plan.h"
+#include "plan/expected.h"
+#include "plan/plan.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The plan without a device: which passes a scene calls for, why the others are left out, what is culled, and that a
 // region decides as the whole picture does (DESIGN rule 3, SPEC 8).
-#include "plan.h"
+#include "plan/plan.h"
 #include "scenes/support.h"
 
 #include <math.h>

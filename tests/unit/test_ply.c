@@ -2,7 +2,7 @@
 // The PLY reader and writer through the public header: hand-made files in memory, then the shared collection where
 // there is one (folder PATINA_SHARED, else ../shared).
 #include "../../native/io/number.h"
-#include "../../native/progress.h"
+#include "../../native/base/progress.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

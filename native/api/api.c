@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Devices, frames and progress as callers see them: check, delegate. The other exported functions stand with what they
 // concern: scene/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
-#include "frame_samples.h"
-#include "progress.h"
+#include "run/frame_samples.h"
+#include "base/progress.h"
 
 #include <math.h>
 #include <stdlib.h>

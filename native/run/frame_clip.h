@@ -3,7 +3,7 @@
 #ifndef PT_FRAME_CLIP_H
 #define PT_FRAME_CLIP_H
 
-#include "plan.h"
+#include "plan/plan.h"
 
 struct pt_clip_buffers {
     struct pt_buffer clips; // of the plan at hand

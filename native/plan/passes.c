@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "plan_passes.h"
+#include "passes.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Clips, hidden classes, hidden shapes and masks. Chunks that they take whole are culled, chunks that they leave whole cost nothing; the points of
 // divided ones are sifted before scatter, into a word of bits for every PT_SLOTS_A_WORD of them. The cut may be tinted.
-#include "plan_passes.h"
+#include "passes.h"
 #include "scene/clip.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Long calls on threads of their own, for hosts that must go on meanwhile and start no threads themselves.
-#include "error.h"
+#include "base/error.h"
 #include "scene/analysis.h"
 #include "scene/fingerprint.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "plan_lines.h"
+#include "lines.h"
 
 #include <math.h>
 #include <string.h>

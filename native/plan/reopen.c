@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The passes that take back what was closed where a station looked through: what shows there is drawn a second time behind it, and
 // what closes it once more becomes what was measured. Planned only where a cloud's free space is asked for.
-#include "plan_passes.h"
+#include "passes.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Equirectangular pictures, joined from the six sides of a cube around the eye. Sides overlap by a guard band, in which
 // colours go over from one to the other: what image space decides differently in two views leaves no seam.
-#include "error.h"
-#include "pool.h"
+#include "base/error.h"
+#include "base/pool.h"
 
 #include <math.h>
 #include <stdlib.h>

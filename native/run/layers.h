@@ -3,7 +3,7 @@
 #ifndef PT_LAYERS_H
 #define PT_LAYERS_H
 
-#include "plan.h"
+#include "plan/plan.h"
 
 struct pt_tile { // as the TILES plane has it
     float least;      // limit; +inf: every pixel is finished

@@ -4,7 +4,7 @@
 #define PT_FRAME_SAMPLES_H
 
 #include "frame.h"
-#include "plan.h"
+#include "plan/plan.h"
 
 enum { PT_NOISE_SHIFTS = 4 }; // from so many pictures on their noise is told well enough to end them
 

@@ -90,7 +90,7 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
 // Says why a pass is left out; once, with the first layer.
 void pt_skip(struct pt_builder *builder, const char *name, const char *reason);
 
-// ---- effects: plan_effects.c --------------------------------------------------------------------------------------------
+// ---- effects: effects.c --------------------------------------------------------------------------------------------
 
 int pt_effects_want_normals(const struct patina_scene *scene);
 int pt_effects_want_albedo(const struct patina_scene *scene);
@@ -103,7 +103,7 @@ int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct 
 // On the picture.
 void pt_plan_paper(struct pt_builder *builder);
 
-// ---- meshes: plan_mesh.c -----------------------------------------------------------------------------------------------
+// ---- meshes: mesh.c -----------------------------------------------------------------------------------------------
 
 // Draws the meshes in view over the layer's filled points; shown: they are shaded, too.
 void pt_plan_meshes(struct pt_builder *builder, int shown);
@@ -111,18 +111,18 @@ void pt_plan_meshes(struct pt_builder *builder, int shown);
 void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color);
 // plan.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
-// plan_splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
+// splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
 void pt_plan_splat(struct pt_builder *builder);
 void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of every instance
 
-// plan_average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
+// average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
 void pt_plan_average(struct pt_builder *builder);
 int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance *instance);
 
-// plan_assess.c: certainty and thickness of what the picture shows.
+// assess.c: certainty and thickness of what the picture shows.
 void pt_plan_assess(struct pt_builder *builder);
 
-// plan_reopen.c: what was closed where stations looked through. Of pictures of one layer, not of light maps.
+// reopen.c: what was closed where stations looked through. Of pictures of one layer, not of light maps.
 int pt_plan_reopen_find(struct pt_builder *builder); // after filling. 0: nothing asks for it; else the layer is planned again, behind
 void pt_plan_reopen_keep(struct pt_builder *builder); // before filling, the last time
 void pt_plan_reopen_take(struct pt_builder *builder); // after it

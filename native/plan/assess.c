@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The passes of what an analysis knows of the points that a picture shows: certainty and thickness.
-#include "plan_passes.h"
+#include "passes.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What shade makes of the points' colours: a ramp over a scalar, a height or a distance; exposure and contrast.
-#include "plan_passes.h"
+#include "passes.h"
 
 #include <math.h>
 #include <string.h>

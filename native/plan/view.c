@@ -8,7 +8,7 @@
 #include "plan.h"
 
 #include "expected.h"
-#include "plan_lines.h"
+#include "lines.h"
 #include "scene/clip.h"
 
 #include <math.h>

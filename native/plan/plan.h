@@ -195,7 +195,7 @@ static inline uint32_t pt_disc_ids(const struct patina_scene *scene)
     return first + scene->points < 0xFFFFFFFFu ? (uint32_t)first : 0;
 }
 
-// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2. (plan_view.c)
+// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2. (view.c)
 double pt_thinning(const struct patina_scene *scene);
 
 // Times an instance's spacing of a class of sigma: a thickness, world units. Strata that are left out make nothing thicker.
@@ -214,28 +214,28 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_
 // A line a pass, and one for each that is left out. Returns the full length.
 size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
 
-// plan_view.c: how the camera sees the scene.
+// view.c: how the camera sees the scene.
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
 // No more than the spacings on screen.
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
-// plan_mesh.c: the image of a mesh, as a picture or a light sees it.
+// mesh.c: the image of a mesh, as a picture or a light sees it.
 void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out);
-// plan_reopen.c, once the layers are known: plan->reopens.
+// reopen.c, once the layers are known: plan->reopens.
 uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan);
 int pt_reopen_asked(const struct pt_instance *instance); // whether what its stations saw is needed
-// plan_window.c, once the spacings are known: how holes are closed; how many layers; which pixels the planes hold, with a picture
+// window.c, once the spacings are known: how holes are closed; how many layers; which pixels the planes hold, with a picture
 // that is `guard` pixels wider on each side.
 void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan);
 void pt_choose_layers(const patina_settings *settings, struct pt_plan *plan);
 void pt_choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard);
 static inline uint32_t pt_round_up(uint32_t value, uint32_t multiple) { return (value + multiple - 1) / multiple * multiple; }
-// How far, in pixels, the effects of a picture carry influence. (plan_effects.c)
+// How far, in pixels, the effects of a picture carry influence. (effects.c)
 uint32_t pt_effects_reach(const struct patina_scene *scene);
 // Every chunk of the instance as the plan's view sees it, inside or outside; nothing is culled.
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
                    struct instance_args *args, struct chunk_view **chunks);
 
-// ---- clips and hidden classes: plan_clip.c --------------------------------------------------------------------------------
+// ---- clips and hidden classes: clip.c --------------------------------------------------------------------------------
 
 struct pt_builder;
 struct pt_sieve;
@@ -245,12 +245,12 @@ int pt_plan_divide(struct pt_plan *plan, struct pt_plan_instance *instance, cons
 void pt_plan_sift(struct pt_builder *builder);                       // passes before scatter
 void pt_plan_tint(struct pt_builder *builder, enum pt_plane color); // passes on a layer's colour
 
-// ---- colours: plan_color.c -------------------------------------------------------------------------------------------------
+// ---- colours: color.c -------------------------------------------------------------------------------------------------
 
 // The instance's ramp, exposure and contrast, and the format of what shade reads for its colours.
 void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_instance *instance, struct shade_args *args);
 
-// ---- shadows: plan_light.c -----------------------------------------------------------------------------------------------
+// ---- shadows: light.c -----------------------------------------------------------------------------------------------
 
 // The passes of a depth map with its holes filled, and no more: scatter to fill.
 // behind: only of what lies behind the limit plane.

@@ -3,7 +3,7 @@
 #include "plan.h"
 
 #include "expected.h"
-#include "plan_lines.h"
+#include "lines.h"
 
 #include <math.h>
 

@@ -3,7 +3,7 @@
 #ifndef PT_PLAN_LINES_H
 #define PT_PLAN_LINES_H
 
-#include "plan_passes.h"
+#include "passes.h"
 
 // Radius of the widest disc in pixels, wherever in the scene; 0: no lines.
 float pt_line_radius(const struct patina_scene *scene);

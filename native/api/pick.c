@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Picking: which points of an instance an outline on the picture holds, and pixels that show selected ones. Decided in float64, point
 // by point, in chunks that may have any; a row of pixels knows which edges of the outline cross it.
-#include "frame.h"
-#include "progress.h"
+#include "run/frame.h"
+#include "base/progress.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The passes of discs: visibility, then (with the surfaces known) what the discs on the nearest surface show. SPEC 5, solid.
-#include "plan_passes.h"
+#include "passes.h"
 
 #include <string.h>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // THE file: scene + settings -> passes, each with its reason, and why each other pass is left out.
-#include "plan_passes.h"
+#include "passes.h"
 
 #include "expected.h"
-#include "plan_lines.h"
+#include "lines.h"
 
 #include <math.h>
 #include <stdio.h>

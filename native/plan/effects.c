@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Effects in image space: which of them a picture has, and what their kernels get.
-#include "plan_passes.h"
+#include "passes.h"
 
 #include <math.h>
 

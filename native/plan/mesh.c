@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes in a picture or a light's map. They are drawn into keys of their own and laid over the points after filling: so no
 // hole is filled from a mesh, none is closed where a mesh stands behind it, and what it hides fills as if it were not there.
-#include "plan_lines.h"
+#include "lines.h"
 
 #include <string.h>
 
