@@ -109,7 +109,7 @@ void pt_plan_paper(struct pt_builder *builder);
 void pt_plan_meshes(struct pt_builder *builder, int shown);
 // Lights and colours what they show, into COLOR_A, or UNLIT for their own colours.
 void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color);
-// plan.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
+// shading.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
 // splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
 void pt_plan_splat(struct pt_builder *builder);

@@ -63,7 +63,7 @@ static void plan_scatter(struct pt_builder *builder)
                   (unsigned long long)chunks, args.instances);
 }
 
-static int knows_sigmas(const struct pt_plan *plan, const struct pt_plan_instance *instance)
+static int has_sigmas(const struct pt_plan *plan, const struct pt_plan_instance *instance)
 {
     return plan->sigmas && instance->instance->cloud->shapes != NULL;
 }
@@ -84,7 +84,7 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
                   "instance %u has no normals: estimated from the depth of at most %u x %u pixels", i, 2 * args.radius + 1,
                   2 * args.radius + 1);
     }
-    const int thick = knows_sigmas(plan, instance);
+    const int thick = has_sigmas(plan, instance);
     struct surface_args args = {.view = pt_view_of(plan, instance, 0),
                                 .instance = instance->args,
                                 .sigma_scale = thick ? pt_sigma_scale(builder->scene) : 0.0f,
@@ -104,7 +104,7 @@ static float least_distance(const struct pt_plan *plan)
         const struct instance_args *args = &plan->instances[i].args;
         const patina_cloud_info *info = &plan->instances[i].instance->cloud->info;
         int known = info->spacing_min > 0.0 && isfinite(info->spacing_max); // no chunk is of class 0
-        const float spacings = knows_sigmas(plan, &plan->instances[i]) ? PT_SPACING_SURE : PT_SPACING_FACTOR;
+        const float spacings = has_sigmas(plan, &plan->instances[i]) ? PT_SPACING_SURE : PT_SPACING_FACTOR;
         least = fminf(least, fmaxf(args->d_min, spacings * args->spacing[known]));
     }
     return 0.999f * least;
@@ -204,95 +204,6 @@ static void plan_filling(struct pt_builder *builder)
         pt_skip(builder, "push", reason);
     }
     plan_fill_level(builder, 0);
-}
-
-static void set_vector(const double axes[9], const double vector[3], float out[3])
-{
-    double view[3];
-    pt_apply(axes, vector, view);
-    for (int k = 0; k < 3; k++)
-        out[k] = (float)view[k];
-}
-
-static void set_light(const struct patina_scene *scene, const patina_light_desc *light, struct light_args *out)
-{
-    const double pi = 3.14159265358979323846;
-    double axes[9], position[3], vector[3], points[3 * PT_AREA_POINTS], strength = (double)light->power;
-    pt_camera_axes(&scene->camera, axes, position);
-    for (int k = 0; k < 3; k++)
-        vector[k] = light->type == PATINA_LIGHT_SUN ? -light->direction[k] : light->position[k] - position[k];
-    set_vector(axes, vector, out->vector);
-    set_vector(axes, light->direction, out->axis);
-    if (light->type == PATINA_LIGHT_POINT || light->type == PATINA_LIGHT_SPOT)
-        strength /= 4.0 * pi;               // radiant power -> intensity
-    if (light->type == PATINA_LIGHT_AREA) { // radiance times area, over its points
-        strength /= pi * PT_AREA_POINTS;
-        pt_area_points(light, points);
-        for (int i = 0; i < PT_AREA_POINTS; i++) {
-            for (int k = 0; k < 3; k++)
-                vector[k] = points[3 * i + k] - position[k];
-            set_vector(axes, vector, out->points + 3 * i);
-        }
-    }
-    double edge = cos(0.5 * (double)light->cone);
-    out->cone[0] = (float)edge;
-    out->cone[1] = (float)(1.0 / fmax((1.0 - edge) * (double)light->blend, 1e-6));
-    out->type = light->type;
-    for (int k = 0; k < 3; k++)
-        out->color[k] = (float)((double)light->color[k] * strength);
-}
-
-// receives: whether the instance's shadow words are there to be read.
-static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, int receives,
-                       struct shade_args *args)
-{
-    uint32_t casting = 0;
-    for (uint32_t i = 0; i < scene->light_count; i++) { // patina_scene_add_light keeps them to PT_MAX_LIGHTS
-        struct light_args *out = &args->lights[args->light_count++];
-        set_light(scene, &scene->lights[i], out);
-        if (casting < plan->light_count && plan->lights[casting].light == &scene->lights[i] && ++casting && receives)
-            out->shadow = casting; // the frame puts the scale in, when it knows how many samples there are
-    }
-}
-
-// world_light seen from the camera: its first three directions as a vector, the last five as a symmetric matrix, which turn.
-static void set_ambient(const struct patina_scene *scene, struct shade_args *args)
-{
-    double axes[9], position[3];
-    args->directed = scene->settings.world_directed;
-    if (!args->directed)
-        return;
-    pt_camera_axes(&scene->camera, axes, position);
-    for (int c = 0; c < 3; c++) {
-        const float *world = scene->settings.world_light[c];
-        const double along[3] = {world[1], world[2], world[3]}, xy = 0.5 * world[4], yz = 0.5 * world[5], zx = 0.5 * world[6];
-        const double matrix[9] = {world[7] - world[8], xy, zx, xy, -world[7] - world[8], yz, zx, yz, 2.0 * world[8]};
-        double turned[9], rows[9];
-        float *view = args->ambient + 9 * c;
-        for (int k = 0; k < 3; k++)
-            pt_apply(matrix, axes + 3 * k, rows + 3 * k);
-        for (int k = 0; k < 3; k++)
-            pt_apply(rows, axes + 3 * k, turned + 3 * k);
-        view[0] = world[0];
-        set_vector(axes, along, view + 1);
-        view[4] = (float)(2.0 * turned[1]);
-        view[5] = (float)(2.0 * turned[5]);
-        view[6] = (float)(2.0 * turned[2]);
-        view[7] = (float)(0.5 * (turned[0] - turned[4]));
-        view[8] = (float)(0.5 * turned[8]);
-    }
-}
-
-void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args)
-{
-    const struct patina_scene *scene = builder->scene;
-    *args = (struct shade_args){.view = builder->plan->view};
-    memcpy(args->world, scene->settings.world_color, sizeof args->world);
-    set_ambient(scene, args);
-    args->eye_z = pt_eye_z(scene);
-    args->arrived =
-        builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
-    set_lights(builder->plan, scene, receives, args);
 }
 
 // color: COLOR_A, or UNLIT for the points' own colours.

@@ -223,6 +223,14 @@ void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *
 // reopen.c, once the layers are known: plan->reopens.
 uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan);
 int pt_reopen_asked(const struct pt_instance *instance); // whether what its stations saw is needed
+// window.c: whether the instance's points may be discs.
+int pt_knows_discs(const struct patina_scene *scene, const struct pt_instance *instance);
+// Whether every cloud knows how far its points spread, and that is to be kept to.
+int pt_knows_reach(const struct patina_scene *scene);
+// Whether layer distances follow what an analysis found: where some surfaces lie nearer to each other than two spacings. Elsewhere
+// that tells nothing, and a million points on a torus would take a fifth longer to fill. Decided for the whole scene: a region's
+// planes are those of the whole.
+int pt_knows_sigmas(const struct patina_scene *scene);
 // window.c, once the spacings are known: how holes are closed; how many layers; which pixels the planes hold, with a picture
 // that is `guard` pixels wider on each side.
 void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan);

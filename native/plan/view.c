@@ -169,15 +169,6 @@ static void chunk_translation(const struct camera *camera, const struct object *
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
 
-// Whether points may be discs.
-static int knows_discs(const struct patina_scene *scene, const struct pt_instance *instance)
-{
-    return scene->settings.surface == PATINA_SURFACE_SPLATS ||
-           (scene->settings.surface == PATINA_SURFACE_AUTO && scene->settings.fill == PATINA_FILL_CLOSED &&
-            !(scene->settings.error_target > 0.0f) && // whose curves are those of filling
-            instance->cloud->shapes && pt_disc_ids(scene));
-}
-
 // No disc is wider than this; 0: as wide as it is.
 static double radius_most(const struct pt_instance *instance, double thinned)
 {
@@ -200,7 +191,7 @@ static double own_reach(const struct pt_instance *instance, const struct object 
 static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
                          const struct pt_chunk *chunk, double thinned, int most)
 {
-    if (!knows_discs(scene, instance))
+    if (!pt_knows_discs(scene, instance))
         return 0.0;
     const double reach = own_reach(instance, object, chunk, thinned, most), limit = radius_most(instance, thinned);
     return limit > 0.0 ? fmin(reach, limit) : reach;
@@ -721,29 +712,6 @@ int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
     return look_around(scene, plan, &survey);
 }
 
-// Whether every cloud knows how far its points spread, and that is to be kept to.
-static int knows_reach(const struct patina_scene *scene)
-{
-    int known = scene->settings.surface == PATINA_SURFACE_AUTO;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
-        known = known && knows_discs(scene, &scene->instances[i]);
-    return known;
-}
-
-// Whether layer distances follow what an analysis found: where some surfaces lie nearer to each other than two spacings. Elsewhere
-// that tells nothing, and a million points on a torus would take a fifth longer to fill. Not where points are filled as in the papers, nor with an error target,
-// whose curves are those of spacings. Decided for the whole scene: a region's planes are those of the whole.
-static int knows_sigmas(const struct patina_scene *scene)
-{
-    const patina_settings *settings = &scene->settings;
-    int known = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++)
-        known |= scene->instances[i].cloud->shapes && scene->instances[i].cloud->beside;
-    return known && (settings->surface == PATINA_SURFACE_SPLATS ||
-                     (settings->surface == PATINA_SURFACE_AUTO && settings->fill == PATINA_FILL_CLOSED &&
-                      !(settings->error_target > 0.0f)));
-}
-
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
     struct survey survey = { 0 };
@@ -759,8 +727,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     plan->filled = survey.points;
-    plan->reaches = plan->discs_count && knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
-    plan->sigmas = knows_sigmas(scene);
+    plan->reaches = plan->discs_count && pt_knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
+    plan->sigmas = pt_knows_sigmas(scene);
     pt_choose_filling(scene, plan);
     pt_choose_layers(&scene->settings, plan);
     plan->reopens = pt_reopen_rounds(scene, plan);

@@ -16,6 +16,35 @@ enum { LEVELS_BESIDE_DISCS = 2 }; // of the caller's pixels
 // iterations, 1.6% of an umbra stays lit at 1.65, where nothing does at 1.2; a sun at 2 degrees gets acne at 1.2.
 static const double WIDEST = 1.65, WIDEST_OF_LAMPS = 1.2;
 
+// Whether holes are closed by what an analysis found. Not where points are filled as in the papers, nor with an error target, whose
+// curves are those of spacings alone.
+static int closes_by_analysis(const patina_settings *settings)
+{
+    return settings->surface == PATINA_SURFACE_AUTO && settings->fill == PATINA_FILL_CLOSED && !(settings->error_target > 0.0f);
+}
+
+int pt_knows_discs(const struct patina_scene *scene, const struct pt_instance *instance)
+{
+    return scene->settings.surface == PATINA_SURFACE_SPLATS ||
+           (instance->cloud->shapes && closes_by_analysis(&scene->settings) && pt_disc_ids(scene));
+}
+
+int pt_knows_reach(const struct patina_scene *scene)
+{
+    int known = scene->settings.surface == PATINA_SURFACE_AUTO;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        known = known && pt_knows_discs(scene, &scene->instances[i]);
+    return known;
+}
+
+int pt_knows_sigmas(const struct patina_scene *scene)
+{
+    int known = 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        known |= scene->instances[i].cloud->shapes && scene->instances[i].cloud->beside;
+    return known && (scene->settings.surface == PATINA_SURFACE_SPLATS || closes_by_analysis(&scene->settings));
+}
+
 // How many levels and iterations the spacing asks for. With s = spacing in pixels a pixel stays empty with probability
 // exp(-1/s^2); n iterations close holes n wide from all sides. Above 1.65 (0.37 points a pixel) n alone leaves holes open
 // (2.7% of a disc at 0.3 points a pixel), so coarser levels halve s down to 1 first: 0.14% open. Starting them earlier,
