@@ -361,4 +361,39 @@ enum ref_truth ref_seen_through(const struct reopen_args *args, const struct sta
                                 int y, double z);
 int ref_closed(const struct reopen_args *args, const struct ref_planes *planes, int x, int y);
 
+// ---- soft.c: balls along a ray [S] ------------------------------------------------------------------------------------------
+
+struct ref_ball {
+    double z, r;       // of the centre; world units
+    double d, along;   // from the ray, in radii; where along it that is, world units
+    double square;     // Express: of the distance from the middle of its disc, in radii
+    double color[3];
+    double a, w;       // opacity at the centre; W of [S Eq. 22], 1: as it is
+    uint32_t shells;   // Concentric
+    uint32_t record;
+};
+
+struct ref_soft_model {
+    uint32_t model, mu; // PT_SOFT_*
+};
+
+struct ref_soft {
+    double color[3], through; // premultiplied; light that comes through
+    double density;           // points per square of the world's unit
+    uint32_t fragments;       // balls or discs that count
+};
+
+// Of the unit ball at d from its centre: integral of 1 - distance from the centre; of lengths within shells, times mu.
+double ref_soft_integral(double d, double from, double to);
+double ref_soft_shells(uint32_t mu, uint32_t shells, double d, double from, double to);
+double ref_soft_factor(const struct ref_ball *ball, const struct ref_soft_model *model); // m of [S Eq. 22]
+double ref_soft_disc(double square, double a, double w); // [S Eq. 19, 22]
+// Base and Concentric between two places along the ray; Express, sorting the balls.
+struct ref_soft ref_soft_ray(const struct ref_ball *balls, uint32_t count, const struct ref_soft_model *model, double from, double to);
+struct ref_soft ref_soft_discs(struct ref_ball *balls, uint32_t count, double from, double to);
+
+struct ref_ball ref_ball_at(const struct soft_args *args, const uint32_t *records, uint32_t index, int x, int y);
+// A pixel: reached is that of its plane, z its key's.
+struct ref_soft ref_soft(const struct soft_args *args, const uint32_t *records, int x, int y, double reached, double z);
+
 #endif
