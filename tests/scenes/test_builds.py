@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""compare_builds.py finds what differs, and its scenes show what their names say: no two are the same.
+
+    test_builds.py LIBRARY
+"""
+
+from __future__ import annotations
+
+import copy
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import builds_cases  # noqa: E402
+import compare_builds  # noqa: E402
+
+LIBRARY = ""
+# What is drawn by another way and has to come out the same.
+SAME = {"cloud saved and opened": "lit", "surface filled": "lit", "surface error target": "surface paper", "surface error target, coarse": "surface not filled",
+        "layers with nothing to see": "cloud none", "scan, free space off": "scan"}
+
+
+class Altered(compare_builds.Process):
+    """A build that draws something else than it is asked, in the scenes of some name."""
+
+    def __init__(self, name: str, **settings: Any) -> None:
+        super().__init__(compare_builds.located(LIBRARY), "cpu")
+        self.name, self.settings = name, settings
+
+    def tell(self, **asked: Any) -> None:
+        if asked.get("draw", {}).get("name") == self.name:
+            asked = copy.deepcopy(asked)
+            asked["draw"].setdefault("settings", {}).update(self.settings)
+        super().tell(**asked)
+
+
+class Builds(unittest.TestCase):
+    def setUp(self) -> None:
+        self.cases = builds_cases.cases()
+        self.process = compare_builds.Process(compare_builds.located(LIBRARY), "cpu")
+        self.addCleanup(self.process.close)
+
+    def compared(self, other: compare_builds.Process, names: list[str]) -> tuple[tuple[int, int, int], list[str]]:
+        self.addCleanup(other.close)
+        lines: list[str] = []
+        with tempfile.TemporaryDirectory() as folder:
+            chosen = [case for case in self.cases if case["name"] in names]
+            self.assertEqual(len(chosen), len(names))
+            return compare_builds.compared(self.process, other, chosen, Path(folder), lines.append), lines
+
+    def test_the_list(self) -> None:
+        names = [case["name"] for case in self.cases]
+        self.assertGreaterEqual(len(names), 80)
+        self.assertEqual(len(set(names)), len(names))
+        self.assertTrue(all(case["size"][0] <= 320 and case["size"][1] <= 240 for case in self.cases))
+
+    def test_every_scene_is_another(self) -> None:
+        known: dict[str, str] = {}
+        pictures = {}
+        for case in self.cases:
+            told = self.process.ask(draw=case)
+            self.assertFalse({"error", "unknown"} & set(told), (case["name"], told))
+            pictures[case["name"]] = told
+        for name, told in pictures.items():
+            key = str(sorted((plane, value) for plane, value in told.items() if plane != "stats"))
+            if known.setdefault(key, name) != name:
+                self.assertEqual(SAME.get(name), known[key], name)
+
+    def test_a_difference_is_found(self) -> None:
+        counts, lines = self.compared(Altered("plain", world_color=[0.05, 0.06, 0.08000001]), ["plain", "film transparent", "light sun"])
+        self.assertEqual(counts, (2, 1, 0))
+        self.assertRegex(lines[0], r"^  DIFFER plain: COMBINED: \d+ of 76800 by \S+$")  # and nothing else
+
+    def test_keys_are_compared(self) -> None:
+        counts, lines = self.compared(Altered("light sun", strata=3), ["plain", "light sun"])
+        self.assertEqual(counts, (1, 1, 0))
+        self.assertIn("KEYS: ", lines[0])
+
+    def test_what_fails_is_told(self) -> None:
+        counts, lines = self.compared(Altered("plain", width=1 << 31), ["plain"])
+        self.assertEqual(counts, (0, 1, 0))
+        self.assertIn("FAILED plain: old drew it, new ", lines[0])
+        counts, lines = self.compared(Altered("plain", nothing_like_it=1), ["plain"])
+        self.assertEqual(counts, (0, 1, 0))
+        self.assertIn("nothing_like_it", lines[0])
+
+
+if __name__ == "__main__":
+    LIBRARY = sys.argv.pop(1)
+    unittest.main()
