@@ -100,6 +100,14 @@ int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t o
 // program.c
 // Compiles shaders/NAME with a line of definitions ("#define PASS 1\n") into a program.
 int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definitions, GLuint *program);
+// The same with the file that `#include "BODY"` stands for.
+int pt_gl_program_of_body(struct pt_gl_device *d, const char *name, const char *definitions, const char *body, GLuint *program);
+
+// pointwise.c. Of its kernels, whether they walk over the crop; binds the planes that one reads; runs it.
+int pt_gl_is_pointwise(enum pt_kernel kernel);
+int pt_gl_of_crop(enum pt_kernel kernel);
+int pt_gl_pointwise_planes(struct pt_gl_device *d, enum pt_kernel kernel, struct pt_buffer *const *buffers);
+int pt_gl_pointwise(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments);
 
 // kernels.c
 int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, size_t argument_size,

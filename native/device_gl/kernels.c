@@ -67,11 +67,10 @@ static const uint8_t textures[PT_KERNEL_COUNT][PT_GL_TEXTURES] = {
     // keys, from, deff, float4, float4, words (of points: by their runners; of others: span)
     [PT_KERNEL_normals] = {1},          [PT_KERNEL_surface] = {1, 0, 0, 3},   [PT_KERNEL_pull] = {1, 2},
     [PT_KERNEL_fill] = {1, 2, 4, 3, 0, 5}, [PT_KERNEL_push] = {1, 2, 6, 5, 0, 7}, [PT_KERNEL_shade] = {1, 2, 4, 3},
-    [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4}, [PT_KERNEL_compose] = {1, 0, 0, 2},
+    [PT_KERNEL_smooth] = {1, 2, 3, 4},  [PT_KERNEL_antialias] = {1, 2, 3, 4},
     [PT_KERNEL_extract] = {1, 2, 0, 3}, [PT_KERNEL_peel] = {1, 2, 3, 4, 5},   [PT_KERNEL_mark] = {1},
     [PT_KERNEL_lit] = {1, 2, 3},        [PT_KERNEL_edl] = {1},
-    [PT_KERNEL_obscure] = {1, 2, 3, 4}, [PT_KERNEL_toon] = {1, 0, 0, 2},      [PT_KERNEL_hatch] = {1, 0, 0, 2},
-    [PT_KERNEL_fog] = {1},              [PT_KERNEL_focus] = {1, 0, 0, 2},             [PT_KERNEL_tint] = {1},
+    [PT_KERNEL_obscure] = {1, 2, 3, 4}, [PT_KERNEL_focus] = {1, 0, 0, 2},
     [PT_KERNEL_lines] = {1, 2, 4, 3},   [PT_KERNEL_ink] = {1},            [PT_KERNEL_limit] = {1, 2, 3},
     [PT_KERNEL_assess] = {1},           [PT_KERNEL_reopen] = {1, 2, 3},
 };
@@ -103,8 +102,7 @@ static int tiled(enum pt_kernel kernel)
     return kernel == PT_KERNEL_normals || kernel == PT_KERNEL_surface || kernel == PT_KERNEL_shade ||
            kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
            kernel == PT_KERNEL_push || kernel == PT_KERNEL_mark || kernel == PT_KERNEL_edl ||
-           kernel == PT_KERNEL_obscure || kernel == PT_KERNEL_toon || kernel == PT_KERNEL_hatch || kernel == PT_KERNEL_fog ||
-           kernel == PT_KERNEL_tint;
+           kernel == PT_KERNEL_obscure || (pt_gl_is_pointwise(kernel) && !pt_gl_of_crop(kernel));
 }
 
 static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
@@ -210,6 +208,8 @@ int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t arg
 static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, struct pt_buffer *const *buffers)
 {
     const struct view_args *view = arguments; // every argument struct begins with its view
+    if (pt_gl_is_pointwise(kernel))
+        return pt_gl_pointwise(d, kernel, arguments);
     switch (kernel) {
     case PT_KERNEL_shade:
         return pt_gl_shade(d, arguments, buffers);
@@ -225,21 +225,9 @@ static int run_filter(struct pt_gl_device *d, enum pt_kernel kernel, const void 
     case PT_KERNEL_smooth:
     case PT_KERNEL_mark:
     case PT_KERNEL_edl:
-    case PT_KERNEL_toon:
-    case PT_KERNEL_hatch:
-    case PT_KERNEL_fog:
-    case PT_KERNEL_tint:
         return run_tiles(d, kernel);
-    case PT_KERNEL_compose: {
-        const struct compose_args *args = arguments;
-        return run_rows(d, kernel, args->crop_width, args->crop_height);
-    }
     case PT_KERNEL_focus: {
         const struct focus_args *args = arguments;
-        return run_over(d, kernel, 0, "", args->crop_width, args->crop_height);
-    }
-    case PT_KERNEL_paper: {
-        const struct paper_args *args = arguments;
         return run_over(d, kernel, 0, "", args->crop_width, args->crop_height);
     }
     case PT_KERNEL_extract:
@@ -298,8 +286,7 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
         return pt_gl_center(d, argument_size, buffers, count, cancel);
     if (kernel == PT_KERNEL_sift)
         return pt_gl_sift(d, argument_size, buffers, count, cancel);
-    int crops = kernel == PT_KERNEL_compose || kernel == PT_KERNEL_focus || kernel == PT_KERNEL_paper ||
-                kernel == PT_KERNEL_extract || kernel == PT_KERNEL_ink;
+    int crops = pt_gl_of_crop(kernel) || kernel == PT_KERNEL_focus || kernel == PT_KERNEL_extract || kernel == PT_KERNEL_ink;
     if (!crops && (view->rect[2] <= view->rect[0] || view->rect[3] <= view->rect[1]))
         return PATINA_OK;
     if (kernel == PT_KERNEL_fill)
@@ -308,5 +295,7 @@ int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *argumen
     int result = tiled(kernel) ? pt_gl_tiles(d, buffers[0], &tiles) : PATINA_OK;
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, kernel, argument_size, buffers, count);
+    if (result == PATINA_OK && pt_gl_is_pointwise(kernel))
+        result = pt_gl_pointwise_planes(d, kernel, buffers);
     return result == PATINA_OK ? run_filter(d, kernel, arguments, buffers) : result;
 }

@@ -13,6 +13,7 @@ enum { MAX_FILES = 16, MAX_NAME = 64, LOG_SIZE = 4096 };
 
 struct source {
     char *text;
+    const char *body; // what #include "BODY" stands for; NULL: nothing
     size_t length, capacity;
     char files[MAX_FILES][MAX_NAME]; // number in #line = index
     unsigned file_count;
@@ -86,6 +87,8 @@ static int include(struct pt_gl_device *d, struct source *s, const char *line, c
     if (!close || close - open - 1 >= MAX_NAME)
         return PATINA_OK;
     snprintf(name, sizeof name, "%.*s", (int)(close - open - 1), open + 1);
+    if (s->body && !strcmp(name, "BODY"))
+        snprintf(name, sizeof name, "%s", s->body);
     for (unsigned i = 0; i < s->file_count; i++)
         if (!strcmp(s->files[i], name))
             return PATINA_OK;
@@ -183,7 +186,12 @@ static int compile(struct pt_gl_device *d, const struct source *s, GLuint *progr
 
 int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definitions, GLuint *program)
 {
-    struct source s = {0};
+    return pt_gl_program_of_body(d, name, definitions, NULL, program);
+}
+
+int pt_gl_program_of_body(struct pt_gl_device *d, const char *name, const char *definitions, const char *body, GLuint *program)
+{
+    struct source s = {.body = body};
     char all[512];
     snprintf(all, sizeof all, "%s%s", d->base.info.hardware ? "" : "#define PT_SOFTWARE 1\n", definitions);
     int result = add_file(d, &s, name, all);

@@ -564,26 +564,54 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     return color;
 }
 
-static int runs_with_others(enum pt_kernel kernel)
+static int pointwise(enum pt_kernel kernel)
 {
-    return kernel == PT_KERNEL_shade || kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias ||
-           kernel == PT_KERNEL_peel || kernel == PT_KERNEL_compose || kernel == PT_KERNEL_extract;
+    switch (kernel) {
+#define PT_POINTWISE(name, ...) case PT_KERNEL_##name:
+#include "pointwise.def"
+#undef PT_POINTWISE
+        return 1;
+    default: return 0;
+    }
 }
 
-// From shading on, passes may run as one where nobody asks for what lies between them.
+static int reads_planes(enum pt_kernel kernel) { return kernel == PT_KERNEL_smooth || kernel == PT_KERNEL_antialias; }
+
+static int gives_picture(enum pt_kernel kernel) { return kernel == PT_KERNEL_compose || kernel == PT_KERNEL_peel; }
+
+static int runs_with_others(enum pt_kernel kernel)
+{
+    return kernel == PT_KERNEL_shade || reads_planes(kernel) || gives_picture(kernel) || kernel == PT_KERNEL_extract ||
+           pointwise(kernel);
+}
+
+// From shading on, passes may run as one where nobody asks for what lies between them; or from behind the last of those that look
+// around in the colours, if smoothing or anti-aliasing follow.
 static void put_together(const struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     const patina_settings *settings = &builder->scene->settings;
     const uint32_t of_first = 1u << PATINA_PASS_NORMAL | 1u << PATINA_PASS_SOURCE |
                               1u << PATINA_PASS_SHADOW; // are taken from its planes, at the end
+    uint32_t first = builder->finish, end = first;
+    int picture = 0, reads = 0;
     if (settings->layer_passes || plan->triangles || (plan->layers == 1 && plan->transparent) ||
         (plan->layers > 1 && builder->layer == 1 && (settings->passes & of_first)))
         return;
-    for (uint32_t i = builder->finish; i < plan->pass_count; i++)
-        if (!runs_with_others(plan->passes[i].kernel))
-            return;
-    plan->passes[builder->finish].together = plan->pass_count - builder->finish;
+    for (; end < plan->pass_count; end++) {
+        const enum pt_kernel kernel = plan->passes[end].kernel;
+        if (runs_with_others(kernel)) {
+            picture |= gives_picture(kernel);
+            reads |= reads_planes(kernel);
+        } else if (picture) {
+            break;
+        } else {
+            first = end + 1;
+            reads = 0;
+        }
+    }
+    if (picture && (first == builder->finish || reads))
+        plan->passes[first].together = end - first;
 }
 
 static void plan_points(struct pt_builder *builder)
@@ -602,12 +630,12 @@ static void plan_points(struct pt_builder *builder)
         pt_skip(builder, "peel",
                 plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
-    if (plan->layers == 1)
-        put_together(builder);
     set_background(&builder->scene->settings, background);
     pt_plan_ink(builder, background);
-    pt_plan_assess(builder);
     pt_plan_paper(builder);
+    if (plan->layers == 1)
+        put_together(builder);
+    pt_plan_assess(builder);
 }
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
@@ -620,8 +648,8 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
     skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
     skip_all(builder, reason, others, sizeof others / sizeof *others);
     plan_output(builder, PT_PLANE_COLOR_A);
-    put_together(builder);
     pt_plan_paper(builder);
+    put_together(builder);
 }
 
 int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behind)

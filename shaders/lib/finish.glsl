@@ -25,21 +25,26 @@ layout(std430, binding = 6) readonly buffer line_block { float line[]; };
 layout(std430, binding = 7) buffer counters_block { uint edge_count; };
 layout(std430, binding = 8) buffer edges_block { uint edges[]; };
 
+#define ARGS composing
+#include "lib/bodies.glsl"
+#include "pointwise/compose.h"
+
 struct crop_part {
     uvec2 corner, size;
-    vec4 background;
 };
 
 crop_part read_crop()
 {
-    return crop_part(uvec2(composing.crop_x, composing.crop_y), uvec2(composing.crop_width, composing.crop_height),
-                     vec4(composing.background[0], composing.background[1], composing.background[2], composing.background[3]));
+    return crop_part(uvec2(composing.crop_x, composing.crop_y), uvec2(composing.crop_width, composing.crop_height));
 }
 
 void write_pixel(crop_part crop, uvec2 in_crop, vec4 color)
 {
-    precise vec4 over = color + (1.0 - color.w) * crop.background;
-    combined[in_crop.y * crop.size.x + in_crop.x] = over;
+    pt_here here;
+    float over[4] = {color.x, color.y, color.z, color.w};
+    here.some = true;
+    pt_compose(here, over);
+    combined[in_crop.y * crop.size.x + in_crop.x] = vec4(over[0], over[1], over[2], over[3]);
 }
 
 #if STEP == 0

@@ -687,7 +687,8 @@ struct focus_args {
 // paper: the picture times color (1 - grain noise), the noise of the pixel's place in the full picture.
 struct paper_args {
     struct view_args view;
-    uint32_t crop_width, crop_height, x, y; // x, y: of the crop in the full picture
+    uint32_t crop_x, crop_y, crop_width, crop_height;
+    uint32_t x, y; // of the crop in the full picture
     float color[3];
     float grain;
 };

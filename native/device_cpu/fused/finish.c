@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// finish: shade, smooth, antialias, then peel or compose and extract as one walk over rows. The planes between them stay
-// in rings of rows that the second-level cache holds: nothing but the picture, or what peeling hands on, is written. Same
-// functions, same numbers as the kernels.
+// finish: shade, smooth, antialias, then peel or compose and extract as one walk over rows, with the pointwise kernels that the plan
+// has between and behind them. The planes between them stay in rings of rows that the second-level cache holds: nothing but the
+// picture, or what peeling hands on, is written. Same functions, same numbers as the kernels. It begins with shading, or behind a
+// kernel that is none of these with the colours that this left.
 // Where nothing is peeled the scene is opaque: alpha is 1 but for edges.
 #include "finish_shade.h"
+#include "device_cpu/pointwise/bodies.h"
 
 static void lay_out(const struct finish *finish, uint32_t thread, struct walk *walk)
 {
@@ -16,6 +18,8 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
         walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s } };
         for (uint32_t k = 0; k < 5; k++)
             walk->shown[i][k] = at + (8 + k) * s;
+        for (uint32_t k = 0; k < 3; k++)
+            walk->albedo[i][k] = at + (13 + k) * s;
     }
     for (uint32_t k = 0; k < 3; k++)
         walk->blended[k] = at + k * s;
@@ -31,10 +35,6 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
     struct pt_color_row *out = &walk->smoothed[slot(y)];
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
-    if (!finish->smooth) {
-        *out = *rows[1];
-        return;
-    }
     out->z = rows[1]->z;
     const vf scale = vf_set(pt_smooth_scale(finish->smooth));
     const struct pt_nine nine = pt_smooth_weights(finish->smooth);
@@ -57,6 +57,15 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         for (int k = 0; k < finish->channels; k++)
             vf_store(out->color[k] + x, color[k]);
     }
+}
+
+static void draw(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    if (finish->smooth)
+        smooth(finish, walk, y);
+    else
+        walk->smoothed[slot(y)] = walk->shaded[slot(y)];
+    take_steps(finish, walk, &finish->after, &walk->smoothed[slot(y)], y);
 }
 
 // ---- the picture ----------------------------------------------------------------------------------------------------------
@@ -140,7 +149,7 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
     }
     if (args->shadow) {
         vf value = vf_set(1.0f);
-        if (finish->with_normals && vm_bits(some))
+        if ((finish->with_normals || finish->arrived) && vm_bits(some))
             value = vf_select(some, vf_load(walk->shown[slot((int32_t)py)][4] + px), value);
         vf_put(finish->shadow + out, value, count);
     }
@@ -169,13 +178,18 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
             } else {
                 if (finish->antialias)
                     mixed = mix_edges(finish, &around, seen->limit, px, (uint32_t)y, some, shown);
-                pt_compose(shown, background, some, color);
+                const struct pt_here here = { .some = some };
+                pt_compose(args, &here, shown);
+                memcpy(color, shown, sizeof color);
             }
         }
         vf_put4(combined + 4 * (size_t)x, color, count);
         if (finish->extract)
             put_passes(finish, walk, z, some, mixed, x, row, count);
     }
+    for (uint32_t i = finish->last.first; i < finish->last.first + finish->last.count; i++)
+        PT_POINTWISE_KERNELS[finish->passes[i].kernel].step(&(struct pt_walk_row){
+            .args = finish->passes[i].call.arguments, .y = row, .end = args->crop_width, .color = combined });
 }
 
 // ---- or what is peeled ---------------------------------------------------------------------------------------------------
@@ -229,7 +243,7 @@ static void finish_rows(void *context, uint32_t begin, uint32_t end, uint32_t th
         if (y + 2 >= walk->first - 2)
             shade(finish, walk, y + 2);
         if (y + 1 >= walk->first - 1)
-            smooth(finish, walk, y + 1);
+            draw(finish, walk, y + 1);
         if (y >= walk->first && finish->peel)
             peel_row(finish, walk, y);
         else if (y >= walk->first)
@@ -238,9 +252,34 @@ static void finish_rows(void *context, uint32_t begin, uint32_t end, uint32_t th
     walk->next = last;
 }
 
+// What a pointwise pass asks for.
+static void add_step(struct finish *finish, uint32_t i)
+{
+    const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[finish->passes[i].kernel];
+    struct steps *steps = finish->compose || finish->peel ? &finish->last : finish->smooth ? &finish->after : &finish->before;
+    if (!steps->count++)
+        steps->first = i;
+    finish->shows_normals |= kernel->shading >= 0;
+    if (kernel->albedo >= 0)
+        finish->albedo = finish->passes[i].call.buffers[kernel->albedo];
+    if (!finish->shade_count && !finish->colors && steps != &finish->last)
+        finish->colors = pt_cpu_data(&finish->passes[i].call, (uint32_t)kernel->color);
+}
+
+// Where nothing is shaded: smoothing and anti-aliasing say what pixels show.
+static void take_planes(struct finish *finish, const struct pt_cpu_call *call)
+{
+    if (finish->shade_count)
+        return;
+    finish->planes.from = pt_cpu_data(call, 1);
+    finish->planes.deff = pt_cpu_data(call, 2);
+    if (!finish->colors)
+        finish->colors = pt_cpu_data(call, 3);
+}
+
 int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
 {
-    struct finish finish = { .shades = passes };
+    struct finish finish = { .passes = passes };
     const struct pt_cpu_call *shared = &passes[0].call;
     for (uint32_t i = 0; i < count; i++) {
         const struct pt_cpu_call *call = &passes[i].call;
@@ -253,14 +292,19 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.planes.normals = pt_cpu_data(call, 2);
             finish.planes.deff = pt_cpu_data(call, 3);
             break;
-        case PT_KERNEL_smooth: finish.smooth = call->arguments; break;
+        case PT_KERNEL_smooth:
+            take_planes(&finish, call);
+            finish.smooth = call->arguments;
+            break;
         case PT_KERNEL_antialias:
+            take_planes(&finish, call);
             finish.antialias = call->arguments;
             finish.through = finish.antialias->behind ? pt_cpu_data(call, 4) : NULL;
             finish.line = finish.antialias->inked ? pt_cpu_data(call, 5) : NULL;
             break;
         case PT_KERNEL_peel:
             finish.peel = call->arguments;
+            finish.shading = pt_cpu_data(call, 3);
             finish.planes.keys = pt_cpu_data(call, 0);
             finish.planes.view = &finish.peel->view;
             finish.peeled = (struct pt_peeled){ pt_cpu_data(call, 5), pt_cpu_data(call, 6), pt_cpu_data(call, 7) };
@@ -276,9 +320,11 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.base = (int32_t)finish.compose->crop_y;
             finish.end = finish.base + (int32_t)finish.compose->crop_height;
             break;
-        default: // extract
+        case PT_KERNEL_extract:
             finish.extract = call->arguments;
-            finish.with_normals |= (int)finish.extract->normal;
+            finish.shows_normals |= (int)finish.extract->normal;
+            finish.shading = finish.extract->normal ? pt_cpu_data(call, 2) : NULL;
+            finish.arrived = finish.extract->shadow ? pt_cpu_data(call, 6) : NULL;
             finish.planes.from = pt_cpu_data(call, 1);
             finish.depth = pt_cpu_data(call, 3);
             finish.normals = pt_cpu_data(call, 4);
@@ -286,10 +332,15 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.shadow = pt_cpu_data(call, 7);
             finish.away = pt_cpu_data(call, 8);
             finish.offsets = pt_cpu_data(call, 9);
+            break;
+        default: add_step(&finish, i);
         }
     }
-    if (finish.shade_count)
+    if (finish.shade_count) {
         finish.planes.from = pt_cpu_data(shared, 1);
+        finish.with_normals |= finish.shows_normals;
+        finish.shading = finish.arrived = NULL; // both are shaded here
+    }
     memcpy(finish.planes.rect, finish.planes.view->rect, sizeof finish.planes.rect);
     finish.channels = finish.peel ? 4 : 3;
     finish.stride = pt_row_stride(finish.planes.view->width);

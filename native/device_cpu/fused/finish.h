@@ -4,19 +4,28 @@
 #define PT_FINISH_H
 
 #include "device_cpu/kernels/antialias.h"
-#include "device_cpu/kernels/compose.h"
 #include "device_cpu/kernels/extract.h"
 #include "device_cpu/kernels/peel.h"
 #include "device_cpu/kernels/shade.h"
 #include "device_cpu/kernels/smooth.h"
+#include "device_cpu/pointwise/walk.h"
 
-enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 6, CHANNELS_COLOR = 13 }; // shaded 4, smoothed 4, shown 5
+enum { UNIT = PT_TILE, RING = 4, CHANNELS_SEEN = 6, CHANNELS_COLOR = 16 }; // shaded 4, smoothed 4, shown 5, albedo 3
 // Row s is shaded when s + reach has been seen, s - 1 is smoothed then, s - 2 finished: anti-aliasing reads s - 3 too.
 enum { SEEN_MOST = 2 * PT_BLEND_MOST + 1 };
 
+struct steps { // passes that follow one another
+    uint32_t first, count;
+};
+
 struct finish {
-    const struct pt_cpu_pass *shades;
-    uint32_t shade_count;
+    const struct pt_cpu_pass *passes;
+    uint32_t shade_count;                     // of passes, from the first on
+    struct steps before, after, last;         // pointwise: before smoothing, after it, on the picture
+    const struct pt_buffer *albedo;           // the plane that one of them asks for; else NULL
+    int shows_normals;                        // one of them, or extract, asks for normals
+    const float *colors;                      // where nothing is shaded: as they are so far; and, where peeling or extract
+    const float *shading, *arrived;           // ask for them, what was shown
     const struct smooth_args *smooth;         // NULL: off
     const struct antialias_args *antialias;   // NULL: off
     const struct compose_args *compose;
@@ -47,6 +56,7 @@ struct walk {
     struct pt_seen_row seen[SEEN_MOST];
     struct pt_color_row shaded[RING], smoothed[RING];
     float *shown[RING][5];          // normals, opacities, what arrives of the lights
+    float *albedo[RING][4];         // the last of them NULL
     float *blended[3];              // sums of normals of the row at hand, where all that their windows show is one layer:
     uint8_t *wide;                  // by `flat` of the row, or of windows wider than 3 x 3 pixels their radius, else 0
     struct pt_tile_sum *tiles;      // of the row of tiles at hand
@@ -58,5 +68,11 @@ static struct pt_seen_row *seen_row(const struct finish *finish, struct walk *wa
 }
 
 static uint32_t slot(int32_t y) { return (uint32_t)(y + RING) % RING; }
+
+// Whether a pass shades points with their own colours, for a step that asks for these.
+static int shades_albedo(const struct finish *finish, uint32_t i)
+{
+    return finish->albedo && finish->passes[i].call.buffers[6] == finish->albedo;
+}
 
 #endif

@@ -13,14 +13,14 @@ static void ask_for_colors(const struct finish *finish, const struct pt_seen_row
 {
     const struct view_args *view = finish->planes.view;
     for (uint32_t i = 0; i < finish->shade_count; i++) {
-        const struct shade_args *args = finish->shades[i].call.arguments;
-        const char *colors = pt_cpu_data(&finish->shades[i].call, 4);
+        const struct shade_args *args = finish->passes[i].call.arguments;
+        const char *colors = pt_cpu_data(&finish->passes[i].call, 4);
         const size_t bytes = pt_color_bytes[args->instance.color_format], size = lies_far(&args->instance, bytes) ? bytes : 0;
         const uint32_t *words[PT_MAX_LIGHTS];
         uint32_t casting = 0;
         for (uint32_t l = 0; l < args->light_count; l++)
             if (args->lights[l].shadow)
-                words[casting++] = (const uint32_t *)pt_cpu_data(&finish->shades[i].call, 8) +
+                words[casting++] = (const uint32_t *)pt_cpu_data(&finish->passes[i].call, 8) +
                                    (size_t)(args->lights[l].shadow - 1) * args->instance.id_count;
         for (uint32_t x = seen->first; (size || casting) && x < seen->end; x += PT_LANES) {
             size_t at = (size_t)y * view->width + x;
@@ -99,7 +99,7 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
                                    plain, color, normal);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(out->color[k] + x, color[k], ours);
-        for (uint32_t k = 0; k < 3 && finish->extract && finish->extract->normal; k++)
+        for (uint32_t k = 0; k < 3 && finish->shows_normals; k++)
             vf_store_where(walk->shown[slot(y)][k] + x, normal[k], ours);
         if (finish->extract && finish->extract->shadow)
             vf_store_where(walk->shown[slot(y)][4] + x, share, ours);
@@ -169,6 +169,16 @@ static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *
     }
 }
 
+static void fetch(const struct finish *finish, const struct pt_cpu_call *call, const struct pt_seen_row *seen,
+                  const struct pt_color_row *out, int32_t y)
+{
+    const struct shade_args *args = call->arguments;
+    if (pt_gathers_bytes(&args->instance) && !pt_recolors(args))
+        fetch_bytes(finish, call, seen, out, y);
+    else
+        fetch_colors(finish, call, seen, out, y);
+}
+
 // Where the row's next part that is flat, or is not, ends.
 static uint32_t end_of_part(const struct pt_seen_row *seen, uint32_t x)
 {
@@ -205,6 +215,69 @@ static void blend_wide(const struct finish *finish, struct walk *walk, int32_t y
         pt_blend_flat(&blend, x, x + PT_BLEND_COLUMNS < end ? x + PT_BLEND_COLUMNS : end, walk->wide, walk->blended);
 }
 
+// Colours without light, for steps that ask for them.
+static void fetch_albedo(const struct finish *finish, struct walk *walk, const struct pt_cpu_call *call, int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    float *const *rows = walk->albedo[slot(y)];
+    const struct pt_color_row out = { seen->z, { rows[0], rows[1], rows[2], walk->shaded[slot(y)].color[3] } };
+    fetch(finish, call, seen, &out, y);
+    if (finish->channels == 4)
+        make_translucent(finish, call, seen, &out, walk->shown[slot(y)][3], y);
+}
+
+// Of a picture that was shaded before: what others left in planes.
+static void load_shaded(const struct finish *finish, struct walk *walk, int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    const struct pt_color_row *out = &walk->shaded[slot(y)];
+    float *const *shown = walk->shown[slot(y)];
+    for (uint32_t x = seen->first; x < seen->end; x += PT_LANES) {
+        const size_t at = (size_t)y * finish->planes.view->width + x;
+        vf four[4];
+        vf_load4(finish->colors + 4 * at, four);
+        for (uint32_t k = 0; k < 4; k++)
+            vf_store(out->color[k] + x, four[k]);
+        if (finish->shading) {
+            vf_load4(finish->shading + 4 * at, four);
+            for (uint32_t k = 0; k < 4; k++)
+                vf_store(shown[k] + x, four[k]);
+        }
+        if (finish->arrived)
+            vf_store(shown[4] + x, vf_load(finish->arrived + at));
+    }
+}
+
+// Steps on a row of colours.
+static void take_steps(const struct finish *finish, struct walk *walk, const struct steps *steps, const struct pt_color_row *colors,
+                       int32_t y)
+{
+    const struct pt_seen_row *seen = seen_row(finish, walk, y);
+    for (uint32_t i = steps->first; i < steps->first + steps->count && seen->end; i++) {
+        const struct pt_cpu_call *call = &finish->passes[i].call;
+        const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[finish->passes[i].kernel];
+        const size_t at = (size_t)y * finish->planes.view->width;
+        struct pt_walk_row row = { .args = call->arguments,
+                                   .clips = kernel->clips < 0 ? NULL : pt_cpu_data(call, (uint32_t)kernel->clips),
+                                   .y = (uint32_t)y,
+                                   .first = seen->first,
+                                   .end = seen->end,
+                                   .keys = finish->planes.keys + at,
+                                   .z = seen->z };
+        if (kernel->shading >= 0 && !finish->shade_count)
+            row.shading = (const float *)pt_cpu_data(call, (uint32_t)kernel->shading) + 4 * at;
+        if (kernel->albedo >= 0 && !finish->shade_count)
+            row.albedo = (const float *)pt_cpu_data(call, (uint32_t)kernel->albedo) + 4 * at;
+        for (uint32_t k = 0; k < 3; k++) {
+            row.normal_rows[k] = walk->shown[slot(y)][k];
+            row.albedo_rows[k] = walk->albedo[slot(y)][k];
+            row.color_rows[k] = colors->color[k];
+        }
+        row.color_rows[3] = finish->channels == 4 ? colors->color[3] : NULL;
+        kernel->step(&row);
+    }
+}
+
 static void shade(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
@@ -215,17 +288,20 @@ static void shade(const struct finish *finish, struct walk *walk, int32_t y)
     else if (finish->with_normals && finish->reach && seen->end)
         blend_wide(finish, walk, y);
     for (uint32_t i = 0; i < finish->shade_count && seen->end; i++) {
-        const struct pt_cpu_call *call = &finish->shades[i].call;
-        const struct shade_args *args = call->arguments;
-        if (pt_gathers_bytes(&args->instance) && !pt_recolors(args))
-            fetch_bytes(finish, call, seen, out, y);
-        else
-            fetch_colors(finish, call, seen, out, y);
+        const struct pt_cpu_call *call = &finish->passes[i].call;
+        if (shades_albedo(finish, i)) {
+            fetch_albedo(finish, walk, call, y);
+            continue;
+        }
+        fetch(finish, call, seen, out, y);
         if (finish->with_normals)
             shade_lit(finish, walk, call, y);
         if (finish->channels == 4)
             make_translucent(finish, call, seen, out, walk->shown[slot(y)][3], y);
     }
+    if (finish->colors && seen->end)
+        load_shaded(finish, walk, y);
+    take_steps(finish, walk, &finish->before, out, y);
 }
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ink: lines get their colour. [X 3.3]; twin of shaders/kernels/ink.comp
-#include "compose.h"
+#include "device_cpu/rows.h"
 #include "shade.h"
 
 struct ink {
