@@ -181,7 +181,7 @@ int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene)
     if (!frame || !scene)
         return fail("patina_frame_bake_shadows: frame or scene is NULL");
     int error = take_turn(frame);
-    return error ? error : end_turn(frame, pt_shadows_bake(frame, scene));
+    return error ? error : end_turn(frame, pt_frame_bake(frame, scene));
 }
 
 int patina_frame_load_shadows(patina_frame *frame, const patina_scene *scene, const char *path)
@@ -189,21 +189,21 @@ int patina_frame_load_shadows(patina_frame *frame, const patina_scene *scene, co
     if (!frame || !scene || !path)
         return fail("patina_frame_load_shadows: frame, scene or path is NULL");
     int error = take_turn(frame);
-    return error ? error : end_turn(frame, pt_shadows_load(frame, scene, path));
+    return error ? error : end_turn(frame, pt_frame_load_shadows(frame, scene, path));
 }
 
 int patina_frame_save_shadows(const patina_frame *frame, const char *path)
 {
     if (!frame || !path)
         return fail("patina_frame_save_shadows: frame or path is NULL");
-    return pt_shadows_save(frame, path);
+    return pt_frame_save_shadows(frame, path);
 }
 
 int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size)
 {
     if (!frame || !values)
         return fail("patina_frame_read_shadows: frame or values is NULL");
-    return pt_shadows_read(frame, instance, light, values, size);
+    return pt_frame_read_shadows(frame, instance, light, values, size);
 }
 
 void patina_frame_cancel(patina_frame *frame)

@@ -100,16 +100,22 @@ static void plan_locate(struct pt_builder *builder, uint32_t i)
               "mesh %u receives shadows", i);
 }
 
+int pt_mesh_pixels_shadowed(const struct pt_plan *plan)
+{
+    int some = 0;
+    for (uint32_t i = 0; i < plan->mesh_count && plan->light_count; i++)
+        some |= in_view(&plan->meshes[i]) && pt_mesh_receives(plan->meshes[i].instance);
+    return some;
+}
+
 // Before pixels are tested: where they lie.
 static void plan_places(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    plan->mesh_shadows = 0;
+    plan->mesh_shadows = pt_mesh_pixels_shadowed(plan);
     for (uint32_t i = 0; i < plan->mesh_count && plan->light_count; i++)
-        if (in_view(&plan->meshes[i]) && pt_mesh_receives(plan->meshes[i].instance)) {
+        if (in_view(&plan->meshes[i]) && pt_mesh_receives(plan->meshes[i].instance))
             plan_locate(builder, i);
-            plan->mesh_shadows = 1;
-        }
     if (!plan->mesh_shadows)
         pt_skip(builder, "locate",
                 !plan->triangles     ? "no mesh is in view"
@@ -161,12 +167,13 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
                                            .opacity = 1.0f};
     pt_own_colors(color, &args);
     pt_line_surface(builder, &args.instance);
-    PT_REASON(PT_ADD(builder, shade, args,
+    struct pt_pass *pass = PT_ADD(builder, shade, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
                       pt_span_of(plan), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
                       pt_plane_at(color, 0), pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE),
-                      pt_buffer_of(PT_SHADOWS, unlit ? PT_NO_INSTANCE : PT_PIXELS), pt_plane_at(PT_PLANE_ARRIVED, 0)}),
-              "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
+                      pt_buffer_of(PT_SHADOWS, unlit ? PT_NO_INSTANCE : PT_PIXELS), pt_plane_at(PT_PLANE_ARRIVED, 0)});
+    pass->late = pt_shade_late(&args, PT_LATE_PIXELS);
+    PT_REASON(pass, "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
 }
 
 void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color)

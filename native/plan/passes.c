@@ -33,7 +33,8 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
     struct pt_pass *pass = &plan->passes[plan->pass_count++];
     *pass = (struct pt_pass){.kernel = kernel,
                              .layer = builder->layer,
-                             .name = name,
+                             .name = builder->as ? builder->as : name,
+                             .output = !builder->layer && !plan->map,
                              .arguments = copy(builder, arguments, argument_size),
                              .argument_size = argument_size,
                              .refs = copy(builder, refs, ref_count * sizeof *refs),

@@ -15,8 +15,12 @@ struct pt_builder {
     uint32_t finish; // first shading pass of the last layer planned
     int behind;      // of a light's map, or where what stations looked through is drawn again: the limit plane holds
     int again;       // passes that were planned before: what is left out was said
+    const char *as;  // what statistics add its passes to; NULL: their kernels' names
+    uint32_t listed; // passes that steps name already
+    uint32_t step_room;
     int failed;      // memory lacked: the plan fails as a whole
     struct pt_pass nowhere; // written to then
+    struct pt_step no_step;
 };
 
 // ---- what a pass binds -----------------------------------------------------------------------------------------------
@@ -90,6 +94,25 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
 // Says why a pass is left out; once, with the first layer.
 void pt_skip(struct pt_builder *builder, const char *name, const char *reason);
 
+// ---- steps: steps.c --------------------------------------------------------------------------------------------------
+
+// Never NULL; what is added next moves it.
+struct pt_step *pt_add_step(struct pt_builder *builder, enum pt_step_of of);
+// A step whose own follow, and its place; then its own end here.
+uint32_t pt_open_step(struct pt_builder *builder, enum pt_step_of of);
+struct pt_step *pt_step_at(struct pt_builder *builder, uint32_t at);
+void pt_close_step(struct pt_builder *builder, uint32_t at);
+// The passes added since the last; none: no step.
+void pt_add_passes_step(struct pt_builder *builder, enum pt_step_of of);
+// What is cleared before the layer at hand; shown: what pixels show of meshes too.
+void pt_plan_clears(struct pt_builder *builder, int shown);
+void pt_plan_peeling(struct pt_builder *builder); // and before the first of several
+void pt_plan_light_steps(struct pt_builder *builder);
+
+// plan.c: the passes of a depth map with its holes filled, and no more: scatter to fill. builder->behind: only of what lies behind the
+// limit plane.
+int pt_plan_depth(struct pt_builder *builder);
+
 // ---- effects: effects.c --------------------------------------------------------------------------------------------
 
 int pt_effects_want_normals(const struct patina_scene *scene);
@@ -107,10 +130,13 @@ void pt_plan_paper(struct pt_builder *builder);
 
 // Draws the meshes in view over the layer's filled points; shown: they are shaded, too.
 void pt_plan_meshes(struct pt_builder *builder, int shown);
+// Whether some mesh in view receives shadows.
+int pt_mesh_pixels_shadowed(const struct pt_plan *plan);
 // Lights and colours what they show, into COLOR_A, or UNLIT for their own colours.
 void pt_plan_mesh_shade(struct pt_builder *builder, enum pt_plane color);
 // shading.c: what shading asks of the view, the world and the lights; receives: whether there are shadow words to be read.
 void pt_shade_lights(const struct pt_builder *builder, int receives, struct shade_args *args);
+enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words); // `words`, where some light's are read
 // splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
 void pt_plan_splat(struct pt_builder *builder);
 void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of every instance

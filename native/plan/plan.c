@@ -235,13 +235,14 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
         pt_plan_recolor(builder, instance, &args);
     int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
     enum pt_instance_buffer colors = args.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
-    PT_REASON(PT_ADD(builder, shade, args,
+    struct pt_pass *pass = PT_ADD(builder, shade, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_span_of(plan),
                       of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i), pt_shading_of(builder),
                       pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, instance->of),
-                      pt_plane_at(PT_PLANE_ARRIVED, 0)}),
-              "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
+                      pt_plane_at(PT_PLANE_ARRIVED, 0)});
+    pass->late = pt_shade_late(&args, PT_LATE_POINTS);
+    PT_REASON(pass, "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
               args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");
 }
 
@@ -537,6 +538,20 @@ static void plan_surfaces(struct pt_builder *builder)
     pt_plan_reopen_take(builder);
 }
 
+// What must be known of shadows before the layer at hand is shaded.
+static void plan_shadows(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    if (plan->light_count && (builder->layer == 1 || plan->mesh_shadows))
+        pt_add_passes_step(builder, PT_STEP_PASSES);
+    if (builder->layer == 1)
+        plan_marks(builder);
+    if (builder->layer == 1 && plan->light_count)
+        pt_add_passes_step(builder, PT_STEP_MARK);
+    if (plan->light_count && (builder->layer == 1 || plan->mesh_shadows))
+        pt_plan_light_steps(builder);
+}
+
 // Returns the plane that holds the layer's colour.
 static enum pt_plane plan_layer(struct pt_builder *builder)
 {
@@ -544,9 +559,8 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     plan_surfaces(builder);
     pt_plan_meshes(builder, 1);
     pt_plan_average(builder);
-    if (builder->layer == 1)
-        plan_marks(builder);
     pt_plan_lines(builder);
+    plan_shadows(builder);
     uint32_t finish = plan->pass_count;
     for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
         enum pt_plane shaded = own ? PT_PLANE_UNLIT : PT_PLANE_COLOR_A;
@@ -614,17 +628,47 @@ static void put_together(const struct pt_builder *builder)
         plan->passes[first].together = end - first;
 }
 
+// A layer with its passes and steps, of several or the only one.
+static enum pt_plane plan_whole_layer(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    pt_plan_clears(builder, 1);
+    if (plan->layers > 1 && builder->layer == 1)
+        pt_plan_peeling(builder);
+    const enum pt_plane color = plan_layer(builder);
+    if (plan->layers > 1)
+        put_together(builder);
+    plan_layer_passes(builder, color);
+    if (plan->layers > 1) {
+        pt_add_passes_step(builder, PT_STEP_PASSES);
+        PT_REASON(pt_add_step(builder, PT_STEP_COVERED), "what layer %u covers, and what may lie behind it", builder->layer);
+    }
+    return color;
+}
+
 static void plan_points(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    enum pt_plane color = PT_PLANE_COLOR_A;
     float background[4];
-    for (builder->layer = 1; builder->layer <= plan->layers; builder->layer++) {
-        color = plan_layer(builder);
-        if (plan->layers > 1)
-            put_together(builder);
-        plan_layer_passes(builder, color);
+    builder->layer = 1;
+    enum pt_plane color = plan_whole_layer(builder);
+    uint32_t loop = 0;
+    if (plan->layers > 1) {
+        builder->layer = 2;
+        loop = pt_open_step(builder, PT_STEP_LAYERS);
+        pt_step_at(builder, loop)->most = plan->layers - 1;
+        pt_step_at(builder, loop)->ends = PT_END_LAYER_EMPTY | PT_END_SPENT;
+        PT_REASON(pt_step_at(builder, loop), "%s", plan->transparent ? "something in view lets light through"
+                                                                     : "passes of every layer are asked for");
     }
+    for (; builder->layer >= 2 && builder->layer <= plan->layers; builder->layer++) {
+        const uint32_t layer = pt_open_step(builder, PT_STEP_LAYER);
+        PT_REASON(pt_step_at(builder, layer), "what lies behind layer %u", builder->layer - 1);
+        color = plan_whole_layer(builder);
+        pt_close_step(builder, layer);
+    }
+    if (plan->layers > 1)
+        pt_close_step(builder, loop);
     builder->layer = 0;
     if (plan->layers == 1)
         pt_skip(builder, "peel",
@@ -636,6 +680,7 @@ static void plan_points(struct pt_builder *builder)
     if (plan->layers == 1)
         put_together(builder);
     pt_plan_assess(builder);
+    pt_add_passes_step(builder, PT_STEP_PASSES);
 }
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
@@ -647,26 +692,36 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
     builder->plan->line_radius = 0.0f;
     skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
     skip_all(builder, reason, others, sizeof others / sizeof *others);
+    pt_plan_clears(builder, 1);
     plan_output(builder, PT_PLANE_COLOR_A);
     pt_plan_paper(builder);
     put_together(builder);
+    pt_add_passes_step(builder, PT_STEP_PASSES);
 }
 
-int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behind)
+int pt_plan_depth(struct pt_builder *builder)
 {
-    struct pt_builder builder = {.scene = scene, .plan = plan, .behind = behind};
-    *plan = (struct pt_plan){.map = 1};
-    int error = pt_plan_view(scene, plan);
+    struct pt_plan *plan = builder->plan;
+    plan->map = 1;
+    const int error = pt_plan_view(builder->scene, plan);
     if (plan->iterations > MAP_ITERATIONS)
         plan->iterations = MAP_ITERATIONS;
-    if (!error && pt_plan_shows(plan)) {
-        plan_surfaces(&builder);
-        pt_plan_meshes(&builder, 0);
-        error = builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
-    }
-    if (error)
+    if (error || !pt_plan_shows(plan))
+        return error;
+    plan_surfaces(builder);
+    pt_plan_meshes(builder, 0);
+    return builder->failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+}
+
+int pt_plan_textures(const struct patina_scene *scene, struct pt_plan *plan)
+{
+    struct pt_builder builder = {.scene = scene, .plan = plan};
+    *plan = (struct pt_plan){0};
+    pt_plan_lights(scene, plan);
+    pt_plan_light_steps(&builder);
+    if (builder.failed)
         pt_plan_destroy(plan);
-    return error;
+    return builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
 }
 
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)

@@ -7,6 +7,7 @@
 #include "device.h"
 #include "expected.h"
 #include "scene/scene.h"
+#include "steps.h"
 
 enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 
@@ -79,13 +80,8 @@ enum pt_instance_buffer {
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
 
-// What a pass binds: a plane at a level, or a buffer of an instance or a mesh.
-enum pt_ref_of { PT_OF_FRAME, PT_OF_INSTANCE, PT_OF_MESH };
-struct pt_ref {
-    uint32_t of;    // pt_ref_of
-    uint32_t which; // pt_plane, pt_instance_buffer or pt_mesh_buffer
-    uint32_t index; // level, layer from 0 on, instance or mesh
-};
+// What of a pass's arguments is known only when its turn comes: how many samples shadow words hold, of points or of pixels.
+enum pt_late { PT_LATE_NOTHING, PT_LATE_POINTS, PT_LATE_PIXELS };
 
 struct pt_pass {
     enum pt_kernel kernel;
@@ -96,6 +92,8 @@ struct pt_pass {
     size_t argument_size;
     const struct pt_ref *refs;
     uint32_t ref_count;
+    enum pt_late late; // pt_plan_late
+    int output;        // writes the picture that readers see
     uint32_t together; // so many passes from this one on may run as one: nothing else reads the planes between them. 0: alone
 };
 
@@ -146,6 +144,23 @@ struct pt_plan_mesh {
     uint32_t rect[4]; // in the planes; empty where it is out of view: x0 >= x1
 };
 
+// The maps of one sample: those of all opaque casters; of all but one that must not shadow itself, for that one; and of
+// every transparent caster by itself, layer behind layer where its points have opacities of their own.
+struct pt_shadow_group {
+    uint32_t only, without; // instances, or PT_NO_INSTANCE
+    uint32_t loss;          // 1..255
+    int faint;              // its points have opacities of their own
+};
+enum { PT_NO_INSTANCE = 0xFFFFFFFFu, PT_PIXELS = 0xFFFFFFFEu }; // PT_PIXELS: those that show meshes, of which shadows are kept, too
+enum { PT_FAINT_LAYERS = 8 }; // of a caster whose points have opacities of their own, at most
+
+// What is tested against a light's map.
+struct pt_receiver {
+    const struct patina_cloud *cloud; // NULL: the picture's pixels that show meshes
+    struct chunk_view *chunks;
+    uint32_t chunk_count;
+};
+
 struct pt_plan {
     struct view_args view;  // level 0; rect: union over instances and meshes
     uint32_t levels;        // coarse levels
@@ -163,6 +178,12 @@ struct pt_plan {
     int mesh_shadows;   // some of these receive shadows: their pixels are tested
     struct pt_pass *passes;
     uint32_t pass_count;
+    struct pt_step *steps; // what of them runs when
+    uint32_t step_count;
+    struct pt_shadow_group *groups; // of casters
+    uint32_t group_count;
+    struct pt_receiver *receivers; // of a light's map
+    uint32_t receiver_count;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     struct pt_plan_light lights[PT_MAX_LIGHTS]; // those that cast, in the scene's order
@@ -260,15 +281,33 @@ void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_inst
 
 // ---- shadows: light.c -----------------------------------------------------------------------------------------------
 
-// The passes of a depth map with its holes filled, and no more: scatter to fill.
-// behind: only of what lies behind the limit plane.
-int pt_plan_map(const struct patina_scene *scene, struct pt_plan *plan, int behind);
+// Where the loops around a map stand.
+struct pt_round {
+    uint32_t light, group, sample, face;
+    uint32_t layer;     // of a faint caster, from 0 on
+    int points, pixels; // which are tested: receivers, or pixels that show meshes
+    int compare;        // whether the samples so far differ is asked
+};
+
+// maps.c, pure as all planning: the sub-plan of a light's map with its tests; without passes where there is nothing to see. picture:
+// the plan with the loops. Those of other threads may be made at the same time.
+int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, struct pt_plan *map);
+// What the round's maps took together goes into the sum, of receivers that several were tested for.
+int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, struct pt_plan *map);
+// Whether anything is tested against the group's maps.
+int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, uint32_t group);
+// shading.c: writes what is known late into a copy of the pass's arguments; samples: of each light, in the words.
+void pt_plan_late(const struct pt_pass *pass, const uint32_t samples[PT_MAX_LIGHTS], void *arguments);
+// plan.c: the loops of all shadow textures, without a picture.
+int pt_plan_textures(const struct patina_scene *scene, struct pt_plan *plan);
 
 // Lists plan->lights.
 void pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan);
 // What the maps of light i are like: before they are drawn. Lights whose textures are kept need none.
 int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i);
 int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i); // the same, told in its reason
+// Once they are known: of a sample of light i.
+static inline uint32_t pt_light_faces(const struct pt_plan *plan, uint32_t i) { return plan->lights[i].cube ? 6 : 1; }
 int pt_receives(const struct pt_instance *instance); // shadows, at all
 int pt_mesh_casts(const struct pt_mesh_instance *instance);
 int pt_mesh_receives(const struct pt_mesh_instance *instance);
@@ -277,19 +316,11 @@ int pt_casts_in_layers(const struct patina_scene *scene); // some cloud does: it
 // with an error target: a part of the picture would stop at other samples than the whole.
 int pt_plan_lazy(const struct patina_scene *scene, const struct pt_plan *plan);
 
-// The maps of one sample: those of all opaque casters; of all but one that must not shadow itself, for that one; and of
-// every transparent caster by itself, layer behind layer where its points have opacities of their own.
-struct pt_shadow_group {
-    uint32_t only, without; // instances, or PT_NO_INSTANCE
-    uint32_t loss;          // 1..255
-    int faint;              // its points have opacities of their own
-};
-enum { PT_NO_INSTANCE = 0xFFFFFFFFu, PT_PIXELS = 0xFFFFFFFEu }; // PT_PIXELS: those that show meshes, of which shadows are kept, too
 uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_group *groups); // at most 2 instances + 1
 int pt_group_casts(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_group *group, uint32_t instance);
 
-// A scene of the group's casters as a sample of the light sees them, for pt_plan_map. instances, meshes: room for the scene's. The
+// A scene of the group's casters as a sample of the light sees them, for pt_plan_depth. instances, meshes: room for the scene's. The
 // window is what of the map counts, in window units: left, bottom, right, top. 0: there is nothing to see.
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
                    uint32_t sample, uint32_t face, struct pt_instance *instances, struct pt_mesh_instance *meshes,

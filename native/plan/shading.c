@@ -50,7 +50,7 @@ static void set_lights(const struct pt_plan *plan, const struct patina_scene *sc
         struct light_args *out = &args->lights[args->light_count++];
         set_light(scene, &scene->lights[i], out);
         if (casting < plan->light_count && plan->lights[casting].light == &scene->lights[i] && ++casting && receives)
-            out->shadow = casting; // the frame puts the scale in, when it knows how many samples there are
+            out->shadow = casting; // its scale is known late
     }
 }
 
@@ -92,4 +92,22 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
     args->arrived =
         builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
     set_lights(builder->plan, scene, receives, args);
+}
+
+// ---- what is known late --------------------------------------------------------------------------------------------------
+
+enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words)
+{
+    for (uint32_t i = 0; i < args->light_count; i++)
+        if (args->lights[i].shadow)
+            return words;
+    return PT_LATE_NOTHING;
+}
+
+void pt_plan_late(const struct pt_pass *pass, const uint32_t samples[PT_MAX_LIGHTS], void *arguments)
+{
+    struct shade_args *args = arguments;
+    for (uint32_t i = 0; i < args->light_count && pass->late != PT_LATE_NOTHING; i++)
+        if (args->lights[i].shadow)
+            args->lights[i].shadow_scale = 1.0f / (255.0f * (float)samples[args->lights[i].shadow - 1]);
 }

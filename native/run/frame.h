@@ -2,28 +2,13 @@
 #ifndef PT_FRAME_H
 #define PT_FRAME_H
 
-#include "frame_shadow.h"
+#include "layers.h"
 #include "numbering.h"
+#include "residency.h"
+#include "shadows.h"
+#include "times.h"
 
-enum { PT_TIMINGS = PT_KERNEL_COUNT + 4 };
-
-struct pt_timing {
-    const char *name;
-    double ms;
-};
-
-struct pt_layer {
-    uint64_t points; // in chunks that were scattered
-    uint64_t pixels; // that it covers; 0 where one layer was not peeled
-};
-
-struct pt_resident;
 struct pt_mean;
-
-// The clouds whose buffers a device holds for a frame.
-struct pt_residency {
-    struct pt_resident *first;
-};
 
 // What readers are told of the last finished render. The planes of its picture go with it.
 struct pt_shown {
@@ -43,7 +28,7 @@ struct patina_frame {
     struct patina_device *device;
     struct pt_residency residency;
     struct pt_numbering numbering; // of the last scene that was rendered, baked or loaded for
-    struct pt_buffer planes[PT_PLANE_COUNT][PT_SLOTS];
+    struct pt_planes planes;
     struct pt_shown shown;
     struct pt_shadows shadows;
     struct pt_clip_buffers clips;
@@ -53,8 +38,7 @@ struct patina_frame {
     float progress_done, progress_share; // of the render: before the picture at hand, and by it
     uint32_t sampling[2];                // of the last picture: grid and shifts of its samples
     struct pt_mean *mean;                // while samples of the last picture are pending
-    struct pt_timing timings[PT_TIMINGS];
-    uint32_t timing_count;
+    struct pt_times times;
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     struct pt_layer layers[PATINA_MAX_LAYERS];
@@ -74,14 +58,13 @@ int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t 
 int pt_frame_read_slots(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size);
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size);
 int pt_frame_dump(const struct patina_frame *frame, const char *folder);
-// For its parts (frame_shadow.c).
-int pt_frame_ensure_plane(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
-                          enum pt_plane which, uint32_t level);
-// An empty key everywhere in a plane of keys.
-int pt_frame_clear_keys(struct patina_frame *frame, struct pt_buffer (*planes)[PT_SLOTS], const struct pt_plan *plan,
-                        enum pt_plane which);
-void pt_frame_note_time(struct patina_frame *frame, const char *name, double ms);
-double pt_milliseconds(void);
+// All of the scene's shadow textures, whole, without a picture.
+int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene);
+// What arrives of the light at each point of the instance.
+int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size);
+// frame_shadow_file.c
+int pt_frame_save_shadows(const struct patina_frame *frame, const char *path);
+int pt_frame_load_shadows(struct patina_frame *frame, const struct patina_scene *scene, const char *path);
 // Takes the scene's numbering over; PATINA_ERROR_MEMORY says so.
 int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene);
 void pt_frame_release(struct patina_frame *frame); // planes and resident clouds

@@ -53,9 +53,9 @@ static void swap_bytes(void *a, void *b, size_t size)
 // Changes what readers see for what lies aside.
 static void swap(struct patina_frame *frame, struct aside *aside)
 {
-    swap_bytes(&frame->planes[PT_PLANE_KEYS][0], &aside->keys, sizeof aside->keys);
+    swap_bytes(&frame->planes.at[PT_PLANE_KEYS][0], &aside->keys, sizeof aside->keys);
     for (int p = 0; p < PT_PLANE_COUNT - PT_PLANE_COMBINED; p++)
-        swap_bytes(frame->planes[PT_PLANE_COMBINED + p], aside->planes[p], sizeof aside->planes[p]);
+        swap_bytes(frame->planes.at[PT_PLANE_COMBINED + p], aside->planes[p], sizeof aside->planes[p]);
     swap_bytes(&frame->shown, &aside->shown, sizeof aside->shown);
     swap_bytes(frame->layers, aside->layers, sizeof aside->layers);
     swap_bytes(frame->skipped, aside->skipped, sizeof aside->skipped);
@@ -227,7 +227,7 @@ static int show(struct patina_frame *frame)
             for (size_t i = 4 * (size_t)row * width, to = 4 * (size_t)(row - y) * width; i < 4 * (size_t)(row + 1) * width; i++, to++)
                 mean->fine[to] = (mean->sums[0][i] + (mean->sampling.shifts > 1 ? mean->sums[1][i] : 0.0f)) * share;
         }
-        int error = frame->device->ops->buffer_write(frame->device, &frame->planes[PT_PLANE_COMBINED][0],
+        int error = frame->device->ops->buffer_write(frame->device, &frame->planes.at[PT_PLANE_COMBINED][0],
                                                      4 * (size_t)y * width * sizeof(float), mean->fine,
                                                      4 * (size_t)(end - y) * width * sizeof(float));
         if (error) {

@@ -94,7 +94,7 @@ static int write_file(const struct patina_frame *frame, const char *path, const 
     return good ? PATINA_OK : pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: shadows cannot be written", path);
 }
 
-int pt_shadows_save(const struct patina_frame *frame, const char *path)
+int pt_frame_save_shadows(const struct patina_frame *frame, const char *path)
 {
     const struct pt_shadows *shadows = &frame->shadows;
     struct bytes body = { 0 }, header = { 0 };
@@ -266,7 +266,9 @@ static int take_textures(struct reader *reader, struct patina_frame *frame, cons
     if (!error)
         error = check_instances(*reader, scene);
     if (!error)
-        error = pt_shadows_make_places(frame, scene, plan->light_count);
+        error = pt_shadows_make_places(frame->device, &frame->shadows, scene, plan->light_count);
+    if (error)
+        pt_fail_again(&frame->handle, error);
     for (uint32_t i = 0; i < reader->instances && !error; i++) {
         reader->at += 16;
         if (frame->shadows.words[i].size)
@@ -281,7 +283,7 @@ static int take_textures(struct reader *reader, struct patina_frame *frame, cons
     return error;
 }
 
-int pt_shadows_load(struct patina_frame *frame, const struct patina_scene *scene, const char *path)
+int pt_frame_load_shadows(struct patina_frame *frame, const struct patina_scene *scene, const char *path)
 {
     struct pt_plan plan = { 0 };
     size_t size;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "layers.h"
+#include "execute.h"
+
+#include <stdlib.h>
 
 static uint32_t columns_of(const struct pt_plan *plan)
 {
@@ -51,4 +53,50 @@ uint32_t pt_layer_chunks(const struct pt_plan *plan, uint32_t instance, const st
         out[count++] = from->chunks[c];
     }
     return count;
+}
+
+// ---- the loop ------------------------------------------------------------------------------------------------------------
+
+int pt_read_covered(struct pt_execution *e, const struct pt_step *step)
+{
+    const struct pt_buffer *tiles = &e->binder.planes->at[PT_PLANE_TILES][PT_TILE_LEVEL];
+    if (!e->tiles && !(e->tiles = malloc(tiles->size)))
+        return pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    int error = e->device->ops->buffer_read(e->device, tiles, 0, e->tiles, tiles->size);
+    if (!error)
+        e->layers[step->layer - 1].pixels = pt_layer_pixels(e->plan, e->tiles);
+    return error;
+}
+
+// Chooses the chunks of a layer. *some: 0 when there is nothing behind.
+static int choose_chunks(struct pt_execution *e, struct pt_layer *layer, int *some)
+{
+    const struct pt_plan *plan = e->plan;
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < plan->instance_count && !error; i++) {
+        const uint32_t most = plan->instances[i].chunk_count;
+        if (!most)
+            continue;
+        if (!e->behind[i] && !(e->behind[i] = malloc(most * sizeof **e->behind)))
+            return pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+        const uint32_t count = pt_layer_chunks(plan, i, e->tiles, e->behind[i], &layer->points);
+        error = pt_bind_chunks(&e->binder, i, e->behind[i], count);
+    }
+    *some = layer->points > 0 || plan->triangles;
+    return error;
+}
+
+int pt_run_layer(struct pt_execution *e, const struct pt_step *step)
+{
+    struct pt_layer *layer = &e->layers[step->layer - 1];
+    int some = 0;
+    if (e->ended)
+        return PATINA_OK;
+    *layer = (struct pt_layer){ 0 };
+    int error = layer[-1].pixels ? choose_chunks(e, layer, &some) : PATINA_OK;
+    e->ended = !some;
+    if (error || !some)
+        return error;
+    e->layer_count = step->layer;
+    return pt_walk(e, step + 1, pt_step_after(step));
 }

@@ -10,6 +10,12 @@ struct pt_tile { // as the TILES plane has it
     uint32_t covered; // pixels
 };
 
+// Of a frame's layer.
+struct pt_layer {
+    uint64_t points; // in chunks that were scattered
+    uint64_t pixels; // that it covers; 0 where one layer was not peeled
+};
+
 // Pixels that the layer covers. tiles: the whole plane.
 uint64_t pt_layer_pixels(const struct pt_plan *plan, const struct pt_tile *tiles);
 

@@ -203,20 +203,6 @@ int pt_residency_take_texture(struct pt_residency *residency, struct patina_devi
     return pt_residency_take_bytes(residency, device, texture->alive, texture->texels, texture->bytes, out);
 }
 
-int pt_residency_mesh_buffer(struct pt_residency *residency, struct patina_device *device, const struct pt_mesh_instance *instance,
-                             uint32_t which, struct pt_buffer **out)
-{
-    static struct pt_buffer none; // never written: kernels that bind it do not touch it
-    struct pt_resident *resident = NULL;
-    int error = PATINA_OK;
-    if (which != PT_MESH_TEXELS)
-        error = pt_residency_take_mesh(residency, device, instance->mesh, &resident);
-    else if (instance->style.texture)
-        error = pt_residency_take_texture(residency, device, instance->style.texture, &resident);
-    *out = resident ? &resident->buffers[which == PT_MESH_TEXELS ? 0 : which] : &none;
-    return error;
-}
-
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device)
 {
     while (residency->first) {

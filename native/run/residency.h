@@ -3,7 +3,14 @@
 #ifndef PT_RESIDENCY_H
 #define PT_RESIDENCY_H
 
-#include "frame.h"
+#include "plan/plan.h"
+
+struct pt_resident;
+
+// The clouds whose buffers a device holds for a frame.
+struct pt_residency {
+    struct pt_resident *first;
+};
 
 struct pt_resident {
     struct pt_resident *next;
@@ -29,9 +36,6 @@ int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device 
                            struct pt_resident **out);
 int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device, const struct patina_texture *texture,
                               struct pt_resident **out);
-// The buffer of a mesh or its texture that a pass binds; of no texture, an empty one.
-int pt_residency_mesh_buffer(struct pt_residency *residency, struct patina_device *device, const struct pt_mesh_instance *instance,
-                             uint32_t which, struct pt_buffer **out);
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device);
 
 #endif

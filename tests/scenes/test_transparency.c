@@ -507,7 +507,7 @@ static uint64_t *scatter_behind(patina_frame *frame, const struct pt_plan *plan,
     CHECK(pt_residency_take(&frame->residency, device, cloud, &resident), device);
     struct scatter_args args = {.view = plan->view, .instances = 1, .behind = 1};
     struct pt_buffer *buffers[] = {&keys, &list, &resident->buffers[PT_POSITIONS],
-                                   &resident->buffers[PT_SURFACE], &frame->planes[PT_PLANE_LIMIT][0]};
+                                   &resident->buffers[PT_SURFACE], &frame->planes.at[PT_PLANE_LIMIT][0]};
     CHECK(device->ops->run(device, PT_KERNEL_scatter, &args, sizeof args, buffers, 5, NULL), device);
     CHECK(device->ops->buffer_read(device, &keys, 0, out, pixels * 8), device);
     device->ops->buffer_destroy(device, &keys);
@@ -541,7 +541,7 @@ static void test_chunks_left_out(void **state)
         CHECK(patina_frame_render(frame, scene), frame);
         struct pt_plan plan;
         CHECK(pt_plan_create(scene, &plan), scene);
-        const struct pt_buffer *plane = &frame->planes[PT_PLANE_TILES][PT_TILE_LEVEL];
+        const struct pt_buffer *plane = &frame->planes.at[PT_PLANE_TILES][PT_TILE_LEVEL];
         struct pt_tile *tiles = malloc(plane->size);
         struct chunk_view *list = malloc((plan.instances[0].chunk_count + 1) * sizeof *list);
         assert_true(tiles && list);

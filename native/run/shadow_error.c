@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How far soft shadows are off, told from what more samples changed. The sums are integers, equal on every device, and are
 // gone through in one order on the caller's thread: when a light stops is decided alike everywhere.
-#include "frame.h"
+#include "shadows.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,19 +17,18 @@ void pt_shadow_sums_free(struct pt_shadow_sums *sums)
     *sums = (struct pt_shadow_sums){ 0 };
 }
 
-int pt_shadow_sums_read(struct patina_frame *frame, uint32_t light, struct pt_shadow_sums *sums)
+int pt_shadow_sums_read(struct patina_device *device, const struct pt_shadows *shadows, uint32_t light, struct pt_shadow_sums *sums)
 {
-    const struct pt_shadows *shadows = &frame->shadows;
     size_t at = 0;
     pt_shadow_sums_free(sums);
     for (uint32_t i = 0; i < shadows->instance_count; i++)
         sums->count += shadows->words[i].size / 4 / shadows->light_count;
     sums->words = malloc((sums->count + 1) * sizeof *sums->words);
     if (!sums->words)
-        return pt_fail(&frame->device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
     for (uint32_t i = 0; i < shadows->instance_count; i++) {
         size_t size = shadows->words[i].size / shadows->light_count;
-        int error = size ? frame->device->ops->buffer_read(frame->device, &shadows->words[i], light * size, sums->words + at, size)
+        int error = size ? device->ops->buffer_read(device, &shadows->words[i], light * size, sums->words + at, size)
                          : PATINA_OK;
         if (error)
             return error;

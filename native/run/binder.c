@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "binder.h"
+
+#include "scene/mask.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+int pt_binder_open(struct pt_binder *binder)
+{
+    const struct pt_plan *plan = binder->plan;
+    binder->instances = calloc((size_t)plan->instance_count + 1, sizeof *binder->instances);
+    binder->receivers = calloc((size_t)plan->receiver_count + 1, sizeof *binder->receivers);
+    binder->meshes = calloc((size_t)plan->mesh_count + 1, sizeof *binder->meshes);
+    if (!binder->instances || !binder->receivers || !binder->meshes)
+        return pt_fail(&binder->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    return pt_clip_buffers_fill(binder->device, plan, binder->clips);
+}
+
+void pt_binder_close(struct pt_binder *binder)
+{
+    const struct pt_plan *plan = binder->plan;
+    for (uint32_t i = 0; i < plan->instance_count && binder->instances; i++)
+        binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].chunks);
+    for (uint32_t i = 0; i < plan->receiver_count && binder->receivers; i++)
+        binder->device->ops->buffer_destroy(binder->device, &binder->receivers[i].chunks);
+    free(binder->instances);
+    free(binder->receivers);
+    free(binder->meshes);
+}
+
+int pt_bind_chunks(struct pt_binder *binder, uint32_t instance, const struct chunk_view *chunks, uint32_t count)
+{
+    struct pt_buffer *buffer = &binder->instances[instance].chunks;
+    binder->device->ops->buffer_destroy(binder->device, buffer);
+    binder->instances[instance].placed = 1;
+    return binder->device->ops->buffer_create(binder->device, count * sizeof *chunks, chunks, 1, buffer);
+}
+
+static int take_cloud(struct pt_binder *binder, struct pt_bound_instance *bound, const struct patina_cloud *cloud)
+{
+    return bound->cloud ? PATINA_OK : pt_residency_take(binder->residency, binder->device, cloud, &bound->cloud);
+}
+
+static int take_mask(struct pt_binder *binder, struct pt_bound_instance *bound, const struct patina_mask *mask)
+{
+    return bound->mask ? PATINA_OK
+                       : pt_residency_take_bytes(binder->residency, binder->device, mask->alive, mask->words,
+                                                 mask->word_count * sizeof *mask->words, &bound->mask);
+}
+
+static int take_grade(struct pt_binder *binder, struct pt_bound_instance *bound, const struct patina_grade *grade)
+{
+    return bound->grade ? PATINA_OK
+                        : pt_residency_take_bytes(binder->residency, binder->device, grade->alive, grade->colors, grade->size,
+                                                  &bound->grade);
+}
+
+// Colours: the cloud's own, with what stations saw through in magenta, or graded.
+static int bind_colors(struct pt_binder *binder, const struct pt_plan_instance *planned, struct pt_bound_instance *bound,
+                       struct pt_buffer **out)
+{
+    const struct pt_instance *instance = planned->instance;
+    int error = PATINA_OK;
+    if (planned->marked) {
+        error = pt_residency_mark(binder->device, instance->cloud, bound->cloud);
+        *out = &bound->cloud->marked;
+    } else if (instance->style.grade) {
+        error = take_grade(binder, bound, instance->style.grade);
+        *out = error ? NULL : &bound->grade->buffers[0];
+    } else {
+        *out = &bound->cloud->buffers[PT_COLORS];
+    }
+    return error;
+}
+
+static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
+{
+    const struct pt_plan_instance *planned = &binder->plan->instances[ref->index];
+    struct pt_bound_instance *bound = &binder->instances[ref->index];
+    int error = PATINA_OK;
+    if (ref->which == PT_CHUNKS) {
+        *out = &bound->chunks;
+        return bound->placed ? PATINA_OK : pt_bind_chunks(binder, ref->index, planned->chunks, planned->chunk_count);
+    }
+    if (ref->which == PT_MASK) {
+        error = take_mask(binder, bound, pt_mask_of(planned->instance));
+        *out = error ? NULL : &bound->mask->buffers[0];
+        return error;
+    }
+    if ((error = take_cloud(binder, bound, planned->instance->cloud)))
+        return error;
+    if (ref->which == PT_COLORS)
+        return bind_colors(binder, planned, bound, out);
+    *out = &bound->cloud->buffers[ref->which];
+    return ref->which == PT_SIGHTS ? pt_residency_see(binder->device, planned->instance->cloud, bound->cloud) : PATINA_OK;
+}
+
+static int bind_receiver(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
+{
+    const struct pt_receiver *receiver = &binder->plan->receivers[ref->index];
+    struct pt_bound_instance *bound = &binder->receivers[ref->index];
+    if (ref->which == PT_CHUNKS) {
+        *out = &bound->chunks;
+        return bound->chunks.size ? PATINA_OK
+                                  : binder->device->ops->buffer_create(binder->device, receiver->chunk_count * sizeof *receiver->chunks,
+                                                                       receiver->chunks, 1, &bound->chunks);
+    }
+    int error = take_cloud(binder, bound, receiver->cloud);
+    *out = error ? NULL : &bound->cloud->buffers[ref->which];
+    return error;
+}
+
+static int bind_mesh(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
+{
+    const struct pt_mesh_instance *instance = binder->plan->meshes[ref->index].instance;
+    struct pt_bound_mesh *bound = &binder->meshes[ref->index];
+    int error = PATINA_OK;
+    *out = &binder->none;
+    if (ref->which != PT_MESH_TEXELS) {
+        if (!bound->mesh)
+            error = pt_residency_take_mesh(binder->residency, binder->device, instance->mesh, &bound->mesh);
+        if (!error)
+            *out = &bound->mesh->buffers[ref->which];
+    } else if (instance->style.texture) {
+        if (!bound->texture)
+            error = pt_residency_take_texture(binder->residency, binder->device, instance->style.texture, &bound->texture);
+        if (!error)
+            *out = &bound->texture->buffers[0];
+    }
+    return error;
+}
+
+int pt_bind(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
+{
+    switch (ref->of) {
+    case PT_OF_FRAME:
+        *out = &binder->planes->at[ref->which][ref->index];
+        return pt_planes_ensure(binder->device, binder->planes, binder->plan, ref->which, ref->index);
+    case PT_OF_LEFT: *out = &binder->planes->at[ref->which][ref->index]; return PATINA_OK;
+    case PT_OF_PICTURE: *out = &binder->picture->at[ref->which][ref->index]; return PATINA_OK;
+    case PT_OF_MESH: return bind_mesh(binder, ref, out);
+    case PT_OF_RECEIVER: return bind_receiver(binder, ref, out);
+    case PT_OF_FLAG: *out = &binder->shadows->flags[ref->which]; return PATINA_OK;
+    case PT_OF_NOTHING: *out = &binder->none; return PATINA_OK;
+    case PT_OF_INSTANCE: break;
+    }
+    if (ref->which == PT_MARKS || ref->which == PT_SHADOWS)
+        *out = pt_shadows_buffer(binder->shadows, ref->which, ref->index);
+    else if (ref->which == PT_CLIPS || ref->which == PT_DRAWN)
+        *out = pt_clip_buffer(binder->clips, ref->which);
+    else
+        return bind_instance(binder, ref, out);
+    return PATINA_OK;
+}

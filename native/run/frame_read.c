@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is read of a frame: passes, layers, keys, shadow textures, statistics, planes.
+#include "frame.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const struct {
+    enum pt_plane plane;
+    uint32_t channels;
+    const char *name;
+} pass_table[PATINA_PASS_COUNT] = {
+    [PATINA_PASS_COMBINED] = { PT_PLANE_COMBINED, 4, "COMBINED" },
+    [PATINA_PASS_DEPTH] = { PT_PLANE_DEPTH, 1, "DEPTH" },
+    [PATINA_PASS_NORMAL] = { PT_PLANE_NORMALS, 3, "NORMAL" },
+    [PATINA_PASS_SOURCE] = { PT_PLANE_SOURCE, 1, "SOURCE" },
+    [PATINA_PASS_SHADOW] = { PT_PLANE_SHADOW, 1, "SHADOW" },
+    [PATINA_PASS_LINE] = { PT_PLANE_LINES, 1, "LINE" },
+    [PATINA_PASS_CERTAINTY] = { PT_PLANE_CERTAINTY, 1, "CERTAINTY" },
+    [PATINA_PASS_THICKNESS] = { PT_PLANE_THICKNESS, 1, "THICKNESS" },
+};
+
+int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
+{
+    if (pass >= PATINA_PASS_COUNT)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: no pass %u", pass);
+    if (!frame->shown.picture_valid || !(frame->shown.passes >> pass & 1u))
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read: no %s pass was rendered",
+                       pass_table[pass].name);
+    size_t expected = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels * sizeof *pixels;
+    if (size != expected)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
+                       pass_table[pass].name, frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, expected,
+                       size);
+    const uint32_t known = 1u << PATINA_PASS_CERTAINTY | 1u << PATINA_PASS_THICKNESS;
+    if ((pass == PATINA_PASS_SHADOW && frame->shown.all_lit) || (pass == PATINA_PASS_LINE && !frame->shown.has_lines) ||
+        (known & ~frame->shown.assessed) >> pass & 1u) { // no plane
+        for (size_t i = 0; i < size / sizeof *pixels; i++)
+            pixels[i] = pass == PATINA_PASS_SHADOW ? 1.0f : 0.0f;
+        return PATINA_OK;
+    }
+    int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[pass_table[pass].plane][0], 0, pixels, size);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size)
+{
+    static const enum pt_plane planes[] = { [PATINA_PASS_COMBINED] = PT_PLANE_LAYER_COMBINED,
+                                            [PATINA_PASS_DEPTH] = PT_PLANE_LAYER_DEPTH,
+                                            [PATINA_PASS_NORMAL] = PT_PLANE_LAYER_NORMALS };
+    if (pass > PATINA_PASS_NORMAL || !layer || layer > PATINA_MAX_LAYERS)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: no pass %u of a layer %u", pass, layer);
+    if (!frame->keys_valid || !(frame->shown.layer_passes >> pass & 1u) || layer > frame->shown.layer_most)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_layer: no %s pass of layer %u was asked for",
+                       pass_table[pass].name, layer);
+    size_t count = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels;
+    if (size != count * sizeof *pixels)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: %s is %u x %u x %u floats; got %zu bytes",
+                       pass_table[pass].name, frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, size);
+    if (layer > frame->layer_count) { // peeling ended before
+        for (size_t i = 0; i < count; i++)
+            pixels[i] = pass == PATINA_PASS_DEPTH ? INFINITY : 0.0f;
+        return PATINA_OK;
+    }
+    int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[planes[pass]][layer - 1], 0, pixels, size);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+// Keys as they lie in the plane, where points have numbers of slots.
+static int read_slots(const struct patina_frame *frame, uint64_t *keys, size_t size)
+{
+    if (!frame->keys_valid)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: no finished render");
+    if (size != (size_t)frame->shown.crop[2] * frame->shown.crop[3] * sizeof *keys)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_keys: %u x %u keys; got %zu bytes",
+                       frame->shown.crop[2], frame->shown.crop[3], size);
+    size_t row = (size_t)frame->shown.crop[2] * sizeof *keys;
+    for (uint32_t y = 0; y < frame->shown.crop[3]; y++) {
+        size_t offset = ((size_t)(frame->shown.crop[1] + y) * frame->shown.plane_width + frame->shown.crop[0]) * sizeof *keys;
+        int error = frame->device->ops->buffer_read(frame->device, &frame->planes.at[PT_PLANE_KEYS][0], offset,
+                                                    (char *)keys + y * row, row);
+        if (error)
+            return pt_fail_again(&frame->handle, error);
+    }
+    return PATINA_OK;
+}
+
+int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size)
+{
+    int error = read_slots(frame, keys, size);
+    if (error)
+        return error;
+    return pt_numbering_keys(&frame->numbering, keys, size / sizeof *keys)
+               ? pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_keys: a cloud in view was destroyed since")
+               : PATINA_OK;
+}
+
+int pt_frame_read_slots(const struct patina_frame *frame, const struct patina_scene *scene, uint64_t *keys, size_t size)
+{
+    int same = frame->numbering.count == scene->instance_count;
+    for (uint32_t i = 0; same && i < scene->instance_count; i++)
+        same = frame->numbering.clouds[i].alive == scene->instances[i].cloud->alive;
+    if (!same)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "the frame's last picture is of another scene");
+    int error = read_slots(frame, keys, size);
+    for (size_t i = 0; i < size / sizeof *keys && !error && frame->numbering.discs < UINT32_MAX; i++)
+        if (keys[i] >> 32 != PT_KEY_EMPTY_Z && (uint32_t)keys[i] >= frame->numbering.discs)
+            keys[i] -= frame->numbering.discs;
+    return error;
+}
+
+int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size)
+{
+    const struct pt_shadows *shadows = &frame->shadows;
+    if (instance >= shadows->instance_count || light >= shadows->light_count || !shadows->words[instance].size ||
+        !shadows->lights[light].samples)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: no texture of light %u on instance %u",
+                       light, instance);
+    const struct patina_cloud *cloud = pt_numbering_cloud(&frame->numbering, instance);
+    if (!cloud)
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read_shadows: cloud %u was destroyed since", instance);
+    size_t count = (size_t)cloud->info.count, bytes = shadows->words[instance].size / shadows->light_count;
+    if (size != count * sizeof *values)
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_shadows: %zu points; got %zu bytes", count,
+                       size);
+    uint32_t *words = malloc(bytes + 1);
+    if (!words)
+        return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "patina_frame_read_shadows: out of memory");
+    int error = frame->device->ops->buffer_read(frame->device, &shadows->words[instance], light * bytes, words, bytes);
+    float scale = 1.0f / (255.0f * (float)shadows->lights[light].samples);
+    for (size_t i = 0; i < count && !error; i++)
+        values[i] = 1.0f; // of points that are not drawn
+    for (uint32_t c = 0; c < cloud->chunk_count && !error; c++) {
+        const struct pt_chunk *chunk = &cloud->chunks[c];
+        for (uint32_t slot = chunk->first; slot < chunk->first + chunk->count; slot++)
+            values[cloud->order[slot]] = 1.0f - (float)(words[slot] & PT_SHADOW_SUM) * scale;
+    }
+    free(words);
+    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
+}
+
+size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size)
+{
+    size_t length = 0;
+#define PUT(...)                                                                                                  \
+    length += (size_t)snprintf(buffer && length < size ? buffer + length : NULL, buffer && length < size ? size - length : 0, \
+                               __VA_ARGS__)
+    PUT("{\"passes\":{");
+    for (uint32_t i = 0; i < frame->times.count; i++) { // whole numbers: a locale may write 0,5 for 0.5
+        unsigned long long parts = (unsigned long long)(frame->times.each[i].ms * 1e4 + 0.5);
+        PUT("%s\"%s\":%llu.%04llu", i ? "," : "", frame->times.each[i].name, parts / 10000, parts % 10000);
+    }
+    PUT("},\"skipped\":{");
+    for (uint32_t i = 0; i < frame->skipped_count; i++) // reasons are our own words: no quotes, no backslashes
+        PUT("%s\"%s\":\"%s\"", i ? "," : "", frame->skipped[i].name, frame->skipped[i].reason);
+    PUT("},\"layers\":[");
+    for (uint32_t i = 0; i < frame->layer_count; i++)
+        PUT("%s{\"points\":%llu,\"pixels\":%llu}", i ? "," : "", (unsigned long long)frame->layers[i].points,
+            (unsigned long long)frame->layers[i].pixels);
+    PUT("],\"lights\":[");
+    for (uint32_t i = 0; i < frame->light_count; i++) {
+        const struct pt_shadow_light *light = &frame->shadows.lights[i];
+        unsigned long long parts = (unsigned long long)((double)light->error * 1e6 + 0.5);
+        PUT("%s{\"samples\":%u,\"error\":%llu.%06llu}", i ? "," : "", light->samples, parts / 1000000, parts % 1000000);
+    }
+    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u}}", frame->sampling[0], frame->sampling[1]);
+#undef PUT
+    return length;
+}
+
+int pt_frame_dump(const struct patina_frame *frame, const char *folder)
+{
+    const int sampled = frame->sampling[0] * frame->sampling[1] > 1; // what lies between is of the last finer picture
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int level = 0; level < PT_SLOTS; level++) {
+            const struct pt_buffer *plane = &frame->planes.at[p][level];
+            char path[4096];
+            if (!plane->size || (sampled && p != PT_PLANE_KEYS && p < PT_PLANE_COMBINED))
+                continue;
+            void *copy = malloc(plane->size);
+            if (!copy)
+                return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "dumping planes: out of memory");
+            int error = frame->device->ops->buffer_read(frame->device, plane, 0, copy, plane->size);
+            snprintf(path, sizeof path, "%s/%s_%d.raw", folder, pt_plane_names[p], level);
+            FILE *file = error ? NULL : fopen(path, "wb");
+            size_t written = file ? fwrite(copy, 1, plane->size, file) : 0;
+            free(copy);
+            if (error || !file || fclose(file) || written != plane->size)
+                return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
+            uint32_t width = p >= PT_PLANE_COMBINED ? frame->shown.crop[2] : (frame->shown.plane_width + (1u << level) - 1) >> level;
+            snprintf(path, sizeof path, "%s/%s_%d.txt", folder, pt_plane_names[p], level);
+            file = fopen(path, "w");
+            if (!file || fprintf(file, "%s level %d: %u pixels wide, %zu rows, %u bytes a pixel, row 0 at the bottom\n",
+                                 pt_plane_names[p], level, width, width ? plane->size / pt_plane_bytes[p] / width : 0,
+                                 pt_plane_bytes[p]) < 0 || fclose(file))
+                return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
+        }
+    return PATINA_OK;
+}

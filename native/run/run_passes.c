@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Passes of a step, one after another, or as one where the device takes some so.
+#include "execute.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static int is_output(const struct pt_pass *pass) { return pass->output; }
+
+// The pass's arguments, with what is known late.
+static int arguments_of(struct pt_execution *e, uint32_t i, const void **out)
+{
+    const struct pt_pass *pass = &e->plan->passes[i];
+    const struct pt_shadows *shadows = e->binder.shadows;
+    uint32_t samples[PT_MAX_LIGHTS];
+    *out = pass->arguments;
+    if (pass->late == PT_LATE_NOTHING)
+        return PATINA_OK;
+    if (!e->late[i] && !(e->late[i] = malloc(pass->argument_size)))
+        return pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    for (uint32_t k = 0; k < PT_MAX_LIGHTS; k++)
+        samples[k] = pass->late == PT_LATE_PIXELS ? shadows->pixels.samples[k] : shadows->lights[k].samples;
+    memcpy(e->late[i], pass->arguments, pass->argument_size);
+    pt_plan_late(pass, samples, e->late[i]);
+    *out = e->late[i];
+    return PATINA_OK;
+}
+
+static int run_pass(struct pt_execution *e, uint32_t i)
+{
+    const struct pt_pass *pass = &e->plan->passes[i];
+    const void *arguments;
+    struct pt_buffer *few[16], **bound = pass->ref_count <= 16 ? few : calloc(pass->ref_count, sizeof *bound);
+    int error = bound ? arguments_of(e, i, &arguments) : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    for (uint32_t k = 0; k < pass->ref_count && !error; k++)
+        error = pt_bind(&e->binder, &pass->refs[k], &bound[k]);
+    // the picture is written last and at one go: a cancelled frame leaves the one before it
+    if (!error)
+        error = e->device->ops->run(e->device, pass->kernel, arguments, pass->argument_size, bound, pass->ref_count,
+                                    is_output(pass) ? NULL : e->cancel);
+    if (bound != few)
+        free(bound);
+    return error;
+}
+
+// Planes that lie between passes that run as one are neither made nor written. Those that go from layer to layer are.
+static int is_made(const struct pt_ref *ref)
+{
+    return ref->of != PT_OF_FRAME || (ref->which >= PT_PLANE_LIMIT && ref->which <= PT_PLANE_TILES);
+}
+
+static int bind_between(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
+{
+    const struct pt_ref as_it_is = { PT_OF_LEFT, ref->which, ref->index };
+    return pt_bind(binder, is_made(ref) ? ref : &as_it_is, out);
+}
+
+// How many passes from here on the device runs as one; 0: none.
+static uint32_t together(const struct patina_device *device, const struct pt_pass *passes)
+{
+    struct pt_bound_pass some[64]; // not bound yet
+    if (!passes->together || !device->ops->finish_picture ||
+        (device->ops->finishes && passes->together > sizeof some / sizeof *some))
+        return 0;
+    if (!device->ops->finishes)
+        return passes->together;
+    for (uint32_t i = 0; i < passes->together; i++)
+        some[i] = (struct pt_bound_pass){ .kernel = passes[i].kernel, .arguments = passes[i].arguments };
+    return device->ops->finishes(some, passes->together);
+}
+
+static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
+{
+    const struct pt_pass *passes = e->plan->passes + first;
+    uint32_t refs = 0;
+    for (uint32_t i = 0; i < count; i++)
+        refs += passes[i].ref_count;
+    struct pt_bound_pass *bound = calloc(count, sizeof *bound);
+    struct pt_buffer **buffers = calloc(refs, sizeof *buffers), **next = buffers;
+    int error = bound && buffers ? PATINA_OK : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    for (uint32_t i = 0; i < count && !error; i++) {
+        bound[i] = (struct pt_bound_pass){ passes[i].kernel, NULL, next, passes[i].ref_count };
+        error = arguments_of(e, first + i, &bound[i].arguments);
+        for (uint32_t k = 0; k < passes[i].ref_count && !error; k++)
+            error = bind_between(&e->binder, &passes[i].refs[k], next++);
+    }
+    if (!error)
+        error = e->device->ops->finish_picture(e->device, bound, count);
+    free(bound);
+    free(buffers);
+    return error;
+}
+
+// A pass, or `count` as one.
+static int run_some(struct pt_execution *e, uint32_t first, uint32_t count)
+{
+    const int output = is_output(&e->plan->passes[first + count - 1]);
+    if (!e->writing && e->cancel && atomic_load(e->cancel))
+        return PATINA_ERROR_CANCELLED;
+    if (!e->writing && output) {
+        const int error = pt_planes_ensure_picture(e->device, e->binder.planes, e->plan);
+        if (error)
+            return error;
+        e->writing = 1;
+    }
+    return count > 1 ? run_together(e, first, count) : run_pass(e, first);
+}
+
+int pt_run_passes(struct pt_execution *e, uint32_t first, uint32_t count)
+{
+    const uint32_t end = first + count;
+    double before = pt_milliseconds();
+    int error = PATINA_OK;
+    for (uint32_t i = first; i < end && !error;) {
+        const struct pt_pass *pass = &e->plan->passes[i];
+        const uint32_t some = together(e->device, pass), taken = some ? some : 1;
+        const char *name = taken > 1 ? "finish" : pass->name;
+        error = run_some(e, i, taken);
+        i += taken;
+        if (error)
+            break;
+        if (i < end && e->plan->passes[i].name == name) // timed with it
+            continue;
+        error = e->device->ops->finish(e->device); // so that a time is that of its work
+        const double now = pt_milliseconds();
+        pt_note_time(e->times, name, now - before);
+        before = now;
+        if (e->progress)
+            atomic_store(e->progress, e->progress_done + e->progress_share * (float)i / (float)e->plan->pass_count);
+    }
+    return error;
+}

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Shadow textures: what is at hand, and room for what is not.
+#include "shadows.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void forget_lights(struct pt_shadows *shadows)
+{
+    for (uint32_t i = 0; i < shadows->light_count; i++)
+        free(shadows->lights[i].key);
+    memset(shadows->lights, 0, sizeof shadows->lights);
+    shadows->light_count = 0;
+}
+
+static void forget_instances(struct patina_device *device, struct pt_shadows *shadows)
+{
+    for (uint32_t i = 0; i < shadows->instance_count; i++) {
+        device->ops->buffer_destroy(device, &shadows->words[i]);
+        device->ops->buffer_destroy(device, &shadows->marks[i]);
+    }
+    free(shadows->words);
+    free(shadows->marks);
+    free(shadows->fingerprints);
+    shadows->words = shadows->marks = NULL;
+    shadows->fingerprints = NULL;
+    shadows->instance_count = 0;
+}
+
+void pt_shadows_release(struct patina_device *device, struct pt_shadows *shadows)
+{
+    forget_lights(shadows);
+    forget_instances(device, shadows);
+    pt_planes_release(device, &shadows->planes);
+    for (int i = 0; i < PT_FLAGS; i++)
+        device->ops->buffer_destroy(device, &shadows->flags[i]);
+    pt_clip_buffers_release(device, &shadows->clips);
+    device->ops->buffer_destroy(device, &shadows->pixels.words);
+}
+
+struct pt_buffer *pt_shadows_buffer(struct pt_shadows *shadows, uint32_t which, uint32_t instance)
+{
+    if (instance == PT_PIXELS && which == PT_SHADOWS)
+        return &shadows->pixels.words;
+    if (instance >= shadows->instance_count)
+        return &shadows->none;
+    return which == PT_MARKS ? &shadows->marks[instance] : &shadows->words[instance];
+}
+
+uint64_t pt_shadows_identity(const struct pt_instance *instance)
+{
+    return pt_receives(instance) ? pt_cloud_fingerprint(instance->cloud) : 0;
+}
+
+// The words are for these instances and so many lights.
+static int same_places(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    int same = shadows->light_count == plan->light_count && shadows->instance_count == scene->instance_count;
+    for (uint32_t i = 0; same && i < scene->instance_count; i++)
+        same = shadows->fingerprints[i] == pt_shadows_identity(&scene->instances[i]);
+    return same;
+}
+
+int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
+                           uint32_t light_count)
+{
+    forget_lights(shadows);
+    forget_instances(device, shadows);
+    shadows->words = calloc((size_t)scene->instance_count + 1, sizeof *shadows->words);
+    shadows->marks = calloc((size_t)scene->instance_count + 1, sizeof *shadows->marks);
+    shadows->fingerprints = calloc((size_t)scene->instance_count + 1, sizeof *shadows->fingerprints);
+    if (!shadows->words || !shadows->marks || !shadows->fingerprints) {
+        forget_instances(device, shadows);
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+    }
+    shadows->instance_count = scene->instance_count;
+    shadows->light_count = light_count;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        uint64_t points = scene->instances[i].cloud->slots;
+        shadows->fingerprints[i] = pt_shadows_identity(&scene->instances[i]);
+        if (!shadows->fingerprints[i])
+            continue;
+        int error = light_count * points > UINT32_MAX
+                        ? pt_fail(&device->handle, PATINA_ERROR_TOO_MANY_POINTS,
+                                  "shadows of %u lights on %llu points: their product must stay below 4294967296",
+                                  light_count, (unsigned long long)points)
+                        : device->ops->buffer_create(device, light_count * points * 4, NULL, 0, &shadows->words[i]);
+        if (error) {
+            forget_lights(shadows);
+            forget_instances(device, shadows);
+            return error;
+        }
+    }
+    return PATINA_OK;
+}
+
+uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan, uint32_t i)
+{
+    const struct pt_shadow_light *light = &shadows->lights[i];
+    const struct pt_plan_light *planned = &plan->lights[i];
+    if (light->settled)
+        return light->samples;
+    if (!scene->settings.shadow_progressive || pt_plan_lazy(scene, plan))
+        return planned->samples;
+    const uint32_t next = light->samples ? 2 * light->samples : 1;
+    return next < planned->samples ? next : planned->samples;
+}
+
+int pt_shadows_stale(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan)
+{
+    for (uint32_t i = 0; i < plan->light_count; i++)
+        if (shadows->lights[i].samples != pt_samples_wanted(shadows, scene, plan, i))
+            return 1;
+    return 0;
+}
+
+int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, const struct patina_scene *scene,
+                    const struct pt_plan *plan)
+{
+    int error = PATINA_OK, changed = 0;
+    if (!plan->light_count)
+        return PATINA_OK;
+    for (int i = 0; i < PT_FLAGS && !error; i++)
+        if (!shadows->flags[i].size)
+            error = device->ops->buffer_create(device, sizeof(uint32_t), NULL, 0, &shadows->flags[i]);
+    if (error)
+        return error;
+    if (!same_places(shadows, scene, plan)) {
+        error = pt_shadows_make_places(device, shadows, scene, plan->light_count);
+        changed = 1;
+    }
+    for (uint32_t i = 0; i < plan->light_count && !error; i++) {
+        struct pt_shadow_light *light = &shadows->lights[i];
+        size_t count = pt_light_key(scene, &plan->lights[i], NULL, 0);
+        double *key = malloc(count * sizeof *key);
+        if (!key)
+            return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+        pt_light_key(scene, &plan->lights[i], key, count);
+        int known = light->key && light->key_count == count && pt_same_key(light->key, key, count);
+        changed |= !known;
+        if (!known || light->partial || (light->samples > plan->lights[i].samples && !light->settled))
+            light->samples = light->settled = 0;
+        free(light->key);
+        light->key = key;
+        light->key_count = count;
+    }
+    if (!error)
+        error = pt_pixels_open(device, &shadows->pixels, scene, plan, changed);
+    if (error || !pt_plan_lazy(scene, plan) || !pt_shadows_stale(shadows, scene, plan))
+        return error;
+    for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
+        if (shadows->fingerprints[i] && !shadows->marks[i].size)
+            error = device->ops->buffer_create(device, (scene->instances[i].cloud->slots + 3) / 4 * 4, NULL, 0,
+                                       &shadows->marks[i]);
+        if (!error && shadows->marks[i].size)
+            error = device->ops->buffer_fill(device, &shadows->marks[i], 0, shadows->marks[i].size, 0, 4);
+    }
+    return error;
+}
+
+// ---- words and flags -----------------------------------------------------------------------------------------------------
+
+int pt_shadows_clear(struct patina_device *device, struct pt_shadows *shadows, uint32_t light)
+{
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
+        struct pt_buffer *words = &shadows->words[i];
+        const size_t size = words->size / shadows->light_count;
+        if (!size)
+            continue;
+        if (shadows->light_count == 1) {
+            error = device->ops->buffer_fill(device, words, 0, size, 0, 4);
+            continue;
+        }
+        void *zeros = calloc(size, 1);
+        error = zeros ? device->ops->buffer_write(device, words, light * size, zeros, size)
+                      : pt_fail(&device->handle, PATINA_ERROR_MEMORY, "shadow textures: out of memory");
+        free(zeros);
+    }
+    return error;
+}
+
+int pt_flag_write(struct patina_device *device, struct pt_shadows *shadows, enum pt_flag flag, uint32_t word)
+{
+    return device->ops->buffer_write(device, &shadows->flags[flag], 0, &word, sizeof word);
+}
+
+int pt_flag_read(struct patina_device *device, const struct pt_shadows *shadows, enum pt_flag flag, uint32_t *word)
+{
+    return device->ops->buffer_read(device, &shadows->flags[flag], 0, word, sizeof *word);
+}

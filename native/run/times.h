@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What passes of a render took, by the names that statistics know them by.
+#ifndef PT_TIMES_H
+#define PT_TIMES_H
+
+#include "device.h"
+
+enum { PT_TIMINGS = PT_KERNEL_COUNT + 4 };
+
+struct pt_timing {
+    const char *name;
+    double ms;
+};
+
+struct pt_times {
+    struct pt_timing each[PT_TIMINGS];
+    uint32_t count;
+};
+
+double pt_milliseconds(void); // of a clock that only goes forward
+void pt_note_time(struct pt_times *times, const char *name, double ms);
+
+#endif
