@@ -46,7 +46,7 @@ enum { SHOWS = sizeof shows / sizeof shows[0] };
 
 // A few of each kind: perspective, orthographic, lit, unlit, without normals, many clouds, glass, layers as passes.
 static const uint32_t chosen[] = {2, 5, 8, 10, 11, 18, 19, 20, 21};
-enum { CHOSEN = sizeof chosen / sizeof chosen[0] };
+enum { CHOSEN = sizeof chosen / sizeof chosen[0], ONE_LAYERED = 5 };
 
 // Every show in the two smallest scenes, then a third of them, and all at once everywhere.
 static int pairs(uint32_t stage, uint32_t show)
@@ -127,6 +127,28 @@ static void test_threads(void **state)
         picture_free(&truth);
         stage_free(&stage);
     }
+}
+
+// Passes of a layer ask for planes on the way: what runs as one without them runs pass by pass then. Of one layer: with more of them
+// edges mix with what lies behind.
+static void test_one_by_one(void **state)
+{
+    (void)state;
+    patina_device *device = support_device_open("cpu", 0, 0);
+    for (uint32_t s = 0; s < ONE_LAYERED * SHOWS; s++) {
+        struct stage stage = build(s / SHOWS, s % SHOWS);
+        stage.settings.layers = 1;
+        stage.settings.layer_passes = 0;
+        struct picture as_one = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        stage.settings.layer_passes = 1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_NORMAL;
+        struct picture apart = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        apart.layers = 0; // the other has none to compare
+        picture_assert_identical(&as_one, &apart, 0, 0, shows[s % SHOWS].name);
+        picture_free(&as_one);
+        picture_free(&apart);
+        stage_free(&stage);
+    }
+    patina_device_destroy(device);
 }
 
 static double worst(const float *a, const float *b, uint64_t count)
@@ -258,7 +280,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_regions),  cmocka_unit_test(test_threads),
         cmocka_unit_test(test_devices),  cmocka_unit_test(test_nothing_else_changes),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_refusals), cmocka_unit_test(test_one_by_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
