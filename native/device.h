@@ -6,17 +6,36 @@
 
 #include "base/error.h"
 #include "kernel_args.h"
+#include "kernels.h"
 
 #include <stdatomic.h>
 
-enum pt_kernel {
-#define PT_KERNEL(name, kind, buffers) PT_KERNEL_##name,
-#include "kernels.def"
-#undef PT_KERNEL
-    PT_KERNEL_COUNT
+// ---- kernels.def, as build/generate_kernels makes it ------------------------------------------------------------------
+// PT_KERNEL_NAME, PT_BUF_KERNEL_NAME: a buffer's place among those that a pass binds; PT_BUFS_KERNEL: how many these are;
+// PT_EACH_KERNEL: how many of them, the last, repeat once an instance; PT_BIND_KERNEL_NAME: its storage block in GLSL.
+
+struct pt_buffer_row {
+    const char *name;
+    uint32_t formats; // bits 1 << pt_format: any of them
+    uint8_t places;   // bits PT_AT_*: any of them
+    uint8_t read, written, optional;
+    uint8_t binding; // of its storage block in GLSL; 0: it has none
+    uint8_t unit;    // 1 + pt_unit of its buffer texture there; 0: it is none
+    uint8_t soft;    // this texture only in software
 };
 
-extern const char *const pt_kernel_names[PT_KERNEL_COUNT];
+struct pt_kernel_row {
+    const char *name;
+    enum pt_domain domain;
+    enum pt_stage stage;
+    int reach;            // pixels; -1: its arguments say
+    uint32_t fixed, each; // buffers: those once, and behind them those once an instance
+    const struct pt_buffer_row *buffers; // fixed + each
+};
+
+extern const struct pt_kernel_row pt_kernels[PT_KERNEL_COUNT];
+extern const char *const pt_format_names[PT_FORMAT_COUNT];
+extern const uint8_t pt_format_bytes[PT_FORMAT_COUNT]; // a pixel; 0: no plane has this format
 
 // Device memory. CPU: data points to it. Owned by the device that made it.
 struct pt_buffer {

@@ -8,12 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const pt_kernel_names[PT_KERNEL_COUNT] = {
-#define PT_KERNEL(name, kind, buffers) #name,
-#include "kernels.def"
-#undef PT_KERNEL
-};
-
 #define TEXT_(x) #x
 #define TEXT(x) TEXT_(x)
 

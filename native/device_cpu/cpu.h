@@ -33,8 +33,11 @@ static inline int pt_cpu_cancelled(const struct pt_cpu_call *call)
     return call->cancel && atomic_load_explicit(call->cancel, memory_order_relaxed);
 }
 
-// The memory of the n-th buffer of kernels.def.
+// The memory of the n-th buffer that is bound; NULL: it is missing.
 static inline void *pt_cpu_data(const struct pt_cpu_call *call, uint32_t n) { return call->buffers[n]->data; }
+// The same by its name in kernels.def; each: of instance i.
+#define PT_DATA(call, kernel, name) pt_cpu_data(call, PT_BUF_##kernel##_##name)
+#define PT_DATA_EACH(call, kernel, name, i) pt_cpu_data(call, PT_BUF_##kernel##_##name + PT_EACH_##kernel * (i))
 
 // Where the chunks of each instance begin in the list of all chunks; begins[instances]: how many there are. Those of instance
 // i are the buffer first + i stride.
@@ -68,12 +71,8 @@ typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
 pt_cpu_finish pt_kernel_finish_scalar, pt_kernel_finish_sse42, pt_kernel_finish_avx2, pt_kernel_finish_avx512;
 
 // Every kernel once per level; the levels that a build leaves out are declared and never called.
-#define PT_KERNEL(name, kind, buffers)     \
-    pt_cpu_kernel pt_kernel_##name##_scalar; \
-    pt_cpu_kernel pt_kernel_##name##_sse42;  \
-    pt_cpu_kernel pt_kernel_##name##_avx2;   \
-    pt_cpu_kernel pt_kernel_##name##_avx512;
-#include "kernels.def"
-#undef PT_KERNEL
+#define PT_X(name) pt_cpu_kernel pt_kernel_##name##_scalar, pt_kernel_##name##_sse42, pt_kernel_##name##_avx2, pt_kernel_##name##_avx512;
+PT_EACH_KERNEL(PT_X)
+#undef PT_X
 
 #endif

@@ -18,28 +18,19 @@ struct cpu_device {
     struct pt_cpu_scratch scratch[PT_CPU_SCRATCHES];
 };
 
-#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_scalar,
-static pt_cpu_kernel *const kernels_scalar[] = {
-#include "kernels.def"
-};
-#undef PT_KERNEL
-
+#define PT_X(name) pt_kernel_##name##_scalar,
+static pt_cpu_kernel *const kernels_scalar[] = { PT_EACH_KERNEL(PT_X) };
+#undef PT_X
 #if !defined(PT_ONLY_SCALAR)
-#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_sse42,
-static pt_cpu_kernel *const kernels_sse42[] = {
-#include "kernels.def"
-};
-#undef PT_KERNEL
-#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_avx2,
-static pt_cpu_kernel *const kernels_avx2[] = {
-#include "kernels.def"
-};
-#undef PT_KERNEL
-#define PT_KERNEL(name, kind, buffers) pt_kernel_##name##_avx512,
-static pt_cpu_kernel *const kernels_avx512[] = {
-#include "kernels.def"
-};
-#undef PT_KERNEL
+#define PT_X(name) pt_kernel_##name##_sse42,
+static pt_cpu_kernel *const kernels_sse42[] = { PT_EACH_KERNEL(PT_X) };
+#undef PT_X
+#define PT_X(name) pt_kernel_##name##_avx2,
+static pt_cpu_kernel *const kernels_avx2[] = { PT_EACH_KERNEL(PT_X) };
+#undef PT_X
+#define PT_X(name) pt_kernel_##name##_avx512,
+static pt_cpu_kernel *const kernels_avx512[] = { PT_EACH_KERNEL(PT_X) };
+#undef PT_X
 #endif
 
 struct level {
@@ -186,7 +177,7 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
     int error = cpu->kernels[kernel](&call);
     if (error == PATINA_ERROR_MEMORY)
         return pt_fail(&device->handle, error, "%s: out of memory for the scratch of kernel %s", device->info.name,
-                       pt_kernel_names[kernel]);
+                       pt_kernels[kernel].name);
     return error;
 }
 

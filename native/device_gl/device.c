@@ -90,7 +90,7 @@ static int close_context(struct pt_gl_device *d, void *unused)
             d->gl.DeleteBuffers(1, &d->scratch[i].name);
         for (int i = 0; i < 2; i++)
             d->gl.DeleteProgram(d->tile_programs[i]);
-        d->gl.DeleteTextures(PT_GL_TEXTURES, d->textures);
+        d->gl.DeleteTextures(PT_UNIT_COUNT, d->textures);
         d->gl.DeleteBuffers(1, &d->arguments);
         d->gl.DeleteBuffers(1, &d->srgb);
         d->gl.Finish();
@@ -166,7 +166,7 @@ static void make_srgb_table(struct pt_gl_device *d)
     d->gl.GenBuffers(1, &d->srgb);
     d->gl.BindBuffer(GL_UNIFORM_BUFFER, d->srgb);
     d->gl.BufferData(GL_UNIFORM_BUFFER, sizeof table, table, GL_STATIC_DRAW);
-    d->gl.BindBufferBase(GL_UNIFORM_BUFFER, 0, d->srgb);
+    d->gl.BindBufferBase(GL_UNIFORM_BUFFER, PT_UNIFORM_srgb, d->srgb);
 }
 
 static int open_context(struct pt_gl_device *d, void *unused)
@@ -201,15 +201,15 @@ static int open_context(struct pt_gl_device *d, void *unused)
         return result;
     if (bindings < blocks)
         blocks = bindings;
-    if (blocks < PT_GL_BINDINGS)
+    if (blocks < PT_BINDINGS)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "%s offers %d storage blocks to a shader, %d are needed",
-                          info->description, blocks, PT_GL_BINDINGS);
+                          info->description, blocks, PT_BINDINGS);
     d->block_size = (uint64_t)block > SIZE_MAX ? SIZE_MAX : (size_t)block;
     alignment = alignment > texel_alignment ? alignment : texel_alignment; // powers of two
     d->alignment = alignment > 4 ? (size_t)alignment : 4;
     d->texels = texels > 0 ? (size_t)texels : 0;
     d->gl.GenBuffers(1, &d->arguments);
-    d->gl.GenTextures(PT_GL_TEXTURES, d->textures);
+    d->gl.GenTextures(PT_UNIT_COUNT, d->textures);
     make_srgb_table(d);
     info->key64 = (uint32_t)pt_gl_key64_works(d);
     return pt_gl_check(d, "opening the device");
@@ -320,19 +320,9 @@ static int fill_buffer(struct pt_gl_device *d, void *context)
     return pt_gl_clear(d, b->buffer, b->offset, b->size, (const uint32_t[]){low, high, low, high}, b->bytes);
 }
 
-struct run_call {
-    enum pt_kernel kernel;
-    const void *arguments;
-    size_t argument_size;
-    struct pt_buffer *const *buffers;
-    uint32_t count;
-    const atomic_int *cancel;
-};
-
 static int run_kernel(struct pt_gl_device *d, void *context)
 {
-    const struct run_call *r = context;
-    return pt_gl_run(d, r->kernel, r->arguments, r->argument_size, r->buffers, r->count, r->cancel);
+    return pt_gl_run(d, context);
 }
 
 struct finish_call {
@@ -393,13 +383,13 @@ static int op_buffer_fill(struct patina_device *device, struct pt_buffer *buffer
 static int op_run(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,
                   struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
 {
+    (void)count; // as kernels.def lists them
     return call(device, run_kernel,
-                &(struct run_call){.kernel = kernel,
-                                   .arguments = arguments,
-                                   .argument_size = argument_size,
-                                   .buffers = buffers,
-                                   .count = count,
-                                   .cancel = cancel});
+                &(struct pt_gl_work){.kernel = kernel,
+                                     .arguments = arguments,
+                                     .argument_size = argument_size,
+                                     .buffers = buffers,
+                                     .cancel = cancel});
 }
 
 // What pt_gl_finish_picture is made for; z comes from the keys, what else is extracted from planes that it does not make.

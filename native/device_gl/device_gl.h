@@ -9,10 +9,7 @@
 #include "glad/gl.h"
 
 enum {
-    PT_GL_VARIANTS = 128,     // programs of one kernel: its passes and special cases
-    PT_GL_BINDINGS = 12,      // storage blocks a kernel may use: its arguments, its buffers, scratch, tiles
-    PT_GL_BINDING_TILES = 11, // as in lib/tiles.glsl
-    PT_GL_TEXTURES = 6,       // planes that a kernel reads as buffer textures, as in lib/planes.glsl
+    PT_GL_VARIANTS = 128, // programs of one kernel: its passes and special cases
 };
 
 // Memory that kernels keep between runs; grows, never shrinks.
@@ -82,7 +79,7 @@ struct pt_gl_device {
     uint32_t shade_count;
     GLuint tile_programs[2];
     GLuint shown; // the key plane that PT_GL_SCRATCH_SHOWN is of, as long as no kernel writes planes; else 0
-    GLuint textures[PT_GL_TEXTURES];
+    GLuint textures[PT_UNIT_COUNT];
     struct pt_gl_tiles tiles;
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
 };
@@ -97,31 +94,41 @@ int pt_gl_check(struct pt_gl_device *d, const char *doing);
 int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
                 uint32_t bytes);
 
+struct pt_gl_unit {
+    GLenum format;
+    uint8_t bytes; // a texel
+};
+extern const struct pt_gl_unit pt_gl_units[PT_UNIT_COUNT]; // of buffer textures: kernels.def
+
 // program.c
 // Compiles shaders/NAME with a line of definitions ("#define PASS 1\n") into a program.
 int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definitions, GLuint *program);
 // The same with the file that `#include "BODY"` stands for.
 int pt_gl_program_of_body(struct pt_gl_device *d, const char *name, const char *definitions, const char *body, GLuint *program);
 
-// pointwise.c. Of its kernels, whether they walk over the crop; binds the planes that one reads; runs it.
-int pt_gl_is_pointwise(enum pt_kernel kernel);
-int pt_gl_of_crop(enum pt_kernel kernel);
-int pt_gl_pointwise_planes(struct pt_gl_device *d, enum pt_kernel kernel, struct pt_buffer *const *buffers);
-int pt_gl_pointwise(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments);
-
 // kernels.c
-int pt_gl_run(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments, size_t argument_size,
-              struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel);
+// A kernel with what it runs on.
+struct pt_gl_work {
+    enum pt_kernel kernel;
+    const void *arguments;
+    size_t argument_size;
+    struct pt_buffer *const *buffers; // as kernels.def lists them
+    const atomic_int *cancel;
+};
+int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work);
 // Steps that a kernel's own runner shares with the default one.
 void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size); // bound at 0
 int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions);
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what);
-// The kernel's buffers from binding 1 on, and those of them that it reads as textures.
-int pt_gl_bind_buffers(struct pt_gl_device *d, enum pt_kernel kernel, size_t argument_size,
-                       struct pt_buffer *const *buffers, uint32_t count);
-// Unit 0: keys, 1: from, 2: deff, 3 and 4: float4 planes, 5: words of points.
-int pt_gl_bind_texture(struct pt_gl_device *d, uint32_t unit, const struct pt_buffer *plane);
-int pt_gl_bind_texels(struct pt_gl_device *d, uint32_t unit, GLuint name, size_t offset, size_t size); // a part of a buffer
+// The kernel's buffers, but for those that repeat and for parts.
+int pt_gl_bind_buffers(struct pt_gl_device *d, const struct pt_gl_work *work);
+// Of the list's rows from `first` on those `count` that are no parts: buffers[0] is that of the first.
+int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t count,
+                    struct pt_buffer *const *buffers);
+// Bytes a slot of what is bound in parts, since clouds are larger than blocks and textures; 0: it is bound whole.
+size_t pt_gl_part(const struct pt_buffer_row *row);
+int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct pt_buffer *plane);
+int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, size_t offset, size_t size); // a part of a buffer
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);
 // At least `size` bytes; keeps the first `keep` bytes when it has to grow.
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep);
@@ -131,38 +138,22 @@ int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t siz
 int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const struct view_args *view);
 void pt_gl_tiles_forget(struct pt_gl_device *d); // keys changed
 int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list);
-// Workgroups for `count` tiles of the list bound at PT_GL_BINDING_TILES.
+// Workgroups for `count` tiles of the list bound at PT_BIND_tile_list.
 int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count);
 // Workgroups for every pixel, of programs whose invocations take several of a row each (lib/planes.glsl).
 int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height);
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 
-// raster.c, scatter.c, fill.c, pixels.c: kernels of several dispatches. The filters find their buffers bound and tiles listed.
-int pt_gl_raster(struct pt_gl_device *d, const struct raster_args *args, size_t argument_size,
-                 struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel);
-int pt_gl_scatter(struct pt_gl_device *d, const struct scatter_args *args, struct pt_buffer *const *buffers,
-                  uint32_t count, const atomic_int *cancel);
-int pt_gl_splat(struct pt_gl_device *d, const struct splat_args *args, struct pt_buffer *const *buffers,
-                const atomic_int *cancel);
-int pt_gl_blend(struct pt_gl_device *d, const struct blend_args *args, struct pt_buffer *const *buffers,
-                const atomic_int *cancel);
-int pt_gl_average(struct pt_gl_device *d, const struct average_args *args, struct pt_buffer *const *buffers,
-                  const atomic_int *cancel);
-int pt_gl_lit(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
-              const atomic_int *cancel);
-int pt_gl_center(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
-                 const atomic_int *cancel);
-int pt_gl_sift(struct pt_gl_device *d, size_t argument_size, struct pt_buffer *const *buffers, uint32_t count,
-               const atomic_int *cancel);
-int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers, uint32_t count,
-               const atomic_int *cancel);
-int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt_buffer *const *buffers);
-int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args);
+// raster.c, scatter.c, fill.c, pixels.c: kernels of several dispatches. They find their buffers bound, and tiles listed where
+// that is their domain. pt_gl_points: one dispatch over the points of an instance.
+typedef int pt_gl_runner(struct pt_gl_device *d, const struct pt_gl_work *work);
+int pt_gl_is_pointwise(enum pt_kernel kernel); // pointwise.c runs it
+pt_gl_runner pt_gl_pointwise;
+pt_gl_runner pt_gl_raster, pt_gl_scatter, pt_gl_splat, pt_gl_blend, pt_gl_average, pt_gl_points, pt_gl_fill, pt_gl_shade,
+    pt_gl_antialias, pt_gl_push, pt_gl_lines;
 // shade, of any number of instances, smooth, antialias and compose, without the planes between them.
 int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count);
-int pt_gl_push(struct pt_gl_device *d);
-int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args);
 // The coarse cells over the rectangle of a push.
 struct view_args pt_gl_coarse_view(const struct push_args *args);
 

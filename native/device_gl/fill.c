@@ -61,17 +61,17 @@ static int prepare(struct fill *f)
     size_t tiles = (size_t)f->d->tiles.columns * f->d->tiles.rows * 4;
     int result = programs(f);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 5, PT_GL_SCRATCH_COUNTERS, sizeof f->counters, 0);
+        result = bind_scratch(f, PT_BIND_fill_counters, PT_GL_SCRATCH_COUNTERS, sizeof f->counters, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 6, PT_GL_SCRATCH_PIXELS, LEAST_ENTRIES * CHANGE_SIZE, 0);
+        result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_PIXELS, LEAST_ENTRIES * CHANGE_SIZE, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, f->args->unfills ? LEAST_ENTRIES * SAVED_SIZE : 16, 0);
+        result = bind_scratch(f, PT_BIND_fill_saved, PT_GL_SCRATCH_SAVED, f->args->unfills ? LEAST_ENTRIES * SAVED_SIZE : 16, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 8, PT_GL_SCRATCH_FILLED, refills ? bits : 16, 0);
+        result = bind_scratch(f, PT_BIND_fill_filled, PT_GL_SCRATCH_FILLED, refills ? bits : 16, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 9, PT_GL_SCRATCH_STAMPS, tiles, 0);
+        result = bind_scratch(f, PT_BIND_fill_stamps, PT_GL_SCRATCH_STAMPS, tiles, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, 10, PT_GL_SCRATCH_WOKEN, tiles, 0);
+        result = bind_scratch(f, PT_BIND_fill_woken, PT_GL_SCRATCH_WOKEN, tiles, 0);
     if (result != PATINA_OK || !refills)
         return result;
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, f->d->scratch[PT_GL_SCRATCH_FILLED].name);
@@ -112,7 +112,7 @@ static int find_once(struct fill *f, uint32_t woken)
     if (f->first)
         return pt_gl_dispatch_tiles(f->d, PT_KERNEL_fill, f->find,
                                     f->find == FIND_EMPTY ? PT_GL_TILES_RIM : PT_GL_TILES_POINTS);
-    int result = bind_scratch(f, PT_GL_BINDING_TILES, PT_GL_SCRATCH_WOKEN, woken * (size_t)4, 0);
+    int result = bind_scratch(f, PT_BIND_tile_list, PT_GL_SCRATCH_WOKEN, woken * (size_t)4, 0);
     return result == PATINA_OK ? pt_gl_dispatch_list(f->d, PT_KERNEL_fill, f->find, woken) : result;
 }
 
@@ -131,7 +131,7 @@ static int find(struct fill *f)
             result = read_counters(f);
         if (result != PATINA_OK || f->counters.changed <= room)
             return result;
-        result = bind_scratch(f, 6, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.changed * CHANGE_SIZE, 0);
+        result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.changed * CHANGE_SIZE, 0);
         if (result != PATINA_OK)
             return result;
     }
@@ -148,7 +148,7 @@ static int fill_step(struct fill *f)
     if (f->phase == PT_FILL_BACKGROUND) // the other phase touches no empty pixel
         pt_gl_tiles_forget(f->d);
     if (f->args->unfills)
-        result = bind_scratch(f, 7, PT_GL_SCRATCH_SAVED, ((size_t)kept + changed) * SAVED_SIZE,
+        result = bind_scratch(f, PT_BIND_fill_saved, PT_GL_SCRATCH_SAVED, ((size_t)kept + changed) * SAVED_SIZE,
                               (size_t)kept * SAVED_SIZE);
     f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][DECIDE], 3, (GLuint)all_new);
     f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][DECIDE], 4, kept);
@@ -170,7 +170,7 @@ static int fill_step(struct fill *f)
 static int unfill_step(struct fill *f)
 {
     uint32_t look = f->first ? f->counters.saved : f->counters.woken;
-    int result = bind_scratch(f, 6, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.saved * CHANGE_SIZE, 0);
+    int result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_PIXELS, (size_t)f->counters.saved * CHANGE_SIZE, 0);
     f->counters.changed = f->counters.woken = 0;
     write_counters(f);
     f->d->gl.ProgramUniform1ui(f->d->programs[PT_KERNEL_fill][MARK], 3, (GLuint)f->first);
@@ -217,18 +217,18 @@ static int run_phase(struct pt_gl_device *d, const struct fill_args *args, uint3
     return result;
 }
 
-int pt_gl_fill(struct pt_gl_device *d, const struct fill_args *args, struct pt_buffer *const *buffers, uint32_t count,
-               const atomic_int *cancel)
+int pt_gl_fill(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
+    const struct fill_args *args = work->arguments;
     int result = PATINA_OK;
     for (uint32_t phase = PT_FILL_BACKGROUND; phase <= PT_FILL_OCCLUDED && result == PATINA_OK; phase++) {
         if (!(args->phases & phase))
             continue;
-        result = pt_gl_tiles(d, buffers[0], &args->view); // anew where the phase before wrote keys
+        result = pt_gl_tiles(d, work->buffers[PT_BUF_fill_keys], &args->view); // anew where the phase before wrote keys
         if (result == PATINA_OK)
-            result = pt_gl_bind_buffers(d, PT_KERNEL_fill, sizeof *args, buffers, count);
+            result = pt_gl_bind_buffers(d, work);
         if (result == PATINA_OK)
-            result = run_phase(d, args, phase, cancel);
+            result = run_phase(d, args, phase, work->cancel);
     }
     return result;
 }

@@ -124,26 +124,26 @@ static int bind_shown(struct pt_gl_device *d, const struct view_args *view, cons
     if (result == PATINA_OK && d->shown != keys->name) {
         result = *program ? PATINA_OK : pt_gl_program(d, "lib/shown.glsl", "", program);
         if (result == PATINA_OK)
-            result = pt_gl_bind(d, 1, name, 0, size, "shade");
+            result = pt_gl_bind(d, PT_BIND_shade_shown, name, 0, size, "shade");
         if (result == PATINA_OK)
             result = pt_gl_dispatch_rows(d, PT_KERNEL_shade, SHOWN, view->width, view->height);
         d->shown = result == PATINA_OK ? keys->name : 0;
     }
-    return result == PATINA_OK ? pt_gl_bind_texels(d, 4, name, 0, size) : result;
+    return result == PATINA_OK ? pt_gl_bind_texels(d, PT_UNIT_other_float4, name, 0, size) : result;
 }
 
-int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt_buffer *const *buffers)
+int pt_gl_shade(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
+    const struct shade_args *args = work->arguments;
+    const struct pt_buffer *shading = work->buffers[PT_BUF_shade_shading];
     char definitions[sizeof d->shade_definitions[0]];
     uint32_t variant;
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
-    shade_definitions(args, buffers[5] && buffers[5]->name, definitions, sizeof definitions);
+    shade_definitions(args, shading && shading->name, definitions, sizeof definitions);
     int result = shade_program(d, definitions, &variant);
-    if (result == PATINA_OK && !d->base.info.hardware && buffers[4] && buffers[4]->name)
-        result = pt_gl_bind_texture(d, 5, buffers[4]);
     if (result == PATINA_OK && args->blend > 1)
-        result = bind_shown(d, &args->view, buffers[0]);
+        result = bind_shown(d, &args->view, work->buffers[PT_BUF_shade_keys]);
     if (result == PATINA_OK && args->instance.lit)
         set_lights(d, args, variant);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, variant, PT_GL_TILES_POINTS) : result;
@@ -153,8 +153,9 @@ int pt_gl_shade(struct pt_gl_device *d, const struct shade_args *args, struct pt
 
 enum { FIND = 0, MIX = 1, APPLY = 2 };
 
-int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args)
+int pt_gl_antialias(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
+    const struct antialias_args *args = work->arguments;
     const uint32_t variant = 3 * args->behind + 6 * args->inked;
     int result = PATINA_OK;
     if (!d->tiles.count[PT_GL_TILES_POINTS])
@@ -166,7 +167,7 @@ int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args)
         result = pt_gl_kernel_program(d, PT_KERNEL_antialias, variant + step, definitions);
     }
     if (result == PATINA_OK)
-        result = prepare_list(d, 7, 8, TILE_PIXELS);
+        result = prepare_list(d, PT_BIND_antialias_counters, PT_BIND_antialias_edges, TILE_PIXELS);
     if (result == PATINA_OK)
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_antialias, variant + FIND, PT_GL_TILES_POINTS);
     if (result != PATINA_OK)
@@ -174,7 +175,7 @@ int pt_gl_antialias(struct pt_gl_device *d, const struct antialias_args *args)
     uint32_t count = list_length(d);
     result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, (size_t)count * 16, 0);
     if (result == PATINA_OK && count)
-        result = pt_gl_bind(d, 9, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
+        result = pt_gl_bind(d, PT_BIND_antialias_mixed, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
     if (result == PATINA_OK)
         result = dispatch_list(d, PT_KERNEL_antialias, variant + MIX, count, GROUP);
     if (result == PATINA_OK)
@@ -196,15 +197,20 @@ struct finish_args {
 static int bind_finish(struct pt_gl_device *d, const struct finish_args *args, const struct pt_bound_pass *passes,
                        const struct pt_buffer *shaded)
 {
-    struct pt_buffer *const *planes = passes[0].buffers; // keys, from, deff
-    const struct pt_buffer *combined = passes[2].buffers[2], *line = args->antialias.inked ? passes[1].buffers[5] : combined;
+    struct pt_buffer *const *planes = passes[0].buffers; // of smooth
+    const struct pt_buffer *combined = passes[2].buffers[PT_BUF_compose_combined];
+    const struct pt_buffer *line = args->antialias.inked ? passes[1].buffers[PT_BUF_antialias_line] : combined;
     pt_gl_arguments(d, args, sizeof *args);
-    int result = pt_gl_bind(d, 1, combined->name, 0, combined->size, "finish");
+    int result = pt_gl_bind(d, PT_BIND_finish_combined, combined->name, 0, combined->size, "finish");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 6, line->name, 0, line->size, "finish");
-    for (uint32_t unit = 0; unit < 3 && result == PATINA_OK; unit++)
-        result = pt_gl_bind_texture(d, unit, planes[unit]);
-    return result == PATINA_OK ? pt_gl_bind_texture(d, 3, shaded) : result;
+        result = pt_gl_bind(d, PT_BIND_finish_line, line->name, 0, line->size, "finish");
+    if (result == PATINA_OK)
+        result = pt_gl_bind_texture(d, PT_UNIT_key, planes[PT_BUF_smooth_keys]);
+    if (result == PATINA_OK)
+        result = pt_gl_bind_texture(d, PT_UNIT_from, planes[PT_BUF_smooth_from]);
+    if (result == PATINA_OK)
+        result = pt_gl_bind_texture(d, PT_UNIT_deff, planes[PT_BUF_smooth_deff]);
+    return result == PATINA_OK ? pt_gl_bind_texture(d, PT_UNIT_float4, shaded) : result;
 }
 
 // What shows no point is background; the rest is smoothed into the picture, and then its edges.
@@ -213,13 +219,13 @@ static int finish(struct pt_gl_device *d, const struct finish_args *args, const 
 {
     static const char *const definitions[] = {"#define STEP 0\n#define INKED 0\n", "#define STEP 1\n#define INKED 0\n",
                                               "#define STEP 0\n#define INKED 1\n", "#define STEP 1\n#define INKED 1\n"};
-    const struct pt_buffer *combined = passes[2].buffers[2];
+    const struct pt_buffer *combined = passes[2].buffers[PT_BUF_compose_combined];
     const uint32_t find = 2 * (args->antialias.inked != 0);
     uint32_t words[4];
     memcpy(words, args->compose.background, sizeof words);
     int result = pt_gl_clear(d, combined, 0, combined->size, words, sizeof words);
     if (result == PATINA_OK)
-        result = pt_gl_tiles(d, passes[0].buffers[0], &args->smooth.view);
+        result = pt_gl_tiles(d, passes[0].buffers[PT_BUF_smooth_keys], &args->smooth.view);
     if (result != PATINA_OK || !d->tiles.count[PT_GL_TILES_POINTS])
         return result;
     for (uint32_t i = find; i < find + 2 && result == PATINA_OK; i++)
@@ -228,7 +234,7 @@ static int finish(struct pt_gl_device *d, const struct finish_args *args, const 
     if (result == PATINA_OK)
         result = bind_finish(d, args, passes, shaded);
     if (result == PATINA_OK)
-        result = prepare_list(d, 7, 8, TILE_PIXELS);
+        result = prepare_list(d, PT_BIND_finish_counters, PT_BIND_finish_edges, TILE_PIXELS);
     if (result == PATINA_OK)
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_compose, FINISH + find, PT_GL_TILES_POINTS);
     return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, FINISH + find + 1, list_length(d), GROUP) : result;
@@ -244,10 +250,12 @@ int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *pas
     int result = pt_gl_scratch(d, PT_GL_SCRATCH_SHADED, size, 0);
     struct pt_buffer shaded = {.size = size, .name = d->scratch[PT_GL_SCRATCH_SHADED].name};
     for (const struct pt_bound_pass *shade = passes; shade < tail && result == PATINA_OK; shade++) {
-        shade->buffers[5] = NULL; // shading
-        shade->buffers[6] = &shaded;
-        result = pt_gl_run(d, PT_KERNEL_shade, shade->arguments, sizeof(struct shade_args), shade->buffers, shade->buffer_count,
-                           NULL);
+        shade->buffers[PT_BUF_shade_shading] = NULL;
+        shade->buffers[PT_BUF_shade_color] = &shaded;
+        result = pt_gl_run(d, &(struct pt_gl_work){.kernel = PT_KERNEL_shade,
+                                                   .arguments = shade->arguments,
+                                                   .argument_size = sizeof(struct shade_args),
+                                                   .buffers = shade->buffers});
     }
     return result == PATINA_OK ? finish(d, &args, tail, &shaded) : result;
 }
@@ -268,15 +276,16 @@ struct view_args pt_gl_coarse_view(const struct push_args *args)
     return view;
 }
 
-int pt_gl_push(struct pt_gl_device *d)
+int pt_gl_push(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
+    (void)work;
     int result = pt_gl_kernel_program(d, PT_KERNEL_push, COVERED, "#define STEP 0\n");
     if (!d->tiles.count[PT_GL_TILES_POINTS])
         return PATINA_OK;
     if (result == PATINA_OK)
         result = pt_gl_kernel_program(d, PT_KERNEL_push, TAKE, "#define STEP 1\n");
     if (result == PATINA_OK)
-        result = prepare_list(d, 7, 8, 4 * TILE_PIXELS);
+        result = prepare_list(d, PT_BIND_push_counters, PT_BIND_push_taken, 4 * TILE_PIXELS);
     if (result == PATINA_OK) // a tile has twice the columns of a tile of its own level
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_push, COVERED, PT_GL_TILES_POINTS);
     return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_push, TAKE, list_length(d), TAKEN_EACH * GROUP) : result;
@@ -284,8 +293,9 @@ int pt_gl_push(struct pt_gl_device *d)
 
 // ---- lines -----------------------------------------------------------------------------------------------------
 
-int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args)
+int pt_gl_lines(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
+    const struct lines_args *args = work->arguments;
     enum { STEPS = 3, SIDE = 16 };
     static const char *const definitions[STEPS] = {"#define STEP 0\n", "#define STEP 1\n", "#define STEP 2\n"};
     const struct view_args *view = &args->view;
@@ -296,9 +306,9 @@ int pt_gl_lines(struct pt_gl_device *d, const struct lines_args *args)
     if (result == PATINA_OK)
         result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, size, 0);
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 9, d->scratch[PT_GL_SCRATCH_PIXELS].name, 0, size, "lines");
+        result = pt_gl_bind(d, PT_BIND_lines_steps, d->scratch[PT_GL_SCRATCH_PIXELS].name, 0, size, "lines");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 10, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, size, "lines");
+        result = pt_gl_bind(d, PT_BIND_lines_discs, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, size, "lines");
     for (uint32_t step = 0; step < STEPS && result == PATINA_OK; step++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_lines, step, definitions[step]);
         if (result == PATINA_OK)

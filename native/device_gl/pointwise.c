@@ -15,11 +15,6 @@ static const struct pointwise {
 
 int pt_gl_is_pointwise(enum pt_kernel kernel) { return kernels[kernel].name != NULL; }
 
-int pt_gl_of_crop(enum pt_kernel kernel)
-{
-    return kernels[kernel].name && (kernels[kernel].keys < 0 || kernels[kernel].result >= 0);
-}
-
 static int program(struct pt_gl_device *d, enum pt_kernel kernel)
 {
     const struct pointwise *k = &kernels[kernel];
@@ -28,33 +23,22 @@ static int program(struct pt_gl_device *d, enum pt_kernel kernel)
         return PATINA_OK;
     snprintf(definitions, sizeof definitions,
              "#define PT_ARGUMENTS %s_args\n#define PT_RUN pt_%s\n#define KEYS %d\n#define SHADING %d\n#define ALBEDO %d\n"
-             "#define CLIPS %d\n#define COLOR %d\n#define RESULT %d\n",
-             k->name, k->name, k->keys >= 0, k->shading >= 0, k->albedo >= 0, k->clips + 1, k->color + 1, k->result + 1);
+             "#define CLIPS %d\n#define RESULT %d\n",
+             k->name, k->name, k->keys >= 0, k->shading >= 0, k->albedo >= 0, k->clips >= 0, k->result >= 0);
     snprintf(body, sizeof body, "pointwise/%s.h", k->name);
     return pt_gl_program_of_body(d, "lib/pointwise.glsl", definitions, body, &d->programs[kernel][0]);
 }
 
-int pt_gl_pointwise_planes(struct pt_gl_device *d, enum pt_kernel kernel, struct pt_buffer *const *buffers)
-{
-    const struct pointwise *k = &kernels[kernel];
-    const int first = k->shading >= 0 ? k->shading : k->albedo >= 0 ? k->albedo : k->result >= 0 ? k->color : -1;
-    int result = k->keys >= 0 ? pt_gl_bind_texture(d, 0, buffers[k->keys]) : PATINA_OK;
-    if (result == PATINA_OK && first >= 0)
-        result = pt_gl_bind_texture(d, 3, buffers[first]);
-    if (result == PATINA_OK && k->shading >= 0 && k->albedo >= 0)
-        result = pt_gl_bind_texture(d, 4, buffers[k->albedo]);
-    return result;
-}
-
-int pt_gl_pointwise(struct pt_gl_device *d, enum pt_kernel kernel, const void *arguments)
+int pt_gl_pointwise(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     const struct { // what arguments of kernels of the crop begin with
         struct view_args view;
         uint32_t crop_x, crop_y, crop_width, crop_height;
-    } *crop = arguments;
-    int result = program(d, kernel);
+    } *crop = work->arguments;
+    int result = program(d, work->kernel);
     if (result != PATINA_OK)
         return result;
-    return pt_gl_of_crop(kernel) ? pt_gl_dispatch_rows(d, kernel, 0, crop->crop_width, crop->crop_height)
-                                 : pt_gl_dispatch_tiles(d, kernel, 0, PT_GL_TILES_POINTS);
+    return pt_kernels[work->kernel].domain == PT_DOMAIN_crop
+               ? pt_gl_dispatch_rows(d, work->kernel, 0, crop->crop_width, crop->crop_height)
+               : pt_gl_dispatch_tiles(d, work->kernel, 0, PT_GL_TILES_POINTS);
 }

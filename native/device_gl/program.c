@@ -184,6 +184,15 @@ static int compile(struct pt_gl_device *d, const struct source *s, GLuint *progr
     return pt_gl_check(d, "compiling a shader");
 }
 
+// The numbers of its storage blocks and textures.
+static const char *bindings_of(const char *name)
+{
+    const struct pt_embedded_shader *s = pt_shader_bindings;
+    while (s->name && strcmp(s->name, name) != 0)
+        s++;
+    return s->name ? s->text : "";
+}
+
 int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definitions, GLuint *program)
 {
     return pt_gl_program_of_body(d, name, definitions, NULL, program);
@@ -192,8 +201,9 @@ int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definiti
 int pt_gl_program_of_body(struct pt_gl_device *d, const char *name, const char *definitions, const char *body, GLuint *program)
 {
     struct source s = {.body = body};
-    char all[512];
-    snprintf(all, sizeof all, "%s%s", d->base.info.hardware ? "" : "#define PT_SOFTWARE 1\n", definitions);
+    char all[2048];
+    snprintf(all, sizeof all, "%s%s%s", d->base.info.hardware ? "" : "#define PT_SOFTWARE 1\n", bindings_of(body ? body : name),
+             definitions);
     int result = add_file(d, &s, name, all);
     if (result == PATINA_OK)
         result = compile(d, &s, program);

@@ -8,17 +8,16 @@ enum {
     LONG_RUN = 2048 // workgroups between two looks at cancel
 };
 
-int pt_gl_raster(struct pt_gl_device *d, const struct raster_args *args, size_t argument_size,
-                 struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
+int pt_gl_raster(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     static const char *const definitions[] = {"#define PASS 0\n", "#define PASS 1\n"};
-    int result = pt_gl_bind_buffers(d, PT_KERNEL_raster, argument_size, buffers, count);
-    uint32_t groups = (args->mesh.id_count + GROUP - 1) / GROUP;
-    pt_gl_tiles_forget(d);
+    const struct raster_args *args = work->arguments;
+    const uint32_t groups = (args->mesh.id_count + GROUP - 1) / GROUP;
+    int result = PATINA_OK;
     for (uint32_t pass = 0; pass < 2 && result == PATINA_OK; pass++) {
         result = pt_gl_kernel_program(d, PT_KERNEL_raster, pass, definitions[pass]);
         for (uint32_t done = 0; done < groups && result == PATINA_OK; done += LONG_RUN) {
-            if (cancel && atomic_load(cancel))
+            if (work->cancel && atomic_load(work->cancel))
                 return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
             d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_raster][pass], 0, done * GROUP);
             result = pt_gl_dispatch(d, PT_KERNEL_raster, pass, groups - done < LONG_RUN ? groups - done : LONG_RUN,

@@ -42,8 +42,8 @@ static int run(struct pt_gl_device *d, GLuint program)
     uint64_t ones[CELLS];
     memset(ones, 0xFF, sizeof ones);
     gl->BufferData(GL_COPY_WRITE_BUFFER, sizeof ones, ones, GL_DYNAMIC_COPY);
-    gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, names[0]);
-    gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, names[1]);
+    gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, PT_BIND_key64_test_values, names[0]);
+    gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, PT_BIND_key64_test_cells, names[1]);
     gl->UseProgram(program);
     gl->DispatchCompute(VALUES / GROUP, 1, 1);
     gl->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);

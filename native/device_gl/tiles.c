@@ -48,11 +48,11 @@ static int build(struct pt_gl_device *d, struct pt_gl_tiles *t)
     size_t tiles = (size_t)t->columns * t->rows;
     gl->BindBuffer(GL_COPY_WRITE_BUFFER, s[PT_GL_SCRATCH_TILE_COUNTS].name);
     gl->BufferSubData(GL_COPY_WRITE_BUFFER, 0, sizeof none, none);
-    int result = pt_gl_bind(d, 2, s[PT_GL_SCRATCH_TILES].name, 0, tiles * 4, "tiles");
+    int result = pt_gl_bind(d, PT_BIND_tile_lists_tiles, s[PT_GL_SCRATCH_TILES].name, 0, tiles * 4, "tiles");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 3, s[PT_GL_SCRATCH_TILE_LISTS].name, 0, LISTS * t->stride * 4, "tiles");
+        result = pt_gl_bind(d, PT_BIND_tile_lists_lists, s[PT_GL_SCRATCH_TILE_LISTS].name, 0, LISTS * t->stride * 4, "tiles");
     if (result == PATINA_OK)
-        result = pt_gl_bind(d, 4, s[PT_GL_SCRATCH_TILE_COUNTS].name, 0, sizeof none, "tiles");
+        result = pt_gl_bind(d, PT_BIND_tile_lists_counts, s[PT_GL_SCRATCH_TILE_COUNTS].name, 0, sizeof none, "tiles");
     if (result != PATINA_OK)
         return result;
     for (int i = 0; i < 2; i++) {
@@ -87,7 +87,7 @@ int pt_gl_tiles(struct pt_gl_device *d, const struct pt_buffer *keys, const stru
     if (result == PATINA_OK)
         result = room(d, t);
     if (result == PATINA_OK)
-        result = pt_gl_bind_texture(d, 0, keys);
+        result = pt_gl_bind_texture(d, PT_UNIT_key, keys);
     if (result == PATINA_OK)
         result = build(d, t);
     t->valid = result == PATINA_OK;
@@ -99,7 +99,7 @@ int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
     const struct pt_gl_tiles *t = &d->tiles;
     if (!t->count[list])
         return PATINA_OK;
-    int result = pt_gl_bind(d, PT_GL_BINDING_TILES, d->scratch[PT_GL_SCRATCH_TILE_LISTS].name, list * t->stride * 4,
+    int result = pt_gl_bind(d, PT_BIND_tile_list, d->scratch[PT_GL_SCRATCH_TILE_LISTS].name, list * t->stride * 4,
                             t->count[list] * (size_t)4, "tiles");
     return result == PATINA_OK ? pt_gl_dispatch_list(d, kernel, variant, t->count[list]) : result;
 }

@@ -39,8 +39,8 @@ void pt_plan_assess(struct pt_builder *builder)
         args.instance = instance->args;
         PT_REASON(PT_ADD(builder, assess, args,
                          {pt_plane_at(PT_PLANE_KEYS, 0), pt_shapes_of(instance, i),
-                          pt_plane_at(args.certainty ? PT_PLANE_CERTAINTY : PT_PLANE_THICKNESS, 0),
-                          pt_plane_at(args.thickness ? PT_PLANE_THICKNESS : PT_PLANE_CERTAINTY, 0)}),
+                          pt_plane_if(args.certainty != 0, PT_PLANE_CERTAINTY, 0),
+                          pt_plane_if(args.thickness != 0, PT_PLANE_THICKNESS, 0)}),
                   "of instance %u are asked for:%s%s", i, args.certainty ? " certainty" : "", args.thickness ? " thickness" : "");
         args.first = 0;
         plan->assessed = asked;

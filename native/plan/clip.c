@@ -65,9 +65,10 @@ void pt_plan_sift(struct pt_builder *builder)
         memcpy(args.hidden, instance->instance->style.hidden_classes, sizeof args.hidden);
         pt_hidden_shapes(instance->instance, args.hidden_shapes);
         PT_REASON(PT_ADD(builder, sift, args,
-                         { pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_CLASSES, i),
+                         { pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), args.by_class ? pt_buffer_of(PT_CLASSES, i) : pt_nothing(),
                            pt_buffer_of(PT_CLIPS, i), pt_buffer_of(PT_DRAWN, i),
-                           pt_shapes_of(instance, i), pt_buffer_of(args.by_mask ? PT_MASK : PT_CLASSES, i) }),
+                           args.by_shape ? pt_shapes_of(instance, i) : pt_nothing(),
+                           args.by_mask ? pt_buffer_of(PT_MASK, i) : pt_nothing() }),
                   "clips, classes, shapes or a mask divide %u chunks of instance %u", instance->chunks_cut, i);
     }
 }

@@ -112,7 +112,7 @@ static void plan_ink(struct pt_builder *builder, struct ink_args args, const str
     if (of_points)
         all.color_target = all.depth = 0;
     if (all.color_target || all.depth || all.mask || all.blank)
-        add_ink(builder, &all, targets[0], targets);
+        add_ink(builder, &all, pt_nothing(), targets);
     args.blank = args.mask = 0;
     for (uint32_t i = 0; i < plan->instance_count && of_points; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
@@ -127,7 +127,7 @@ static void plan_ink(struct pt_builder *builder, struct ink_args args, const str
         args.instance = (struct instance_args){.id_base = (uint32_t)builder->scene->points,
                                                .id_count = (uint32_t)builder->scene->triangles,
                                                .color = {1.0f, 1.0f, 1.0f}};
-        add_ink(builder, &args, targets[0], targets);
+        add_ink(builder, &args, pt_nothing(), targets);
     }
 }
 
@@ -147,8 +147,8 @@ void pt_plan_ink_layer(struct pt_builder *builder, enum pt_plane color, enum pt_
     if (!(builder->plan->line_radius > 0.0f) || !(args.color_target || args.depth))
         return;
     const uint32_t slot = builder->layer - 1;
-    const struct pt_ref some = pt_plane_at(args.color_target ? color : depth, slot); // stands in for what is not asked for
-    plan_ink(builder, args, (struct pt_ref[]){some, args.depth ? pt_plane_at(depth, slot) : some, some});
+    plan_ink(builder, args, (struct pt_ref[]){pt_plane_if(args.color_target != 0, color, slot),
+                                              pt_plane_if(args.depth != 0, depth, slot), pt_nothing()});
 }
 
 void pt_plan_ink(struct pt_builder *builder, const float background[4])
@@ -164,8 +164,9 @@ void pt_plan_ink(struct pt_builder *builder, const float background[4])
     args.blank = args.color_target && builder->scene->lines.surface == PATINA_LINE_SURFACE_NONE && !is_clear(plan);
     memcpy(args.background, background, sizeof args.background);
     if (args.color_target || args.depth || args.mask)
-        plan_ink(builder, args, (struct pt_ref[]){pt_plane_at(PT_PLANE_COMBINED, 0), pt_plane_at(PT_PLANE_DEPTH, 0),
-                                                  pt_plane_at(PT_PLANE_LINES, 0)});
+        plan_ink(builder, args, (struct pt_ref[]){pt_plane_if(args.color_target || args.blank, PT_PLANE_COMBINED, 0),
+                                                  pt_plane_if(args.depth != 0, PT_PLANE_DEPTH, 0),
+                                                  pt_plane_if(args.mask != 0, PT_PLANE_LINES, 0)});
 }
 
 // ---- lines ---------------------------------------------------------------------------------------------------------------
@@ -209,14 +210,14 @@ void pt_plan_lines(struct pt_builder *builder)
     const struct pt_ref refs[] = {pt_keys_of(builder, 0),           pt_from_of(builder, 0),
                                   pt_plane_at(PT_PLANE_NORMAL, 0),  pt_span_of(builder->plan),
                                   pt_line_of(builder),              nearest_of(builder),
-                                  pt_plane_at(PT_PLANE_LIMIT, 0),   pt_plane_at(PT_PLANE_THROUGH, 0)};
-    PT_REASON(pt_add(builder, PT_KERNEL_lines, "lines", &args, sizeof args, refs, args.behind ? 8 : 6),
+                                  pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0), pt_plane_if(args.behind != 0, PT_PLANE_THROUGH, 0)};
+    PT_REASON(pt_add(builder, PT_KERNEL_lines, "lines", &args, sizeof args, refs, sizeof refs / sizeof *refs),
               "silhouettes of layer %u, at most %.2f pixels wide", builder->layer, (double)plan->line_radius);
     if (plan->layers > 1) {
         const struct pt_ref over = pt_plane_at(PT_PLANE_OVER, 0);
         plan_ink(builder,
                  (struct ink_args){.behind = 1, .color_target = 1, .crop_width = plan->view.width, .crop_height = plan->view.height},
-                 (struct pt_ref[]){over, over, over});
+                 (struct pt_ref[]){over, pt_nothing(), pt_nothing()});
     }
 }
 

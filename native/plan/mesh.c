@@ -33,8 +33,8 @@ static void plan_raster(struct pt_builder *builder, uint32_t i)
     struct raster_args args = {.view = plan->view, .mesh = plan->meshes[i].args, .behind = builder->layer > 1};
     const struct pt_ref refs[] = {pt_plane_at(PT_PLANE_MESH_KEYS, 0), pt_mesh_buffer_of(PT_MESH_VERTICES, i),
                                   pt_mesh_buffer_of(PT_MESH_INDICES, i), pt_mesh_buffer_of(PT_MESH_TEXELS, i),
-                                  pt_plane_at(PT_PLANE_LIMIT, 0)};
-    struct pt_pass *pass = pt_add(builder, PT_KERNEL_raster, "raster", &args, sizeof args, refs, args.behind ? 5 : 4);
+                                  pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0)};
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_raster, "raster", &args, sizeof args, refs, sizeof refs / sizeof *refs);
     PT_REASON(pass, "%u triangles of mesh %u", args.mesh.id_count, i);
 }
 
@@ -47,7 +47,6 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
                               .shown = (uint32_t)shown,
                               .first = plan->meshes[i].instance->style.unlit ? pixels_of(plan) : 0};
     memcpy(args.view.rect, plan->meshes[i].rect, sizeof args.view.rect);
-    // where nothing is shown the keys stand in and are not touched
     const struct pt_ref refs[] = {pt_keys_of(builder, 0),
                                   pt_from_of(builder, 0),
                                   pt_plane_at(PT_PLANE_NORMAL, 0),
@@ -55,11 +54,11 @@ static void plan_cover(struct pt_builder *builder, uint32_t i, int shown)
                                   pt_plane_at(PT_PLANE_MESH_KEYS, 0),
                                   pt_mesh_buffer_of(PT_MESH_VERTICES, i),
                                   pt_mesh_buffer_of(PT_MESH_INDICES, i),
-                                  pt_plane_at(shown ? PT_PLANE_MESH_SHOWN : PT_PLANE_MESH_KEYS, 0),
-                                  pt_plane_at(shown ? PT_PLANE_MESH_NORMAL : PT_PLANE_MESH_KEYS, 0),
-                                  pt_plane_at(shown ? PT_PLANE_MESH_ALBEDO : PT_PLANE_MESH_KEYS, 0),
-                                  pt_plane_at(PT_PLANE_LIMIT, 0)};
-    struct pt_pass *pass = pt_add(builder, PT_KERNEL_cover, "cover", &args, sizeof args, refs, args.behind ? 11 : 10);
+                                  pt_plane_if(shown, PT_PLANE_MESH_SHOWN, 0),
+                                  pt_plane_if(shown, PT_PLANE_MESH_NORMAL, 0),
+                                  pt_plane_if(shown, PT_PLANE_MESH_ALBEDO, 0),
+                                  pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0)};
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_cover, "cover", &args, sizeof args, refs, sizeof refs / sizeof *refs);
     PT_REASON(pass, "mesh %u over what lies behind it", i);
 }
 
@@ -170,8 +169,8 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
     struct pt_pass *pass = PT_ADD(builder, shade, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
                       pt_span_of(plan), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
-                      pt_plane_at(color, 0), pt_buffer_of(PT_SHADOWS, PT_NO_INSTANCE),
-                      pt_buffer_of(PT_SHADOWS, unlit ? PT_NO_INSTANCE : PT_PIXELS), pt_plane_at(PT_PLANE_ARRIVED, 0)});
+                      pt_plane_at(color, 0), pt_nothing(), unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS),
+                      pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
     pass->late = pt_shade_late(&args, PT_LATE_PIXELS);
     PT_REASON(pass, "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
 }

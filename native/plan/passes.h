@@ -29,6 +29,15 @@ static inline struct pt_ref pt_plane_at(enum pt_plane which, uint32_t level)
 {
     return (struct pt_ref){PT_OF_FRAME, which, level};
 }
+// In place of what the kernel does without.
+static inline struct pt_ref pt_nothing(void)
+{
+    return (struct pt_ref){PT_OF_NOTHING, 0, 0};
+}
+static inline struct pt_ref pt_plane_if(int wanted, enum pt_plane which, uint32_t level)
+{
+    return wanted ? pt_plane_at(which, level) : pt_nothing();
+}
 // Of the layer at hand: the first has its own.
 static inline struct pt_ref pt_keys_of(const struct pt_builder *builder, uint32_t level)
 {

@@ -39,6 +39,8 @@ static void plan_scatter(struct pt_builder *builder)
         return;
     }
     refs[count++] = pt_keys_of(builder, 0);
+    refs[count++] = pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0);
+    refs[count++] = args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         if (!plan->instances[i].chunk_count || plan->instances[i].discs)
             continue;
@@ -49,10 +51,6 @@ static void plan_scatter(struct pt_builder *builder)
         chunks += plan->instances[i].chunk_count;
         points += plan->instances[i].points;
     }
-    if (args.behind)
-        refs[count++] = pt_plane_at(PT_PLANE_LIMIT, 0);
-    if (args.sifted)
-        refs[count++] = pt_buffer_of(PT_DRAWN, 0);
     struct pt_pass *pass = pt_add(builder, PT_KERNEL_scatter, "scatter", &args, sizeof args, refs, count);
     if (builder->layer > 1)
         PT_REASON(pass, "layer %u: what lies behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
@@ -91,8 +89,8 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
                                 .with_span = plan->sigmas != 0};
     PT_REASON(PT_ADD(builder, surface, args,
                      {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0), thick ? pt_shapes_of(instance, i) : pt_buffer_of(PT_SURFACE, i),
-                      pt_span_of(plan)}),
+                      pt_plane_at(PT_PLANE_DEFF, 0), pt_from_of(builder, 0), thick ? pt_shapes_of(instance, i) : pt_nothing(),
+                      pt_plane_if(plan->sigmas, PT_PLANE_SPAN, 0)}),
               "layer distance%s and normal of instance %u's pixels", thick ? " by sigma" : "", i);
 }
 
@@ -240,7 +238,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
                       pt_span_of(plan),
                       of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i), pt_shading_of(builder),
                       pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, instance->of),
-                      pt_plane_at(PT_PLANE_ARRIVED, 0)});
+                      pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
     pass->late = pt_shade_late(&args, PT_LATE_POINTS);
     PT_REASON(pass, "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
               args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");
@@ -278,10 +276,9 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
                                   .mesh_base = (uint32_t)builder->scene->points,
                                   .mesh_count = (uint32_t)builder->scene->triangles,
                                   .inked = plan->line_radius > 0.0f};
-    const struct pt_ref line = pt_line_of(builder); // stands in for what only layers behind have
-    const struct pt_ref refs[] = {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan),
-                                  pt_plane_at(color, 0), args.behind ? pt_plane_at(PT_PLANE_THROUGH, 0) : line, line};
-    PT_REASON(pt_add(builder, PT_KERNEL_antialias, "antialias", &args, sizeof args, refs, args.inked ? 6 : args.behind ? 5 : 4),
+    PT_REASON(PT_ADD(builder, antialias, args,
+                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan), pt_plane_at(color, 0),
+                      pt_plane_if(args.behind != 0, PT_PLANE_THROUGH, 0), args.inked ? pt_line_of(builder) : pt_nothing()}),
               args.layers ? "edges of background and layers" : "edges of background");
     return color;
 }
@@ -347,9 +344,6 @@ static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
     const uint32_t passes = builder->scene->settings.layer_passes, layer = builder->layer, slot = layer - 1;
     struct compose_args compose = compose_args(builder->plan);
     struct extract_args extract = extract_args(builder, passes);
-    // where one is not asked for, the other stands in and is not touched
-    enum pt_plane depth = extract.depth ? PT_PLANE_LAYER_DEPTH : PT_PLANE_LAYER_NORMALS;
-    enum pt_plane normal = extract.normal ? PT_PLANE_LAYER_NORMALS : PT_PLANE_LAYER_DEPTH;
     if (passes >> PATINA_PASS_COMBINED & 1u)
         PT_REASON(PT_ADD(builder, compose, compose,
                          {pt_keys_of(builder, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_LAYER_COMBINED, slot)}),
@@ -357,8 +351,9 @@ static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
     if (extract.depth || extract.normal)
         PT_REASON(PT_ADD(builder, extract, extract,
                          {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_shading_of(builder),
-                          pt_plane_at(depth, slot), pt_plane_at(normal, slot), pt_plane_at(depth, slot),
-                          pt_plane_at(depth, slot), pt_plane_at(depth, slot)}),
+                          pt_plane_if(extract.depth != 0, PT_PLANE_LAYER_DEPTH, slot),
+                          pt_plane_if(extract.normal != 0, PT_PLANE_LAYER_NORMALS, slot), pt_nothing(), pt_nothing(), pt_nothing(),
+                          pt_nothing(), pt_nothing()}),
                   "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "",
                   extract.normal ? " normal" : "");
     pt_plan_ink_layer(builder, passes >> PATINA_PASS_COMBINED & 1u ? PT_PLANE_LAYER_COMBINED : PT_PLANE_COUNT,
@@ -401,10 +396,10 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
     }
     PT_REASON(PT_ADD(builder, extract, extract,
                      {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_SHADING, 0),
-                      pt_plane_at(PT_PLANE_DEPTH, 0), pt_plane_at(PT_PLANE_NORMALS, 0), pt_plane_at(PT_PLANE_SOURCE, 0),
-                      pt_plane_at(PT_PLANE_ARRIVED, 0), pt_plane_at(PT_PLANE_SHADOW, 0),
-                      pt_plane_at(extract.discs_count ? PT_PLANE_AWAY : PT_PLANE_SHADING, 0),
-                      pt_plane_at(extract.centered ? PT_PLANE_OFFSET : PT_PLANE_SHADING, 0)}),
+                      pt_plane_if(extract.depth != 0, PT_PLANE_DEPTH, 0), pt_plane_if(extract.normal != 0, PT_PLANE_NORMALS, 0),
+                      pt_plane_if(extract.source != 0, PT_PLANE_SOURCE, 0), pt_plane_if(extract.shadow != 0, PT_PLANE_ARRIVED, 0),
+                      pt_plane_if(extract.shadow != 0, PT_PLANE_SHADOW, 0), pt_plane_if(extract.discs_count != 0, PT_PLANE_AWAY, 0),
+                      pt_plane_if(extract.centered != 0, PT_PLANE_OFFSET, 0)}),
               "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
               extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
@@ -595,8 +590,7 @@ static int gives_picture(enum pt_kernel kernel) { return kernel == PT_KERNEL_com
 
 static int runs_with_others(enum pt_kernel kernel)
 {
-    return kernel == PT_KERNEL_shade || reads_planes(kernel) || gives_picture(kernel) || kernel == PT_KERNEL_extract ||
-           pointwise(kernel);
+    return pt_kernels[kernel].stage == PT_STAGE_finish || pointwise(kernel);
 }
 
 // From shading on, passes may run as one where nobody asks for what lies between them; or from behind the last of those that look

@@ -81,20 +81,18 @@ static struct reopen_args *arguments_of(struct pt_builder *builder, uint32_t i, 
     return args;
 }
 
-// Planes that a phase does without are not made for it: their place holds the keys.
 static void add_pass(struct pt_builder *builder, uint32_t i, const struct reopen_args *args, size_t size, enum pt_plane color)
 {
-    const struct pt_ref keys = pt_keys_of(builder, 0);
     const uint32_t phase = args->phase;
     const int keeps = phase == PT_REOPEN_KEEP || phase == PT_REOPEN_TAKE;
-    const struct pt_ref refs[] = {keys,
+    const struct pt_ref refs[] = {pt_keys_of(builder, 0),
                                   pt_from_of(builder, 0),
                                   pt_plane_at(PT_PLANE_DEFF, 0),
-                                  args->discs ? pt_plane_at(PT_PLANE_AWAY, 0) : keys,
-                                  phase == PT_REOPEN_KEEP ? keys : pt_buffer_of(PT_SIGHTS, i),
-                                  phase == PT_REOPEN_FIND ? pt_plane_at(PT_PLANE_LIMIT, 0) : keys,
-                                  keeps ? pt_plane_at(PT_PLANE_KEYS_KEPT, 0) : keys,
-                                  phase == PT_REOPEN_SHOW ? pt_plane_at(color, 0) : keys};
+                                  pt_plane_if(args->discs != 0, PT_PLANE_AWAY, 0),
+                                  phase == PT_REOPEN_KEEP ? pt_nothing() : pt_buffer_of(PT_SIGHTS, i),
+                                  pt_plane_if(phase == PT_REOPEN_FIND, PT_PLANE_LIMIT, 0),
+                                  pt_plane_if(keeps, PT_PLANE_KEYS_KEPT, 0),
+                                  pt_plane_if(phase == PT_REOPEN_SHOW, color, 0)};
     struct pt_pass *pass = pt_add(builder, PT_KERNEL_reopen, "reopen", args, size, refs, sizeof refs / sizeof *refs);
     if (phase == PT_REOPEN_KEEP)
         PT_REASON(pass, "what was measured, before it is filled");

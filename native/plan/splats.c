@@ -14,13 +14,12 @@ static uint32_t bind_instance(struct pt_ref *refs, uint32_t i, int blend)
     return count;
 }
 
-// Arguments with the discs of every instance in view behind them.
-static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref *planes, uint32_t plane_count,
-                      const struct pt_ref *last)
+// Arguments with the discs of every instance in view behind them. behind: of splat, the limit holds.
+static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref *planes, uint32_t plane_count, int behind)
 {
     struct pt_plan *plan = builder->plan;
     const size_t head = blend ? sizeof(struct blend_args) : sizeof(struct splat_args);
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 2 + 6 * (size_t)plan->instance_count) * sizeof *refs);
+    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 1 + 6 * (size_t)plan->instance_count) * sizeof *refs);
     char *args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args));
     if (!refs || !args) {
         builder->failed = 1;
@@ -30,6 +29,7 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
     uint64_t points = 0, chunks = 0;
     uint32_t instances = 0, count = plane_count;
     memcpy(refs, planes, plane_count * sizeof *planes);
+    refs[count++] = plan->drawn_words ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         const struct patina_cloud *cloud = instance->instance->cloud;
@@ -46,20 +46,16 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
         points += instance->points;
         count += bind_instance(refs + count, i, blend);
     }
-    if (last)
-        refs[count++] = *last;
-    if (plan->drawn_words)
-        refs[count++] = pt_buffer_of(PT_DRAWN, 0);
-    struct splat_args splat = {.view = plan->view, .instances = instances, .behind = last != NULL, .sifted = plan->drawn_words > 0};
+    struct splat_args splat = {.view = plan->view, .instances = instances, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
     struct blend_args mix = {.view = plan->view, .instances = instances, .sifted = plan->drawn_words > 0};
     memcpy(args, blend ? (void *)&mix : (void *)&splat, head);
     struct pt_pass *pass = pt_add(builder, blend ? PT_KERNEL_blend : PT_KERNEL_splat, blend ? "blend" : "splat", args,
                                   head + instances * sizeof *discs, refs, count);
     if (blend)
         PT_REASON(pass, "discs within a layer distance of the nearest, %u instances", instances);
-    else if (last && builder->layer <= 1)
+    else if (behind && builder->layer <= 1)
         PT_REASON(pass, "discs behind what is drawn already, %u instances", instances);
-    else if (last)
+    else if (behind)
         PT_REASON(pass, "layer %u: discs behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
     else
         PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view, as discs", (unsigned long long)points,
@@ -68,13 +64,14 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
 
 void pt_plan_splat(struct pt_builder *builder)
 {
-    const struct pt_ref keys = pt_keys_of(builder, 0), limit = pt_plane_at(PT_PLANE_LIMIT, 0);
-    add_discs(builder, 0, &keys, 1, builder->layer > 1 || builder->behind ? &limit : NULL);
+    const int behind = builder->layer > 1 || builder->behind;
+    const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_if(behind, PT_PLANE_LIMIT, 0)};
+    add_discs(builder, 0, planes, 2, behind);
 }
 
 void pt_plan_blend(struct pt_builder *builder)
 {
     const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
                                     pt_plane_at(PT_PLANE_ALBEDO, 0), pt_plane_at(PT_PLANE_AWAY, 0)};
-    add_discs(builder, 1, planes, 5, NULL);
+    add_discs(builder, 1, planes, 5, 0);
 }

@@ -18,14 +18,14 @@
 layout(local_size_x = 64) in;
 #endif
 
-layout(std430, binding = 0) readonly buffer arguments_block { antialias_args args; };
-layout(std430, binding = 2) buffer from_block { uint from[]; };
-layout(std430, binding = 4) writeonly buffer color_block { vec4 color[]; };
-layout(std430, binding = 5) readonly buffer through_block { float through[]; };
-layout(std430, binding = 6) readonly buffer line_block { float line[]; };
-layout(std430, binding = 7) buffer counters_block { uint edge_count; };
-layout(std430, binding = 8) buffer edges_block { uint edges[]; };
-layout(std430, binding = 9) buffer mixed_block { vec4 mixed[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { antialias_args args; };
+layout(std430, binding = BIND_from) buffer from_block { uint from[]; };
+layout(std430, binding = BIND_color) writeonly buffer color_block { vec4 color[]; };
+layout(std430, binding = BIND_through) readonly buffer through_block { float through[]; };
+layout(std430, binding = BIND_line) readonly buffer line_block { float line[]; };
+layout(std430, binding = BIND_counters) buffer counters_block { uint edge_count; };
+layout(std430, binding = BIND_edges) buffer edges_block { uint edges[]; };
+layout(std430, binding = BIND_mixed) buffer mixed_block { vec4 mixed[]; };
 
 #include "lib/edges.glsl"
 

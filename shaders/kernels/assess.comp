@@ -6,10 +6,10 @@
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { assess_args args; };
-layout(std430, binding = 2) readonly buffer shapes_block { uint shapes[]; };
-layout(std430, binding = 3) writeonly buffer certainty_block { float certainty[]; };
-layout(std430, binding = 4) writeonly buffer thickness_block { float thickness[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { assess_args args; };
+layout(std430, binding = BIND_shapes) readonly buffer shapes_block { uint shapes[]; };
+layout(std430, binding = BIND_certainty) writeonly buffer certainty_block { float certainty[]; };
+layout(std430, binding = BIND_thickness) writeonly buffer thickness_block { float thickness[]; };
 
 void main()
 {

@@ -16,15 +16,15 @@ layout(local_size_x = 32, local_size_y = 8) in;
 
 #define SUMS 8u // colour 3, weight, normal 3, nothing: two words each, the low one first
 
-layout(std430, binding = 0) readonly buffer arguments_block { average_args args; };
-layout(std430, binding = 1) buffer sums_block { uint sums[]; };
-layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = 3) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = 4) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 5) readonly buffer drawn_block { uint drawn[]; };
-layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; };
-layout(std430, binding = 7) buffer normal_block { vec4 normal[]; };
-layout(std430, binding = 8) writeonly buffer albedo_block { vec4 albedo[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { average_args args; };
+layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
+layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
+layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
+layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
+layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albedo[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins

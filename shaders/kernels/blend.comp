@@ -14,13 +14,13 @@ layout(local_size_x = 32, local_size_y = 8) in;
 
 #define SUMS 8u // colour 3, opacity, normal 3, weight: two words each, the low one first
 
-layout(std430, binding = 0) readonly buffer arguments_block { blend_args args; disc_args discs[]; };
-layout(std430, binding = 1) buffer sums_block { uint sums[]; };
-layout(std430, binding = 6) readonly buffer colors_block { uint point_colors[]; };
-layout(std430, binding = 7) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
-layout(std430, binding = 8) buffer normal_block { vec4 normal[]; };
-layout(std430, binding = 9) writeonly buffer albedo_block { vec4 albedo[]; };
-layout(std430, binding = 11) writeonly buffer away_block { float away_from[]; }; // how many pixels the key's point fell away
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { blend_args args; disc_args discs[]; };
+layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
+layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
+layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
+layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
+layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albedo[]; };
+layout(std430, binding = BIND_away) writeonly buffer away_block { float away_from[]; }; // how many pixels the key's point fell away
 
 layout(location = 3) uniform int band_first;
 layout(location = 4) uniform int band_end;

@@ -8,13 +8,13 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { center_args args; };
-layout(std430, binding = 1) readonly buffer keys_block { uvec2 keys[]; }; // id, z bits
-layout(std430, binding = 2) readonly buffer normal_block { vec4 normal[]; };
-layout(std430, binding = 3) readonly buffer deff_block { float deff[]; };
-layout(std430, binding = 4) writeonly buffer offset_block { float offset[]; };
-layout(std430, binding = 5) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = 6) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { center_args args; };
+layout(std430, binding = BIND_keys) readonly buffer keys_block { uvec2 keys[]; }; // id, z bits
+layout(std430, binding = BIND_normal) readonly buffer normal_block { vec4 normal[]; };
+layout(std430, binding = BIND_deff) readonly buffer deff_block { float deff[]; };
+layout(std430, binding = BIND_offset) writeonly buffer offset_block { float offset[]; };
+layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins

@@ -6,18 +6,18 @@
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { cover_args args; };
-layout(std430, binding = 1) buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 2) buffer from_block { uint from[]; };
-layout(std430, binding = 3) buffer normals_block { vec4 normals[]; };
-layout(std430, binding = 4) writeonly buffer deff_block { float deff[]; };
-layout(std430, binding = 5) readonly buffer mesh_keys_block { uvec2 mesh_keys[]; };
-layout(std430, binding = 6) readonly buffer vertices_block { float vertices[]; };
-layout(std430, binding = 7) readonly buffer indices_block { uint indices[]; };
-layout(std430, binding = 8) writeonly buffer shown_block { uvec2 shown[]; };
-layout(std430, binding = 9) writeonly buffer shown_normals_block { vec4 shown_normals[]; };
-layout(std430, binding = 10) writeonly buffer albedo_block { vec4 albedo[]; };
-layout(std430, binding = 11) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { cover_args args; };
+layout(std430, binding = BIND_keys) buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = BIND_from) buffer from_block { uint from[]; };
+layout(std430, binding = BIND_normal) buffer normals_block { vec4 normals[]; };
+layout(std430, binding = BIND_deff) writeonly buffer deff_block { float deff[]; };
+layout(std430, binding = BIND_mesh_keys) readonly buffer mesh_keys_block { uvec2 mesh_keys[]; };
+layout(std430, binding = BIND_vertices) readonly buffer vertices_block { float vertices[]; };
+layout(std430, binding = BIND_indices) readonly buffer indices_block { uint indices[]; };
+layout(std430, binding = BIND_shown) writeonly buffer shown_block { uvec2 shown[]; };
+layout(std430, binding = BIND_shown_normal) writeonly buffer shown_normals_block { vec4 shown_normals[]; };
+layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albedo[]; };
+layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]; };
 
 #include "lib/triangle.glsl"
 

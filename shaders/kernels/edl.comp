@@ -5,8 +5,8 @@
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = 0) readonly buffer arguments_block { edl_args args; };
-layout(std430, binding = 2) buffer color_block { vec4 color[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { edl_args args; };
+layout(std430, binding = BIND_color) buffer color_block { vec4 color[]; };
 
 float depth_of(float z, bool perspective)
 {

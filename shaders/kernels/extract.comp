@@ -7,14 +7,14 @@
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { extract_args args; };
-layout(std430, binding = 4) writeonly buffer depth_block { float depth[]; };
-layout(std430, binding = 5) writeonly buffer normal_block { float normal[]; }; // 3 a pixel
-layout(std430, binding = 6) writeonly buffer source_block { float source[]; };
-layout(std430, binding = 7) readonly buffer arrived_block { float arrived[]; };
-layout(std430, binding = 8) writeonly buffer shadow_block { float shadow[]; };
-layout(std430, binding = 10) readonly buffer offset_block { float offset[]; }; // to the middle of a measured pixel
-layout(std430, binding = 9) readonly buffer away_block { float away[]; }; // how far off a disc's point fell
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { extract_args args; };
+layout(std430, binding = BIND_depth) writeonly buffer depth_block { float depth[]; };
+layout(std430, binding = BIND_normal) writeonly buffer normal_block { float normal[]; }; // 3 a pixel
+layout(std430, binding = BIND_source) writeonly buffer source_block { float source[]; };
+layout(std430, binding = BIND_arrived) readonly buffer arrived_block { float arrived[]; };
+layout(std430, binding = BIND_shadow) writeonly buffer shadow_block { float shadow[]; };
+layout(std430, binding = BIND_offset) readonly buffer offset_block { float offset[]; }; // to the middle of a measured pixel
+layout(std430, binding = BIND_away) readonly buffer away_block { float away[]; }; // how far off a disc's point fell
 
 float source_value(uint width, uint origin, uint x, uint y)
 {

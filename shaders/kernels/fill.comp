@@ -27,15 +27,15 @@ struct saved_pixel { // as it was before the phase
     float threshold; // a neighbour nearer than this was dark
 };
 
-layout(std430, binding = 0) readonly buffer arguments_block { fill_args args; };
-layout(std430, binding = 1) writeonly buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 2) writeonly buffer from_block { uint from[]; };
-layout(std430, binding = 5) buffer counters_block { uint changed_count, saved_count, woken_count; };
-layout(std430, binding = 6) buffer changed_block { change changed[]; };
-layout(std430, binding = 7) buffer saved_block { saved_pixel saved[]; };
-layout(std430, binding = 8) buffer filled_block { uint filled[]; }; // a bit a pixel: filled in this phase
-layout(std430, binding = 9) buffer stamps_block { uint stamps[]; }; // a word a tile: the step it was listed for last
-layout(std430, binding = 10) buffer woken_block { uint woken[]; };  // tiles for the next step
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { fill_args args; };
+layout(std430, binding = BIND_keys) writeonly buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; };
+layout(std430, binding = BIND_counters) buffer counters_block { uint changed_count, saved_count, woken_count; };
+layout(std430, binding = BIND_changed) buffer changed_block { change changed[]; };
+layout(std430, binding = BIND_saved) buffer saved_block { saved_pixel saved[]; };
+layout(std430, binding = BIND_filled) buffer filled_block { uint filled[]; }; // a bit a pixel: filled in this phase
+layout(std430, binding = BIND_stamps) buffer stamps_block { uint stamps[]; }; // a word a tile: the step it was listed for last
+layout(std430, binding = BIND_woken) buffer woken_block { uint woken[]; };  // tiles for the next step
 
 layout(location = 0) uniform uint entries; // STEP 0: room in `changed`, else the entries to walk
 layout(location = 1) uniform uint stamp;   // of this step

@@ -6,8 +6,8 @@
 
 layout(local_size_x = 16, local_size_y = 16) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { focus_args args; };
-layout(std430, binding = 3) writeonly buffer combined_block { vec4 combined[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { focus_args args; };
+layout(std430, binding = BIND_combined) writeonly buffer combined_block { vec4 combined[]; };
 
 // Radius of the circle of confusion, pixels.
 float circle_of(float z)

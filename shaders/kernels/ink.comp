@@ -7,14 +7,14 @@
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { ink_args args; };
-layout(std430, binding = 2) readonly buffer line_block { float line[]; };
-layout(std430, binding = 3) readonly buffer nearest_block { uint nearest[]; };
-layout(std430, binding = 4) readonly buffer colors_block { uint point_colors[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { ink_args args; };
+layout(std430, binding = BIND_line) readonly buffer line_block { float line[]; };
+layout(std430, binding = BIND_nearest) readonly buffer nearest_block { uint nearest[]; };
+layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
 #define POINT_COLOR(i) point_colors[i]
-layout(std430, binding = 5) buffer color_block { vec4 color[]; };
-layout(std430, binding = 6) buffer depth_block { float depth[]; };
-layout(std430, binding = 7) writeonly buffer mask_block { float mask[]; };
+layout(std430, binding = BIND_color) buffer color_block { vec4 color[]; };
+layout(std430, binding = BIND_depth) buffer depth_block { float depth[]; };
+layout(std430, binding = BIND_mask) writeonly buffer mask_block { float mask[]; };
 
 #include "lib/albedo.glsl"
 

@@ -7,10 +7,10 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { limit_args args; };
-layout(std430, binding = 4) readonly buffer opacities_block { uint opacities[]; }; // four a word
-layout(std430, binding = 5) writeonly buffer limit_block { float limit[]; };
-layout(std430, binding = 6) writeonly buffer some_block { uint some_left[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { limit_args args; };
+layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; }; // four a word
+layout(std430, binding = BIND_limit) writeonly buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_some) writeonly buffer some_block { uint some_left[]; };
 
 void main()
 {

@@ -9,13 +9,13 @@
 
 layout(local_size_x = 16, local_size_y = 16) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { lines_args args; };
-layout(std430, binding = 5) buffer line_block { float line[]; };
-layout(std430, binding = 6) writeonly buffer nearest_block { uint nearest[]; };
-layout(std430, binding = 7) readonly buffer limit_block { float limit[]; };
-layout(std430, binding = 8) readonly buffer through_block { float through[]; };
-layout(std430, binding = 9) buffer steps_block { float steps[]; };  // v of pixels with a step beside them, +inf: none
-layout(std430, binding = 10) buffer discs_block { float discs[]; }; // of them those with company
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { lines_args args; };
+layout(std430, binding = BIND_line) buffer line_block { float line[]; };
+layout(std430, binding = BIND_nearest) writeonly buffer nearest_block { uint nearest[]; };
+layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_through) readonly buffer through_block { float through[]; };
+layout(std430, binding = BIND_steps) buffer steps_block { float steps[]; };  // v of pixels with a step beside them, +inf: none
+layout(std430, binding = BIND_discs) buffer discs_block { float discs[]; }; // of them those with company
 
 #define NOTHING pt_float(PT_KEY_EMPTY_Z)
 

@@ -8,15 +8,15 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { lit_args args; };
-layout(std430, binding = 4) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = 5) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = 6) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 7) readonly buffer marks_block { uint marks[]; };
-layout(std430, binding = 8) buffer shadows_block { uint words[]; };
-layout(std430, binding = 9) buffer differs_block { uint differs[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { lit_args args; };
+layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_marks) readonly buffer marks_block { uint marks[]; };
+layout(std430, binding = BIND_shadows) buffer shadows_block { uint words[]; };
+layout(std430, binding = BIND_differs) buffer differs_block { uint differs[]; };
 
-layout(std430, binding = 10) readonly buffer opacities_block { uint opacities[]; };
+layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins

@@ -6,13 +6,13 @@
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { locate_args args; };
-layout(std430, binding = 1) readonly buffer shown_block { uvec2 shown[]; };
-layout(std430, binding = 2) readonly buffer mesh_keys_block { uvec2 mesh_keys[]; };
-layout(std430, binding = 3) readonly buffer vertices_block { float vertices[]; };
-layout(std430, binding = 4) readonly buffer indices_block { uint indices[]; };
-layout(std430, binding = 5) writeonly buffer places_block { float places[]; };
-layout(std430, binding = 6) writeonly buffer words_block { uint words[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { locate_args args; };
+layout(std430, binding = BIND_shown) readonly buffer shown_block { uvec2 shown[]; };
+layout(std430, binding = BIND_mesh_keys) readonly buffer mesh_keys_block { uvec2 mesh_keys[]; };
+layout(std430, binding = BIND_vertices) readonly buffer vertices_block { float vertices[]; };
+layout(std430, binding = BIND_indices) readonly buffer indices_block { uint indices[]; };
+layout(std430, binding = BIND_places) writeonly buffer places_block { float places[]; };
+layout(std430, binding = BIND_words) writeonly buffer words_block { uint words[]; };
 
 #include "lib/triangle.glsl"
 

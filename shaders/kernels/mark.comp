@@ -6,8 +6,8 @@
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = 0) readonly buffer arguments_block { mark_args args; };
-layout(std430, binding = 2) buffer marks_block { uint marks[]; }; // four a word
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { mark_args args; };
+layout(std430, binding = BIND_marks) buffer marks_block { uint marks[]; }; // four a word
 
 void main()
 {

@@ -8,9 +8,9 @@
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = 0) readonly buffer arguments_block { normals_args args; };
-layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { normals_args args; };
+layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_normal) writeonly buffer normals_block { vec4 normals[]; };
 
 struct window_sums {
     float n, x, y, xx, xy, yy, w, xw, yw;

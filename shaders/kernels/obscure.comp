@@ -6,9 +6,9 @@
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = 0) readonly buffer arguments_block { obscure_args args; };
-layout(std430, binding = 5) buffer color_block { vec4 color[]; };
-layout(std430, binding = 6) buffer obscured_block { float obscured[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { obscure_args args; };
+layout(std430, binding = BIND_color) buffer color_block { vec4 color[]; };
+layout(std430, binding = BIND_obscured) buffer obscured_block { float obscured[]; };
 
 #if STEP == 0
 

@@ -7,12 +7,12 @@
 
 layout(local_size_x = 16, local_size_y = 16) in; // 2^PT_TILE_LEVEL
 
-layout(std430, binding = 0) readonly buffer arguments_block { peel_args args; };
-layout(std430, binding = 1) buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 6) buffer limit_block { float limit[]; };
-layout(std430, binding = 7) buffer through_block { float through[]; };
-layout(std430, binding = 8) buffer over_block { vec4 over[]; };
-layout(std430, binding = 9) writeonly buffer tiles_block { uvec2 tiles[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { peel_args args; };
+layout(std430, binding = BIND_keys) buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = BIND_limit) buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_through) buffer through_block { float through[]; };
+layout(std430, binding = BIND_over) buffer over_block { vec4 over[]; };
+layout(std430, binding = BIND_tiles) writeonly buffer tiles_block { uvec2 tiles[]; };
 
 shared uint least; // bits of a float >= 0 order as the float does
 shared uint covered;

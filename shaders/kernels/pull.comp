@@ -7,9 +7,9 @@
 
 layout(local_size_x = 32) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { pull_args args; };
-layout(std430, binding = 3) writeonly buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 4) writeonly buffer from_block { uint from[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { pull_args args; };
+layout(std430, binding = BIND_keys) writeonly buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; };
 
 void main()
 {

@@ -13,11 +13,11 @@
 layout(local_size_x = 64) in;
 #endif
 
-layout(std430, binding = 0) readonly buffer arguments_block { push_args args; };
-layout(std430, binding = 3) buffer keys_block { uvec2 keys[]; };
-layout(std430, binding = 4) buffer from_block { uint from[]; };
-layout(std430, binding = 7) buffer counters_block { uint taken_count; };
-layout(std430, binding = 8) buffer taken_block { uint taken[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { push_args args; };
+layout(std430, binding = BIND_keys) buffer keys_block { uvec2 keys[]; };
+layout(std430, binding = BIND_from) buffer from_block { uint from[]; };
+layout(std430, binding = BIND_counters) buffer counters_block { uint taken_count; };
+layout(std430, binding = BIND_taken) buffer taken_block { uint taken[]; };
 
 #if STEP == 0
 

@@ -11,12 +11,12 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { raster_args args; };
-layout(std430, binding = 1) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
-layout(std430, binding = 2) readonly buffer vertices_block { float vertices[]; };
-layout(std430, binding = 3) readonly buffer indices_block { uint indices[]; };
-layout(std430, binding = 4) readonly buffer texels_block { uint texels[]; };
-layout(std430, binding = 5) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { raster_args args; };
+layout(std430, binding = BIND_keys) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
+layout(std430, binding = BIND_vertices) readonly buffer vertices_block { float vertices[]; };
+layout(std430, binding = BIND_indices) readonly buffer indices_block { uint indices[]; };
+layout(std430, binding = BIND_texels) readonly buffer texels_block { uint texels[]; };
+layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]; };
 
 #include "lib/texture.glsl"
 

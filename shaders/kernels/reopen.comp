@@ -8,14 +8,14 @@
 
 layout(local_size_x = 32, local_size_y = 8) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { reopen_args args; station_args stations[]; };
-layout(std430, binding = 1) writeonly buffer keys_block { uvec2 keys[]; }; // id, z bits
-layout(std430, binding = 2) writeonly buffer from_block { uint from[]; };
-layout(std430, binding = 4) readonly buffer away_block { float away[]; };
-layout(std430, binding = 5) readonly buffer sights_block { uint sights[]; };
-layout(std430, binding = 6) writeonly buffer limit_block { float limit[]; };
-layout(std430, binding = 7) buffer kept_block { uvec2 kept[]; };
-layout(std430, binding = 8) buffer color_block { vec4 color[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { reopen_args args; station_args stations[]; };
+layout(std430, binding = BIND_keys) writeonly buffer keys_block { uvec2 keys[]; }; // id, z bits
+layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; };
+layout(std430, binding = BIND_away) readonly buffer away_block { float away[]; };
+layout(std430, binding = BIND_sights) readonly buffer sights_block { uint sights[]; };
+layout(std430, binding = BIND_limit) writeonly buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_kept) buffer kept_block { uvec2 kept[]; };
+layout(std430, binding = BIND_color) buffer color_block { vec4 color[]; };
 
 // Of a place over the face, in cells.
 uint cell_of(float across, float inverse, float half_edge, uint edge)

@@ -21,15 +21,15 @@ layout(local_size_x = 8) in;
 layout(local_size_x = 64) in;
 #endif
 
-layout(std430, binding = 0) readonly buffer arguments_block { scatter_args args; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { scatter_args args; };
 #if PASS == 2
-layout(std430, binding = 1) buffer keys_block { uint64_t keys[]; };
+layout(std430, binding = BIND_keys) buffer keys_block { uint64_t keys[]; };
 #else
-layout(std430, binding = 1) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
+layout(std430, binding = BIND_keys) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
 #endif
-layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = 5) readonly buffer limit_block { float limit[]; };
-layout(std430, binding = 6) readonly buffer drawn_block { uint drawn[]; };
+layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_drawn) readonly buffer drawn_block { uint drawn[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions and surface begins

@@ -13,18 +13,18 @@
 #include "lib/srgb.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = 0) readonly buffer arguments_block { shade_args args; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { shade_args args; };
 #ifdef PT_SOFTWARE // as in surface
 #define POINT_COLOR(i) read_word(i)
 #else
-layout(std430, binding = 5) readonly buffer colors_block { uint point_colors[]; };
+layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
 #define POINT_COLOR(i) point_colors[i]
 #endif
-layout(std430, binding = 6) writeonly buffer shading_block { vec4 shading[]; };
-layout(std430, binding = 7) writeonly buffer color_block { vec4 color[]; };
-layout(std430, binding = 8) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
-layout(std430, binding = 9) readonly buffer shadows_block { uint shadows[]; };
-layout(std430, binding = 10) writeonly buffer arrived_block { float arrived[]; };
+layout(std430, binding = BIND_shading) writeonly buffer shading_block { vec4 shading[]; };
+layout(std430, binding = BIND_color) writeonly buffer color_block { vec4 color[]; };
+layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
+layout(std430, binding = BIND_shadows) readonly buffer shadows_block { uint shadows[]; };
+layout(std430, binding = BIND_arrived) writeonly buffer arrived_block { float arrived[]; };
 
 #include "lib/albedo.glsl"
 #include "lib/recolor.glsl"

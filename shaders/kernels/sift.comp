@@ -8,14 +8,14 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { sift_args args; };
-layout(std430, binding = 1) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = 2) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = 3) readonly buffer classes_block { uint classes[]; }; // four bytes a word
-layout(std430, binding = 4) readonly buffer clips_block { clip_view clips[]; };
-layout(std430, binding = 5) writeonly buffer drawn_block { uint drawn[]; };
-layout(std430, binding = 6) readonly buffer shapes_block { uint shapes[]; };
-layout(std430, binding = 7) readonly buffer mask_block { uint mask[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { sift_args args; };
+layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = BIND_classes) readonly buffer classes_block { uint classes[]; }; // four bytes a word
+layout(std430, binding = BIND_clips) readonly buffer clips_block { clip_view clips[]; };
+layout(std430, binding = BIND_drawn) writeonly buffer drawn_block { uint drawn[]; };
+layout(std430, binding = BIND_shapes) readonly buffer shapes_block { uint shapes[]; };
+layout(std430, binding = BIND_mask) readonly buffer mask_block { uint mask[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins

@@ -7,8 +7,8 @@
 #include "lib/smooth.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = 0) readonly buffer arguments_block { smooth_args args; };
-layout(std430, binding = 5) writeonly buffer result_block { vec4 result[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { smooth_args args; };
+layout(std430, binding = BIND_result) writeonly buffer result_block { vec4 result[]; };
 
 void main()
 {

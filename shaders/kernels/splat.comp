@@ -11,13 +11,13 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { splat_args args; disc_args discs[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { splat_args args; disc_args discs[]; };
 #if PASS == 2
-layout(std430, binding = 1) buffer keys_block { uint64_t keys[]; };
+layout(std430, binding = BIND_keys) buffer keys_block { uint64_t keys[]; };
 #else
-layout(std430, binding = 1) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
+layout(std430, binding = BIND_keys) buffer keys_block { uint keys[]; }; // two words a pixel: id, z bits
 #endif
-layout(std430, binding = 6) readonly buffer limit_block { float limit[]; };
+layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]; };
 
 #include "lib/disc.glsl"
 

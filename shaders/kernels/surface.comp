@@ -6,22 +6,22 @@
 #include "lib/planes.glsl"
 #include "lib/tiles.glsl"
 
-layout(std430, binding = 0) readonly buffer arguments_block { surface_args args; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { surface_args args; };
 layout(location = 16) uniform float spacings[PT_SPACINGS]; // args.instance.spacing
 #ifdef PT_SOFTWARE // a texel takes half the time of a block's word; elsewhere blocks hold more
 #define WORD(i) read_word(i)
 #else
-layout(std430, binding = 2) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
 #define WORD(i) surface[i]
 #endif
-layout(std430, binding = 3) writeonly buffer normals_block { vec4 normals[]; };
-layout(std430, binding = 4) writeonly buffer deff_block { float deff[]; };
-layout(std430, binding = 5) writeonly buffer from_block { uint from[]; };
+layout(std430, binding = BIND_normal) writeonly buffer normals_block { vec4 normals[]; };
+layout(std430, binding = BIND_deff) writeonly buffer deff_block { float deff[]; };
+layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; };
 #if SIGMAS
-layout(std430, binding = 6) readonly buffer shapes_block { uint shapes[]; };
+layout(std430, binding = BIND_shapes) readonly buffer shapes_block { uint shapes[]; };
 #endif
 #if SPAN
-layout(std430, binding = 7) writeonly buffer span_block { float span[]; };
+layout(std430, binding = BIND_span) writeonly buffer span_block { float span[]; };
 #endif
 
 struct instance_part {

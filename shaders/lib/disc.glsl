@@ -15,15 +15,15 @@ layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
 layout(location = 2) uniform uint instance;    // whose points these are
 
-layout(std430, binding = 2) readonly buffer chunks_block { chunk_view chunks[]; };
-layout(std430, binding = 3) readonly buffer positions_block { float positions[]; };
-layout(std430, binding = 4) readonly buffer surface_block { uint surface[]; };
-layout(std430, binding = 5) readonly buffer radii_block { uint radii[]; }; // floats or shape words
+layout(std430, binding = BIND_chunks) readonly buffer chunks_block { chunk_view chunks[]; };
+layout(std430, binding = BIND_positions) readonly buffer positions_block { float positions[]; };
+layout(std430, binding = BIND_surface) readonly buffer surface_block { uint surface[]; };
+layout(std430, binding = BIND_radii) readonly buffer radii_block { uint radii[]; }; // floats or shape words
 
 #if LARGE == 0
-layout(std430, binding = 10) buffer large_block { uint large_count; uint large[]; }; // chunk and slot of each
+layout(std430, binding = BIND_large) buffer large_block { uint large_count; uint large[]; }; // chunk and slot of each
 #else
-layout(std430, binding = 10) readonly buffer large_block { uint large_count; uint large[]; };
+layout(std430, binding = BIND_large) readonly buffer large_block { uint large_count; uint large[]; };
 layout(location = 5) uniform uint parts; // workgroups that share a disc
 #endif
 

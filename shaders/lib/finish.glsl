@@ -15,15 +15,15 @@
 layout(local_size_x = 64) in;
 #endif
 
-layout(std430, binding = 0) readonly buffer arguments_block {
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block {
     smooth_args smoothing;
     antialias_args edging;
     compose_args composing;
 };
-layout(std430, binding = 1) writeonly buffer combined_block { vec4 combined[]; };
-layout(std430, binding = 6) readonly buffer line_block { float line[]; };
-layout(std430, binding = 7) buffer counters_block { uint edge_count; };
-layout(std430, binding = 8) buffer edges_block { uint edges[]; };
+layout(std430, binding = BIND_combined) writeonly buffer combined_block { vec4 combined[]; };
+layout(std430, binding = BIND_line) readonly buffer line_block { float line[]; };
+layout(std430, binding = BIND_counters) buffer counters_block { uint edge_count; };
+layout(std430, binding = BIND_edges) buffer edges_block { uint edges[]; };
 
 #define ARGS composing
 #include "lib/bodies.glsl"

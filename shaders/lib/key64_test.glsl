@@ -6,8 +6,8 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer values_block { uint64_t values[]; };
-layout(std430, binding = 1) buffer cells_block { uint64_t cells[]; };
+layout(std430, binding = BIND_values) readonly buffer values_block { uint64_t values[]; };
+layout(std430, binding = BIND_cells) buffer cells_block { uint64_t cells[]; };
 
 void main()
 {

@@ -14,12 +14,12 @@
 #define PT_ACROSS (PT_STEP.yx)
 #define PT_UPWARDS (PT_STEP.y != 0u)
 
-layout(binding = 0) uniform usamplerBuffer key_plane;
-layout(binding = 1) uniform usamplerBuffer from_plane;
-layout(binding = 2) uniform samplerBuffer deff_plane;
-layout(binding = 3) uniform samplerBuffer float4_plane; // normals or colours
-layout(binding = 4) uniform samplerBuffer other_float4_plane;
-layout(binding = 5) uniform usamplerBuffer word_plane; // of points
+layout(binding = UNIT_key) uniform usamplerBuffer key_plane;
+layout(binding = UNIT_from) uniform usamplerBuffer from_plane;
+layout(binding = UNIT_deff) uniform samplerBuffer deff_plane;
+layout(binding = UNIT_float4) uniform samplerBuffer float4_plane; // normals or colours
+layout(binding = UNIT_other_float4) uniform samplerBuffer other_float4_plane;
+layout(binding = UNIT_word) uniform usamplerBuffer word_plane; // of points
 
 uvec2 read_key(uint pixel) { return texelFetch(key_plane, int(pixel)).xy; }
 uint read_z_bits(uint pixel) { return texelFetch(key_plane, int(pixel)).y; }

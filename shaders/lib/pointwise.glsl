@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The walk of a pointwise kernel: reads what its body asks for, runs that, writes colours. native/device_gl/pointwise.c defines
 //   PT_ARGUMENTS, PT_RUN: struct and function of the body;   KEYS, SHADING, ALBEDO: whether it reads these planes
-//   CLIPS, COLOR, RESULT: bindings, 0: none. A result is a picture of the crop; else the colours are changed in place, and a picture
+//   CLIPS, RESULT: whether it has these. A result is a picture of the crop; else the colours are changed in place, and a picture
 //   without keys is the crop.
 #version 430 core
 #include "lib/math.glsl"
@@ -14,17 +14,17 @@ layout(local_size_x = 32) in;
 #include "lib/tiles.glsl"
 #endif
 
-layout(std430, binding = 0) readonly buffer arguments_block { PT_ARGUMENTS pt_given; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { PT_ARGUMENTS pt_given; };
 #if CLIPS
-layout(std430, binding = CLIPS) readonly buffer clips_block { clip_view clips[]; };
+layout(std430, binding = BIND_clips) readonly buffer clips_block { clip_view clips[]; };
 #include "lib/clip.glsl"
 #define CLIP(i) clips[i]
 #define PT_CLIP_ROW(i, k, x, y, z) pt_clip_row(i, k, vec3(x, y, z))
 #endif
 #if RESULT
-layout(std430, binding = RESULT) writeonly buffer result_block { vec4 result[]; };
+layout(std430, binding = BIND_combined) writeonly buffer result_block { vec4 result[]; };
 #else
-layout(std430, binding = COLOR) buffer color_block { vec4 colors[]; };
+layout(std430, binding = BIND_color) buffer color_block { vec4 colors[]; };
 #endif
 #define ARGS pt_given
 

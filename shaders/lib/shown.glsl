@@ -8,8 +8,8 @@
 
 layout(local_size_x = 32) in;
 
-layout(std430, binding = 0) readonly buffer arguments_block { shade_args args; };
-layout(std430, binding = 1) writeonly buffer shown_block { vec4 shown[]; };
+layout(std430, binding = BIND_arguments) readonly buffer arguments_block { shade_args args; };
+layout(std430, binding = BIND_shown) writeonly buffer shown_block { vec4 shown[]; };
 
 void main()
 {

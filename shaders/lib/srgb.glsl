@@ -3,7 +3,7 @@
 #ifndef PT_SRGB_GLSL
 #define PT_SRGB_GLSL
 
-layout(std140, binding = 0) uniform srgb_block { vec4 srgb_table[256]; }; // in x
+layout(std140, binding = UNIFORM_srgb) uniform srgb_block { vec4 srgb_table[256]; }; // in x
 
 float pt_srgb(uint value) { return srgb_table[value].x; }
 

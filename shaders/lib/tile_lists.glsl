@@ -10,10 +10,10 @@
 
 layout(local_size_x = 32) in;
 
-layout(binding = 0) uniform usamplerBuffer key_plane;
-layout(std430, binding = 2) buffer tiles_block { uint tiles[]; };
-layout(std430, binding = 3) buffer lists_block { uint lists[]; };   // two of `stride`
-layout(std430, binding = 4) buffer counts_block { uint counts[]; }; // 0: with points, 1: with a hole's rim
+layout(binding = UNIT_key) uniform usamplerBuffer key_plane;
+layout(std430, binding = BIND_tiles) buffer tiles_block { uint tiles[]; };
+layout(std430, binding = BIND_lists) buffer lists_block { uint lists[]; };   // two of `stride`
+layout(std430, binding = BIND_counts) buffer counts_block { uint counts[]; }; // 0: with points, 1: with a hole's rim
 
 layout(location = 0) uniform uvec4 rect;
 layout(location = 1) uniform uint width;

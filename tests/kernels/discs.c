@@ -115,7 +115,7 @@ void discs_beside(struct harness *h, struct rng *rng, struct disc_scene *scene, 
 
 struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
 {
-    struct pt_buffer *buffers[2 + 5 * MOST_INSTANCES];
+    struct pt_buffer *buffers[3 + 4 * MOST_INSTANCES];
     const struct scene *points = &scene->points;
     const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct splat_args);
     char args[sizeof(struct splat_args) + sizeof scene->discs];
@@ -124,6 +124,8 @@ struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
         empty[i] = REF_EMPTY_KEY;
     uint32_t n = 0;
     buffers[n++] = harness_buffer(h, empty, pixels * 8);
+    buffers[n++] = points->limit ? harness_buffer(h, points->limit, pixels * 4) : NULL;
+    buffers[n++] = NULL; // drawn
     for (uint32_t i = 0; i < points->count; i++) {
         struct cloud *cloud = &scene->points.clouds[i];
         points_pad(cloud);
@@ -133,8 +135,6 @@ struct pt_buffer *discs_splat(struct harness *h, struct disc_scene *scene)
         buffers[n++] = harness_buffer(h, scene->radii[i], 4 * (size_t)cloud->slots);
     }
     const struct splat_args splat = {.view = points->view, .instances = points->count, .behind = points->limit != NULL};
-    if (points->limit)
-        buffers[n++] = harness_buffer(h, points->limit, pixels * 4);
     memcpy(args, &splat, head);
     memcpy(args + head, scene->discs, points->count * sizeof *scene->discs);
     harness_run(h, PT_KERNEL_splat, args, head + points->count * sizeof *scene->discs, buffers, n);

@@ -126,8 +126,18 @@ void *harness_read(struct harness *h, const struct pt_buffer *buffer)
 void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size,
                  struct pt_buffer *const *buffers, uint32_t count)
 {
-    int result = h->device->ops->run(h->device, kernel, arguments, size, buffers, count, NULL);
-    must(h, result == PATINA_OK, pt_kernel_names[kernel]);
+    static struct pt_buffer none;
+    const struct pt_kernel_row *row = &pt_kernels[kernel];
+    struct pt_buffer *bound[64];
+    must(h, count >= row->fixed && (row->each ? (count - row->fixed) % row->each == 0 : count == row->fixed) && count <= 64,
+         "as many buffers as kernels.def lists");
+    for (uint32_t i = 0; i < count; i++) {
+        const struct pt_buffer_row *of = &row->buffers[i < row->fixed ? i : row->fixed + (i - row->fixed) % row->each];
+        must(h, buffers[i] || of->optional, of->name);
+        bound[i] = buffers[i] ? buffers[i] : &none;
+    }
+    int result = h->device->ops->run(h->device, kernel, arguments, size, bound, count, NULL);
+    must(h, result == PATINA_OK, pt_kernels[kernel].name);
 }
 
 void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element,

@@ -28,6 +28,7 @@ int harness_main(int argc, char **argv, const struct harness_case *cases, size_t
 void *harness_alloc(struct harness *h, size_t size); // zeroed
 struct pt_buffer *harness_buffer(struct harness *h, const void *data, size_t size);
 void *harness_read(struct harness *h, const struct pt_buffer *buffer);
+// buffers: as kernels.def lists them; NULL where one may be missing and is.
 void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size,
                  struct pt_buffer *const *buffers, uint32_t count);
 #define HARNESS_RUN(h, name, arguments, ...)                                                                           \

@@ -21,7 +21,7 @@ static void check(struct harness *h, const struct picture *picture, uint32_t lay
     struct pt_buffer *from = harness_buffer(h, picture->from, count * 4);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, count * 4);
     struct pt_buffer *color = harness_buffer(h, colors, count * 16);
-    HARNESS_RUN(h, antialias, &args, keys, from, deff, color, harness_buffer(h, through, through ? count * 4 : 0));
+    HARNESS_RUN(h, antialias, &args, keys, from, deff, color, through ? harness_buffer(h, through, count * 4) : NULL, NULL);
     const float *got = harness_read(h, color);
     uint32_t *got_from = harness_read(h, from);
     struct ref_planes planes = picture_planes(picture);

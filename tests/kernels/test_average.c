@@ -144,10 +144,10 @@ static struct planes run(struct harness *h, struct rng *rng, struct setup *s, do
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->color_bytes);
     struct pt_buffer *drawn = harness_buffer(h, scene->drawn, 4 * (size_t)scene->words);
     const struct scatter_args scatter = {.view = scene->view, .instances = 1, .sifted = s->args.sifted};
-    struct pt_buffer *const scattered[] = {keys, chunks, positions, surface, drawn};
-    harness_run(h, PT_KERNEL_scatter, &scatter, sizeof scatter, scattered, s->args.sifted ? 5 : 4);
+    struct pt_buffer *const scattered[] = {keys, NULL, s->args.sifted ? drawn : NULL, chunks, positions, surface};
+    harness_run(h, PT_KERNEL_scatter, &scatter, sizeof scatter, scattered, 6);
     const struct surface_args of_pixels = {.view = scene->view, .instance = s->args.instance};
-    HARNESS_RUN(h, surface, &of_pixels, keys, surface, normal, deff, from);
+    HARNESS_RUN(h, surface, &of_pixels, keys, surface, normal, deff, from, NULL, NULL);
     planes.keys = harness_read(h, keys);
     planes.from = harness_read(h, from);
     planes.deff = harness_read(h, deff);
@@ -155,8 +155,9 @@ static struct planes run(struct harness *h, struct rng *rng, struct setup *s, do
     invent(rng, &scene->view, &planes);
     keys = harness_buffer(h, planes.keys, pixels * 8);
     from = harness_buffer(h, planes.from, pixels * 4);
-    struct pt_buffer *const buffers[] = {keys, from, deff, normal, albedo, chunks, positions, surface, colors, drawn};
-    harness_run(h, PT_KERNEL_average, &s->args, sizeof s->args, buffers, s->args.sifted ? 10 : 9);
+    struct pt_buffer *const buffers[] = {keys, from, deff, normal, albedo, chunks, positions, surface, colors,
+                                         s->args.sifted ? drawn : NULL};
+    harness_run(h, PT_KERNEL_average, &s->args, sizeof s->args, buffers, 10);
     planes.normal = harness_read(h, normal);
     planes.albedo = harness_read(h, albedo);
     harness_same(h, "albedo", planes.albedo, pixels * 4, 4, 4, scene->view.width);

@@ -68,7 +68,7 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
 {
     const struct scene *points = &scene->points;
     const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct blend_args);
-    struct pt_buffer *buffers[5 + 7 * MOST_INSTANCES];
+    struct pt_buffer *buffers[6 + 6 * MOST_INSTANCES];
     char args[sizeof(struct blend_args) + sizeof scene->discs];
     struct planes out;
     struct pt_buffer *keys = discs_splat(h, scene);
@@ -83,11 +83,12 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     buffers[n++] = zero;
     buffers[n++] = albedo;
     buffers[n++] = away;
+    buffers[n++] = NULL; // drawn
     for (uint32_t i = 0; i < points->count; i++) {
         const struct cloud *cloud = &points->clouds[i];
         struct pt_buffer *surface = harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots);
         const struct surface_args of_pixels = {.view = points->view, .instance = scene->discs[i].instance};
-        HARNESS_RUN(h, surface, &of_pixels, keys, surface, zero, deff, from);
+        HARNESS_RUN(h, surface, &of_pixels, keys, surface, zero, deff, from, NULL, NULL);
         buffers[n++] = harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks);
         buffers[n++] = harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots);
         buffers[n++] = surface;

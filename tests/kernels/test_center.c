@@ -13,13 +13,15 @@ enum { SIZES = sizeof sizes / sizeof sizes[0] };
 static uint64_t *keys_of(struct harness *h, struct scene *scene, struct pt_buffer **chunks, struct pt_buffer **positions,
                          struct pt_buffer **keys)
 {
-    struct pt_buffer *buffers[1 + 3 * MOST_INSTANCES];
+    struct pt_buffer *buffers[3 + 3 * MOST_INSTANCES];
     const size_t pixels = (size_t)scene->view.width * scene->view.height;
     uint64_t *empty = harness_alloc(h, pixels * 8);
     for (size_t i = 0; i < pixels; i++)
         empty[i] = REF_EMPTY_KEY;
     uint32_t n = 0;
     buffers[n++] = *keys = harness_buffer(h, empty, pixels * 8);
+    buffers[n++] = NULL; // limit
+    buffers[n++] = NULL; // drawn
     for (uint32_t i = 0; i < scene->count; i++) {
         struct cloud *cloud = &scene->clouds[i];
         points_pad(cloud);

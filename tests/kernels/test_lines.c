@@ -169,7 +169,8 @@ static void smooth_surfaces(struct harness *h)
                 struct pt_buffer *line = harness_buffer(h, NULL, picture.count * 4);
                 HARNESS_RUN(h, lines, &args, harness_buffer(h, picture.keys, picture.count * 8),
                             harness_buffer(h, picture.from, picture.count * 4), harness_buffer(h, picture.normal, picture.count * 16),
-                            harness_buffer(h, picture.deff, picture.count * 4), line, harness_buffer(h, NULL, picture.count * 4));
+                            harness_buffer(h, picture.deff, picture.count * 4), line, harness_buffer(h, NULL, picture.count * 4),
+                            NULL, NULL);
                 const float *got = harness_read(h, line);
                 size_t wrong = 0;
                 for (size_t i = 0; i < picture.count; i++)

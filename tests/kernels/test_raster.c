@@ -47,10 +47,7 @@ static uint64_t *run(struct harness *h, const struct soup *s, const float *limit
     struct pt_buffer *keys = harness_buffer(h, empty, pixels * 8);
     struct pt_buffer *vertices = harness_buffer(h, s->vertices, corners * 12);
     struct pt_buffer *indices = harness_buffer(h, s->indices, corners * 4);
-    if (limit)
-        HARNESS_RUN(h, raster, &s->args, keys, vertices, indices, harness_buffer(h, NULL, 0), harness_buffer(h, limit, pixels * 4));
-    else
-        HARNESS_RUN(h, raster, &s->args, keys, vertices, indices, harness_buffer(h, NULL, 0));
+    HARNESS_RUN(h, raster, &s->args, keys, vertices, indices, NULL, limit ? harness_buffer(h, limit, pixels * 4) : NULL);
     return harness_read(h, keys);
 }
 

@@ -15,6 +15,8 @@ static uint64_t *run_scatter(struct harness *h, struct scene *scene)
         empty[i] = REF_EMPTY_KEY;
     uint32_t n = 0;
     buffers[n++] = harness_buffer(h, empty, pixels * 8);
+    buffers[n++] = scene->limit ? harness_buffer(h, scene->limit, pixels * 4) : NULL;
+    buffers[n++] = scene->drawn ? harness_buffer(h, scene->drawn, 4 * (size_t)scene->words) : NULL;
     for (uint32_t i = 0; i < scene->count; i++) {
         struct cloud *cloud = &scene->clouds[i];
         points_pad(cloud);
@@ -24,10 +26,6 @@ static uint64_t *run_scatter(struct harness *h, struct scene *scene)
     }
     struct scatter_args args = {.view = scene->view, .instances = scene->count, .behind = scene->limit != NULL};
     args.sifted = scene->drawn != NULL;
-    if (scene->limit)
-        buffers[n++] = harness_buffer(h, scene->limit, pixels * 4);
-    if (scene->drawn)
-        buffers[n++] = harness_buffer(h, scene->drawn, 4 * (size_t)scene->words);
     harness_run(h, PT_KERNEL_scatter, &args, sizeof args, buffers, n);
     uint64_t *keys = harness_read(h, buffers[0]);
     harness_same(h, "keys", keys, pixels, 8, 1, scene->view.width);

@@ -148,7 +148,7 @@ static void points(struct harness *h)
             empty[i] = REF_EMPTY_KEY;
         struct pt_buffer *plane = harness_buffer(h, empty, pixels * 8);
         const struct scatter_args args = {.view = scene.points.view, .instances = 1};
-        HARNESS_RUN(h, scatter, &args, plane, harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
+        HARNESS_RUN(h, scatter, &args, plane, NULL, NULL, harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
                     harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots),
                     harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots));
         const uint64_t *scattered = harness_read(h, plane);

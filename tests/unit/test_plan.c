@@ -86,7 +86,7 @@ static void test_every_pass_runs_or_has_a_reason(void **state)
     patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
     struct pt_plan plan = plan_of(scene);
     for (int k = 0; k < PT_KERNEL_COUNT; k++)
-        assert_true((passes_of(&plan, (enum pt_kernel)k) > 0) != (skipped(&plan, pt_kernel_names[k]) != NULL));
+        assert_true((passes_of(&plan, (enum pt_kernel)k) > 0) != (skipped(&plan, pt_kernels[k].name) != NULL));
     for (uint32_t i = 0; i < plan.pass_count; i++)
         assert_true(plan.passes[i].reason[0]);
     assert_non_null(skipped(&plan, "normals")); // the cloud has them

@@ -267,14 +267,17 @@ static void add_step(struct finish *finish, uint32_t i)
 }
 
 // Where nothing is shaded: smoothing and anti-aliasing say what pixels show.
+_Static_assert((int)PT_BUF_smooth_from == (int)PT_BUF_antialias_from && (int)PT_BUF_smooth_deff == (int)PT_BUF_antialias_deff &&
+                   (int)PT_BUF_smooth_color == (int)PT_BUF_antialias_color,
+               "smooth and antialias list what they read alike");
 static void take_planes(struct finish *finish, const struct pt_cpu_call *call)
 {
     if (finish->shade_count)
         return;
-    finish->planes.from = pt_cpu_data(call, 1);
-    finish->planes.deff = pt_cpu_data(call, 2);
+    finish->planes.from = PT_DATA(call, smooth, from);
+    finish->planes.deff = PT_DATA(call, smooth, deff);
     if (!finish->colors)
-        finish->colors = pt_cpu_data(call, 3);
+        finish->colors = PT_DATA(call, smooth, color);
 }
 
 int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
@@ -289,8 +292,8 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.with_normals |= (int)((const struct shade_args *)call->arguments)->instance.lit;
             if (finish.reach < (int32_t)((const struct shade_args *)call->arguments)->blend)
                 finish.reach = (int32_t)((const struct shade_args *)call->arguments)->blend;
-            finish.planes.normals = pt_cpu_data(call, 2);
-            finish.planes.deff = pt_cpu_data(call, 3);
+            finish.planes.normals = PT_DATA(call, shade, normal);
+            finish.planes.deff = PT_DATA(call, shade, deff);
             break;
         case PT_KERNEL_smooth:
             take_planes(&finish, call);
@@ -299,23 +302,23 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
         case PT_KERNEL_antialias:
             take_planes(&finish, call);
             finish.antialias = call->arguments;
-            finish.through = finish.antialias->behind ? pt_cpu_data(call, 4) : NULL;
-            finish.line = finish.antialias->inked ? pt_cpu_data(call, 5) : NULL;
+            finish.through = finish.antialias->behind ? PT_DATA(call, antialias, through) : NULL;
+            finish.line = finish.antialias->inked ? PT_DATA(call, antialias, line) : NULL;
             break;
         case PT_KERNEL_peel:
             finish.peel = call->arguments;
-            finish.shading = pt_cpu_data(call, 3);
-            finish.planes.keys = pt_cpu_data(call, 0);
+            finish.shading = PT_DATA(call, peel, shading);
+            finish.planes.keys = PT_DATA(call, peel, keys);
             finish.planes.view = &finish.peel->view;
-            finish.peeled = (struct pt_peeled){ pt_cpu_data(call, 5), pt_cpu_data(call, 6), pt_cpu_data(call, 7) };
-            finish.tiles = pt_cpu_data(call, 8);
+            finish.peeled = (struct pt_peeled){ PT_DATA(call, peel, limit), PT_DATA(call, peel, through), PT_DATA(call, peel, over) };
+            finish.tiles = PT_DATA(call, peel, tiles);
             finish.base = (int32_t)(finish.peel->view.rect[1] / PT_TILE * PT_TILE);
             finish.end = (int32_t)finish.peel->view.rect[3];
             break;
         case PT_KERNEL_compose:
             finish.compose = call->arguments;
-            finish.planes.keys = pt_cpu_data(call, 0);
-            finish.combined = pt_cpu_data(call, 2);
+            finish.planes.keys = PT_DATA(call, compose, keys);
+            finish.combined = PT_DATA(call, compose, combined);
             finish.planes.view = &finish.compose->view;
             finish.base = (int32_t)finish.compose->crop_y;
             finish.end = finish.base + (int32_t)finish.compose->crop_height;
@@ -323,21 +326,21 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
         case PT_KERNEL_extract:
             finish.extract = call->arguments;
             finish.shows_normals |= (int)finish.extract->normal;
-            finish.shading = finish.extract->normal ? pt_cpu_data(call, 2) : NULL;
-            finish.arrived = finish.extract->shadow ? pt_cpu_data(call, 6) : NULL;
-            finish.planes.from = pt_cpu_data(call, 1);
-            finish.depth = pt_cpu_data(call, 3);
-            finish.normals = pt_cpu_data(call, 4);
-            finish.source = pt_cpu_data(call, 5);
-            finish.shadow = pt_cpu_data(call, 7);
-            finish.away = pt_cpu_data(call, 8);
-            finish.offsets = pt_cpu_data(call, 9);
+            finish.shading = finish.extract->normal ? PT_DATA(call, extract, shading) : NULL;
+            finish.arrived = finish.extract->shadow ? PT_DATA(call, extract, arrived) : NULL;
+            finish.planes.from = PT_DATA(call, extract, from);
+            finish.depth = PT_DATA(call, extract, depth);
+            finish.normals = PT_DATA(call, extract, normal);
+            finish.source = PT_DATA(call, extract, source);
+            finish.shadow = PT_DATA(call, extract, shadow);
+            finish.away = PT_DATA(call, extract, away);
+            finish.offsets = PT_DATA(call, extract, offset);
             break;
         default: add_step(&finish, i);
         }
     }
     if (finish.shade_count) {
-        finish.planes.from = pt_cpu_data(shared, 1);
+        finish.planes.from = PT_DATA(shared, shade, from);
         finish.with_normals |= finish.shows_normals;
         finish.shading = finish.arrived = NULL; // both are shaded here
     }

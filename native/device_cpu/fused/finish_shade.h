@@ -14,13 +14,13 @@ static void ask_for_colors(const struct finish *finish, const struct pt_seen_row
     const struct view_args *view = finish->planes.view;
     for (uint32_t i = 0; i < finish->shade_count; i++) {
         const struct shade_args *args = finish->passes[i].call.arguments;
-        const char *colors = pt_cpu_data(&finish->passes[i].call, 4);
+        const char *colors = PT_DATA(&finish->passes[i].call, shade, colors);
         const size_t bytes = pt_color_bytes[args->instance.color_format], size = lies_far(&args->instance, bytes) ? bytes : 0;
         const uint32_t *words[PT_MAX_LIGHTS];
         uint32_t casting = 0;
         for (uint32_t l = 0; l < args->light_count; l++)
             if (args->lights[l].shadow)
-                words[casting++] = (const uint32_t *)pt_cpu_data(&finish->passes[i].call, 8) +
+                words[casting++] = (const uint32_t *)PT_DATA(&finish->passes[i].call, shade, shadows) +
                                    (size_t)(args->lights[l].shadow - 1) * args->instance.id_count;
         for (uint32_t x = seen->first; (size || casting) && x < seen->end; x += PT_LANES) {
             size_t at = (size_t)y * view->width + x;
@@ -67,7 +67,7 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
             continue;
         const size_t at = (size_t)y * width + x;
         const vi source = pt_color_pixels(&args->instance, pt_source(&finish->planes, at), at);
-        vf opacity = pt_opacity(&args->instance, pt_cpu_data(call, 4), pt_cpu_data(call, 7), id, source, ours);
+        vf opacity = pt_opacity(&args->instance, PT_DATA(call, shade, colors), PT_DATA(call, shade, opacities), id, source, ours);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
         vf_store_where(row->color[3] + x, opacity, ours);
@@ -79,7 +79,7 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
                                                             const struct pt_cpu_call *call, int32_t y, int plain)
 {
     const struct shade_args *args = call->arguments;
-    const uint32_t *shadows = pt_cpu_data(call, 8);
+    const uint32_t *shadows = PT_DATA(call, shade, shadows);
     const struct view_args *view = finish->planes.view;
     const struct pt_color_row *out = &walk->shaded[slot(y)];
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
@@ -122,7 +122,7 @@ static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *c
     enum { BLOCK = 16 };
     const struct shade_args *args = call->arguments;
     const uint32_t width = finish->planes.view->width;
-    const uint8_t *colors = pt_cpu_data(call, 4);
+    const uint8_t *colors = PT_DATA(call, shade, colors);
     for (uint32_t first = seen->first; first < seen->end; first += BLOCK * PT_LANES) {
         uint32_t words[BLOCK * PT_LANES];
         vm ours[BLOCK];
@@ -161,7 +161,7 @@ static void fetch_colors(const struct finish *finish, const struct pt_cpu_call *
         if (!vm_bits(ours))
             continue;
         const vi source = pt_color_pixels(&args->instance, pt_source(&finish->planes, at), at);
-        pt_albedo(&args->instance, pt_cpu_data(call, 4), id, source, ours, albedo);
+        pt_albedo(&args->instance, PT_DATA(call, shade, colors), id, source, ours, albedo);
         if (pt_recolors(args))
             pt_recolor(args, x, (uint32_t)y, vf_load(out->z + x), ours, albedo);
         for (uint32_t k = 0; k < 3; k++)

@@ -24,10 +24,10 @@ struct antialias {
 static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struct edge *edge)
 {
     const struct view_args *view = &job->args->view;
-    const uint64_t *keys = pt_cpu_data(job->call, 0);
-    const uint32_t *from = pt_cpu_data(job->call, 1);
-    const float *deff = pt_cpu_data(job->call, 2), *colors = pt_cpu_data(job->call, 3);
-    const float *through = job->args->behind ? pt_cpu_data(job->call, 4) : NULL;
+    const uint64_t *keys = PT_DATA(job->call, antialias, keys);
+    const uint32_t *from = PT_DATA(job->call, antialias, from);
+    const float *deff = PT_DATA(job->call, antialias, deff), *colors = PT_DATA(job->call, antialias, color);
+    const float *through = job->args->behind ? PT_DATA(job->call, antialias, through) : NULL;
     const float empty = pt_float(PT_KEY_EMPTY_Z);
     uint32_t at = y * view->width + x;
     float sum[4] = { 0.0f, 0.0f, 0.0f, 0.0f }, count = 0.0f, limit = empty;
@@ -58,17 +58,17 @@ static uint32_t look(const struct antialias *job, uint32_t x, uint32_t y, uint32
 {
     const struct view_args *view = &job->args->view;
     size_t at = (size_t)y * view->width + x;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(job->call, 0) + at;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(job->call, antialias, keys) + at;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), z = vi_float(vi_load_z(keys));
     vm some = vm_and(vm_first(lanes), vf_lt(z, empty));
     if (job->args->inked)
-        some = vm_and(some, vm_not(vf_lt(vf_zero(), vf_load((const float *)pt_cpu_data(job->call, 5) + at))));
+        some = vm_and(some, vm_not(vf_lt(vf_zero(), vf_load((const float *)PT_DATA(job->call, antialias, line) + at))));
     if (!vm_bits(some))
         return 0;
     vf limit = empty;
     if (job->args->layers) {
-        vi from = vi_and(vi_load((const uint32_t *)pt_cpu_data(job->call, 1) + at), vi_set(~PT_FROM_MIXED));
-        limit = z + vf_gather(pt_cpu_data(job->call, 2), from, some);
+        vi from = vi_and(vi_load((const uint32_t *)PT_DATA(job->call, antialias, from) + at), vi_set(~PT_FROM_MIXED));
+        limit = z + vf_gather(PT_DATA(job->call, antialias, deff), from, some);
     }
     vf far = z; // the farthest of the four
     for (int i = 0; i < 4; i++) {
@@ -104,8 +104,8 @@ static void look_bands(void *context, uint32_t begin, uint32_t end, uint32_t thr
 static void apply_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct antialias *job = context;
-    uint32_t *from = pt_cpu_data(job->call, 1);
-    float *colors = pt_cpu_data(job->call, 3);
+    uint32_t *from = PT_DATA(job->call, antialias, from);
+    float *colors = PT_DATA(job->call, antialias, color);
     (void)thread;
     for (uint32_t band = begin; band < end; band++)
         for (uint32_t i = 0; i < job->counts[band]; i++) {

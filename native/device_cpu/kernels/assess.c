@@ -6,10 +6,11 @@ static void assess_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
     const struct assess_args *args = call->arguments;
-    const uint32_t *rect = args->view.rect, *shapes = pt_cpu_data(call, 1);
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + (size_t)y * args->view.width;
+    const uint32_t *rect = args->view.rect, *shapes = PT_DATA(call, assess, shapes);
+    const uint64_t *keys = (const uint64_t *)PT_DATA(call, assess, keys) + (size_t)y * args->view.width;
     const size_t row = (size_t)(y - args->crop_y) * args->crop_width;
-    float *certainty = (float *)pt_cpu_data(call, 2) + row, *thickness = (float *)pt_cpu_data(call, 3) + row;
+    float *certainty = args->certainty ? (float *)PT_DATA(call, assess, certainty) + row : NULL;
+    float *thickness = args->thickness ? (float *)PT_DATA(call, assess, thickness) + row : NULL;
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         const uint32_t lanes = pt_lanes_left(x, rect[2]), to = x - args->crop_x;
         pt_fetch_ahead(keys, x + PT_LANES, rect[2], &args->instance, shapes, sizeof *shapes);

@@ -59,9 +59,9 @@ struct terms {
 static int open_band(const struct average *average, struct band *band)
 {
     const struct view_args *view = &average->args->view;
-    const uint64_t *keys = pt_cpu_data(average->call, 0);
-    const uint32_t *from = pt_cpu_data(average->call, 1);
-    const float *deff = pt_cpu_data(average->call, 2), *normals = pt_cpu_data(average->call, 3);
+    const uint64_t *keys = PT_DATA(average->call, average, keys);
+    const uint32_t *from = PT_DATA(average->call, average, from);
+    const float *deff = PT_DATA(average->call, average, deff), *normals = PT_DATA(average->call, average, normal);
     const vf none = vf_set(pt_float(PT_KEY_EMPTY_Z));
     int any = 0;
     for (uint32_t y = band->first; y < band->end; y++) {
@@ -111,9 +111,9 @@ static void project(const struct average *average, const struct band *band, cons
                     uint32_t last, struct blocks *out)
 {
     const struct view_args *view = &average->args->view;
-    const float *positions = (const float *)pt_cpu_data(average->call, 6) + 3 * (size_t)chunk->first;
-    const uint32_t *surface = (const uint32_t *)pt_cpu_data(average->call, 7) + chunk->first;
-    const uint32_t *drawn = average->args->sifted ? pt_cpu_data(average->call, 9) : NULL;
+    const float *positions = (const float *)PT_DATA(average->call, average, positions) + 3 * (size_t)chunk->first;
+    const uint32_t *surface = (const uint32_t *)PT_DATA(average->call, average, surface) + chunk->first;
+    const uint32_t *drawn = average->args->sifted ? PT_DATA(average->call, average, drawn) : NULL;
     const float below = (float)(view->origin_y + (int32_t)band->first) - PT_AVERAGE_WIDEST - 1.0f;
     const float above = (float)(view->origin_y + (int32_t)band->end) + PT_AVERAGE_WIDEST + 1.0f;
     const vf one = vf_set(1.0f), left = vf_set((float)view->origin_x), right = vf_set((float)(view->origin_x + (int32_t)view->width));
@@ -188,7 +188,7 @@ static inline void set_terms(const struct average *average, const struct block *
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST), one = vf_set(1.0f);
     vf color[4], normal[4] = { vf_zero(), vf_zero(), vf_zero(), one };
     float halves[2][PT_LANES][4];
-    pt_albedo(instance, pt_cpu_data(average->call, 8), vi_load(block->id + i), vi_set(0), some, color);
+    pt_albedo(instance, PT_DATA(average->call, average, colors), vi_load(block->id + i), vi_set(0), some, color);
     for (int k = 0; k < 3 && instance->color_format != 1; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most);
         normal[3] = vf_max(normal[3], vf_abs(color[k]));
@@ -331,9 +331,9 @@ static void mean_normal(const struct view_args *view, const vf sum[3], uint32_t 
 static void close_band(const struct average *average, const struct band *band)
 {
     const struct average_args *args = average->args;
-    const uint64_t *keys = pt_cpu_data(average->call, 0);
-    const uint32_t *from = pt_cpu_data(average->call, 1);
-    float *normals = pt_cpu_data(average->call, 3), *albedo = pt_cpu_data(average->call, 4);
+    const uint64_t *keys = PT_DATA(average->call, average, keys);
+    const uint32_t *from = PT_DATA(average->call, average, from);
+    float *normals = PT_DATA(average->call, average, normal), *albedo = PT_DATA(average->call, average, albedo);
     const vf one = vf_set(1.0f);
     for (uint32_t y = band->first; y < band->end; y++)
         for (uint32_t x = 0; x < args->view.width; x += PT_LANES) {
@@ -351,7 +351,7 @@ static void close_band(const struct average *average, const struct band *band)
                 color[k] = sums[k] * share;
             color[3] = one;
             if (vm_bits(ours) != vm_bits(reached)) {
-                pt_albedo(&args->instance, pt_cpu_data(average->call, 8), id, id, ours, own);
+                pt_albedo(&args->instance, PT_DATA(average->call, average, colors), id, id, ours, own);
                 for (int k = 0; k < 3; k++)
                     color[k] = vf_select(reached, color[k], own[k]);
             }
@@ -376,9 +376,9 @@ static int may_reach(const struct view_args *view, const struct chunk_view *chun
 static void average_bands(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct average *average = context;
-    const struct chunk_view *chunks = pt_cpu_data(average->call, 5);
+    const struct chunk_view *chunks = PT_DATA(average->call, average, chunks);
     const uint32_t *rect = average->args->view.rect;
-    const uint32_t count = (uint32_t)(average->call->buffers[5]->size / sizeof *chunks);
+    const uint32_t count = (uint32_t)(average->call->buffers[PT_BUF_average_chunks]->size / sizeof *chunks);
     const size_t pixels = average->rows * average->stride;
     struct blocks blocks;
     char *memory = average->memory + thread * average->thread_bytes;
@@ -408,7 +408,7 @@ int PT_KERNEL_ENTRY(average)(const struct pt_cpu_call *call)
 {
     struct average average = { .call = call, .args = call->arguments };
     const struct view_args *view = &average.args->view;
-    if (view->rect[0] >= view->rect[2] || view->rect[1] >= view->rect[3] || !call->buffers[5]->size)
+    if (view->rect[0] >= view->rect[2] || view->rect[1] >= view->rect[3] || !call->buffers[PT_BUF_average_chunks]->size)
         return PATINA_OK;
     const uint32_t fit = BAND_PIXELS / view->width;
     average.rows = fit < BAND_LEAST ? BAND_LEAST : fit < BAND_MOST ? fit : BAND_MOST;

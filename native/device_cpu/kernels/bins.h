@@ -40,7 +40,7 @@ struct pt_bins {
     const struct view_args *view;
     const struct disc_args *discs;     // an instance each
     const uint32_t *drawn;             // bits of sifted chunks
-    uint32_t instances, first, stride; // buffers of instance i start at first + i stride: chunks, positions, surface, radii
+    uint32_t instances, first, stride; // buffers of instance i start at first + i stride, as splat's do
     uint32_t columns, rows, bins;      // tiles, and one for the large
     uint32_t *cursors;                 // for each thread, of the heads of all
     uint32_t *heads;                   // by thread and bin: the block filled last << PT_BIN_SHIFT | discs in it
@@ -53,19 +53,31 @@ struct pt_bins {
     struct pt_bin_thread *threads;
 };
 
+// Both kernels read the same of an instance, in the same order.
+_Static_assert(PT_BUF_splat_positions - PT_BUF_splat_chunks == PT_BUF_blend_positions - PT_BUF_blend_chunks &&
+                   PT_BUF_splat_surface - PT_BUF_splat_chunks == PT_BUF_blend_surface - PT_BUF_blend_chunks &&
+                   PT_BUF_splat_radii - PT_BUF_splat_chunks == PT_BUF_blend_radii - PT_BUF_blend_chunks,
+               "blend takes up splat's bins");
+
+// of: PT_BUF_splat_*, of instance i.
+static inline void *pt_bin_data(const struct pt_bins *bins, uint32_t of, uint32_t i)
+{
+    return pt_cpu_data(bins->call, bins->first + i * bins->stride + of - PT_BUF_splat_chunks);
+}
+
 // ---- filling -------------------------------------------------------------------------------------------------------------
 
 static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, uint32_t chunk, uint32_t *instance)
 {
     *instance = pt_chunk_instance(bins->begins, chunk, *instance);
-    const uint32_t at = bins->first + *instance * bins->stride;
-    const struct chunk_view *view = (const struct chunk_view *)pt_cpu_data(bins->call, at) + (chunk - bins->begins[*instance]);
+    const struct chunk_view *view =
+        (const struct chunk_view *)pt_bin_data(bins, PT_BUF_splat_chunks, *instance) + (chunk - bins->begins[*instance]);
     return (struct pt_disc_source){ bins->view,
                                     &bins->discs[*instance],
                                     view,
-                                    (const float *)pt_cpu_data(bins->call, at + 1) + 3 * (size_t)view->first,
-                                    (const uint32_t *)pt_cpu_data(bins->call, at + 2) + view->first,
-                                    pt_cpu_data(bins->call, at + 3) };
+                                    (const float *)pt_bin_data(bins, PT_BUF_splat_positions, *instance) + 3 * (size_t)view->first,
+                                    (const uint32_t *)pt_bin_data(bins, PT_BUF_splat_surface, *instance) + view->first,
+                                    pt_bin_data(bins, PT_BUF_splat_radii, *instance) };
 }
 
 // No pixel of a disc lies nearer: see pt_patch_show. In orthographic views slopes that cancel may be off by an eighth.
@@ -350,7 +362,7 @@ static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_bl
     for (uint32_t i = 0, instance = 0; i < PT_BIN_DISCS && colors; i++) {
         instance = pt_bin_instance(bins, pt_bin_id(block, i), instance);
         const struct instance_args *args = &bins->discs[instance].instance;
-        const char *of = pt_cpu_data(bins->call, bins->first + instance * bins->stride + 4);
+        const char *of = PT_DATA_EACH(bins->call, blend, colors, instance);
         if (of) // a cloud without colours
             __builtin_prefetch(of + pt_color_bytes[args->color_format] * (pt_bin_id(block, i) - args->id_base));
     }
@@ -366,7 +378,7 @@ static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct p
 {
     *instance = pt_bin_instance(bins, pt_bin_id(block, i), *instance);
     const struct disc_args *args = &bins->discs[*instance];
-    const void *radii = pt_cpu_data(bins->call, bins->first + *instance * bins->stride + 3);
+    const void *radii = pt_bin_data(bins, PT_BUF_splat_radii, *instance);
     const uint32_t count = pt_lanes_left(i, end);
     const vi word = vi_load(block->word + i);
     struct pt_discs discs;

@@ -45,12 +45,11 @@ struct tile {
 static inline void set_terms(const struct pt_bins *bins, uint32_t instance, const struct pt_discs *discs, struct terms *out)
 {
     const struct instance_args *args = &bins->discs[instance].instance;
-    const uint32_t at = bins->first + instance * bins->stride;
-    const void *colors = pt_cpu_data(bins->call, at + 4);
+    const void *colors = PT_DATA_EACH(bins->call, blend, colors, instance);
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     vf color[4], normal[4], largest = scale;
     pt_albedo(args, colors, discs->id, vi_set(0), discs->drawn, color);
-    color[3] = pt_opacity(args, colors, pt_cpu_data(bins->call, at + 5), discs->id, vi_set(0), discs->drawn) * scale;
+    color[3] = pt_opacity(args, colors, PT_DATA_EACH(bins->call, blend, opacities, instance), discs->id, vi_set(0), discs->drawn) * scale;
     for (int k = 0; k < 3; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
         largest = vf_max(largest, vf_abs(color[k]));
@@ -250,14 +249,15 @@ static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t th
     tile->bins = bins;
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
         pt_patches_turn(&tile->patches, bins->view, pt_bin_tile(bins, t));
-        if (!load(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 1)))
+        if (!load(tile, PT_DATA(bins->call, blend, keys), PT_DATA(bins->call, blend, deff)))
             continue;
         memset(tile->sums, 0, sizeof tile->sums);
         tile->left = SUM_ROOM;
         tile->emptied = 0;
         pt_bin_walk(bins, thread, t, &tile->patches.tile, &tile->farthest, 1, draw, tile);
         pt_bin_walk(bins, thread, large, &tile->patches.tile, &tile->farthest, 1, draw, tile);
-        save(tile, pt_cpu_data(bins->call, 0), pt_cpu_data(bins->call, 2), pt_cpu_data(bins->call, 3), pt_cpu_data(bins->call, 4));
+        save(tile, PT_DATA(bins->call, blend, keys), PT_DATA(bins->call, blend, normal), PT_DATA(bins->call, blend, albedo),
+             PT_DATA(bins->call, blend, away));
     }
 }
 
@@ -268,8 +268,8 @@ int PT_KERNEL_ENTRY(blend)(const struct pt_cpu_call *call)
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
                             .instances = args->instances,
-                            .first = 5,
-                            .stride = 6 };
+                            .first = PT_BUF_blend_chunks,
+                            .stride = PT_EACH_blend };
     pt_bins_again(&bins);
     if (!pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * sizeof(struct tile)))
         return PATINA_ERROR_MEMORY;

@@ -57,8 +57,8 @@ static inline float transform(const struct chunk_view *chunk, int row, float x, 
 // Projects the points; those of no chunk leave.
 static void project(const struct center *center, struct measured *measured)
 {
-    const struct chunk_view *chunks = pt_cpu_data(center->call, 4);
-    const float *positions = pt_cpu_data(center->call, 5);
+    const struct chunk_view *chunks = PT_DATA(center->call, center, chunks);
+    const float *positions = PT_DATA(center->call, center, positions);
     uint32_t near = 0, kept = 0;
     for (uint32_t i = 0; i < measured->count; i++) {
         near = find_start(center, measured->id[i], near);
@@ -89,7 +89,7 @@ static void save(const struct center *center, uint32_t row, const struct measure
         x = x * r;
         y = y * r;
     }
-    vf_gather4((const float *)pt_cpu_data(center->call, 1) + 4 * at, column, some, n);
+    vf_gather4((const float *)PT_DATA(center->call, center, normal) + 4 * at, column, some, n);
     vf_ray_of(view, column, vi_set(row), ray);
     // 1. to the middle of the pixel, in the view's units (perspective: at z = 1), and how n leans that way
     const vf dx = (vi_convert(vi_add(vi_set((uint32_t)view->origin_x), column)) + half) - x;
@@ -103,10 +103,10 @@ static void save(const struct center *center, uint32_t row, const struct measure
     const vf size = vf_abs(facing);
     const vm good = vf_lt(vf_set(1e-6f), size);
     const vf step = rise * vf_rcp(vf_select(good, size, vf_set(1.0f)));
-    const vf most = vf_gather((const float *)pt_cpu_data(center->call, 2) + at, column, some);
+    const vf most = vf_gather((const float *)PT_DATA(center->call, center, deff) + at, column, some);
     vf offset = vf_select(vf_lt(facing, zero), step, zero - step);
     offset = vf_min(vf_max(offset, zero - vf_min(most, half * z)), most);
-    float offsets[PT_LANES], *out = (float *)pt_cpu_data(center->call, 3) + at;
+    float offsets[PT_LANES], *out = (float *)PT_DATA(center->call, center, offset) + at;
     vf_store(offsets, vf_select(good, offset, zero));
     for (uint32_t k = 0; k < count; k++)
         out[measured->column[i + k]] = offsets[k];
@@ -115,7 +115,7 @@ static void save(const struct center *center, uint32_t row, const struct measure
 static void center_row(const struct center *center, uint32_t y)
 {
     const struct view_args *view = &center->args->view;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(center->call, 0) + (size_t)y * view->width;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(center->call, center, keys) + (size_t)y * view->width;
     struct measured measured;
     for (uint32_t first = view->rect[0]; first < view->rect[2]; first += BLOCK) {
         const uint32_t end = view->rect[2] - first < BLOCK ? view->rect[2] : first + BLOCK;
@@ -145,10 +145,10 @@ static void center_rows(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 int PT_KERNEL_ENTRY(center)(const struct pt_cpu_call *call)
 {
-    const struct chunk_view *chunks = pt_cpu_data(call, 4);
+    const struct chunk_view *chunks = PT_DATA(call, center, chunks);
     struct center center = { .call = call, .args = call->arguments };
     const uint32_t *rect = center.args->view.rect;
-    center.count = (uint32_t)(call->buffers[4]->size / sizeof *chunks);
+    center.count = (uint32_t)(call->buffers[PT_BUF_center_chunks]->size / sizeof *chunks);
     struct start *starts = pt_cpu_scratch(call, 0, (center.count + 1) * sizeof *starts);
     if (!starts)
         return PATINA_ERROR_MEMORY;

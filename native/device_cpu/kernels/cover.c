@@ -7,9 +7,9 @@ static void write_shown(const struct pt_cpu_call *call, const struct pt_triangle
 {
     const struct cover_args *args = call->arguments;
     const struct mesh_args *mesh = &args->mesh;
-    const float *vertices = pt_cpu_data(call, 5);
-    uint64_t *shown = pt_cpu_data(call, 7);
-    float *normals = pt_cpu_data(call, 8), *albedo = pt_cpu_data(call, 9);
+    const float *vertices = PT_DATA(call, cover, vertices);
+    uint64_t *shown = PT_DATA(call, cover, shown);
+    float *normals = PT_DATA(call, cover, shown_normal), *albedo = PT_DATA(call, cover, albedo);
     vf color[4];
     vf smooth[4] = { n[0], n[1], n[2], n[3] };
     uint32_t zs[PT_LANES];
@@ -33,14 +33,14 @@ static void cover_pixels(const struct pt_cpu_call *call, uint32_t x, uint32_t y,
 {
     const struct cover_args *args = call->arguments;
     const struct view_args *view = &args->view;
-    uint64_t *keys = pt_cpu_data(call, 0);
-    const uint64_t *mesh_keys = pt_cpu_data(call, 4);
-    uint32_t *from = pt_cpu_data(call, 1);
-    float *normals = pt_cpu_data(call, 2), *deff = pt_cpu_data(call, 3);
+    uint64_t *keys = PT_DATA(call, cover, keys);
+    const uint64_t *mesh_keys = PT_DATA(call, cover, mesh_keys);
+    uint32_t *from = PT_DATA(call, cover, from);
+    float *normals = PT_DATA(call, cover, normal), *deff = PT_DATA(call, cover, deff);
     size_t at = (size_t)y * view->width + x;
     struct pt_triangle t;
     vf ray[2], n[4];
-    pt_find_triangle(view, &args->mesh, pt_cpu_data(call, 5), pt_cpu_data(call, 6), index, x, y, front, &t); // 1.
+    pt_find_triangle(view, &args->mesh, PT_DATA(call, cover, vertices), PT_DATA(call, cover, indices), index, x, y, front, &t); // 1.
     vf_ray(view, x, y, ray);
     pt_plane_normal(view, &args->mesh, &t, ray, n); // 2.
     // 3. layer distance of what is as dense as the pixels
@@ -66,7 +66,7 @@ static void cover_row(void *context, uint32_t y)
     const struct pt_cpu_call *call = context;
     const struct cover_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    const uint64_t *keys = pt_cpu_data(call, 0), *mesh_keys = pt_cpu_data(call, 4);
+    const uint64_t *keys = PT_DATA(call, cover, keys), *mesh_keys = PT_DATA(call, cover, mesh_keys);
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         size_t at = (size_t)y * args->view.width + x;
         vi z = vi_load_z(mesh_keys + at), other = vi_load_z(keys + at);
@@ -74,7 +74,7 @@ static void cover_row(void *context, uint32_t y)
         vm front = vm_or(vi_lt_unsigned(z, other), vm_and(vi_eq(z, other), vi_lt_unsigned(vi_load_id(mesh_keys + at),
                                                                                           vi_load_id(keys + at))));
         if (args->behind) // a pixel that was filled across a layer taken before
-            front = vm_or(front, vf_le(vi_float(other), vf_load((const float *)pt_cpu_data(call, 10) + at)));
+            front = vm_or(front, vf_le(vi_float(other), vf_load((const float *)PT_DATA(call, cover, limit) + at)));
         front = vm_and(front, vm_and(vi_lt_unsigned(index, vi_set(args->mesh.id_count)),
                                      vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z)))));
         front = vm_and(front, vm_first(pt_lanes_left(x, rect[2])));

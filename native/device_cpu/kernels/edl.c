@@ -23,7 +23,7 @@ static float *ring_row(const struct edl *edl, uint32_t thread, int32_t y)
 static void load_row(const struct edl *edl, int32_t y, float *row)
 {
     const struct view_args *view = &edl->args->view;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(edl->call, 0) + (ptrdiff_t)y * view->width;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(edl->call, edl, keys) + (ptrdiff_t)y * view->width;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), beyond = vf_set(PT_EDL_BEYOND);
     const uint32_t inside = y < 0 || y >= (int32_t)view->height ? 0 : view->width;
     for (int32_t x = -PT_ROW_PAD; x < 0; x += PT_LANES)
@@ -45,7 +45,7 @@ static void edl_row(const struct edl *edl, const float *const near[PT_EDL_NEIGHB
     const struct edl_args *args = edl->args;
     const uint32_t *rect = args->view.rect;
     const vf scale = vf_set(args->scale), zero = vf_zero(), most = vf_set(PT_EDL_STEP);
-    float *colors = (float *)pt_cpu_data(edl->call, 1) + 4 * (size_t)y * args->view.width;
+    float *colors = (float *)PT_DATA(edl->call, edl, color) + 4 * (size_t)y * args->view.width;
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         vf depth = vf_load(own + x), sum = zero, color[4];
         vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])), vf_lt(vf_set(PT_EDL_EMPTY), depth));

@@ -55,24 +55,24 @@ static void extract_row(void *context, uint32_t y)
     const struct pt_cpu_call *call = context;
     const struct extract_args *args = call->arguments;
     size_t row = (size_t)(args->crop_y + y) * args->view.width + args->crop_x, out = (size_t)y * args->crop_width;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
-    float *depth = (float *)pt_cpu_data(call, 3) + out;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(call, extract, keys) + row;
+    float *depth = args->depth ? (float *)PT_DATA(call, extract, depth) + out : NULL;
     for (uint32_t x = 0; args->depth && x < args->crop_width; x += PT_LANES) {
         const vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
         vf z = vi_float(vi_load_z(keys + x));
         if (args->centered)
-            z = pt_centered_depth(args, keys + x, pt_cpu_data(call, 9), pt_source_of(pt_cpu_data(call, 1), row + x), lanes);
+            z = pt_centered_depth(args, keys + x, PT_DATA(call, extract, offset), pt_source_of(PT_DATA(call, extract, from), row + x), lanes);
         vf_store_where(depth + x, z, lanes);
     }
     if (args->normal)
-        extract_normal(args, keys, (const float *)pt_cpu_data(call, 2) + 4 * row,
-                       (float *)pt_cpu_data(call, 4) + 3 * out);
+        extract_normal(args, keys, (const float *)PT_DATA(call, extract, shading) + 4 * row,
+                       (float *)PT_DATA(call, extract, normal) + 3 * out);
     if (args->source)
-        extract_source(args, keys, (const uint32_t *)pt_cpu_data(call, 1) + row,
-                       args->discs_count ? (const float *)pt_cpu_data(call, 8) + row : NULL, y,
-                       (float *)pt_cpu_data(call, 5) + out);
+        extract_source(args, keys, (const uint32_t *)PT_DATA(call, extract, from) + row,
+                       args->discs_count ? (const float *)PT_DATA(call, extract, away) + row : NULL, y,
+                       (float *)PT_DATA(call, extract, source) + out);
     if (args->shadow)
-        extract_shadow(args, keys, (const float *)pt_cpu_data(call, 6) + row, (float *)pt_cpu_data(call, 7) + out);
+        extract_shadow(args, keys, (const float *)PT_DATA(call, extract, arrived) + row, (float *)PT_DATA(call, extract, shadow) + out);
 }
 
 int PT_KERNEL_ENTRY(extract)(const struct pt_cpu_call *call)

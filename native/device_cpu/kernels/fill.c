@@ -360,11 +360,11 @@ int PT_KERNEL_ENTRY(fill)(const struct pt_cpu_call *call)
     struct fill fill = { .call = call,
                          .args = args,
                          .view = &args->view,
-                         .keys = pt_cpu_data(call, 0),
-                         .from = pt_cpu_data(call, 1),
-                         .normals = pt_cpu_data(call, 2),
-                         .deff = pt_cpu_data(call, 3),
-                         .span = pt_cpu_data(call, 4) };
+                         .keys = PT_DATA(call, fill, keys),
+                         .from = PT_DATA(call, fill, from),
+                         .normals = PT_DATA(call, fill, normal),
+                         .deff = PT_DATA(call, fill, deff),
+                         .span = PT_DATA(call, fill, span) };
     if (args->view.rect[0] >= args->view.rect[2] || args->view.rect[1] >= args->view.rect[3])
         return PATINA_OK;
     int error = allocate(&fill);

@@ -52,8 +52,8 @@ static void load_row(const struct focus *focus, int32_t y, const struct row *row
     const struct view_args *view = &focus->args->view;
     const uint32_t inside = y < 0 || y >= (int32_t)view->height ? 0 : view->width;
     const size_t base = (size_t)(inside ? y : 0) * view->width;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(focus->call, 0) + base;
-    const float *colors = (const float *)pt_cpu_data(focus->call, 1) + 4 * base;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(focus->call, focus, keys) + base;
+    const float *colors = (const float *)PT_DATA(focus->call, focus, color) + 4 * base;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), zero = vf_zero();
     for (uint32_t b = 0; b < focus->blocks; b++)
         row->largest[b] = 0.0f;
@@ -160,7 +160,7 @@ static void focus_unit(const struct focus *focus, uint32_t thread, uint32_t y)
     const struct focus_args *args = focus->args;
     const uint32_t rows = args->crop_height - y < BLOCK ? args->crop_height - y : BLOCK;
     const int32_t first = (int32_t)(args->crop_y + y);
-    float *out = pt_cpu_data(focus->call, 2);
+    float *out = PT_DATA(focus->call, focus, combined);
     for (int32_t at = first - (int32_t)args->reach; at < first + (int32_t)(rows + args->reach); at++) {
         struct row row = ring_row(focus, thread, at);
         load_row(focus, at, &row);

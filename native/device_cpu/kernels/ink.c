@@ -14,8 +14,8 @@ struct ink {
 
 static struct ink ink_of(const struct pt_cpu_call *call)
 {
-    return (struct ink){ call->arguments, pt_cpu_data(call, 0), pt_cpu_data(call, 1), pt_cpu_data(call, 2), pt_cpu_data(call, 3),
-                         pt_cpu_data(call, 4), pt_cpu_data(call, 5), pt_cpu_data(call, 6) };
+    return (struct ink){ call->arguments, PT_DATA(call, ink, keys), PT_DATA(call, ink, line), PT_DATA(call, ink, nearest), PT_DATA(call, ink, colors),
+                         PT_DATA(call, ink, color), PT_DATA(call, ink, depth), PT_DATA(call, ink, mask) };
 }
 
 // Of lines of surfaces at z that show the instance's points `id`, not yet times their share.

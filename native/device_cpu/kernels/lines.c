@@ -371,14 +371,14 @@ int PT_KERNEL_ENTRY(lines)(const struct pt_cpu_call *call)
         return PATINA_OK;
     struct lines lines = { .args = args,
                            .call = call,
-                           .keys = pt_cpu_data(call, 0),
-                           .from = pt_cpu_data(call, 1),
-                           .normals = pt_cpu_data(call, 2),
-                           .deff = pt_cpu_data(call, 3),
-                           .line = pt_cpu_data(call, 4),
-                           .nearest = pt_cpu_data(call, 5),
-                           .limit = args->behind ? pt_cpu_data(call, 6) : NULL,
-                           .through = args->behind ? pt_cpu_data(call, 7) : NULL,
+                           .keys = PT_DATA(call, lines, keys),
+                           .from = PT_DATA(call, lines, from),
+                           .normals = PT_DATA(call, lines, normal),
+                           .deff = PT_DATA(call, lines, deff),
+                           .line = PT_DATA(call, lines, line),
+                           .nearest = PT_DATA(call, lines, nearest),
+                           .limit = args->behind ? PT_DATA(call, lines, limit) : NULL,
+                           .through = args->behind ? PT_DATA(call, lines, through) : NULL,
                            .width = rect[2] - rect[0] };
     lines.stride = ((size_t)lines.width + 15) / 16 * 16 + 3 * PAD; // vectors begin up to PAD behind the row's end
     lines.thread_floats = (1 + ROW_FLOATS * (BAND_ROWS + 2 * ((size_t)args->reach + 3))) * lines.stride;

@@ -44,7 +44,7 @@ static struct fall fall_of(const struct lit *lit, const struct chunk_view *chunk
     f.column = vi_sub(vf_int(vf_floor(f.at[0])), vi_set((uint32_t)view->origin_x));
     f.row = vi_sub(vf_int(vf_floor(f.at[1])), vi_set((uint32_t)view->origin_y));
     f.texel = vi_add(vi_mul(f.row, vi_set(view->width)), f.column);
-    f.map = vi_float(vi_gather_z(pt_cpu_data(lit->call, 0), f.texel, inside));
+    f.map = vi_float(vi_gather_z(PT_DATA(lit->call, lit, keys), f.texel, inside));
     // no d_eff is less than that of a surface without spacing that faces the light; a thousandth off for rounding
     vf least = vf_set(0.999f) * vf_layer_distance(view, lit->args.instance.d_min, vf_zero(), f.z, vf_set(1.0f));
     f.behind = vm_and(inside, vf_lt(f.map + least, f.z));
@@ -110,7 +110,7 @@ static vf layer_distance(const struct lit *lit, const vf at[2], vf z, vi id, vm 
 {
     const struct view_args *view = &lit->args.view;
     const struct instance_args *instance = &lit->args.instance;
-    vi word = vi_gather(pt_cpu_data(lit->call, 5), id, lanes);
+    vi word = vi_gather(PT_DATA(lit->call, lit, surface), id, lanes);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT)), n[3];
     *none = vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE));
     if (!instance->has_normals)
@@ -136,11 +136,11 @@ static uint32_t in_shadow(const struct lit *lit, const struct fall *f, vi id)
     vm dark = vm_and(f->behind, vf_lt(f->map + d, f->z));
     if (!vm_bits(dark))
         return 0;
-    look_around(&lit->args.view, pt_cpu_data(lit->call, 0), f->column, f->row, dark, &around);
+    look_around(&lit->args.view, PT_DATA(lit->call, lit, keys), f->column, f->row, dark, &around);
     none = vm_and(none, dark);
     if (vm_bits(none)) {
-        vi source = pt_source_gather(pt_cpu_data(lit->call, 1), f->texel, none);
-        vf shown = vf_gather(pt_cpu_data(lit->call, 2), source, none), last = vf_set(pt_float(PT_KEY_EMPTY_Z));
+        vi source = pt_source_gather(PT_DATA(lit->call, lit, from), f->texel, none);
+        vf shown = vf_gather(PT_DATA(lit->call, lit, deff), source, none), last = vf_set(pt_float(PT_KEY_EMPTY_Z));
         vf steep = vf_select(beside_nothing(&around, none), d * vf_set(PT_SHADOW_STEEP), d);
         if (lit->args.view.perspective)
             last = f->map + vf_set(PT_SHADOW_APART) * shown;
@@ -162,8 +162,8 @@ static inline uint32_t loss_at(const struct lit *lit, uint32_t texel)
 {
     if (!lit->args.faint)
         return lit->args.loss;
-    const uint32_t *keys = pt_cpu_data(lit->call, 0); // low words: ids
-    const uint8_t *opacities = pt_cpu_data(lit->call, 9);
+    const uint32_t *keys = PT_DATA(lit->call, lit, keys); // low words: ids
+    const uint8_t *opacities = PT_DATA(lit->call, lit, opacities);
     return share(lit->args.loss, opacities[keys[2 * (size_t)texel] - lit->args.caster]);
 }
 
@@ -220,7 +220,7 @@ static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, co
                        struct queue *queue)
 {
     const struct lit_args *args = &lit->args;
-    const uint8_t *marks = pt_cpu_data(lit->call, 6); // none where none are asked for
+    const uint8_t *marks = PT_DATA(lit->call, lit, marks); // none where none are asked for
     const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
     queue->count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
@@ -245,7 +245,7 @@ static void fill_queue(const struct lit *lit, const struct chunk_view *chunk, co
 static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk, const struct queue *queue, uint32_t at)
 {
     const struct lit_args *args = &lit->args;
-    uint32_t *words = (uint32_t *)pt_cpu_data(lit->call, 7) + args->base + chunk->first, differs = 0;
+    uint32_t *words = (uint32_t *)PT_DATA(lit->call, lit, shadows) + args->base + chunk->first, differs = 0;
     const vm lanes = vm_first(pt_lanes_left(at, queue->count));
     const struct fall fall = queued(queue, at, lanes);
     const vi id = vi_add(vi_load(queue->slot + at), vi_set(chunk->first));
@@ -259,7 +259,7 @@ static uint32_t lit_points(const struct lit *lit, const struct chunk_view *chunk
 
 static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
 {
-    const float *positions = (const float *)pt_cpu_data(lit->call, 4) + 3 * (size_t)chunk->first;
+    const float *positions = (const float *)PT_DATA(lit->call, lit, positions) + 3 * (size_t)chunk->first;
     uint32_t differs = 0;
     struct queue queue;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK) {
@@ -273,19 +273,19 @@ static uint32_t lit_chunk(const struct lit *lit, const struct chunk_view *chunk)
 static void lit_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct lit *lit = context;
-    const struct chunk_view *chunks = pt_cpu_data(lit->call, 3);
+    const struct chunk_view *chunks = PT_DATA(lit->call, lit, chunks);
     uint32_t differs = 0;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(lit->call); c++)
         differs |= lit_chunk(lit, &chunks[c]);
     if (differs && lit->args.compare)
-        __atomic_store_n((uint32_t *)pt_cpu_data(lit->call, 8), 1, __ATOMIC_RELAXED);
+        __atomic_store_n((uint32_t *)PT_DATA(lit->call, lit, differs), 1, __ATOMIC_RELAXED);
 }
 
 int PT_KERNEL_ENTRY(lit)(const struct pt_cpu_call *call)
 {
     struct lit lit = { call, *(const struct lit_args *)call->arguments };
     lit.args.view.footprint = lit.args.view.footprint * PT_TEXEL_SLACK;
-    pt_parallel(call->pool, (uint32_t)(call->buffers[3]->size / sizeof(struct chunk_view)), 4, lit_chunks, &lit);
+    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_lit_chunks]->size / sizeof(struct chunk_view)), 4, lit_chunks, &lit);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

@@ -27,9 +27,9 @@ static void locate_row(void *context, uint32_t y)
     const struct pt_cpu_call *call = context;
     const struct locate_args *args = call->arguments;
     const struct view_args *view = &args->view;
-    const uint64_t *shown = pt_cpu_data(call, 0), *mesh_keys = pt_cpu_data(call, 1);
-    float *places = (float *)pt_cpu_data(call, 4) + 3 * (size_t)y * view->width;
-    uint32_t *words = (uint32_t *)pt_cpu_data(call, 5) + (size_t)y * view->width;
+    const uint64_t *shown = PT_DATA(call, locate, shown), *mesh_keys = PT_DATA(call, locate, mesh_keys);
+    float *places = (float *)PT_DATA(call, locate, places) + 3 * (size_t)y * view->width;
+    uint32_t *words = (uint32_t *)PT_DATA(call, locate, words) + (size_t)y * view->width;
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         const size_t at = (size_t)y * view->width + x;
         vi index;
@@ -38,7 +38,7 @@ static void locate_row(void *context, uint32_t y)
             continue;
         struct pt_triangle t;
         vf ray[2], n[3], z = vi_float(vi_load_z(shown + at)), p[3];
-        pt_find_triangle(view, &args->mesh, pt_cpu_data(call, 2), pt_cpu_data(call, 3), index, x, y, ours, &t);
+        pt_find_triangle(view, &args->mesh, PT_DATA(call, locate, vertices), PT_DATA(call, locate, indices), index, x, y, ours, &t);
         vf_ray(view, x, y, ray);
         pt_plane_normal(view, &args->mesh, &t, ray, n);
         // 1. in view space

@@ -6,8 +6,8 @@ static void mark_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
     const struct mark_args *args = call->arguments;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + (size_t)y * args->view.width;
-    uint8_t *marks = pt_cpu_data(call, 1);
+    const uint64_t *keys = (const uint64_t *)PT_DATA(call, mark, keys) + (size_t)y * args->view.width;
+    uint8_t *marks = PT_DATA(call, mark, marks);
     for (uint32_t x = args->view.rect[0]; x < args->view.rect[2]; x++) {
         uint32_t id = (uint32_t)keys[x] - args->id_base;
         if (id < args->id_count && (uint32_t)(keys[x] >> 32) != PT_KEY_EMPTY_Z)

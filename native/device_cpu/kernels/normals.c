@@ -188,7 +188,7 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     vi_store(c.at, vi_select(ours, at, packed ? vi_set(PT_ROW_PAD) : at));
     c.z = vf_select(c.ours, depths_at(own, at, ours), vf_set(1.0f));
     c.w = linear_depth(view, c.z);
-    vi word = vi_gather(pt_cpu_data(job->call, 1), id, c.ours);
+    vi word = vi_gather(PT_DATA(job->call, normals, surface), id, c.ours);
     vf spacing = vf_look_up(instance->spacing, PT_SPACINGS, vi_shr(word, PT_SPACING_SHIFT));
     c.distance = vf_layer_distance(view, instance->d_min, spacing, c.z, vf_set(1.0f));
     c.slope = vf_set(4.0f) * vf_footprint(view, c.z); // 76 degrees
@@ -220,7 +220,7 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     scale = vf_rsqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
     vm away = vf_lt(vf_zero(), (n[0] * ray[0] + n[1] * ray[1]) - n[2]);
     scale = vf_select(away, vf_zero() - scale, scale);
-    float out[3][PT_LANES], *normals = (float *)pt_cpu_data(job->call, 2) + 4 * (size_t)y * view->width;
+    float out[3][PT_LANES], *normals = (float *)PT_DATA(job->call, normals, normal) + 4 * (size_t)y * view->width;
     for (int k = 0; k < 3; k++)
         vf_store(out[k], vf_select(found, n[k] * scale, vf_zero()));
     for (uint32_t lanes = vm_bits(c.ours); lanes; lanes &= lanes - 1) {
@@ -247,7 +247,7 @@ static void normal_packed(const struct job *job, const struct depth_row *const *
 static void normals_row(const struct job *job, const struct depth_row *const *around, uint32_t y)
 {
     const struct view_args *view = &job->args->view;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(job->call, 0) + (size_t)y * view->width;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(job->call, normals, keys) + (size_t)y * view->width;
     struct packed packed = { .count = 0 };
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         vi id, at = vi_add(vi_set(x + PT_ROW_PAD), vi_lanes());
@@ -281,7 +281,7 @@ static void normals_bands(void *context, uint32_t begin, uint32_t end, uint32_t 
         const int32_t last = first + BAND_ROWS < (int32_t)view->rect[3] ? first + BAND_ROWS : (int32_t)view->rect[3];
         for (int32_t y = first - 2 * reach; y < last; y++) { // the last row seen is y + reach
             const struct depth_row *around[ROWS_MOST];
-            see_row(view, pt_cpu_data(job->call, 0), y + reach, &rows[(y + reach + ring) % ring]);
+            see_row(view, PT_DATA(job->call, normals, keys), y + reach, &rows[(y + reach + ring) % ring]);
             for (int32_t k = -reach; k <= reach && y >= first; k++)
                 around[reach + k] = &rows[(y + k + ring) % ring];
             if (y >= first)

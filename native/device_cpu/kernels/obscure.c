@@ -32,7 +32,7 @@ static void place(const struct obscure *obscure, uint32_t x, uint32_t y, vm some
     const vf zero = vf_zero();
     vf shown[4], width = vf_footprint(view, p->z), toward;
     vf_ray(view, x, y, p->ray);
-    vf_load4((const float *)pt_cpu_data(obscure->call, 3) + 4 * ((size_t)y * view->width + x), shown);
+    vf_load4((const float *)PT_DATA(obscure->call, obscure, shading) + 4 * ((size_t)y * view->width + x), shown);
     toward = zero - shown[2]; // n . r: a surface that faces away from the viewer is seen from behind
     if (view->perspective)
         toward = (shown[0] * p->ray[0] + shown[1] * p->ray[1]) - shown[2];
@@ -79,7 +79,7 @@ static void gather_row(void *context, uint32_t y)
 {
     const struct obscure *obscure = context;
     const struct view_args *view = &obscure->args->view;
-    float *out = pt_cpu_data(obscure->call, 5);
+    float *out = PT_DATA(obscure->call, obscure, obscured);
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         size_t at = (size_t)y * view->width + x;
         struct point p = {.z = vi_float(vi_load_z(obscure->planes.keys + at))};
@@ -109,7 +109,7 @@ static void load_row(const struct obscure *obscure, int32_t y, const struct row 
     pt_empty_row(row->z, width);
     if (y < 0 || y >= (int32_t)obscure->args->view.height)
         return;
-    const float *from = (const float *)pt_cpu_data(obscure->call, 5) + (size_t)y * width;
+    const float *from = (const float *)PT_DATA(obscure->call, obscure, obscured) + (size_t)y * width;
     for (uint32_t x = 0; x < width; x += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(x, width));
         vf_store_where(row->z + x, vi_float(vi_load_z(obscure->planes.keys + (size_t)y * width + x)), lanes);
@@ -122,7 +122,7 @@ static void blur_row(const struct obscure *obscure, const struct row rows[RING],
     static const float weights[RING] = {0.5f, 1.0f, 1.0f, 1.0f, 0.5f};
     const struct view_args *view = &obscure->args->view;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
-    float *colors = pt_cpu_data(obscure->call, 4);
+    float *colors = PT_DATA(obscure->call, obscure, color);
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         size_t at = (size_t)y * view->width + x;
         vf z = vf_load(rows[REACH].z + x), sum = vf_zero(), total = vf_zero(), color[4];
@@ -181,9 +181,9 @@ int PT_KERNEL_ENTRY(obscure)(const struct pt_cpu_call *call)
     struct obscure obscure = {.call = call,
                               .args = args,
                               .planes = {.view = &args->view,
-                                         .keys = pt_cpu_data(call, 0),
-                                         .from = pt_cpu_data(call, 1),
-                                         .deff = pt_cpu_data(call, 2)},
+                                         .keys = PT_DATA(call, obscure, keys),
+                                         .from = PT_DATA(call, obscure, from),
+                                         .deff = PT_DATA(call, obscure, deff)},
                               .stride = pt_row_stride(args->view.width)};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;

@@ -7,9 +7,9 @@ static void paint_row(void *context, uint32_t y)
     const struct pt_cpu_call *call = context;
     const struct paint_args *args = call->arguments;
     const struct view_args *view = &args->view;
-    const uint64_t *shown = pt_cpu_data(call, 0), *mesh_keys = pt_cpu_data(call, 1);
-    const float *vertices = pt_cpu_data(call, 2);
-    float *albedo = pt_cpu_data(call, 5);
+    const uint64_t *shown = PT_DATA(call, paint, shown), *mesh_keys = PT_DATA(call, paint, mesh_keys);
+    const float *vertices = PT_DATA(call, paint, vertices);
+    float *albedo = PT_DATA(call, paint, albedo);
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         const size_t at = (size_t)y * view->width + x;
         vi index;
@@ -19,9 +19,9 @@ static void paint_row(void *context, uint32_t y)
         struct pt_triangle t;
         struct pt_on_image place;
         vf color[4];
-        pt_find_triangle(view, &args->mesh, vertices, pt_cpu_data(call, 3), index, x, y, ours, &t);
+        pt_find_triangle(view, &args->mesh, vertices, PT_DATA(call, paint, indices), index, x, y, ours, &t);
         pt_place_on_image(&t, &args->mesh.texture, vertices, ours, &place);
-        pt_image_at(&args->mesh.texture, pt_cpu_data(call, 4), &place, ours, color);
+        pt_image_at(&args->mesh.texture, PT_DATA(call, paint, texels), &place, ours, color);
         if (!args->mesh.texture.blend)
             color[3] = vf_set(1.0f);
         vf_store4(albedo + 4 * at, color, vm_bits(ours));

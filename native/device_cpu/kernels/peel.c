@@ -51,13 +51,13 @@ static void peel_rows(void *context, uint32_t begin, uint32_t end, uint32_t thre
     const struct pt_cpu_call *call = context;
     const struct peel_args *args = call->arguments;
     const struct peel peel = { .args = args,
-                               .keys = pt_cpu_data(call, 0),
-                               .from = pt_cpu_data(call, 1),
-                               .deff = pt_cpu_data(call, 2),
-                               .shading = pt_cpu_data(call, 3),
-                               .color = pt_cpu_data(call, 4),
-                               .planes = { pt_cpu_data(call, 5), pt_cpu_data(call, 6), pt_cpu_data(call, 7) } };
-    struct pt_tile_value *tiles = pt_cpu_data(call, 8);
+                               .keys = PT_DATA(call, peel, keys),
+                               .from = PT_DATA(call, peel, from),
+                               .deff = PT_DATA(call, peel, deff),
+                               .shading = PT_DATA(call, peel, shading),
+                               .color = PT_DATA(call, peel, color),
+                               .planes = { PT_DATA(call, peel, limit), PT_DATA(call, peel, through), PT_DATA(call, peel, over) } };
+    struct pt_tile_value *tiles = PT_DATA(call, peel, tiles);
     uint32_t columns = (args->view.width + PT_TILE - 1) / PT_TILE, first = args->view.rect[1] / PT_TILE;
     (void)thread;
     for (uint32_t ty = first + begin; ty < first + end && !pt_cpu_cancelled(call); ty++)

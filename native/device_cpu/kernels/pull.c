@@ -67,10 +67,10 @@ static void pull_row(void *context, uint32_t y)
 {
     const struct pt_cpu_call *call = context;
     const struct pull_args *args = call->arguments;
-    const uint64_t *fine_keys = pt_cpu_data(call, 0);
-    const uint32_t *fine_from = pt_cpu_data(call, 1);
-    uint64_t *keys = pt_cpu_data(call, 2);
-    uint32_t *from = pt_cpu_data(call, 3);
+    const uint64_t *fine_keys = PT_DATA(call, pull, fine_keys);
+    const uint32_t *fine_from = PT_DATA(call, pull, fine_from);
+    uint64_t *keys = PT_DATA(call, pull, keys);
+    uint32_t *from = PT_DATA(call, pull, from);
     for (uint32_t x = pull_vectors(args, fine_keys, fine_from, keys, from, y); x < args->view.rect[2]; x++) {
         uint32_t best = pull_cell(args, fine_keys, x, y);
         keys[(size_t)y * args->view.width + x] = fine_keys[best];

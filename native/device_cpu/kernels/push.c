@@ -26,7 +26,7 @@ static uint32_t asked(const struct push *push, uint32_t x, uint32_t y, vf parent
     if (x >= rect[2] || y < rect[1] || y >= rect[3])
         return 0;
     const vm lanes = vm_first(pt_lanes_left(x, rect[2]));
-    const vf z = vi_float(vi_load_z((const uint64_t *)pt_cpu_data(push->call, 2) + (size_t)y * push->args->view.width + x));
+    const vf z = vi_float(vi_load_z((const uint64_t *)PT_DATA(push->call, push, keys) + (size_t)y * push->args->view.width + x));
     *p = (struct pixels){ x, y, z, parent };
     vm some = vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
     vf t = vf_select(some, z - pt_least_distance(&push->args->view, push->args->least, push->args->least_share, z), z); // what is nearer covers it
@@ -45,8 +45,8 @@ static uint32_t covered(const struct push *push, const struct pixels *p, vf besi
     vm lanes = vm_of_bits(bits), some = vm_and(lanes, vf_lt(p->z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
     vf t = p->z;
     if (vm_bits(some)) {
-        t = vf_select(some, t - pt_own_distance(&push->args->view, pt_cpu_data(push->call, 5), pt_cpu_data(push->call, 4),
-                                                pt_cpu_data(push->call, 3), at, t, some), t);
+        t = vf_select(some, t - pt_own_distance(&push->args->view, PT_DATA(push->call, push, deff), PT_DATA(push->call, push, normal),
+                                                PT_DATA(push->call, push, from), at, t, some), t);
         lanes = vm_and(lanes, vf_lt(p->parent, t));
         if (!vm_bits(lanes))
             return 0;
@@ -84,18 +84,18 @@ static inline void pixel_ray(const struct push *push, const struct parents *p, u
 static void load_parents(const struct push *push, uint32_t x, uint32_t y, vf z, struct parents *p)
 {
     const struct view_args *view = &push->args->view;
-    const float *normals = pt_cpu_data(push->call, 4);
+    const float *normals = PT_DATA(push->call, push, normal);
     const size_t at = (size_t)y * push->args->coarse_width + x;
     p->x = x;
     p->y = y;
     p->z = z;
-    p->id = vi_load_id((const uint64_t *)pt_cpu_data(push->call, 0) + at);
-    p->source = vi_load((const uint32_t *)pt_cpu_data(push->call, 1) + at);
+    p->id = vi_load_id((const uint64_t *)PT_DATA(push->call, push, coarse_keys) + at);
+    p->source = vi_load((const uint32_t *)PT_DATA(push->call, push, coarse_from) + at);
     vm some = vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
     vf normal[4], ray[2];
     vf_gather4(normals, p->source, some, normal);
     vf inverse = normal[3];
-    vf distance = vf_gather(pt_cpu_data(push->call, 6), p->source, some); // at level 0
+    vf distance = vf_gather(PT_DATA(push->call, push, span), p->source, some); // at level 0
     p->give = vm_bits(vm_and(some, vm_not(vf_lt(distance, (vf_set(PT_DENSE) * vf_footprint(view, z)) * inverse))));
     for (uint32_t k = 0; k < 3; k++)
         p->n[k] = normal[k];
@@ -129,8 +129,8 @@ static void take(const struct push *push, const struct parents *p, uint32_t y, c
     vi_zip(p->id, p->id, id);
     vi_zip(p->source, p->source, source);
     const uint32_t width = push->args->view.width;
-    uint64_t *keys = (uint64_t *)pt_cpu_data(push->call, 2) + (size_t)y * width;
-    uint32_t *from = (uint32_t *)pt_cpu_data(push->call, 3) + (size_t)y * width;
+    uint64_t *keys = (uint64_t *)PT_DATA(push->call, push, keys) + (size_t)y * width;
+    uint32_t *from = (uint32_t *)PT_DATA(push->call, push, from) + (size_t)y * width;
     for (uint32_t half = 0; half < 2; half++) {
         const uint32_t x = 2 * p->x + half * PT_LANES;
         if (!bits[half])
@@ -147,25 +147,25 @@ static inline __attribute__((always_inline)) void fetch_pixels(const struct push
     for (uint32_t row = 0; row < 2; row++)
         for (uint32_t i = 0; i < 2 * PT_LANES; i += 16) {
             const size_t at = (size_t)(2 * y + row) * push->args->view.width + 2 * x + i;
-            __builtin_prefetch((const uint64_t *)pt_cpu_data(push->call, 2) + at);
-            __builtin_prefetch((const uint64_t *)pt_cpu_data(push->call, 2) + at + 8);
-            __builtin_prefetch((const uint32_t *)pt_cpu_data(push->call, 3) + at);
+            __builtin_prefetch((const uint64_t *)PT_DATA(push->call, push, keys) + at);
+            __builtin_prefetch((const uint64_t *)PT_DATA(push->call, push, keys) + at + 8);
+            __builtin_prefetch((const uint32_t *)PT_DATA(push->call, push, from) + at);
         }
 }
 
 static inline __attribute__((always_inline)) void fetch_surfaces(const struct push *push, uint32_t x, uint32_t y)
 {
-    const uint32_t *source = (const uint32_t *)pt_cpu_data(push->call, 1) + (size_t)y * push->args->coarse_width + x;
+    const uint32_t *source = (const uint32_t *)PT_DATA(push->call, push, coarse_from) + (size_t)y * push->args->coarse_width + x;
     for (uint32_t i = 0; y < push->args->coarse_height && i < PT_LANES; i++) {
-        __builtin_prefetch((const float *)pt_cpu_data(push->call, 4) + 4 * (size_t)source[i]);
-        __builtin_prefetch((const float *)pt_cpu_data(push->call, 6) + source[i]);
+        __builtin_prefetch((const float *)PT_DATA(push->call, push, normal) + 4 * (size_t)source[i]);
+        __builtin_prefetch((const float *)PT_DATA(push->call, push, span) + source[i]);
     }
 }
 
 static struct pt_row_z load_cells(const struct push *push, uint32_t x, uint32_t y)
 {
     const struct push_args *args = push->args;
-    return pt_load_row_z(pt_cpu_data(push->call, 0), args->coarse_width, args->coarse_height, x, y,
+    return pt_load_row_z(PT_DATA(push->call, push, coarse_keys), args->coarse_width, args->coarse_height, x, y,
                          !x || x + PT_LANES >= args->coarse_width);
 }
 

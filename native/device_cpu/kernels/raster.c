@@ -21,9 +21,9 @@ static vm left_by_image(const struct pt_cpu_call *call, uint32_t index, uint32_t
     struct pt_triangle t;
     struct pt_on_image place;
     vf color[4];
-    pt_find_triangle(&args->view, &args->mesh, pt_cpu_data(call, 1), pt_cpu_data(call, 2), vi_set(index), x, y, lanes, &t);
-    pt_place_on_image(&t, &args->mesh.texture, pt_cpu_data(call, 1), lanes, &place);
-    pt_image_at(&args->mesh.texture, pt_cpu_data(call, 3), &place, lanes, color);
+    pt_find_triangle(&args->view, &args->mesh, PT_DATA(call, raster, vertices), PT_DATA(call, raster, indices), vi_set(index), x, y, lanes, &t);
+    pt_place_on_image(&t, &args->mesh.texture, PT_DATA(call, raster, vertices), lanes, &place);
+    pt_image_at(&args->mesh.texture, PT_DATA(call, raster, texels), &place, lanes, color);
     return vm_and(lanes, vf_le(vf_set(args->mesh.texture.cut), color[3]));
 }
 
@@ -126,7 +126,7 @@ static void raster_range(void *context, uint32_t begin, uint32_t end, uint32_t t
 {
     const struct pt_cpu_call *call = context;
     const struct raster_args *args = call->arguments;
-    const struct target target = { pt_cpu_data(call, 0), args->behind ? pt_cpu_data(call, 4) : NULL,
+    const struct target target = { PT_DATA(call, raster, keys), args->behind ? PT_DATA(call, raster, limit) : NULL,
                                    args->mesh.texture.cut > 0.0f ? call : NULL };
     (void)thread;
     for (uint32_t batch = begin; batch < end && !pt_cpu_cancelled(call); batch++) {
@@ -134,7 +134,7 @@ static void raster_range(void *context, uint32_t begin, uint32_t end, uint32_t t
         for (uint32_t i = first; i < first + (left < BATCH ? left : BATCH); i++) {
             struct pt_outline outline;
             struct pt_facet facet;
-            pt_outline_of(&args->view, &args->mesh, pt_cpu_data(call, 1), pt_cpu_data(call, 2), i, &outline);
+            pt_outline_of(&args->view, &args->mesh, PT_DATA(call, raster, vertices), PT_DATA(call, raster, indices), i, &outline);
             for (uint32_t k = 1; k + 1 < outline.count; k++)
                 if (pt_facet_of(&outline, k, &facet))
                     draw_facet(&args->view, &facet, args->mesh.id_base + i, target);

@@ -59,7 +59,7 @@ static inline vm seen_through(const struct pt_cpu_call *call, uint32_t x, uint32
     for (uint32_t s = 0; s < args->stations; s++) {
         for (int k = 0; k < 3; k++)
             q[k] = vf_set(stations[s].eye[k]) + way[k];
-        seen = vm_or(seen, looked_through(&stations[s], pt_cpu_data(call, 4), q, some));
+        seen = vm_or(seen, looked_through(&stations[s], PT_DATA(call, reopen, sights), q, some));
     }
     return seen;
 }
@@ -120,7 +120,7 @@ static void show(const struct reopen_args *args, float *color, uint32_t x, uint3
 static void find(const struct pt_cpu_call *call, const struct planes *planes, uint32_t x, vf z, vi source, vm some, vm seen)
 {
     const struct reopen_args *args = call->arguments;
-    const vf distance = vf_gather(pt_cpu_data(call, 2), source, seen);
+    const vf distance = vf_gather(PT_DATA(call, reopen, deff), source, seen);
     const vm written = args->first ? some : seen;
     vf_store_where(planes->limit + x, vf_select(seen, z + distance, vf_set(-1.0f)), written);
     if (args->last)
@@ -133,11 +133,11 @@ static void reopen_row(void *context, uint32_t y)
     const struct reopen_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
     const size_t row = (size_t)y * args->view.width;
-    struct planes planes = {.keys = (uint64_t *)pt_cpu_data(call, 0) + row, .from = (uint32_t *)pt_cpu_data(call, 1) + row};
-    planes.all_away = args->discs ? pt_cpu_data(call, 3) : NULL;
+    struct planes planes = {.keys = (uint64_t *)PT_DATA(call, reopen, keys) + row, .from = (uint32_t *)PT_DATA(call, reopen, from) + row};
+    planes.all_away = args->discs ? PT_DATA(call, reopen, away) : NULL;
     planes.away = args->discs ? planes.all_away + row : NULL;
-    planes.limit = args->phase == PT_REOPEN_FIND ? (float *)pt_cpu_data(call, 5) + row : NULL;
-    planes.kept = args->phase == PT_REOPEN_KEEP || args->phase == PT_REOPEN_TAKE ? (uint64_t *)pt_cpu_data(call, 6) + row : NULL;
+    planes.limit = args->phase == PT_REOPEN_FIND ? (float *)PT_DATA(call, reopen, limit) + row : NULL;
+    planes.kept = args->phase == PT_REOPEN_KEEP || args->phase == PT_REOPEN_TAKE ? (uint64_t *)PT_DATA(call, reopen, kept) + row : NULL;
     if (args->phase == PT_REOPEN_KEEP) {
         memcpy(planes.kept + rect[0], planes.keys + rect[0], (rect[2] - rect[0]) * sizeof *planes.kept);
         return;
@@ -155,7 +155,7 @@ static void reopen_row(void *context, uint32_t y)
         else if (vm_bits(seen) && args->phase == PT_REOPEN_TAKE)
             take(call, &planes, x, y, source, seen);
         else if (vm_bits(seen))
-            show(args, pt_cpu_data(call, 7), x, y, vm_bits(seen));
+            show(args, PT_DATA(call, reopen, color), x, y, vm_bits(seen));
     }
 }
 

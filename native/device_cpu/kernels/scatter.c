@@ -142,10 +142,9 @@ struct walk { // over chunks
 static void begin_walk(const struct scatter *scatter, int shared, struct walk *walk)
 {
     const struct pt_cpu_call *call = scatter->call;
-    const uint32_t instances = scatter->args->instances, behind = scatter->args->behind;
-    walk->target = (struct target){ .keys = pt_cpu_data(call, 0),
-                                    .limit = behind ? pt_cpu_data(call, 1 + 3 * instances) : NULL,
-                                    .drawn = scatter->args->sifted ? pt_cpu_data(call, 1 + 3 * instances + behind) : NULL,
+    walk->target = (struct target){ .keys = PT_DATA(call, scatter, keys),
+                                    .limit = scatter->args->behind ? PT_DATA(call, scatter, limit) : NULL,
+                                    .drawn = scatter->args->sifted ? PT_DATA(call, scatter, drawn) : NULL,
                                     .shared = shared };
     walk->window = window_of(&scatter->args->view);
     walk->instance = walk->count = 0;
@@ -154,14 +153,14 @@ static void begin_walk(const struct scatter *scatter, int shared, struct walk *w
 static const struct chunk_view *chunk_at(const struct scatter *scatter, uint32_t c, uint32_t *instance)
 {
     *instance = pt_chunk_instance(scatter->begins, c, *instance);
-    return (const struct chunk_view *)pt_cpu_data(scatter->call, 1 + 3 * *instance) + c - scatter->begins[*instance];
+    return (const struct chunk_view *)PT_DATA_EACH(scatter->call, scatter, chunks, *instance) + c - scatter->begins[*instance];
 }
 
 static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *walk)
 {
     const struct chunk_view *chunk = chunk_at(scatter, c, &walk->instance);
-    const float *positions = (const float *)pt_cpu_data(scatter->call, 2 + 3 * walk->instance) + 3 * (size_t)chunk->first;
-    const uint32_t *surface = (const uint32_t *)pt_cpu_data(scatter->call, 3 + 3 * walk->instance) + chunk->first;
+    const float *positions = (const float *)PT_DATA_EACH(scatter->call, scatter, positions, walk->instance) + 3 * (size_t)chunk->first;
+    const uint32_t *surface = (const uint32_t *)PT_DATA_EACH(scatter->call, scatter, surface, walk->instance) + chunk->first;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK, walk->count++) {
         const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
         project(&scatter->args->view, &walk->window, walk->target, chunk, positions, surface, first, last,
@@ -260,7 +259,7 @@ int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
     scatter.begins = pt_cpu_scratch(call, 0, ((size_t)args->instances + 1) * sizeof *scatter.begins);
     if (!scatter.begins)
         return PATINA_ERROR_MEMORY;
-    pt_chunk_begins(call, 1, 3, args->instances, scatter.begins);
+    pt_chunk_begins(call, PT_BUF_scatter_chunks, PT_EACH_scatter, args->instances, scatter.begins);
     const uint32_t chunks = scatter.begins[args->instances];
     scatter.stripes = pt_cpu_scratch(call, 1, (stripes + 1) * sizeof *scatter.stripes + chunks * sizeof *scatter.order);
     if (!scatter.stripes)

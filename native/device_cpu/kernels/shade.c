@@ -26,14 +26,14 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
 {
     const struct shade_args *args = shade->args;
     const uint32_t *rect = args->view.rect;
-    float *shading = pt_cpu_data(shade->call, 5), *colors = pt_cpu_data(shade->call, 6), *arrived = pt_cpu_data(shade->call, 9);
+    float *shading = PT_DATA(shade->call, shade, shading), *colors = PT_DATA(shade->call, shade, color), *arrived = PT_DATA(shade->call, shade, arrived);
     const uint64_t *keys = shade->planes.keys + (size_t)y * args->view.width;
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         if (args->instance.color_format)
-            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 4),
+            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, PT_DATA(shade->call, shade, colors),
                            pt_color_bytes[args->instance.color_format]);
         if (args->instance.has_opacities)
-            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, pt_cpu_data(shade->call, 7), 1);
+            pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, PT_DATA(shade->call, shade, opacities), 1);
         size_t at = (size_t)y * args->view.width + x;
         vf color[4], normal[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
         vi id;
@@ -41,12 +41,12 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         if (!vm_bits(ours))
             continue;
         const vi source = pt_color_pixels(&args->instance, pt_source(&shade->planes, at), at);
-        pt_albedo(&args->instance, pt_cpu_data(shade->call, 4), id, source, ours, color);
+        pt_albedo(&args->instance, PT_DATA(shade->call, shade, colors), id, source, ours, color);
         if (pt_recolors(args))
             pt_recolor(args, x, y, vf_load(around[args->blend]->z + x), ours, color);
-        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, pt_cpu_data(shade->call, 8), x, y, id,
+        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, PT_DATA(shade->call, shade, shadows), x, y, id,
                                    ours, 0, color, normal);
-        normal[3] = color[3] = pt_opacity(&args->instance, pt_cpu_data(shade->call, 4), pt_cpu_data(shade->call, 7), id, source, ours);
+        normal[3] = color[3] = pt_opacity(&args->instance, PT_DATA(shade->call, shade, colors), PT_DATA(shade->call, shade, opacities), id, source, ours);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * color[3];
         vf_store4(shading + 4 * at, normal, vm_bits(ours));
@@ -87,8 +87,8 @@ int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
     const uint32_t *rect = args->view.rect;
     struct shade shade = { .call = call,
                            .args = args,
-                           .planes = { &args->view, { 0, 0, args->view.width, args->view.height }, pt_cpu_data(call, 0),
-                                       pt_cpu_data(call, 1), pt_cpu_data(call, 2), pt_cpu_data(call, 3) },
+                           .planes = { &args->view, { 0, 0, args->view.width, args->view.height }, PT_DATA(call, shade, keys),
+                                       PT_DATA(call, shade, from), PT_DATA(call, shade, normal), PT_DATA(call, shade, deff) },
                            .stride = pt_row_stride(args->view.width),
                            .ring = 2 * args->blend + 1 };
     if (rect[0] >= rect[2] || rect[1] >= rect[3])

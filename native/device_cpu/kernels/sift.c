@@ -28,7 +28,7 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
     const struct sift_args *args = sift->call->arguments;
     vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
     if (chunk->clip_count) { // else positions need not come from memory, and there may be no clips
-        const struct clip_view *clips = (const struct clip_view *)pt_cpu_data(sift->call, 3) + chunk->clip_first;
+        const struct clip_view *clips = (const struct clip_view *)PT_DATA(sift->call, sift, clips) + chunk->clip_first;
         const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
                           vf_load(positions + 2 * (size_t)chunk->padded + i) };
         for (uint32_t k = 0; k < chunk->clip_keeps; k++)
@@ -39,11 +39,11 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
     if (args->by_class) {
         const vm all = vm_first(PT_LANES);
         vi slot = vi_add(vi_set(chunk->first + i), vi_lanes());
-        vi class = vi_and(vi_gather_bytes(pt_cpu_data(sift->call, 2), slot, all), vi_set(255));
+        vi class = vi_and(vi_gather_bytes(PT_DATA(sift->call, sift, classes), slot, all), vi_set(255));
         cut = vm_or(cut, vi_lt_unsigned(vi_set(0), vi_gather(sift->hides, class, all)));
     }
     if (args->by_shape) {
-        const uint32_t *shapes = (const uint32_t *)pt_cpu_data(sift->call, 5) + chunk->first + i;
+        const uint32_t *shapes = (const uint32_t *)PT_DATA(sift->call, sift, shapes) + chunk->first + i;
         vi sight = vi_and(vi_shr(vi_load(shapes), PT_SHAPE_SIGHT_SHIFT), vi_set(255));
         cut = vm_or(cut, vi_lt_unsigned(vi_set(0), vi_gather(sift->hides_shape, sight, vm_first(PT_LANES))));
     }
@@ -53,14 +53,14 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
 static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct sift *sift = context;
-    const struct chunk_view *chunks = pt_cpu_data(sift->call, 0);
+    const struct chunk_view *chunks = PT_DATA(sift->call, sift, chunks);
     const struct sift_args *args = sift->call->arguments;
     (void)thread;
     for (uint32_t c = begin; c < end && !pt_cpu_cancelled(sift->call); c++) {
         const struct chunk_view *chunk = &chunks[c];
-        const float *positions = (const float *)pt_cpu_data(sift->call, 1) + 3 * (size_t)chunk->first;
-        uint32_t *words = (uint32_t *)pt_cpu_data(sift->call, 4) + chunk->sifted - 1;
-        const uint32_t *mask = args->by_mask ? (const uint32_t *)pt_cpu_data(sift->call, 6) + chunk->first / PT_SLOTS_A_WORD : NULL;
+        const float *positions = (const float *)PT_DATA(sift->call, sift, positions) + 3 * (size_t)chunk->first;
+        uint32_t *words = (uint32_t *)PT_DATA(sift->call, sift, drawn) + chunk->sifted - 1;
+        const uint32_t *mask = args->by_mask ? (const uint32_t *)PT_DATA(sift->call, sift, mask) + chunk->first / PT_SLOTS_A_WORD : NULL;
         for (uint32_t first = 0; first < chunk->count && chunk->sifted; first += PT_SLOTS_A_WORD) {
             uint32_t word = 0;
             for (uint32_t i = 0; i < PT_SLOTS_A_WORD; i += PT_LANES)
@@ -78,6 +78,6 @@ int PT_KERNEL_ENTRY(sift)(const struct pt_cpu_call *call)
         sift.hides[i] = args->hidden[i / 32] >> i % 32 & 1u;
         sift.hides_shape[i] = args->hidden_shapes[i / 32] >> i % 32 & 1u;
     }
-    pt_parallel(call->pool, (uint32_t)(call->buffers[0]->size / sizeof(struct chunk_view)), 4, sift_chunks, &sift);
+    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_sift_chunks]->size / sizeof(struct chunk_view)), 4, sift_chunks, &sift);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

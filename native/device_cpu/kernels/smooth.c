@@ -15,7 +15,7 @@ struct smooth {
 static void load_row(const struct smooth *smooth, int32_t y, const struct pt_color_row *row)
 {
     const uint32_t width = smooth->args->view.width;
-    const float *colors = (const float *)pt_cpu_data(smooth->call, 3) + 4 * (ptrdiff_t)y * width;
+    const float *colors = (const float *)PT_DATA(smooth->call, smooth, color) + 4 * (ptrdiff_t)y * width;
     pt_empty_row(row->z, width);
     if (y < 0 || y >= (int32_t)smooth->args->view.height)
         return;
@@ -34,7 +34,7 @@ static void load_row(const struct smooth *smooth, int32_t y, const struct pt_col
 static void smooth_row(const struct smooth *smooth, const struct pt_color_row *const rows[3], uint32_t y)
 {
     const uint32_t *rect = smooth->args->view.rect;
-    float *out = pt_cpu_data(smooth->call, 4);
+    float *out = PT_DATA(smooth->call, smooth, result);
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         size_t at = (size_t)y * smooth->args->view.width + x;
         vm some = vm_and(vm_first(pt_lanes_left(x, rect[2])), vf_lt(vf_load(rows[1]->z + x), vf_set(pt_float(PT_KEY_EMPTY_Z))));
@@ -75,9 +75,9 @@ int PT_KERNEL_ENTRY(smooth)(const struct pt_cpu_call *call)
     struct smooth smooth = { .call = call,
                              .args = args,
                              .planes = { .view = &args->view,
-                                         .keys = pt_cpu_data(call, 0),
-                                         .from = pt_cpu_data(call, 1),
-                                         .deff = pt_cpu_data(call, 2) },
+                                         .keys = PT_DATA(call, smooth, keys),
+                                         .from = PT_DATA(call, smooth, from),
+                                         .deff = PT_DATA(call, smooth, deff) },
                              .stride = pt_row_stride(args->view.width) };
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;

@@ -84,7 +84,7 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
 {
     const struct pt_bins *bins = context;
     const struct splat_args *args = bins->call->arguments;
-    const float *limit = args->behind ? pt_cpu_data(bins->call, 1 + 4 * args->instances) : NULL;
+    const float *limit = args->behind ? PT_DATA(bins->call, splat, limit) : NULL;
     const uint32_t large = bins->bins - 1;
     struct tile tile;
     tile.bins = bins;
@@ -92,11 +92,11 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
         if (pt_bin_empty(bins, t) && pt_bin_empty(bins, large))
             continue;
         pt_patches_turn(&tile.patches, bins->view, pt_bin_tile(bins, t));
-        load(&tile, pt_cpu_data(bins->call, 0), limit);
+        load(&tile, PT_DATA(bins->call, splat, keys), limit);
         look(&tile);
         pt_bin_walk(bins, thread, large, &tile.patches.tile, &tile.farthest, 0, draw, &tile);
         pt_bin_walk(bins, thread, t, &tile.patches.tile, &tile.farthest, 0, draw, &tile);
-        save(&tile, pt_cpu_data(bins->call, 0));
+        save(&tile, PT_DATA(bins->call, splat, keys));
     }
 }
 
@@ -106,10 +106,10 @@ int PT_KERNEL_ENTRY(splat)(const struct pt_cpu_call *call)
     struct pt_bins bins = { .call = call,
                             .view = &args->view,
                             .discs = (const struct disc_args *)(args + 1),
-                            .drawn = args->sifted ? pt_cpu_data(call, 1 + 4 * args->instances + args->behind) : NULL,
+                            .drawn = args->sifted ? PT_DATA(call, splat, drawn) : NULL,
                             .instances = args->instances,
-                            .first = 1,
-                            .stride = 4 };
+                            .first = PT_BUF_splat_chunks,
+                            .stride = PT_EACH_splat };
     int error = pt_bins_fill(&bins);
     if (error)
         return error;

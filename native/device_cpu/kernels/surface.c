@@ -21,8 +21,8 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
     const struct instance_args *instance = &args->instance;
     const uint32_t *x = measured->x + i;
     const size_t row = (size_t)y * view->width;
-    float *normals = (float *)pt_cpu_data(call, 2) + 4 * row, *deff = (float *)pt_cpu_data(call, 3) + row;
-    float *span = args->with_span ? (float *)pt_cpu_data(call, 6) + row : NULL;
+    float *normals = (float *)PT_DATA(call, surface, normal) + 4 * row, *deff = (float *)PT_DATA(call, surface, deff) + row;
+    float *span = args->with_span ? (float *)PT_DATA(call, surface, span) + row : NULL;
     const vm some = vm_first(count);
     const vf one = vf_set(1.0f);
 
@@ -84,9 +84,9 @@ static void surface_row(void *context, uint32_t y)
     const struct surface_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
     const size_t row = (size_t)y * args->view.width;
-    const uint64_t *keys = (const uint64_t *)pt_cpu_data(call, 0) + row;
-    uint32_t *from = (uint32_t *)pt_cpu_data(call, 4) + row;
-    const uint32_t *words = pt_cpu_data(call, 1), *shapes = args->sigma_scale > 0.0f ? pt_cpu_data(call, 5) : NULL;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(call, surface, keys) + row;
+    uint32_t *from = (uint32_t *)PT_DATA(call, surface, from) + row;
+    const uint32_t *words = PT_DATA(call, surface, surface), *shapes = args->sigma_scale > 0.0f ? PT_DATA(call, surface, shapes) : NULL;
     struct measured measured;
     for (uint32_t first = rect[0]; first < rect[2]; first += BLOCK) {
         const uint32_t end = rect[2] - first < BLOCK ? rect[2] : first + BLOCK;
