@@ -137,6 +137,7 @@ CLOUDS: dict[str, Callable[[], Recipe]] = {
     "torus": lambda: torus(20000),
     "sparse": lambda: torus(1500),
     "dense": lambda: torus(120000),
+    "million": lambda: torus(1_000_000),  # for times
     "analysed": lambda: torus(20000, analysis={}),
     "bare": lambda: bare(12000),
     "bare analysed": lambda: bare(12000, analysis={"keep_normals": False}),

@@ -5,7 +5,7 @@
 
 Reads a line of JSON from standard input for each thing to do and answers with one: {"draw": case} draws a scene (builds_cases.py)
 and gives {plane: sum of its bytes}; {"save": path} writes the planes drawn last as .npz. {"time": case, "turn": degrees} draws it with
-what a former one left, the camera turned, and gives {"ms": milliseconds}. What cannot be done is {"error": sentence}, what this side's
+what a former one left, the camera turned, and gives {"ms": .., "work": ..}, the latter of all threads. What cannot be done is {"error": sentence}, what this side's
 header has no name for {"unknown": name}.
 """
 
@@ -85,7 +85,7 @@ class Side:
 
     def camera(self, case: dict[str, Any], turn: float = 30.0) -> dict[str, Any]:
         width, height = case["size"]
-        how = {"kind": "perspective", "distance": 3.6, "elevation": 40.0, "shift": (0.0, 0.0), "near": 0.1, "far": 100.0} | case.get("camera", {})
+        how: dict[str, Any] = {"kind": "perspective", "distance": 3.6, "elevation": 40.0, "shift": (0.0, 0.0), "near": 0.1, "far": 100.0} | case.get("camera", {})
         camera = orbit(turn, how["elevation"], how["distance"], aspect=width / height)
         if how["kind"] == "parallel":
             return parallel(camera, how["distance"]).fields()
@@ -130,17 +130,17 @@ class Side:
             frame, scene = held.enter_context(native.Frame(self.device)), held.enter_context(self.scene(case))
             return WAYS[case.get("do", "render")](self, case, frame, scene)
 
-    def time(self, case: dict[str, Any], turn: float) -> float:
-        """Of a picture of the frame that the last one of that name was drawn in, made as the case says: "render", or its shadows anew too."""
+    def time(self, case: dict[str, Any], turn: float) -> dict[str, float]:
+        """Milliseconds of a picture, in the frame that the last one of that name was drawn in."""
         if self.kept is None or self.kept[0] != case["name"]:
             self.kept = (case["name"], native.Frame(self.device), self.scene(case))
         _, frame, _ = self.kept
         scene = self.scene(case, turn)
-        start = time.perf_counter()
+        start, busy = time.perf_counter(), time.process_time()
         frame.render(scene)
-        spent = time.perf_counter() - start
+        spent = {"ms": 1e3 * (time.perf_counter() - start), "work": 1e3 * (time.process_time() - busy)}
         self.kept = (case["name"], frame, scene)
-        return 1000.0 * spent
+        return spent
 
 
 def seen(case: dict[str, Any], frame: native.Frame, before: str = "") -> Planes:
@@ -285,7 +285,7 @@ def answer(side: Side, asked: dict[str, Any], drawn: Planes) -> dict[str, Any]:
         drawn.update(side.draw(asked["draw"]))
         return {name: hashlib.sha256(f"{values.dtype} {values.shape}".encode() + values.tobytes()).hexdigest()[:16] for name, values in drawn.items()}
     if "time" in asked:
-        return {"ms": side.time(asked["time"], asked["turn"])}
+        return side.time(asked["time"], asked["turn"])
     np.savez(asked["save"], **{name.replace("/", "_"): values for name, values in drawn.items()})
     return {}
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""compare_builds.py finds what differs, and its scenes show what their names say: no two are the same.
+"""compare_builds.py finds what differs, and its scenes show what their names say: no two are the same. tests/bench/pairs.py tells slow from
+fast.
 
     test_builds.py LIBRARY
 """
@@ -13,10 +14,11 @@ import unittest
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path[:0] = [str(Path(__file__).resolve().parent), str(Path(__file__).resolve().parents[1] / "bench")]
 
 import builds_cases  # noqa: E402
 import compare_builds  # noqa: E402
+import pairs  # noqa: E402
 
 LIBRARY = ""
 # What is drawn by another way and has to come out the same.
@@ -32,9 +34,10 @@ class Altered(compare_builds.Process):
         self.name, self.settings = name, settings
 
     def tell(self, **asked: Any) -> None:
-        if asked.get("draw", {}).get("name") == self.name:
-            asked = copy.deepcopy(asked)
-            asked["draw"].setdefault("settings", {}).update(self.settings)
+        asked = copy.deepcopy(asked)
+        case = asked.get("draw") or asked.get("time") or {}
+        if case.get("name") == self.name:
+            case.setdefault("settings", {}).update(self.settings)
         super().tell(**asked)
 
 
@@ -87,6 +90,21 @@ class Builds(unittest.TestCase):
         counts, lines = self.compared(Altered("plain", nothing_like_it=1), ["plain"])
         self.assertEqual(counts, (0, 1, 0))
         self.assertIn("nothing_like_it", lines[0])
+
+    def test_pairs(self) -> None:
+        """A build against itself is as fast; one that draws four times the pixels is not."""
+        self.assertGreaterEqual(len(pairs.MODES), 12)
+        self.assertEqual(pairs.interval(list(range(200))), (85, 114))
+        other = compare_builds.Process(compare_builds.located(LIBRARY), "cpu")
+        self.addCleanup(other.close)
+        asked = pairs.case("all cues together", 200, "torus")
+        found = pairs.measured(self.process, other, asked, 30)
+        self.assertLess(found["work"]["interval"][0], 1.1)
+        self.assertGreater(found["work"]["interval"][1], 0.9)
+        slow = Altered(asked["name"], width=400, height=400)
+        self.addCleanup(slow.close)
+        self.assertGreater(pairs.measured(self.process, slow, asked, 30)["work"]["interval"][0], 1.5)
+        self.assertRegex(pairs.measured(self.process, other, {**asked, "clouds": [{"of": "torus", "nothing_like_it": 1}]}, 1)["error"], "nothing_like_it")
 
 
 if __name__ == "__main__":
