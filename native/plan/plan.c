@@ -17,14 +17,6 @@ enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16, BLEND_MOST = 8 };
 // 0.18% wrong), one leaves holes that light leaks through.
 enum { MAP_ITERATIONS = 2 };
 
-static const struct {
-    uint32_t bytes, levels;
-} plane_table[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) {bytes, levels},
-    PT_PLANES(PT_X)
-#undef PT_X
-};
-
 // ---- the passes --------------------------------------------------------------------------------------------------------
 
 static void plan_scatter(struct pt_builder *builder)
@@ -395,11 +387,11 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
         return;
     }
     PT_REASON(PT_ADD(builder, extract, extract,
-                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_FROM, 0), pt_plane_at(PT_PLANE_SHADING, 0),
-                      pt_plane_if(extract.depth != 0, PT_PLANE_DEPTH, 0), pt_plane_if(extract.normal != 0, PT_PLANE_NORMALS, 0),
-                      pt_plane_if(extract.source != 0, PT_PLANE_SOURCE, 0), pt_plane_if(extract.shadow != 0, PT_PLANE_ARRIVED, 0),
-                      pt_plane_if(extract.shadow != 0, PT_PLANE_SHADOW, 0), pt_plane_if(extract.discs_count != 0, PT_PLANE_AWAY, 0),
-                      pt_plane_if(extract.centered != 0, PT_PLANE_OFFSET, 0)}),
+                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_if(extract.source || extract.centered, PT_PLANE_FROM, 0),
+                      pt_plane_if(extract.normal != 0, PT_PLANE_SHADING, 0), pt_plane_if(extract.depth != 0, PT_PLANE_DEPTH, 0),
+                      pt_plane_if(extract.normal != 0, PT_PLANE_NORMALS, 0), pt_plane_if(extract.source != 0, PT_PLANE_SOURCE, 0),
+                      pt_plane_if(extract.shadow != 0, PT_PLANE_ARRIVED, 0), pt_plane_if(extract.shadow != 0, PT_PLANE_SHADOW, 0),
+                      pt_plane_if(extract.discs_count != 0, PT_PLANE_AWAY, 0), pt_plane_if(extract.centered != 0, PT_PLANE_OFFSET, 0)}),
               "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
               extract.source ? " source" : "", extract.shadow ? " shadow" : "");
 }
@@ -748,44 +740,4 @@ void pt_plan_destroy(struct pt_plan *plan)
 {
     pt_arena_free(plan->arena);
     *plan = (struct pt_plan){0};
-}
-
-void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_t level, uint32_t size[2])
-{
-    if (which >= PT_PLANE_COMBINED) {
-        size[0] = plan->crop[2];
-        size[1] = plan->crop[3];
-        return;
-    }
-    struct view_args view = pt_view_at(plan, plane_table[which].levels ? level : 0);
-    size[0] = view.width;
-    size[1] = view.height;
-}
-
-size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
-{
-    size_t length = 0;
-#define LINE(...)                                                                                                      \
-    length += (size_t)snprintf(buffer_out && length < size ? buffer_out + length : NULL,                               \
-                               buffer_out && length < size ? size - length : 0, __VA_ARGS__)
-    LINE("planes %u x %u, crop %u x %u at %u, %u, %u coarse levels\n", plan->view.width, plan->view.height,
-         plan->crop[2], plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
-    LINE("expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)\n",
-         (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
-         (double)plan->expected.normal,
-         pt_means_name(plan->means));
-    LINE("points %llu, scattered %llu, chunks %llu, culled %llu\n", (unsigned long long)plan->points,
-         (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
-         (unsigned long long)plan->chunks_culled);
-    if (plan->chunks_clipped || plan->chunks_cut)
-        LINE("chunks clipped %llu, cut %llu\n", (unsigned long long)plan->chunks_clipped,
-             (unsigned long long)plan->chunks_cut);
-    for (uint32_t i = 0; i < plan->pass_count; i++)
-        LINE("run  %-10s %s\n", plan->passes[i].name, plan->passes[i].reason);
-    for (uint32_t i = 0; i < plan->light_count; i++)
-        LINE("run  %-10s %s\n", "lit", plan->lights[i].reason);
-    for (uint32_t i = 0; i < plan->skipped_count; i++)
-        LINE("skip %-10s %s\n", plan->skipped[i].name, plan->skipped[i].reason);
-#undef LINE
-    return length;
 }

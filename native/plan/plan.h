@@ -232,6 +232,9 @@ void pt_plan_destroy(struct pt_plan *plan);
 // Width and height of a plane at a level (of planes with levels) or of a layer.
 void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_t level, uint32_t size[2]);
 
+// Whether the picture that readers see has this plane.
+int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane);
+
 // A line a pass, and one for each that is left out. Returns the full length.
 size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
 

@@ -94,10 +94,7 @@ int pt_planes_ensure_picture(struct patina_device *device, struct pt_planes *pla
     int error = PATINA_OK;
     for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED && !error; p++) {
         const size_t bytes = size_of(plan, (enum pt_plane)p, 0);
-        const int unused = (p == PT_PLANE_SHADOW && !plan->light_count) || (p == PT_PLANE_LINES && !(plan->line_radius > 0.0f)) ||
-                           (p == PT_PLANE_CERTAINTY && !(plan->assessed >> PATINA_PASS_CERTAINTY & 1u)) ||
-                           (p == PT_PLANE_THICKNESS && !(plan->assessed >> PATINA_PASS_THICKNESS & 1u));
-        if (planes->at[p][0].size == bytes || unused)
+        if (planes->at[p][0].size == bytes || !pt_plan_writes(plan, (enum pt_plane)p))
             continue;
         total += bytes - planes->at[p][0].size;
         error = check_cap(device, plan, total);
@@ -105,6 +102,8 @@ int pt_planes_ensure_picture(struct patina_device *device, struct pt_planes *pla
             error = device->ops->buffer_create(device, bytes, NULL, 0, &made[p]);
     }
     for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED; p++) {
+        if (!error && !pt_plan_writes(plan, (enum pt_plane)p))
+            device->ops->buffer_destroy(device, &planes->at[p][0]);
         if (!made[p].size)
             continue;
         device->ops->buffer_destroy(device, error ? &made[p] : &planes->at[p][0]);
