@@ -253,9 +253,7 @@ size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, ch
     struct pt_plan plan;
     if (!frame || !scene || pt_plan_create(scene, &plan))
         return 0;
-    for (uint32_t i = 0; i < plan.light_count; i++)
-        pt_plan_light_text(scene, &plan, i); // without memory it stays untold
-    size_t length = pt_plan_text(&plan, buffer, size);
+    size_t length = pt_plan_text(scene, &plan, buffer, size);
     pt_plan_destroy(&plan);
     return length;
 }

@@ -235,8 +235,12 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_
 // Whether the picture that readers see has this plane.
 int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane);
 
-// A line a pass, and one for each that is left out. Returns the full length.
-size_t pt_plan_text(const struct pt_plan *plan, char *buffer, size_t size);
+extern const uint32_t pt_plane_bytes[PT_PLANE_COUNT]; // a pixel
+extern const char *const pt_plane_names[PT_PLANE_COUNT];
+
+// A line a step or pass, of loops their ends, of each light's maps the first, and a line for each pass that is left out. Finds what the
+// lights' maps are like. Returns the full length.
+size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char *buffer, size_t size);
 
 // view.c: how the camera sees the scene.
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);

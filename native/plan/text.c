@@ -2,12 +2,23 @@
 // What a plan says of itself: its planes' sizes, which of them readers see, and all of it in words.
 #include "passes.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 
-static const struct {
-    uint32_t bytes, levels;
-} plane_table[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) {bytes, levels},
+static const uint32_t has_levels[PT_PLANE_COUNT] = {
+#define PT_X(name, bytes, levels) levels,
+    PT_PLANES(PT_X)
+#undef PT_X
+};
+
+const char *const pt_plane_names[PT_PLANE_COUNT] = {
+#define PT_X(name, bytes, levels) #name,
+    PT_PLANES(PT_X)
+#undef PT_X
+};
+
+const uint32_t pt_plane_bytes[PT_PLANE_COUNT] = {
+#define PT_X(name, bytes, levels) bytes,
     PT_PLANES(PT_X)
 #undef PT_X
 };
@@ -28,35 +39,123 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
         size[1] = plan->crop[3];
         return;
     }
-    struct view_args view = pt_view_at(plan, plane_table[which].levels ? level : 0);
+    struct view_args view = pt_view_at(plan, has_levels[which] ? level : 0);
     size[0] = view.width;
     size[1] = view.height;
 }
 
-size_t pt_plan_text(const struct pt_plan *plan, char *buffer_out, size_t size)
+// ---- in words ------------------------------------------------------------------------------------------------------------
+
+struct text {
+    char *to; // NULL: is only measured
+    size_t size, length;
+};
+
+__attribute__((format(printf, 3, 4))) static void put_line(struct text *text, uint32_t depth, const char *format, ...)
 {
-    size_t length = 0;
-#define LINE(...)                                                                                                      \
-    length += (size_t)snprintf(buffer_out && length < size ? buffer_out + length : NULL,                               \
-                               buffer_out && length < size ? size - length : 0, __VA_ARGS__)
-    LINE("planes %u x %u, crop %u x %u at %u, %u, %u coarse levels\n", plan->view.width, plan->view.height,
-         plan->crop[2], plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
-    LINE("expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)\n",
-         (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
-         (double)plan->expected.normal,
-         pt_means_name(plan->means));
-    LINE("points %llu, scattered %llu, chunks %llu, culled %llu\n", (unsigned long long)plan->points,
-         (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
-         (unsigned long long)plan->chunks_culled);
-    if (plan->chunks_clipped || plan->chunks_cut)
-        LINE("chunks clipped %llu, cut %llu\n", (unsigned long long)plan->chunks_clipped,
-             (unsigned long long)plan->chunks_cut);
-    for (uint32_t i = 0; i < plan->pass_count; i++)
-        LINE("run  %-10s %s\n", plan->passes[i].name, plan->passes[i].reason);
+    const size_t left = text->to && text->length < text->size ? text->size - text->length : 0;
+    char line[256];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(line, sizeof line, format, arguments);
+    va_end(arguments);
+    text->length += (size_t)snprintf(left ? text->to + text->length : NULL, left, "%*s%s\n", (int)(2 * depth), "", line);
+}
+
+static void put_passes(struct text *text, const struct pt_plan *plan, uint32_t first, uint32_t count, uint32_t depth)
+{
+    for (uint32_t i = first; i < first + count; i++)
+        put_line(text, depth, "run  %-10s %s", pt_kernels[plan->passes[i].kernel].name, plan->passes[i].reason);
+}
+
+// "at most 5, until a layer is empty: reason"
+static void put_loop(struct text *text, const char *name, const struct pt_step *step, const char *reason, uint32_t depth)
+{
+    static const char *const ends[] = { "a layer is empty", "no light is left", "nothing changes", "the error is met" };
+    char when[128] = "";
+    for (uint32_t k = 0, length = 0; k < 4 && length < sizeof when; k++)
+        if (step->ends >> k & 1u)
+            length += (uint32_t)snprintf(when + length, sizeof when - length, "%s%s", length ? " or " : ", until ", ends[k]);
+    if (step->most)
+        put_line(text, depth, "loop %-10s at most %u%s: %s", name, step->most, when, reason);
+    else
+        put_line(text, depth, "loop %-10s %s", name, reason);
+}
+
+static void put_steps(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
+                      const struct pt_step *end, uint32_t depth);
+
+// The first of the maps that the step stands for; where the light sees nothing there, the next face's.
+static void put_map(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
+                    uint32_t depth)
+{
+    struct pt_round round = { .light = step->light, .group = step->group, .points = 1, .pixels = plan->mesh_shadows };
+    struct pt_plan map;
+    put_line(text, depth, "plan %-10s %s%s", "map", step->reason, step->layer > 1 ? ", as of layer 1" : "");
+    if (step->layer > 1)
+        return;
+    for (int some = 0; !some && round.face < pt_light_faces(plan, step->light); round.face++) {
+        if (!pt_plan_tested(scene, plan, &round, step->group) || pt_plan_map(scene, plan, &round, &map))
+            return; // without memory it stays untold
+        if ((some = map.step_count > 0)) {
+            put_line(text, depth + 1, "planes %u x %u, %u coarse levels, %llu points, %llu triangles", map.view.width, map.view.height,
+                     map.levels, (unsigned long long)map.points_scattered, (unsigned long long)map.triangles);
+            put_steps(text, scene, &map, map.steps, map.steps + map.step_count, depth + 1);
+        }
+        pt_plan_destroy(&map);
+    }
+}
+
+static void put_step(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
+                     uint32_t depth)
+{
+    switch (step->of) {
+    case PT_STEP_CLEAR: put_line(text, depth, "fill %-10s %s", pt_plane_names[step->plane.which], step->reason); break;
+    case PT_STEP_PASSES: put_passes(text, plan, step->first, step->count, depth); break;
+    case PT_STEP_MARK:
+        put_line(text, depth, "only %s", step->reason);
+        put_passes(text, plan, step->first, step->count, depth + 1);
+        break;
+    case PT_STEP_COVERED: put_line(text, depth, "read %-10s %s", pt_plane_names[PT_PLANE_TILES], step->reason); break;
+    case PT_STEP_LAYERS: put_loop(text, "layers", step, step->reason, depth); break;
+    case PT_STEP_LAYER: put_line(text, depth, "layer %u: %s", step->layer, step->reason); break;
+    case PT_STEP_LIGHT:
+        put_line(text, depth, "light %u: %s", step->light, plan->lights[step->light].reason);
+        put_loop(text, "samples", step, step->reason, depth);
+        break;
+    case PT_STEP_FACES: put_loop(text, "faces", step, step->reason, depth); break;
+    case PT_STEP_FAINT: put_loop(text, "faint", step, step->reason, depth); break;
+    case PT_STEP_MAP: put_map(text, scene, plan, step, depth); break;
+    case PT_STEP_CLOSE: put_line(text, depth, "plan %-10s %s", "close", step->reason); break;
+    }
+}
+
+static void put_steps(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
+                      const struct pt_step *end, uint32_t depth)
+{
+    for (; step < end; step = pt_step_after(step)) {
+        put_step(text, scene, plan, step, depth);
+        put_steps(text, scene, plan, step + 1, pt_step_after(step), depth + 1);
+    }
+}
+
+size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char *buffer, size_t size)
+{
+    struct text text = { buffer, size, 0 };
     for (uint32_t i = 0; i < plan->light_count; i++)
-        LINE("run  %-10s %s\n", "lit", plan->lights[i].reason);
+        pt_plan_light_text(scene, plan, i); // without memory it stays untold
+    put_line(&text, 0, "planes %u x %u, crop %u x %u at %u, %u, %u coarse levels", plan->view.width, plan->view.height, plan->crop[2],
+             plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
+    put_line(&text, 0, "expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)",
+             (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
+             (double)plan->expected.normal, pt_means_name(plan->means));
+    put_line(&text, 0, "points %llu, scattered %llu, chunks %llu, culled %llu", (unsigned long long)plan->points,
+             (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks, (unsigned long long)plan->chunks_culled);
+    if (plan->chunks_clipped || plan->chunks_cut)
+        put_line(&text, 0, "chunks clipped %llu, cut %llu", (unsigned long long)plan->chunks_clipped,
+                 (unsigned long long)plan->chunks_cut);
+    put_steps(&text, scene, plan, plan->steps, plan->steps + plan->step_count, 0);
     for (uint32_t i = 0; i < plan->skipped_count; i++)
-        LINE("skip %-10s %s\n", plan->skipped[i].name, plan->skipped[i].reason);
-#undef LINE
-    return length;
+        put_line(&text, 0, "skip %-10s %s", plan->skipped[i].name, plan->skipped[i].reason);
+    return text.length;
 }

@@ -1,18 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "planes.h"
 
-const uint32_t pt_plane_bytes[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) bytes,
-    PT_PLANES(PT_X)
-#undef PT_X
-};
-
-const char *const pt_plane_names[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) #name,
-    PT_PLANES(PT_X)
-#undef PT_X
-};
-
 uint64_t pt_planes_total(const struct pt_planes *planes)
 {
     uint64_t total = 0;

@@ -12,9 +12,6 @@ struct pt_planes {
     int varies; // in size from plan to plan, from the beginning
 };
 
-extern const uint32_t pt_plane_bytes[PT_PLANE_COUNT]; // a pixel
-extern const char *const pt_plane_names[PT_PLANE_COUNT];
-
 uint64_t pt_planes_total(const struct pt_planes *planes); // bytes that both hold
 // Room for a plane of the plan; what it holds is anything, or what it held where the size is the same. Messages are at the device.
 int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, enum pt_plane which,

@@ -591,7 +591,9 @@ static void test_reasons(void **state)
     assert_int_equal(patina_frame_bake_shadows(frame, stage.scene), PATINA_ERROR_EMPTY);
     stage_light(&stage, PATINA_LIGHT_POINT);
     patina_frame_plan_text(frame, stage.scene, text, sizeof text);
-    assert_non_null(strstr(text, "run  lit        point light, 3 samples, six maps of"));
+    assert_non_null(strstr(text, "loop samples    at most 3, until nothing changes"));
+    assert_non_null(strstr(text, "run  lit        points of instance 0 are tested"));
+    assert_non_null(strstr(text, "light 0: point light, 3 samples, six maps of"));
     render(frame, &stage);
     render(frame, &stage);
     patina_frame_stats_json(frame, text, sizeof text);

@@ -653,6 +653,12 @@ def test_plan():
     ball("plan.ply", 500)
     text = run("render", "plan.ply", "--dump-plan").stdout
     assert "scatter" in text and len(text.splitlines()) > 3
+    text = run("render", "plan.ply", "--dump-plan", "--shadows", "--opacity", "0.5", "--layers", "3").stdout
+    lines = [line.split(None, 1)[0] + " " + line.split()[1] for line in text.splitlines()]
+    for expected in ("fill KEYS", "loop samples", "loop faces", "plan map", "run scatter", "run lit", "loop layers", "layer 2:",
+                     "read TILES", "run peel", "layer 3:", "run compose"):
+        assert expected in lines, (expected, text)
+    assert "at most 2, until a layer is empty" in text, text
     done = run("render", "plan.ply", "--dump-plan", "--stats", "json")
     json.loads(done.stdout)
     assert "scatter" in done.stderr

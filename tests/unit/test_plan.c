@@ -129,6 +129,105 @@ static void test_settings_leave_passes_out(void **state)
     patina_cloud_destroy(cloud);
 }
 
+static const struct pt_step *step_of(const struct pt_plan *plan, enum pt_step_of of, uint32_t layer)
+{
+    for (uint32_t i = 0; i < plan->step_count; i++)
+        if (plan->steps[i].of == of && plan->steps[i].layer == layer)
+            return &plan->steps[i];
+    return NULL;
+}
+
+// Every pass stands in one step, in order; loops hold their rounds and say when they end.
+static void test_steps_hold_the_whole_plan(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
+    const patina_cloud_style style = { .struct_size = sizeof style, .transparency = 0.5f, .lighting = PATINA_LIGHTING_LIT };
+    const patina_light_desc light = { .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .angle = 0.1f, .shadows = 1 };
+    const patina_settings settings = { .struct_size = sizeof settings, .width = 64, .height = 64, .layers = 3, .shadow_samples = 5,
+                                       .shadow_error = 0.1f };
+    assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
+    assert_int_equal(patina_scene_add_light(scene, &light), PATINA_OK);
+    assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+    struct pt_plan plan = plan_of(scene);
+    uint32_t next = 0;
+    for (uint32_t i = 0; i < plan.step_count; i++) {
+        assert_true(plan.steps[i].reason[0]);
+        assert_true(i + plan.steps[i].inside < plan.step_count);
+        if (plan.steps[i].of == PT_STEP_PASSES || plan.steps[i].of == PT_STEP_MARK) {
+            assert_int_equal(plan.steps[i].first, next);
+            next += plan.steps[i].count;
+        }
+    }
+    assert_int_equal(next, plan.pass_count);
+    const struct pt_step *samples = step_of(&plan, PT_STEP_LIGHT, 1), *layers = step_of(&plan, PT_STEP_LAYERS, 2);
+    assert_non_null(samples);
+    assert_int_equal(samples->most, 5);
+    assert_int_equal(samples->ends, PT_END_UNCHANGED | PT_END_ERROR_MET);
+    assert_non_null(layers);
+    assert_int_equal(layers->most, 2);
+    assert_true(layers->ends & PT_END_LAYER_EMPTY);
+    assert_non_null(step_of(&plan, PT_STEP_LAYER, 3));
+    assert_null(step_of(&plan, PT_STEP_LIGHT, 2)); // which points the second layer shows changes no texture
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+// A light's map is a plan of its own, made of scene, plan and round alone: the same twice, and what is not tested has no pass.
+static void test_maps_are_plans(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
+    const patina_cloud_style style = { .struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT };
+    const patina_light_desc light = { .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .shadows = 1 };
+    assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
+    assert_int_equal(patina_scene_add_light(scene, &light), PATINA_OK);
+    struct pt_plan plan = plan_of(scene), maps[2];
+    assert_int_equal(plan.group_count, 1);
+    assert_int_equal(pt_plan_light_map(scene, &plan, 0), PATINA_OK);
+    const struct pt_round round = { .points = 1 }, nobody = { 0 };
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(pt_plan_map(scene, &plan, &round, &maps[i]), PATINA_OK);
+    assert_int_equal(passes_of(&maps[0], PT_KERNEL_lit), 1);
+    assert_int_equal(maps[0].pass_count, maps[1].pass_count);
+    for (uint32_t i = 0; i < maps[0].pass_count; i++) {
+        const struct pt_pass *a = &maps[0].passes[i], *b = &maps[1].passes[i];
+        assert_int_equal(a->argument_size, b->argument_size);
+        assert_memory_equal(a->arguments, b->arguments, a->argument_size);
+        assert_false(a->output);
+    }
+    assert_true(pt_plan_tested(scene, &plan, &round, 0));
+    assert_false(pt_plan_tested(scene, &plan, &nobody, 0));
+    pt_plan_destroy(&maps[0]);
+    pt_plan_destroy(&maps[1]);
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+// Room is made for the passes that are asked for.
+static void test_planes_of_the_picture(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
+    const patina_settings settings = { .struct_size = sizeof settings, .passes = 1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH };
+    for (int all = 0; all < 2; all++) {
+        struct pt_plan plan = plan_of(scene);
+        for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED; p++) {
+            const int asked = p == PT_PLANE_COMBINED || p == PT_PLANE_DEPTH || (!all && (p == PT_PLANE_NORMALS || p == PT_PLANE_SOURCE));
+            assert_int_equal(pt_plan_writes(&plan, (enum pt_plane)p), asked);
+        }
+        pt_plan_destroy(&plan);
+        assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
+    }
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 static void test_spacing_chooses_levels(void **state)
 {
     (void)state;
@@ -394,6 +493,8 @@ int main(void)
         cmocka_unit_test(test_lines_are_planned_where_asked_for),
         cmocka_unit_test(test_every_pass_runs_or_has_a_reason), cmocka_unit_test(test_missing_normals_are_estimated),
         cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
+        cmocka_unit_test(test_steps_hold_the_whole_plan),       cmocka_unit_test(test_maps_are_plans),
+        cmocka_unit_test(test_planes_of_the_picture),
         cmocka_unit_test(test_chunks_around_the_camera),        cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
         cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),
