@@ -178,10 +178,32 @@ static inline vf vf_meet(vf z_q, vf dot_q, vf dot_p)
     return vf_select(good, ((z_q * dot_q) * sign) * r, z_q);
 }
 
+// Which cell, of a level whose rows are `width` long, holds a pixel of level 0, whose rows are `from_width` long. The float
+// quotient is off by one at most.
+static inline vi vi_cell_of(vi pixel, uint32_t from_width, uint32_t level, uint32_t width)
+{
+    if (!level)
+        return pixel;
+    const vi across = vi_set(from_width), one = vi_set(1), none = vi_set(0);
+    vi row = vf_int(vi_convert(pixel) / vi_convert(across)), column = vi_sub(pixel, vi_mul(row, across));
+    const vm before = vi_lt_unsigned(vi_set(INT32_MAX), column), behind = vm_not(vm_or(before, vi_lt_unsigned(column, across)));
+    row = vi_sub(vi_add(row, vi_select(behind, one, none)), vi_select(before, one, none));
+    column = vi_sub(vi_add(column, vi_select(before, across, none)), vi_select(behind, across, none));
+    return vi_add(vi_mul(vi_shr(row, (int)level), vi_set(width)), vi_shr(column, (int)level));
+}
+
+// How far z of a surface goes at most: as far beyond where it was measured as its span reaches along it. Where that cell of the
+// level shows something else by now, as far as z_q.
+static inline vf vf_farthest(const uint64_t *keys, const uint32_t *from, vi cell, vi source, vm lanes, vf z_q, vf span, vf inverse)
+{
+    const vm shown = vm_and(lanes, vi_eq(vi_gather(from, cell, lanes), source));
+    return vf_select(shown, vi_float(vi_gather_z(keys, cell, shown)) + span * vf_rcp(inverse), z_q);
+}
+
 // z at ray p of the plane with normal n through the point at (ray q, z_q), not nearer than z_q, not farther than
-// z_q + limit. SPEC 2.2, refined filling.
+// z_q + limit, nor than `farthest`. SPEC 2.2, refined filling.
 static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], const vf ray_q[2], vf z_q, const vf ray_p[2],
-                                vf limit)
+                                vf limit, vf farthest)
 {
     const vf zero = vf_zero(), one = vf_set(1.0f);
     vf z = z_q;
@@ -195,7 +217,7 @@ static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], con
         vf rise = (n[0] * (ray_p[0] - ray_q[0]) + n[1] * (ray_p[1] - ray_q[1])) * sign;
         z = vf_select(good, z_q + rise * r, z);
     }
-    return vf_min(vf_max(z, z_q), z_q + limit);
+    return vf_max(vf_min(z, vf_min(z_q + limit, farthest)), z_q);
 }
 
 // Which of PT_LANES points face away.

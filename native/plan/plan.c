@@ -120,12 +120,12 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
                              .unfills = plan->fill == PATINA_FILL_CLOSED ? plan->iterations : 0,
                              .refined = plan->quality == PATINA_QUALITY_REFINED,
                              .least = least_distance(plan),
-                             .least_share = least_share(plan, level)};
+                             .least_share = least_share(plan, level),
+                             .from_width = plan->view.width};
     if (plan->reaches) {
         args.reach = REACH;
         args.disc_reach = DISC_REACH;
         args.discs_first = plan->discs_first;
-        args.from_width = plan->view.width;
     }
     PT_REASON(PT_ADD(builder, fill, args,
                      {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
@@ -160,7 +160,8 @@ static void plan_pyramid(struct pt_builder *builder)
                                  .refined = plan->quality == PATINA_QUALITY_REFINED,
                                  .least = least_distance(plan),
                                  .least_share = least_share(plan, level - 1),
-                                 .background = plan->discs_count > 0};
+                                 .background = plan->discs_count > 0,
+                                 .from_width = plan->view.width};
         PT_REASON(
             PT_ADD(builder, push, args,
                    {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),

@@ -212,7 +212,8 @@ void main()
         float z = pt_float(key.y);
         z = pt_plane_depth(view, read_float4(source).xyz, pt_ray(view, best.x, best.y), z,
                            pt_ray(view, place.x, place.y),
-                           pt_level_distance(view, read_span(source), read_float4(source).w, z));
+                           pt_level_distance(view, read_span(source), read_float4(source).w, z),
+                           pt_farthest(pt_cell_of(source, args.from_width, view.level, view.width), source, z));
         key.y = pt_bits(z);
     }
     changed[index] = change(taken ? pixel : NO_PIXEL, key.x, key.y, source);

@@ -120,7 +120,8 @@ void take(view_args view, uint coarse_width, bool refined, uint at)
         view_args coarse = view;
         coarse.level++;
         float limit = pt_level_distance(coarse, read_span(source), normal.w, z);
-        z = pt_plane_depth(view, normal.xyz, pt_ray(coarse, cell.x, cell.y), z, pt_ray(view, place.x, place.y), limit);
+        float farthest = pt_farthest(pt_cell_of(source, args.from_width, coarse.level, coarse_width), source, z);
+        z = pt_plane_depth(view, normal.xyz, pt_ray(coarse, cell.x, cell.y), z, pt_ray(view, place.x, place.y), limit, farthest);
         key.y = pt_bits(z);
     }
     keys[at] = key;

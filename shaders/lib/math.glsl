@@ -170,8 +170,8 @@ float pt_level_distance(view_args view, float deff, float inverse, float z)
 }
 
 // z at ray p of the plane with normal n through the point at (ray q, z_q), not nearer than z_q, not farther than
-// z_q + limit. SPEC 2.2, refined filling.
-float pt_plane_depth(view_args view, vec3 n, vec2 ray_q, float z_q, vec2 ray_p, float limit)
+// z_q + limit, nor than `farthest`. SPEC 2.2, refined filling.
+float pt_plane_depth(view_args view, vec3 n, vec2 ray_q, float z_q, vec2 ray_p, float limit, float farthest)
 {
     precise float z = z_q;
     if (view.perspective != 0u) {
@@ -190,8 +190,8 @@ float pt_plane_depth(view_args view, vec3 n, vec2 ray_q, float z_q, vec2 ray_p, 
         if (size > 1e-6)
             z = plane;
     }
-    precise float farthest = z_q + limit;
-    return pt_min(pt_max(z, z_q), farthest);
+    precise float next = z_q + limit;
+    return pt_max(pt_min(z, pt_min(next, farthest)), z_q);
 }
 
 // Column and row of a pixel's index in a plane of this width (at most 2^22 rows): integer division costs llvmpipe 20
@@ -208,6 +208,15 @@ uvec2 pt_pixel(uint index, uint width)
         column -= int(width);
     }
     return uvec2(uint(column), row);
+}
+
+// Which cell, of a level whose rows are `width` long, holds a pixel of level 0, whose rows are `from_width` long.
+uint pt_cell_of(uint pixel, uint from_width, uint level, uint width)
+{
+    if (level == 0u)
+        return pixel;
+    uvec2 at = pt_pixel(pixel, from_width) >> level;
+    return at.y * width + at.x;
 }
 
 // Bit i of white: ring neighbour i is white, counted anticlockwise. True when five (four) consecutive ones are.

@@ -31,6 +31,14 @@ float read_deff(uint pixel) { return texelFetch(deff_plane, int(pixel)).x; }
 float read_span(uint pixel) { return uintBitsToFloat(texelFetch(word_plane, int(pixel)).x); } // of kernels that read no words
 vec4 read_float4(uint pixel) { return texelFetch(float4_plane, int(pixel)); }
 
+// How far z of a filled surface goes at most: as far beyond where it was measured as its span reaches along it. Where that cell of
+// the level shows something else by now, as far as z_q.
+float pt_farthest(uint cell, uint source, float z_q)
+{
+    precise float farthest = read_z(cell) + read_span(source) * pt_rcp(read_float4(source).w);
+    return texelFetch(from_plane, int(cell)).x == source ? farthest : z_q;
+}
+
 // Of kernels that visit every pixel, 32 invocations a workgroup: 64 x 4 pixels a workgroup, as in native/device_gl/kernels.c,
 // and eight of a row an invocation, PT_APART from one to the next.
 #define PT_APART 8u

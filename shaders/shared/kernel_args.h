@@ -371,6 +371,7 @@ struct push_args {
     float least; // no layer distance in view is below this
     float least_share; // nor below this share of a pixel's footprint
     uint32_t background; // 1: empty pixels alone
+    uint32_t from_width; // of the planes at level 0
 };
 
 #define PT_FILL_SLACK 0.75f // pixels of the level: a neighbour is reached whatever its spacing

@@ -190,7 +190,7 @@ static void every_ring(struct harness *h)
             if (occluded)
                 picture.keys[centre] = ref_key(9.0f, picture.id_base + (uint32_t)centre);
         }
-        struct fill_args args = {.view = picture.view, .phases = occluded ? PT_FILL_OCCLUDED : PT_FILL_BACKGROUND, .iterations = 1};
+        struct fill_args args = {.view = picture.view, .phases = occluded ? PT_FILL_OCCLUDED : PT_FILL_BACKGROUND, .iterations = 1, .from_width = width};
         struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
         for (int ring = 0; ring < 256; ring++) {
             size_t centre = (size_t)(ring / SIDE * STEP + 2) * width + (size_t)(ring % SIDE * STEP + 2);
@@ -212,7 +212,7 @@ static void disc(struct harness *h)
         if (x * x + y * y > 60 * 60)
             picture.keys[i] = REF_EMPTY_KEY;
     }
-    struct fill_args args = {.view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 6, .unfills = 6};
+    struct fill_args args = {.view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 6, .unfills = 6, .from_width = 141};
     struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
     size_t grown = 0;
     for (size_t i = 0; i < picture.count; i++)

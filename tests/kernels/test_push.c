@@ -18,7 +18,8 @@ static size_t check(struct harness *h, const struct picture *picture, const stru
                              .coarse_width = coarse->view.width,
                              .coarse_height = coarse->view.height,
                              .refined = refined,
-                             .background = background};
+                             .background = background,
+                             .from_width = picture->view.width};
     size_t count = (size_t)fine->view.width * fine->view.height, open = 0, taken = 0;
     size_t coarse_count = (size_t)coarse->view.width * coarse->view.height;
     struct pt_buffer *coarse_keys = harness_buffer(h, coarse->keys, coarse_count * 8);

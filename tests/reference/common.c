@@ -222,13 +222,25 @@ static struct ref_range orthographic_plane(const float n[3], struct ref_ray q, s
     return depth;
 }
 
+size_t ref_cell_of(uint32_t pixel, uint32_t from_width, uint32_t level, uint32_t width)
+{
+    return (size_t)(pixel / from_width >> level) * width + (pixel % from_width >> level);
+}
+
+struct ref_range ref_farthest(struct ref_range measured, double span, double inverse)
+{
+    const double way = span / inverse, error = TOL_LEVEL * way;
+    return (struct ref_range){(measured.lo + way - error) * (1.0 - TOL_SUM), (measured.hi + way + error) * (1.0 + TOL_SUM)};
+}
+
 struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q,
-                                 struct ref_range z, struct ref_ray p, struct ref_range limit)
+                                 struct ref_range z, struct ref_ray p, struct ref_range limit, struct ref_range farthest)
 {
     int open = 0;
     struct ref_range depth = view->perspective ? perspective_plane(normal, q, z, p, &open)
                                                : orthographic_plane(normal, q, z, p, &open);
-    double far_lo = (z.lo + limit.lo) * (1.0 - TOL_SUM), far_hi = (z.hi + limit.hi) * (1.0 + TOL_SUM);
+    double far_lo = fmin((z.lo + limit.lo) * (1.0 - TOL_SUM), farthest.lo);
+    double far_hi = fmax(fmin((z.hi + limit.hi) * (1.0 + TOL_SUM), farthest.hi), z.hi);
     if (open) {
         struct ref_range any = {z.lo, far_hi};
         return any;

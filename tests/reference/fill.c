@@ -76,16 +76,29 @@ static enum ref_truth has_white_run(const struct fill_args *args, const struct r
     return found;
 }
 
+// How far a neighbour's surface goes at most: known while the cell that it was measured in shows it.
+static struct ref_range farthest_of(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel *source)
+{
+    const struct view_args *view = &phase->args->view;
+    const struct ref_pixel *cell = &pixels[ref_cell_of(source->from, phase->args->from_width, view->level, view->width)];
+    if (cell->unsure)
+        return (struct ref_range){source->z.lo, INFINITY};
+    if (cell->from != source->from)
+        return source->z;
+    return ref_farthest(cell->z, phase->span[source->from], phase->normal[4 * (size_t)source->from + 3]);
+}
+
 // The neighbour's surface as this pixel would see it.
-static struct ref_range taken_depth(const struct phase *phase, const struct ref_pixel *source, int qx, int qy, int x,
-                                    int y)
+static struct ref_range taken_depth(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel *source, int qx,
+                                    int qy, int x, int y)
 {
     const struct view_args *view = &phase->args->view;
     if (!phase->args->refined)
         return source->z;
     return ref_plane_depth(view, phase->normal + 4 * (size_t)source->from, ref_ray(view, qx, qy), source->z,
                            ref_ray(view, x, y),
-                           ref_level_distance(view, phase->normal, phase->span, source->from, source->z));
+                           ref_level_distance(view, phase->normal, phase->span, source->from, source->z),
+                           farthest_of(phase, pixels, source));
 }
 
 // Whether the neighbour's surface reaches the pixel: its own pixel lies near enough.
@@ -134,7 +147,8 @@ static enum ref_truth leave_reaching(const struct phase *phase, const struct ref
 
 // Takes the least key among the neighbours. Neighbours that share it to the last bit show the same point, but as seen
 // from different pixels: the first of the ring is taken, anticlockwise from the right.
-static struct ref_pixel take_least(const struct phase *phase, const struct ref_pixel ring[8], int x, int y)
+static struct ref_pixel take_least(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel ring[8], int x,
+                                   int y)
 {
     struct ref_pixel least = ref_pixel(REF_EMPTY_KEY, 0);
     double bound = INFINITY;
@@ -154,7 +168,7 @@ static struct ref_pixel take_least(const struct phase *phase, const struct ref_p
     for (int i = 0; i < 8; i++) {
         if (is_empty(&ring[i]) || ring[i].z.lo > bound)
             continue;
-        struct ref_range z = taken_depth(phase, &ring[i], x + ring_x[i], y + ring_y[i], x, y);
+        struct ref_range z = taken_depth(phase, pixels, &ring[i], x + ring_x[i], y + ring_y[i], x, y);
         if (!chosen || (certain && ring[i].id < least.id)) {
             least = ring[i];
             least.z = z;
@@ -200,7 +214,7 @@ static struct ref_pixel fill_pixel(const struct phase *phase, const struct ref_p
         if (some != REF_YES)
             return pixel;
     }
-    return take_least(phase, ring, x, y);
+    return take_least(phase, pixels, ring, x, y);
 }
 
 static int fill_all(const struct phase *phase, const struct ref_pixel *before, struct ref_pixel *after)

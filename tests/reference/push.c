@@ -78,8 +78,12 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
         struct view_args above = *view;
         above.level++;
         struct ref_range limit = ref_level_distance(&above, planes->normal, planes->span, taken.from, taken.z);
+        const size_t cell = ref_cell_of(taken.from, args->from_width, above.level, args->coarse_width);
+        const struct ref_range measured = ref_exactly(ref_key_z(coarse_keys[cell]));
+        const struct ref_range farthest = coarse_from[cell] != taken.from
+            ? taken.z : ref_farthest(measured, planes->span[taken.from], planes->normal[4 * (size_t)taken.from + 3]);
         taken.z = ref_plane_depth(view, planes->normal + 4 * (size_t)taken.from, ref_ray(&above, px, py), taken.z,
-                                  ref_ray(view, x, y), limit);
+                                  ref_ray(view, x, y), limit, farthest);
     }
     return taken;
 }

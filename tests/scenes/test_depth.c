@@ -103,9 +103,60 @@ static void test_parity_and_regions(void **state)
     }
 }
 
+// How far the picture's surface leaves the box of the points, in spacings.
+static double leaves(const patina_cloud_info *info, const patina_camera *camera, const struct picture *picture)
+{
+    double most = 0.0;
+    for (uint32_t y = 0; y < picture->height; y++)
+        for (uint32_t x = 0; x < picture->width; x++) {
+            const double z = (double)picture->depth[y * picture->width + x];
+            double origin[3], direction[3];
+            if (isinf(z))
+                continue;
+            camera_ray(camera, picture->width, picture->height, x + 0.5, y + 0.5, origin, direction);
+            for (int k = 0; k < 3; k++) {
+                const double place = origin[k] + z * direction[k];
+                most = fmax(most, fmax(info->box_min[k] - place, place - info->box_max[k]));
+            }
+        }
+    return most / info->spacing_max;
+}
+
+// What is filled lies where points are: at its rim a closed surface goes at most two spacings deeper than where it was measured, and
+// half of one aside. (It was up to 83 spacings.)
+static void test_within_the_cloud(void **state)
+{
+    (void)state;
+    static const uint64_t counts[] = {300, 1000, 4000, 20000};
+    static const double eye[3] = {0.3, -3.0, 1.3}, target[3] = {0, 0, 0};
+    patina_device *device = support_device_first();
+    for (int kind = 0; kind < 16; kind++) {
+        const uint64_t count = counts[kind / 4];
+        struct points points = kind & 1 ? points_torus(count, 1.0, 0.4, POINTS_NORMALS, 3) : points_sphere(count, 1.0, POINTS_NORMALS, 3);
+        patina_cloud_style style = {.struct_size = sizeof style};
+        patina_cloud_info info = {.struct_size = sizeof info};
+        struct stage stage = {.cloud = points_upload(&points), .settings = settings_default(SIZE, SIZE)};
+        if (kind & 2)
+            assert_int_equal(patina_cloud_analyse(stage.cloud, NULL, NULL), PATINA_OK);
+        stage.scene = scene_of(stage.cloud, &style);
+        stage.camera = camera_perspective(eye, target, 45.0, SIZE, SIZE, 0.01, 1000.0);
+        assert_int_equal(patina_cloud_get_info(stage.cloud, &info), PATINA_OK);
+        struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        const double most = leaves(&info, &stage.camera, &picture);
+        print_message("  %s of %llu points%s: %.2f spacings beyond the cloud\n", kind & 1 ? "torus" : "sphere",
+                      (unsigned long long)count, kind & 2 ? ", analysed" : "", most);
+        assert_true(most <= 2.5);
+        picture_free(&picture);
+        points_free(&points);
+        stage_free(&stage);
+    }
+    patina_device_destroy(device);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bias), cmocka_unit_test(test_parity_and_regions)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bias), cmocka_unit_test(test_parity_and_regions),
+                                       cmocka_unit_test(test_within_the_cloud)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

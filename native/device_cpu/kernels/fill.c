@@ -64,7 +64,9 @@ static void refine(const struct fill *fill, size_t at, size_t end)
     vf_gather4(fill->normals, source, lanes, n);
     vf_ray_of(view, vi_load(e->x + at), vi_load(e->y + at), ray_p);
     vf_ray_of(view, vi_load(e->qx + at), vi_load(e->qy + at), ray_q);
-    z = vf_plane_depth(view, n, ray_q, z, ray_p, vf_level_distance(view, vf_gather(fill->span, source, lanes), n[3], z));
+    const vf span = vf_gather(fill->span, source, lanes), limit = vf_level_distance(view, span, n[3], z);
+    const vi cell = vi_cell_of(source, fill->args->from_width, view->level, view->width);
+    z = vf_plane_depth(view, n, ray_q, z, ray_p, limit, vf_farthest(fill->keys, fill->from, cell, source, lanes, z, span, n[3]));
     vi_store_keys(e->key + at, vf_bits(z), vi_load_id(e->key + at), vm_bits(lanes));
 }
 

@@ -68,7 +68,7 @@ static uint32_t twice(uint32_t bits)
 struct parents { // PT_LANES coarse cells from (x, y) on, and their surfaces
     uint32_t x, y;
     vi id, source;
-    vf z, n[3], ray[2], limit;
+    vf z, n[3], ray[2], limit, farthest;
     vf dot, across[2]; // n . ray; n[0] times the ray's x of the pixels of either column
     uint32_t give;     // cells whose surface is not dense at the fine level
 };
@@ -101,6 +101,12 @@ static void load_parents(const struct push *push, uint32_t x, uint32_t y, vf z, 
         p->n[k] = normal[k];
     vf_ray(&push->coarse, x, y, p->ray);
     p->limit = vf_max(distance, vf_footprint(&push->coarse, z) * inverse);
+    p->farthest = z;
+    if (push->args->refined && p->give) {
+        const vi cell = vi_cell_of(p->source, push->args->from_width, push->coarse.level, push->args->coarse_width);
+        p->farthest = vf_farthest(pt_cpu_data(push->call, 0), pt_cpu_data(push->call, 1), cell, p->source, vm_of_bits(p->give), z,
+                                  distance, inverse);
+    }
     p->dot = (normal[0] * p->ray[0] + normal[1] * p->ray[1]) - normal[2];
     for (uint32_t column = 0; column < 2; column++) {
         pixel_ray(push, p, column, 0, ray);
@@ -116,9 +122,9 @@ static inline vi pixel_z(const struct push *push, const struct parents *p, uint3
     vf ray[2];
     pixel_ray(push, p, column, y, ray);
     if (!push->args->view.perspective)
-        return vf_bits(vf_plane_depth(&push->args->view, p->n, p->ray, p->z, ray, p->limit));
+        return vf_bits(vf_plane_depth(&push->args->view, p->n, p->ray, p->z, ray, p->limit, p->farthest));
     const vf z = vf_meet(p->z, p->dot, (p->across[column] + p->n[1] * ray[1]) - p->n[2]); // as vf_plane_depth does
-    return vf_bits(vf_min(vf_max(z, p->z), p->z + p->limit));
+    return vf_bits(vf_max(vf_min(z, vf_min(p->z + p->limit, p->farthest)), p->z));
 }
 
 // 4. The pixels of row y that `bits` names, PT_LANES in each half, take their parents' keys.
