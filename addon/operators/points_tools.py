@@ -154,6 +154,7 @@ both intersect"""
             start = (event.mouse_prev_press_x - context.region.x, event.mouse_prev_press_y - context.region.y) \
                 if event.value == 'CLICK_DRAG' else self._place
             self._corners = [start]
+        self._take_tool(context)
         context.window.cursor_modal_set('CROSSHAIR')
         context.workspace.status_text_set("Drag around points. Shift: extend, Ctrl: subtract, both: intersect, X: through "
                                           "what is before them, Esc: end")
@@ -162,6 +163,12 @@ both intersect"""
         context.window_manager.modal_handler_add(self)
         context.area.tag_redraw()
         return {'RUNNING_MODAL'}
+
+    def _take_tool(self, context: Context) -> None:
+        """H and X mean the selected points with the tools of points alone: whoever begins with a button has such a tool then, too."""
+        tool = context.workspace.tools.from_space_view3d_mode(context.mode)
+        if tool and tool.idname not in {PatinaSelectBox.bl_idname, PatinaSelectLasso.bl_idname}:
+            bpy.ops.wm.tool_set_by_id(name=(PatinaSelectLasso if self.shape == 'LASSO' else PatinaSelectBox).bl_idname)
 
     def _at(self, context: Context, event: Event) -> tuple[float, float]:
         return (float(event.mouse_x - context.region.x), float(event.mouse_y - context.region.y))

@@ -10,9 +10,7 @@ import bpy
 from bpy.types import Context, Object, Operator, Scene
 from mathutils import Vector
 
-from .. import importers, jobs, native
 from ..engine import PatinaRenderEngine
-from ..sync import attributes, clouds, linked
 
 START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender begins with
 LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a cube beside it 1.5
@@ -34,24 +32,9 @@ def _as_it_came(obj: Object) -> bool:
 
 
 def unlit(scene: Scene, points: Sequence[Object]) -> bool:
-    """Whether points without colours, which lights shade, get light of none."""
-    dark = [obj for obj in points if not (_linked_colored(obj, scene) if obj.patina.linked_file else _colored(obj))]
-    return bool(dark) and not scene.patina.studio.use_light and not any(_reaches(lamp, obj) for obj in dark for lamp in scene.objects
-                                                                       if lamp.type == 'LIGHT' and not lamp.hide_render)
-
-
-def _colored(obj: Object) -> bool:
-    return any(name in obj.data.attributes for name in attributes.COLOR_NAMES) or bool(
-        getattr(obj.data, "color_attributes", None) and obj.data.color_attributes.active_color)
-
-
-def _linked_colored(obj: Object, scene: Scene) -> bool:
-    """A file that cannot be read needs no light."""
-    source = linked.source_of(obj, scene.frame_current, [])
-    try:
-        return source is None or jobs.finish(clouds.CACHE.obtain_linked(source, importers.Progress())).has_colors
-    except (native.PatinaError, OSError):
-        return True
+    """Whether some of the points get light of none. Those with colours of their own too: a ramp over heights or classes is lit."""
+    lamps = [lamp for lamp in scene.objects if lamp.type == 'LIGHT' and not lamp.hide_render]
+    return not scene.patina.studio.use_light and not all(any(_reaches(lamp, obj) for lamp in lamps) for obj in points)
 
 
 def _reaches(lamp: Object, obj: Object) -> bool:
@@ -63,8 +46,8 @@ def _reaches(lamp: Object, obj: Object) -> bool:
 
 
 class PATINA_OT_set_up(Operator):
-    """Render with Patina: leaves out the start scene's cube, aims the camera at the points and looks through it, and where they have no colors and \
-no light reaches them, turns on the headlight"""
+    """Render with Patina: leaves out the start scene's cube, aims the camera at the points and looks through it, and where no light \
+reaches them, turns on the headlight"""
 
     bl_idname = "scene.patina_set_up"
     bl_label = "Set Up for Points"

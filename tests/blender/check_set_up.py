@@ -45,11 +45,6 @@ def test_set_up_lights_linked_scans():
     scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
     picture = render()["Combined"][..., :3].max(axis=2)
     check((picture > 0.2).mean() > 0.1, f"{(picture > 0.2).mean():.0%} of the picture is bright")
-    scene = start_scene()
-    obj, = import_ply(write_ply("linked_colored.ply", columns((500, 500, 0))), link=True)
-    check(not set_up.unlit(scene, [obj]), "colours need no light")
-    (SCRATCH / "linked_colored.ply").unlink()
-    check(not set_up.unlit(scene, [obj]), "a missing file needs none")
 
 
 def test_set_up_leaves_what_is_lit():
@@ -58,9 +53,24 @@ def test_set_up_leaves_what_is_lit():
     check(not set_up.unlit(scene, [obj]), "the start scene's lamp lights a small thing")
     bpy.ops.scene.patina_set_up()
     check(not scene.patina.studio.use_headlight, "a headlight that nobody needs")
+
+
+def test_ramps_of_coloured_surveys_are_lit():
+    """Colours of their own are shown without light; colours by height are not, and were nearly black."""
     scene = start_scene()
-    obj, = import_ply(write_ply("colored.ply", columns((500, 500, 0))))
-    check(not set_up.unlit(scene, [obj]), "colours need no light")
+    points, _, _ = sphere(20000, 100.0, (0, 0, 0))
+    rows = [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")]
+    obj, = import_ply(write_ply("colored_survey.ply", rows + [(name, "u1", np.full(len(points), 180)) for name in ("red", "green", "blue")]))
+    check(set_up.unlit(scene, [obj]), "a lamp of a kilowatt does not reach")
+    check(bpy.ops.scene.patina_set_up() == {'FINISHED'} and scene.patina.studio.use_headlight, "no headlight")
+    scene.render.resolution_x, scene.render.resolution_y, scene.patina.device = 160, 90, 'CPU'
+    own = render()["Combined"][..., :3]
+    shown = own.max(axis=2) > 0.2
+    # 180 of sRGB, whatever the light; the rest is the world and outlines
+    check(shown.mean() > 0.1 and abs(np.median(own[shown]) - 0.456) < 0.01, f"{shown.mean():.0%} show {np.median(own[shown]):.3f}")
+    obj.patina.color_source = 'HEIGHT'
+    ramp = render()["Combined"][..., :3].max(axis=2)
+    check((ramp[shown] > 0.1).mean() > 0.8, f"{(ramp[shown] > 0.1).mean():.0%} of the points are bright")
 
 
 def test_set_up_is_not_offered_twice():

@@ -142,7 +142,10 @@ def test_tools_and_esc():
     if bpy.app.use_event_simulate:
         window, sidebar = bpy.context.window_manager.windows[0], next(region for region in area().regions if region.type == 'UI')
         with bpy.context.temp_override(window=window, screen=window.screen, area=area(), region=sidebar):
+            bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
             check(bpy.ops.object.patina_points_select('INVOKE_REGION_WIN', shape='BOX') == {'RUNNING_MODAL'}, "a button of the sidebar")
+            tool = bpy.context.workspace.tools.from_space_view3d_mode('OBJECT').idname
+            check(tool == "patina.points_box", f"{tool}: H would hide the object")
     if bpy.app.use_event_simulate:
         window, region = bpy.context.window_manager.windows[0], window_region()
         x, y = region.x + 100, region.y + 100
