@@ -161,6 +161,11 @@ def parse(text: str) -> Listing:
             raise ValueError(f"kernels.def:{number}: {error}") from error
     for kernel in listing.kernels + listing.programs:
         _number(kernel)
+        if kernel.domain == "tiles" and not any(b.unit == list(listing.units).index("key") for b in kernel.buffers):
+            raise ValueError(f"{kernel.name} visits tiles, and reads no keys as a texture that tell which")
+        chunks = [i for i, b in enumerate(kernel.buffers) if b.formats == ["chunk"]]
+        if chunks and "position" not in kernel.buffers[chunks[0] + 1].formats:
+            raise ValueError(f"{kernel.name}: positions follow chunks")
     return listing
 
 

@@ -122,7 +122,7 @@ int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what);
 // The kernel's buffers, but for those that repeat and for parts.
 int pt_gl_bind_buffers(struct pt_gl_device *d, const struct pt_gl_work *work);
-// Of the list's rows from `first` on those `count` that are no parts: buffers[0] is that of the first.
+// Of the list's rows from `first` on those `count` that are no parts. buffers: from that of the first on.
 int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t count,
                     struct pt_buffer *const *buffers);
 // Bytes a slot of what is bound in parts, since clouds are larger than blocks and textures; 0: it is bound whole.

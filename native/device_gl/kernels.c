@@ -251,6 +251,16 @@ void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size)
     d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
 }
 
+// The keys that tell which tiles a kernel visits: those that it reads as a texture.
+static const struct pt_buffer *keys_of(const struct pt_gl_work *work)
+{
+    const struct pt_buffer_row *rows = pt_kernels[work->kernel].buffers;
+    uint32_t i = 0;
+    while (rows[i].unit != 1 + PT_UNIT_key)
+        i++;
+    return work->buffers[i];
+}
+
 int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     const struct view_args *view = work->arguments; // every argument struct but that of sift begins with its view
@@ -265,7 +275,7 @@ int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work)
     forget_tiles(d, work);
     if (domain == PT_DOMAIN_tiles) {
         const struct view_args tiles = work->kernel == PT_KERNEL_push ? pt_gl_coarse_view(work->arguments) : *view;
-        result = pt_gl_tiles(d, work->buffers[0], &tiles);
+        result = pt_gl_tiles(d, keys_of(work), &tiles);
     }
     if (result == PATINA_OK)
         result = pt_gl_bind_buffers(d, work);

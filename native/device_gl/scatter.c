@@ -38,8 +38,10 @@ static struct instance_buffers instance_of(const struct pt_gl_work *work, uint32
                                      .count = row->fixed + row->each - chunks};
 }
 
-static const struct pt_buffer *chunks_of(const struct instance_buffers *b) { return b->buffers[0]; }
-static uint64_t slots_of(const struct instance_buffers *b) { return b->buffers[1]->size / 12; }
+enum { CHUNKS, POSITIONS }; // of an instance's buffers
+
+static const struct pt_buffer *chunks_of(const struct instance_buffers *b) { return b->buffers[CHUNKS]; }
+static uint64_t slots_of(const struct instance_buffers *b) { return b->buffers[POSITIONS]->size / 12; }
 
 static int bind_batch(struct pt_gl_device *d, const struct instance_buffers *b, const struct batch *batch)
 {

@@ -91,7 +91,7 @@ static uint32_t clips_in_view(struct pt_builder *builder, const struct pt_instan
     struct pt_inverse_clip *room = pt_arena_take(&plan->arena, (builder->scene->clip_count + 1) * sizeof *room);
     struct clip_view *out = more_clips(plan, builder->scene->clip_count + 1);
     if (!room || !out) {
-        builder->failed = 1;
+        builder->failed = PATINA_ERROR_MEMORY;
         return 0;
     }
     struct pt_sieve sieve = pt_sieve_make(builder->scene, instance, room);

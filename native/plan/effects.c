@@ -301,8 +301,8 @@ uint32_t pt_effects_reach(const struct patina_scene *scene)
     if (effects->edl_strength > 0.0f)
         reach += (uint32_t)lround((double)effects->edl_radius);
     if (effects->obscurance_strength > 0.0f)
-        reach += (uint32_t)PT_OBSCURE_MOST + PT_OBSCURE_BLUR;
+        reach += PT_REACH_obscure;
     if (focuses(scene))
-        reach += PT_FOCUS_MOST;
+        reach += PT_REACH_focus;
     return reach;
 }

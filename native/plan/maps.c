@@ -144,7 +144,7 @@ static int add_tests(struct tests *tests, int close)
             error = add_lit(tests, PT_PIXELS, &instance, (struct pt_ref){ PT_OF_PICTURE, PT_PLANE_MESH_PLACES, 0 },
                             (struct pt_ref){ PT_OF_PICTURE, PT_PLANE_MESH_WORDS, 0 });
     }
-    return error ? error : tests->builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+    return error ? error : tests->builder.failed;
 }
 
 static struct tests begin_tests(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
@@ -225,7 +225,7 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
         tests.builder.step_room = builder.step_room;
         error = plan_tests(&tests, group, window);
         pt_add_passes_step(&tests.builder, PT_STEP_PASSES);
-        error = error ? error : tests.builder.failed || builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+        error = error ? error : tests.builder.failed ? tests.builder.failed : builder.failed;
     }
     pt_handle_destroy(&view.handle);
     if (error)
@@ -249,7 +249,7 @@ int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *pictur
     tests.planes[2] = (struct pt_ref){ PT_OF_LEFT, PT_PLANE_DEFF, 0 };
     int error = add_tests(&tests, 1);
     pt_add_passes_step(&tests.builder, PT_STEP_PASSES);
-    error = error ? error : tests.builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+    error = error ? error : tests.builder.failed;
     if (error)
         pt_plan_destroy(map);
     return error;

@@ -10,7 +10,7 @@ static void *copy(struct pt_builder *builder, const void *source, size_t size)
     if (memory)
         memcpy(memory, source, size);
     else
-        builder->failed = 1;
+        builder->failed = PATINA_ERROR_MEMORY;
     return memory;
 }
 
@@ -22,7 +22,7 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
         uint32_t room = builder->room ? 2 * builder->room : 32;
         struct pt_pass *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
         if (!grown) {
-            builder->failed = 1;
+            builder->failed = PATINA_ERROR_MEMORY;
             return &builder->nowhere;
         }
         if (plan->pass_count)
@@ -30,6 +30,8 @@ struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const 
         plan->passes = grown;
         builder->room = room;
     }
+    const int wrong = pt_check_bindings(kernel, arguments, refs, ref_count);
+    builder->failed = wrong ? wrong : builder->failed;
     struct pt_pass *pass = &plan->passes[plan->pass_count++];
     *pass = (struct pt_pass){.kernel = kernel,
                              .layer = builder->layer,

@@ -18,7 +18,7 @@ struct pt_builder {
     const char *as;  // what statistics add its passes to; NULL: their kernels' names
     uint32_t listed; // passes that steps name already
     uint32_t step_room;
-    int failed;      // memory lacked: the plan fails as a whole
+    int failed;      // PATINA_ERROR_*: memory lacked, or a pass binds what its kernel does not list: the plan fails as a whole
     struct pt_pass nowhere; // written to then
     struct pt_step no_step;
 };
@@ -91,7 +91,11 @@ static inline const float *pt_background(const patina_settings *settings)
 
 // ---- passes ------------------------------------------------------------------------------------------------------------
 
-// Adds a pass for the layer at hand; arguments and refs are copied into the plan. Never NULL.
+// bindings.c: whether refs are what the kernel lists. PATINA_OK, or PATINA_ERROR_INTERNAL with a message at the thread.
+int pt_check_bindings(enum pt_kernel kernel, const void *arguments, const struct pt_ref *refs, uint32_t count);
+
+// Adds a pass for the layer at hand; arguments and refs are copied into the plan. Never NULL. Refs that the kernel does not list
+// fail the plan.
 struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const char *name, const void *arguments,
                        size_t argument_size, const struct pt_ref *refs, uint32_t ref_count);
 

@@ -12,7 +12,7 @@
 // Radius of the window for image-space normals: two spacings, at least 3 pixels so that a point's place within its pixel
 // averages out, at most 16 (beyond, points are too far apart on screen for a surface to be seen anyway). Pixels take less of it
 // where points lie nearer together, PT_ESTIMATE_LEAST at least.
-enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = 16, BLEND_MOST = 8 };
+enum { ESTIMATE_LEAST = 3, ESTIMATE_MOST = PT_REACH_normals, BLEND_MOST = PT_REACH_shade - 1 };
 // Of each filling filter in a light's map, at most: more widen steep surfaces (tests/scenes/test_shadow: 0.20% in place of
 // 0.18% wrong), one leaves holes that light leaks through.
 enum { MAP_ITERATIONS = 2 };
@@ -27,7 +27,7 @@ static void plan_scatter(struct pt_builder *builder)
     uint64_t points = 0, chunks = 0;
     uint32_t count = 0;
     if (!refs) {
-        builder->failed = 1;
+        builder->failed = PATINA_ERROR_MEMORY;
         return;
     }
     refs[count++] = pt_keys_of(builder, 0);
@@ -453,12 +453,27 @@ static void plan_center(struct pt_builder *builder, uint32_t i)
               "depth of instance %u's surface in the middle of each pixel", i);
 }
 
-static const char *const of_points[] = {"sift", "scatter", "splat", "normals", "surface", "center", "blend", "pull", "fill", "push", "reopen"};
-
-static void skip_all(struct pt_builder *builder, const char *reason, const char *const *names, size_t count)
+static int is_of_points(enum pt_stage stage)
 {
-    for (size_t i = 0; i < count; i++)
-        pt_skip(builder, names[i], reason);
+    return stage == PT_STAGE_points || stage == PT_STAGE_surface || stage == PT_STAGE_filling;
+}
+
+static int is_planned(const struct pt_plan *plan, enum pt_kernel kernel)
+{
+    int known = 0;
+    for (uint32_t i = 0; i < plan->pass_count; i++)
+        known |= plan->passes[i].kernel == kernel;
+    for (uint32_t i = 0; i < plan->skipped_count; i++)
+        known |= !strcmp(plan->skipped[i].name, pt_kernels[kernel].name);
+    return known;
+}
+
+// What nothing was said of yet: all of it, or what makes surfaces of points.
+static void skip_rest(struct pt_builder *builder, const char *reason, int of_points)
+{
+    for (int k = 0; k < PT_KERNEL_COUNT; k++)
+        if ((!of_points || is_of_points(pt_kernels[k].stage)) && !is_planned(builder->plan, (enum pt_kernel)k))
+            pt_skip(builder, pt_kernels[k].name, reason);
 }
 
 // Points and discs, with their surfaces.
@@ -504,7 +519,7 @@ static void plan_measured(struct pt_builder *builder)
 static void plan_surfaces(struct pt_builder *builder)
 {
     if (!builder->plan->points_scattered) {
-        skip_all(builder, "no cloud is in view", of_points, sizeof of_points / sizeof *of_points);
+        skip_rest(builder, "no cloud is in view", 1);
         return;
     }
     pt_plan_sift(builder);
@@ -672,17 +687,13 @@ static void plan_points(struct pt_builder *builder)
 
 static void plan_nothing(struct pt_builder *builder, const char *reason)
 {
-    static const char *const others[] = {"raster", "cover",  "paint", "locate", "mark",  "lit", "limit", "shade", "obscure", "edl",
-                                         "tint",   "toon",   "smooth", "hatch", "fog", "antialias", "peel", "average",
-                                         "lines",  "ink",    "assess"};
     builder->plan->light_count = 0;
     builder->plan->line_radius = 0.0f;
-    skip_all(builder, reason, of_points, sizeof of_points / sizeof *of_points);
-    skip_all(builder, reason, others, sizeof others / sizeof *others);
     pt_plan_clears(builder, 1);
     plan_output(builder, PT_PLANE_COLOR_A);
     pt_plan_paper(builder);
     put_together(builder);
+    skip_rest(builder, reason, 0);
     pt_add_passes_step(builder, PT_STEP_PASSES);
 }
 
@@ -697,7 +708,7 @@ int pt_plan_depth(struct pt_builder *builder)
         return error;
     plan_surfaces(builder);
     pt_plan_meshes(builder, 0);
-    return builder->failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+    return builder->failed;
 }
 
 int pt_plan_textures(const struct patina_scene *scene, struct pt_plan *plan)
@@ -708,7 +719,7 @@ int pt_plan_textures(const struct patina_scene *scene, struct pt_plan *plan)
     pt_plan_light_steps(&builder);
     if (builder.failed)
         pt_plan_destroy(plan);
-    return builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+    return builder.failed;
 }
 
 int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
@@ -728,10 +739,12 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
                                    : !scene->instance_count ? "the scene has no cloud"
                                    : !plan->chunks          ? "the clouds have no points"
                                                             : "no cloud is in view");
-        error = builder.failed ? PATINA_ERROR_MEMORY : PATINA_OK;
+        error = builder.failed;
     }
     if (error == PATINA_ERROR_MEMORY)
         pt_fail(&scene->handle, error, "planning the frame: out of memory");
+    if (error == PATINA_ERROR_INTERNAL)
+        pt_fail_again(&scene->handle, error);
     if (error)
         pt_plan_destroy(plan);
     return error;

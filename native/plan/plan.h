@@ -12,61 +12,81 @@
 enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 
 // Layers behind the first have keys, from and shading of their own: the passes of the picture show the first. Coarser levels
-// serve one layer after another.
-// X(name, bytes a pixel, has coarse levels)
-#define PT_PLANES(X)        \
-    X(KEYS, 8, 1)           \
-    X(FROM, 4, 1)           \
-    X(NORMAL, 16, 0)        \
-    X(DEFF, 4, 0)           \
-    X(SPAN, 4, 0)           \
-    X(SHADING, 16, 0)       \
-    X(ARRIVED, 4, 0)        \
-    X(ALBEDO, 16, 0)        \
-    X(AWAY, 4, 0)           \
-    X(OFFSET, 4, 0)         \
-    X(OBSCURED, 4, 0)       \
-    X(UNLIT, 16, 0)         \
-    X(COLOR_A, 16, 0)       \
-    X(COLOR_B, 16, 0)       \
-    X(KEYS_BEHIND, 8, 0)    \
-    X(FROM_BEHIND, 4, 0)    \
-    X(SHADING_BEHIND, 16, 0) \
-    X(LIMIT, 4, 0)          \
-    X(THROUGH, 4, 0)        \
-    X(OVER, 16, 0)          \
-    X(TILES, 8, 1)          \
-    X(MESH_KEYS, 8, 0)      \
-    X(MESH_SHOWN, 8, 0)     \
-    X(MESH_NORMAL, 16, 0)   \
-    X(MESH_ALBEDO, 16, 0)   \
-    X(MESH_PLACES, 12, 0)   \
-    X(MESH_WORDS, 4, 0)     \
-    X(LINE, 4, 0)           \
-    X(NEAREST, 4, 0)        \
-    X(LINE_BEHIND, 4, 0)    \
-    X(NEAREST_BEHIND, 4, 0) \
-    X(KEYS_KEPT, 8, 0)      \
-    X(COMBINED, 16, 0)      \
-    X(DEPTH, 4, 0)          \
-    X(NORMALS, 12, 0)       \
-    X(SOURCE, 4, 0)         \
-    X(SHADOW, 4, 0)         \
-    X(LINES, 4, 0)          \
-    X(CERTAINTY, 4, 0)      \
-    X(THICKNESS, 4, 0)      \
-    X(LAYER_COMBINED, 16, 0) \
-    X(LAYER_DEPTH, 4, 0)    \
-    X(LAYER_NORMALS, 12, 0)
+// serve one layer after another. What a plane holds says kernels.def. No order here means anything.
+// X(name, format, size, slots, carried)
+//   size: WINDOW: the view's; CROP: the picture that callers read; TILES: of 16 x 16 pixels of the window
+//   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
+//   carried: from layer to layer
+#define PT_PLANES(X)                                  \
+    X(KEYS,             key,   WINDOW, LEVELS, 0)     \
+    X(FROM,             u32,   WINDOW, LEVELS, 0)     \
+    X(NORMAL,           f32x4, WINDOW, ONE,    0)     \
+    X(DEFF,             f32,   WINDOW, ONE,    0)     \
+    X(SPAN,             f32,   WINDOW, ONE,    0)     \
+    X(SHADING,          f32x4, WINDOW, ONE,    0)     \
+    X(ARRIVED,          f32,   WINDOW, ONE,    0)     \
+    X(ALBEDO,           f32x4, WINDOW, ONE,    0)     \
+    X(AWAY,             f32,   WINDOW, ONE,    0)     \
+    X(OFFSET,           f32,   WINDOW, ONE,    0)     \
+    X(OBSCURED,         f32,   WINDOW, ONE,    0)     \
+    X(UNLIT,            f32x4, WINDOW, ONE,    0)     \
+    X(COLOR_A,          f32x4, WINDOW, ONE,    0)     \
+    X(COLOR_B,          f32x4, WINDOW, ONE,    0)     \
+    X(KEYS_BEHIND,      key,   WINDOW, ONE,    0)     \
+    X(FROM_BEHIND,      u32,   WINDOW, ONE,    0)     \
+    X(SHADING_BEHIND,   f32x4, WINDOW, ONE,    0)     \
+    X(LIMIT,            f32,   WINDOW, ONE,    1)     \
+    X(THROUGH,          f32,   WINDOW, ONE,    1)     \
+    X(OVER,             f32x4, WINDOW, ONE,    1)     \
+    X(TILES,            tile,  TILES,  ONE,    1)     \
+    X(MESH_KEYS,        key,   WINDOW, ONE,    0)     \
+    X(MESH_SHOWN,       key,   WINDOW, ONE,    0)     \
+    X(MESH_NORMAL,      f32x4, WINDOW, ONE,    0)     \
+    X(MESH_ALBEDO,      f32x4, WINDOW, ONE,    0)     \
+    X(MESH_PLACES,      f32x3, WINDOW, ONE,    0)     \
+    X(MESH_WORDS,       u32,   WINDOW, ONE,    0)     \
+    X(LINE,             f32,   WINDOW, ONE,    0)     \
+    X(NEAREST,          u32,   WINDOW, ONE,    0)     \
+    X(LINE_BEHIND,      f32,   WINDOW, ONE,    0)     \
+    X(NEAREST_BEHIND,   u32,   WINDOW, ONE,    0)     \
+    X(KEYS_KEPT,        key,   WINDOW, ONE,    0)     \
+    X(COMBINED,         f32x4, CROP,   ONE,    0)     \
+    X(DEPTH,            f32,   CROP,   ONE,    0)     \
+    X(NORMALS,          f32x3, CROP,   ONE,    0)     \
+    X(SOURCE,           f32,   CROP,   ONE,    0)     \
+    X(SHADOW,           f32,   CROP,   ONE,    0)     \
+    X(LINES,            f32,   CROP,   ONE,    0)     \
+    X(CERTAINTY,        f32,   CROP,   ONE,    0)     \
+    X(THICKNESS,        f32,   CROP,   ONE,    0)     \
+    X(LAYER_COMBINED,   f32x4, CROP,   LAYERS, 0)     \
+    X(LAYER_DEPTH,      f32,   CROP,   LAYERS, 0)     \
+    X(LAYER_NORMALS,    f32x3, CROP,   LAYERS, 0)
 
 enum pt_plane {
-#define PT_X(name, bytes, levels) PT_PLANE_##name,
+#define PT_X(name, format, size, slots, carried) PT_PLANE_##name,
     PT_PLANES(PT_X)
 #undef PT_X
         PT_PLANE_COUNT
 };
-// From COMBINED on, planes have the size of the crop; they are the picture that callers read. From LAYER_COMBINED on there is
-// one for each layer. TILES exist at level PT_TILE_LEVEL.
+
+enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_CROP, PT_SIZE_TILES };
+enum pt_plane_slots { PT_SLOTS_ONE, PT_SLOTS_LEVELS, PT_SLOTS_LAYERS };
+
+struct pt_plane_row {
+    const char *name;
+    enum pt_format format;
+    enum pt_plane_size size;
+    enum pt_plane_slots slots;
+    int carried;
+};
+extern const struct pt_plane_row pt_plane_rows[PT_PLANE_COUNT];
+
+static inline uint32_t pt_plane_bytes(enum pt_plane plane) { return pt_format_bytes[pt_plane_rows[plane].format]; }
+// One plane of the picture that callers read, or one for each layer.
+static inline int pt_of_picture(enum pt_plane plane)
+{
+    return pt_plane_rows[plane].size == PT_SIZE_CROP && pt_plane_rows[plane].slots == PT_SLOTS_ONE;
+}
 
 enum { PT_SLOTS = 16 }; // levels or layers that a plane may have
 _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_SLOTS, "planes have too few slots");
@@ -234,9 +254,6 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_
 
 // Whether the picture that readers see has this plane.
 int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane);
-
-extern const uint32_t pt_plane_bytes[PT_PLANE_COUNT]; // a pixel
-extern const char *const pt_plane_names[PT_PLANE_COUNT];
 
 // A line a step or pass, of loops their ends, of each light's maps the first, and a line for each pass that is left out. Finds what the
 // lights' maps are like. Returns the full length.

@@ -58,7 +58,7 @@ static struct reopen_args *arguments_of(struct pt_builder *builder, uint32_t i, 
     *size = sizeof(struct reopen_args) + sights->count * sizeof(struct station_args);
     struct reopen_args *args = pt_arena_take(&builder->plan->arena, *size);
     if (!args) {
-        builder->failed = 1;
+        builder->failed = PATINA_ERROR_MEMORY;
         return NULL;
     }
     struct station_args *stations = (struct station_args *)(args + 1);

@@ -22,7 +22,7 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
     struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 1 + 6 * (size_t)plan->instance_count) * sizeof *refs);
     char *args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args));
     if (!refs || !args) {
-        builder->failed = 1;
+        builder->failed = PATINA_ERROR_MEMORY;
         return;
     }
     struct disc_args *discs = (struct disc_args *)(void *)(args + head);

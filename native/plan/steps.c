@@ -10,7 +10,7 @@ struct pt_step *pt_add_step(struct pt_builder *builder, enum pt_step_of of)
         const uint32_t room = builder->step_room ? 2 * builder->step_room : 16;
         struct pt_step *grown = pt_arena_take(&plan->arena, room * sizeof *grown);
         if (!grown) {
-            builder->failed = 1;
+            builder->failed = PATINA_ERROR_MEMORY;
             return &builder->no_step;
         }
         if (plan->step_count)
@@ -124,7 +124,7 @@ void pt_plan_light_steps(struct pt_builder *builder)
     const size_t most = 2 * (size_t)builder->scene->instance_count + 1;
     if (plan->light_count && !plan->groups) {
         if (!(plan->groups = pt_arena_take(&plan->arena, most * sizeof *plan->groups))) {
-            builder->failed = 1;
+            builder->failed = PATINA_ERROR_MEMORY;
             return;
         }
         plan->group_count = pt_shadow_groups(builder->scene, plan->groups);

@@ -5,24 +5,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-static const uint32_t has_levels[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) levels,
-    PT_PLANES(PT_X)
-#undef PT_X
-};
-
-const char *const pt_plane_names[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) #name,
-    PT_PLANES(PT_X)
-#undef PT_X
-};
-
-const uint32_t pt_plane_bytes[PT_PLANE_COUNT] = {
-#define PT_X(name, bytes, levels) bytes,
-    PT_PLANES(PT_X)
-#undef PT_X
-};
-
 int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane)
 {
     for (uint32_t i = 0; i < plan->pass_count; i++)
@@ -34,12 +16,13 @@ int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane)
 
 void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_t level, uint32_t size[2])
 {
-    if (which >= PT_PLANE_COMBINED) {
+    const struct pt_plane_row *row = &pt_plane_rows[which];
+    if (row->size == PT_SIZE_CROP) {
         size[0] = plan->crop[2];
         size[1] = plan->crop[3];
         return;
     }
-    struct view_args view = pt_view_at(plan, has_levels[which] ? level : 0);
+    struct view_args view = pt_view_at(plan, row->slots == PT_SLOTS_LEVELS || row->size == PT_SIZE_TILES ? level : 0);
     size[0] = view.width;
     size[1] = view.height;
 }
@@ -110,13 +93,13 @@ static void put_step(struct text *text, const struct patina_scene *scene, const 
                      uint32_t depth)
 {
     switch (step->of) {
-    case PT_STEP_CLEAR: put_line(text, depth, "fill %-10s %s", pt_plane_names[step->plane.which], step->reason); break;
+    case PT_STEP_CLEAR: put_line(text, depth, "fill %-10s %s", pt_plane_rows[step->plane.which].name, step->reason); break;
     case PT_STEP_PASSES: put_passes(text, plan, step->first, step->count, depth); break;
     case PT_STEP_MARK:
         put_line(text, depth, "only %s", step->reason);
         put_passes(text, plan, step->first, step->count, depth + 1);
         break;
-    case PT_STEP_COVERED: put_line(text, depth, "read %-10s %s", pt_plane_names[PT_PLANE_TILES], step->reason); break;
+    case PT_STEP_COVERED: put_line(text, depth, "read %-10s %s", pt_plane_rows[PT_PLANE_TILES].name, step->reason); break;
     case PT_STEP_LAYERS: put_loop(text, "layers", step, step->reason, depth); break;
     case PT_STEP_LAYER: put_line(text, depth, "layer %u: %s", step->layer, step->reason); break;
     case PT_STEP_LIGHT:

@@ -19,7 +19,7 @@ enum {
 
 // What readers see, aside while finer pictures are drawn; and the finer picture's, aside while it is read.
 struct aside {
-    struct pt_buffer keys, planes[PT_PLANE_COUNT - PT_PLANE_COMBINED][PT_SLOTS];
+    struct pt_buffer keys, planes[PT_PLANE_COUNT][PT_SLOTS]; // of these those of the crop
     struct pt_shown shown;
     struct pt_layer layers[PATINA_MAX_LAYERS];
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
@@ -54,8 +54,9 @@ static void swap_bytes(void *a, void *b, size_t size)
 static void swap(struct patina_frame *frame, struct aside *aside)
 {
     swap_bytes(&frame->planes.at[PT_PLANE_KEYS][0], &aside->keys, sizeof aside->keys);
-    for (int p = 0; p < PT_PLANE_COUNT - PT_PLANE_COMBINED; p++)
-        swap_bytes(frame->planes.at[PT_PLANE_COMBINED + p], aside->planes[p], sizeof aside->planes[p]);
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        if (pt_plane_rows[p].size == PT_SIZE_CROP)
+            swap_bytes(frame->planes.at[p], aside->planes[p], sizeof aside->planes[p]);
     swap_bytes(&frame->shown, &aside->shown, sizeof aside->shown);
     swap_bytes(frame->layers, aside->layers, sizeof aside->layers);
     swap_bytes(frame->skipped, aside->skipped, sizeof aside->skipped);
@@ -68,7 +69,7 @@ static void swap(struct patina_frame *frame, struct aside *aside)
 static void destroy_aside(struct patina_frame *frame, struct aside *aside)
 {
     frame->device->ops->buffer_destroy(frame->device, &aside->keys);
-    for (int p = 0; p < PT_PLANE_COUNT - PT_PLANE_COMBINED; p++)
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int slot = 0; slot < PT_SLOTS; slot++)
             frame->device->ops->buffer_destroy(frame->device, &aside->planes[p][slot]);
 }

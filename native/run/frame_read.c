@@ -177,24 +177,24 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
         for (int level = 0; level < PT_SLOTS; level++) {
             const struct pt_buffer *plane = &frame->planes.at[p][level];
             char path[4096];
-            if (!plane->size || (sampled && p != PT_PLANE_KEYS && p < PT_PLANE_COMBINED))
+            if (!plane->size || (sampled && p != PT_PLANE_KEYS && pt_plane_rows[p].size != PT_SIZE_CROP))
                 continue;
             void *copy = malloc(plane->size);
             if (!copy)
                 return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "dumping planes: out of memory");
             int error = frame->device->ops->buffer_read(frame->device, plane, 0, copy, plane->size);
-            snprintf(path, sizeof path, "%s/%s_%d.raw", folder, pt_plane_names[p], level);
+            snprintf(path, sizeof path, "%s/%s_%d.raw", folder, pt_plane_rows[p].name, level);
             FILE *file = error ? NULL : fopen(path, "wb");
             size_t written = file ? fwrite(copy, 1, plane->size, file) : 0;
             free(copy);
             if (error || !file || fclose(file) || written != plane->size)
                 return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
-            uint32_t width = p >= PT_PLANE_COMBINED ? frame->shown.crop[2] : (frame->shown.plane_width + (1u << level) - 1) >> level;
-            snprintf(path, sizeof path, "%s/%s_%d.txt", folder, pt_plane_names[p], level);
+            uint32_t width = pt_plane_rows[p].size == PT_SIZE_CROP ? frame->shown.crop[2] : (frame->shown.plane_width + (1u << level) - 1) >> level;
+            snprintf(path, sizeof path, "%s/%s_%d.txt", folder, pt_plane_rows[p].name, level);
             file = fopen(path, "w");
             if (!file || fprintf(file, "%s level %d: %u pixels wide, %zu rows, %u bytes a pixel, row 0 at the bottom\n",
-                                 pt_plane_names[p], level, width, width ? plane->size / pt_plane_bytes[p] / width : 0,
-                                 pt_plane_bytes[p]) < 0 || fclose(file))
+                                 pt_plane_rows[p].name, level, width, width ? plane->size / pt_plane_bytes((enum pt_plane)p) / width : 0,
+                                 pt_plane_bytes((enum pt_plane)p)) < 0 || fclose(file))
                 return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
         }
     return PATINA_OK;

@@ -14,7 +14,7 @@ static size_t size_of(const struct pt_plan *plan, enum pt_plane which, uint32_t 
 {
     uint32_t size[2];
     pt_plan_plane_size(plan, which, level, size);
-    return (size_t)size[0] * size[1] * pt_plane_bytes[which];
+    return (size_t)size[0] * size[1] * pt_plane_bytes(which);
 }
 
 static int check_cap(const struct patina_device *device, const struct pt_plan *plan, uint64_t total)
@@ -80,17 +80,17 @@ int pt_planes_ensure_picture(struct patina_device *device, struct pt_planes *pla
     struct pt_buffer made[PT_PLANE_COUNT] = { 0 };
     uint64_t total = pt_planes_total(planes);
     int error = PATINA_OK;
-    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED && !error; p++) {
+    for (int p = 0; p < PT_PLANE_COUNT && !error; p++) {
         const size_t bytes = size_of(plan, (enum pt_plane)p, 0);
-        if (planes->at[p][0].size == bytes || !pt_plan_writes(plan, (enum pt_plane)p))
+        if (!pt_of_picture((enum pt_plane)p) || planes->at[p][0].size == bytes || !pt_plan_writes(plan, (enum pt_plane)p))
             continue;
         total += bytes - planes->at[p][0].size;
         error = check_cap(device, plan, total);
         if (!error)
             error = device->ops->buffer_create(device, bytes, NULL, 0, &made[p]);
     }
-    for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED; p++) {
-        if (!error && !pt_plan_writes(plan, (enum pt_plane)p))
+    for (int p = 0; p < PT_PLANE_COUNT; p++) {
+        if (!error && pt_of_picture((enum pt_plane)p) && !pt_plan_writes(plan, (enum pt_plane)p))
             device->ops->buffer_destroy(device, &planes->at[p][0]);
         if (!made[p].size)
             continue;

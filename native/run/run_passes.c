@@ -46,7 +46,7 @@ static int run_pass(struct pt_execution *e, uint32_t i)
 // Planes that lie between passes that run as one are neither made nor written. Those that go from layer to layer are.
 static int is_made(const struct pt_ref *ref)
 {
-    return ref->of != PT_OF_FRAME || (ref->which >= PT_PLANE_LIMIT && ref->which <= PT_PLANE_TILES);
+    return ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].carried;
 }
 
 static int bind_between(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The plan without a device: which passes a scene calls for, why the others are left out, what is culled, and that a
 // region decides as the whole picture does (DESIGN rule 3, SPEC 8).
-#include "plan/plan.h"
+#include "plan/passes.h"
 #include "scenes/support.h"
 
 #include <math.h>
@@ -487,6 +487,54 @@ static void test_lines_are_planned_where_asked_for(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// What a pass may bind, kernels.def says: anything else fails the plan.
+static void test_passes_bind_what_their_kernels_list(void **state)
+{
+    (void)state;
+    const struct fill_args fill = { .view = { .level = 2 } };
+    const struct pt_ref keys = pt_plane_at(PT_PLANE_KEYS, 2), from = pt_plane_at(PT_PLANE_FROM, 2);
+    const struct pt_ref normal = pt_plane_at(PT_PLANE_NORMAL, 0), deff = pt_plane_at(PT_PLANE_DEFF, 0);
+    const struct {
+        uint32_t count;
+        struct pt_ref refs[6];
+        int right;
+    } fills[] = {
+        { 5, { keys, from, normal, deff, deff }, 1 },
+        { 5, { keys, from, normal, deff, pt_plane_at(PT_PLANE_SPAN, 0) }, 1 },
+        { 4, { keys, from, normal, deff }, 0 },
+        { 6, { keys, from, normal, deff, deff, deff }, 0 },
+        { 5, { keys, normal, from, deff, deff }, 0 },                             // formats
+        { 5, { keys, from, normal, deff, pt_buffer_of(PT_SHADOWS, 0) }, 0 },
+        { 5, { pt_plane_at(PT_PLANE_KEYS, 1), from, normal, deff, deff }, 0 },    // another level than the view's
+        { 5, { keys, from, normal, deff, pt_plane_at(PT_PLANE_DEPTH, 0) }, 0 },   // of the crop
+        { 5, { keys, from, normal, deff, pt_nothing() }, 0 },                     // needed
+        { 5, { keys, keys, normal, deff, deff }, 0 },
+    };
+    for (size_t i = 0; i < sizeof fills / sizeof *fills; i++)
+        assert_int_equal(pt_check_bindings(PT_KERNEL_fill, &fill, fills[i].refs, fills[i].count) == PATINA_OK, fills[i].right);
+
+    const struct scatter_args scatter = { .instances = 2 };
+    const struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, 0), places = pt_buffer_of(PT_POSITIONS, 0), words = pt_buffer_of(PT_SURFACE, 0);
+    const struct pt_ref two[] = { pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, places, words, chunks, places, words };
+    const struct pt_ref mixed[] = { pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, words, places };
+    assert_int_equal(pt_check_bindings(PT_KERNEL_scatter, &scatter, two, 9), PATINA_OK);
+    assert_int_equal(pt_check_bindings(PT_KERNEL_scatter, &scatter, two, 8), PATINA_ERROR_INTERNAL); // half an instance
+    assert_int_equal(pt_check_bindings(PT_KERNEL_scatter, &scatter, mixed, 6), PATINA_ERROR_INTERNAL);
+
+    // what is written has no other name in the pass: nothing stands in for it
+    const struct surface_args surface = { .with_span = 0 };
+    struct pt_ref refs[] = { pt_plane_at(PT_PLANE_KEYS, 0), words, normal, deff, pt_plane_at(PT_PLANE_FROM, 0), pt_nothing(), deff };
+    assert_int_equal(pt_check_bindings(PT_KERNEL_surface, &surface, refs, 7), PATINA_ERROR_INTERNAL);
+    refs[6] = pt_nothing();
+    assert_int_equal(pt_check_bindings(PT_KERNEL_surface, &surface, refs, 7), PATINA_OK);
+
+    struct pt_plan plan = { 0 };
+    struct pt_builder builder = { .plan = &plan };
+    pt_add(&builder, PT_KERNEL_surface, "surface", &surface, sizeof surface, refs, 6);
+    assert_int_equal(builder.failed, PATINA_ERROR_INTERNAL);
+    pt_plan_destroy(&plan);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -498,7 +546,7 @@ int main(void)
         cmocka_unit_test(test_chunks_around_the_camera),        cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
         cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),
-        cmocka_unit_test(test_layers),
+        cmocka_unit_test(test_layers),                          cmocka_unit_test(test_passes_bind_what_their_kernels_list),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

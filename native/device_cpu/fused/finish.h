@@ -72,7 +72,7 @@ static uint32_t slot(int32_t y) { return (uint32_t)(y + RING) % RING; }
 // Whether a pass shades points with their own colours, for a step that asks for these.
 static int shades_albedo(const struct finish *finish, uint32_t i)
 {
-    return finish->albedo && finish->passes[i].call.buffers[6] == finish->albedo;
+    return finish->albedo && finish->passes[i].call.buffers[PT_BUF_shade_color] == finish->albedo;
 }
 
 #endif

@@ -104,7 +104,7 @@ static void load_parents(const struct push *push, uint32_t x, uint32_t y, vf z, 
     p->farthest = z;
     if (push->args->refined && p->give) {
         const vi cell = vi_cell_of(p->source, push->args->from_width, push->coarse.level, push->args->coarse_width);
-        p->farthest = vf_farthest(pt_cpu_data(push->call, 0), pt_cpu_data(push->call, 1), cell, p->source, vm_of_bits(p->give), z,
+        p->farthest = vf_farthest(PT_DATA(push->call, push, coarse_keys), PT_DATA(push->call, push, coarse_from), cell, p->source, vm_of_bits(p->give), z,
                                   distance, inverse);
     }
     p->dot = (normal[0] * p->ray[0] + normal[1] * p->ray[1]) - normal[2];
