@@ -105,7 +105,11 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         layer, size = depsgraph.view_layer_eval, picture.planes["COMBINED"].shape[:2]
         picture.planes.update(cryptomatte.planes(ranks, (item.plane for item in passes.enabled(layer)), size, 1.0 / done))
         passes.write(self, layer, description, picture.planes, eye)
-        self._status(_summary(picture, ms, done < len(moments)), 1.0)
+        stopped = done < len(moments) or bool(picture.stats.get("pixel_pending"))
+        summary = _summary(picture, ms, stopped)
+        self._status(summary, 1.0)
+        if stopped:  # the window of a picture that was ended says no more of it
+            self._tell('INFO', summary)
 
     def _render_moment(self, depsgraph: bpy.types.Depsgraph, eye: str, moment: motion.Moment, frame: int, told: set[str],
                        show: Callable[..., None] | None) -> tuple[sync.SceneDescription, render.Picture]:
@@ -177,7 +181,7 @@ def _summary(picture: render.Picture, ms: float, stopped: bool) -> str:
         parts.append(f"{stats['layers']} layers")
     if stats.get("pixel_samples", 1) > 1:
         parts.append(f"{stats['pixel_samples']} samples")
-    if stopped or stats.get("pixel_pending"):
+    if stopped:
         parts.append("stopped")
     return ", ".join([f"{stats['points']:,} points, {ms:.1f} ms, {picture.device}", *parts])
 

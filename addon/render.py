@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -14,21 +13,16 @@ from typing import Any
 import numpy as np
 
 from . import backdrop, cryptomatte, jobs, mattes, memory, native
-from .sync import Camera, DeviceChoice, SceneDescription, edits
+from .pieces import LARGE_PICTURE, PIXEL_BYTES, Canvas, Piece, Planes, tiles
+from .sync import DeviceChoice, SceneDescription, edits
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
-
-# Planes take some 130 bytes a pixel: 2 GB for a picture of that size. Larger ones are made in tiles, and smaller ones too
-# where memory is short; the smaller the tiles, the more of the time goes into the band around each.
-PIXEL_BYTES = 130
-LARGE_PICTURE = 1 << 24  # pixels
-LEAST_TILE, TILE_STEP = 512, 256  # pixels a side
 
 # Pictures of several samples: milliseconds of them between two looks at whether somebody wants to see the picture; seconds between
 # two that are shown, and how many times as long they last at least as showing one took.
 STEP, SHOWN_EVERY, SHOWN_SHARE = 100.0, 0.25, 10.0
+EXPECTED_SAMPLES = 16  # of a piece whose noise decides, for its progress
 
-Planes = dict[str, np.ndarray]  # (height, width, channels) by plane name, row 0 at the bottom
 Show = Callable[[Planes], None]
 
 
@@ -109,17 +103,15 @@ def _draw_seen(description: SceneDescription, planes: Iterable[str], poll: Calla
             color = backdrop.over(color, behind)
         return found[0] | {"COMBINED": color}
 
-    budget = memory.for_planes()
-    whole = len(tiles(description.settings.region, tile_size, budget // len(parts) if budget else budget)) == 1
+    budget = memory.for_planes() or LARGE_PICTURE * PIXEL_BYTES
+    whole = len(tiles(description.settings.region, tile_size, budget // len(parts))) == 1
     if whole and not description.panorama and description.settings.pixel_samples != 1:
         return _on_device(description.device, poll, lambda device: _draw_samples(device, parts, finish, poll, show))
 
-    def part(number: int) -> Callable[[float], bool]:
-        return lambda progress: poll((number + progress) / len(parts))
+    def on_device(device: native.Device) -> Picture:
+        return _draw_pieces(device, [(Canvas(item, tile_size, budget // len(parts)), names) for item, names in parts], finish, poll, show)
 
-    pictures = [_on_device(item.device, part(number), lambda device, item=item, names=names, number=number: _draw_on(
-        device, item, names, part(number), tile_size)) for number, (item, names) in enumerate(parts)]
-    return replace(pictures[0], planes=finish([picture.planes for picture in pictures]))
+    return _on_device(description.device, poll, on_device)
 
 
 def _on_device(choice: DeviceChoice, poll: Callable[[float], bool], draw_on: Callable[[native.Device], Picture]) -> Picture:
@@ -196,7 +188,7 @@ def _draw_samples(device: native.Device, parts: list[tuple[SceneDescription, lis
                 for frame, scene, (description, wanted) in zip(frames, scenes, parts, strict=True):
                     describe(scene, replace(description, settings=replace(description.settings, pixel_progressive=1)), wanted)
                     frame.render(scene)
-                    found.append({name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted})
+                    found.append({name: _read(frame, name) for name in wanted})
                 if show:
                     news.bring(finish(found))
                 try:
@@ -252,78 +244,97 @@ def _open(choice: DeviceChoice, poll: Callable[[float], bool]) -> native.Device:
     return jobs.run(lambda: device_for(choice), lambda: None, lambda: poll(0.0))
 
 
-def _draw_on(device: native.Device, description: SceneDescription, wanted: list[str], poll: Callable[[float], bool],
-             tile_size: int) -> Picture:
-    """Tile by tile: a tile's pixels are those of the whole picture (the library keeps a guard band around it), so tiles only
-    save memory."""
-    if description.panorama:
-        return _draw_panorama(device, description, wanted, poll, tile_size)
-    regions = tiles(description.settings.region, tile_size, memory.for_planes())
-    if len(regions) > 1:  # all of them take from whole shadow textures
-        description = replace(description, settings=replace(description.settings, shadow_lazy=0))
-    x0, y0, x1, y1 = description.settings.region
-    picture: dict[str, np.ndarray] = {}
-    # The frame is made and closed on this thread, so that poll never meets a dead handle.
-    with native.Frame(device) as frame:
-        done, stats, notice = 0, {}, ""
+class _Pieces:
+    """A picture drawn piece by piece, out of parts with the planes that each gives. Its methods, but for look(), are for the worker."""
+
+    def __init__(self, parts: list[tuple[Canvas, list[str]]], frames: list[native.Frame], finish: Callable[[list[Planes]], Planes],
+                 news: _News) -> None:
+        self._parts, self._frames, self._finish, self._news = parts, frames, finish, news
+        self.stats: list[dict[str, Any]] = [{} for _ in parts]
+        self._frame, self._done, self._each = frames[0], 0.0, 1.0  # under way; the share that is done, and that of each step
+
+    def progress(self) -> float:
+        """From any thread."""
+        return min(self._done + self._each * self._frame.progress(), 1.0)
+
+    def planes(self) -> Planes:
+        return self._finish([canvas.planes(wanted) for canvas, wanted in self._parts])
+
+    def draw(self, share: float, refined: bool, **settings: Any) -> None:
+        """All pieces, by the description's settings but for some. share: of the progress. refined: a piece's samples come by and by, into
+        planes that are there; PatinaCancelled leaves those that it has."""
+        count = len(self._parts[0][0].pieces)
+        self._each = share / (count * len(self._parts))
+        for number in range(count):
+            for (canvas, wanted), self._frame, stats in zip(self._parts, self._frames, self.stats, strict=True):
+                piece = canvas.pieces[number]
+                drawn = replace(piece.description, settings=replace(piece.description.settings, pixel_progressive=int(refined), **settings))
+                with native.Scene() as scene:
+                    describe(scene, drawn, wanted)
+                    self._frame.render(scene)
+                    if refined:
+                        self._better(scene, canvas, piece)
+                    else:
+                        canvas.put(piece, {name: _read(self._frame, name) for name in wanted})
+                self._count(stats, canvas.pieces[0].face != piece.face)
+                self._done += self._each
+
+    def _better(self, scene: native.Scene, canvas: Canvas, piece: Piece) -> None:
+        frame = self._frame
+        try:
+            while frame.stats()["pixel_pending"]:
+                frame.refine(scene, STEP)
+                if self._news.wanted():
+                    canvas.put(piece, {"COMBINED": frame.read("COMBINED")})
+                    self._news.bring({"COMBINED": self._finish([each.planes(["COMBINED"]) for each, _ in self._parts])["COMBINED"]})
+        finally:
+            canvas.put(piece, {"COMBINED": frame.read("COMBINED")})
+
+    def _count(self, stats: dict[str, Any], among_faces: bool) -> None:
+        """Milliseconds add up, layers and samples are the most; the rest is of the last piece, of panoramas of the first face."""
+        now = self._frame.stats()
+        most = {name: max(now[name], stats.get(name, 0)) for name in ("layers", "pixel_samples")}
+        ms = now["ms"] + stats.get("ms", 0.0)
+        stats.update(most if among_faces else now | most)
+        stats["ms"] = ms
+
+
+def _draw_pieces(device: native.Device, parts: list[tuple[Canvas, list[str]]], finish: Callable[[list[Planes]], Planes],
+                 poll: Callable[[float], bool], show: Show | None) -> Picture:
+    """Tiles, and faces of panoramas. Of several samples, where somebody looks, first one of each piece and then, piece by piece, the
+    others; cancelled then, it keeps what it has."""
+    first = parts[0][0].pieces[0].description
+    samples, news, notice, cut_off = first.settings.pixel_samples, _News(show), "", False
+    with ExitStack() as stack:  # frames are made and closed on this thread, so that poll never meets a dead handle
+        frames = [stack.enter_context(native.Frame(device)) for _ in parts]
+        drawing = _Pieces(parts, frames, finish, news)
 
         def work() -> None:
-            nonlocal done, notice
-            notice = _load_shadows(frame, description)
-            for region in regions:
-                tile = replace(description, settings=replace(description.settings, region=region))
-                for name, pixels in _draw_tile(frame, tile, wanted, stats).items():
-                    if len(regions) == 1:
-                        picture[name] = pixels
-                        continue
-                    if name not in picture:
-                        picture[name] = np.empty((y1 - y0, x1 - x0, pixels.shape[2]), pixels.dtype)
-                    picture[name][region[1] - y0:region[3] - y0, region[0] - x0:region[2] - x0] = pixels
-                done += 1
+            nonlocal notice, cut_off
+            notice = _load_shadows(frames[0], first)
+            if show is None or samples == 1:
+                drawing.draw(1.0, False)
+                return
+            share = 1.0 / (1 + (samples or EXPECTED_SAMPLES))
+            drawing.draw(share, False, pixel_samples=1, pixel_noise=0.0)
+            news.bring(drawing.planes())
+            try:
+                drawing.draw(1.0 - share, True)
+            except native.PatinaCancelled:
+                cut_off = True
+
+        def look() -> bool:
+            news.show()
+            return poll(drawing.progress())
 
         with ANALYSES.drawing():
-            jobs.run(work, frame.cancel, lambda: poll((done + frame.progress()) / len(regions)))
-        return Picture(picture, stats, device.label, notice)
+            jobs.run(work, lambda: [frame.cancel() for frame in frames], look)
+        stats = drawing.stats[0] | {"ms": sum(each["ms"] for each in drawing.stats), "pixel_pending": int(cut_off)}
+        return Picture(drawing.planes(), stats, device.label, notice)
 
 
-def _draw_panorama(device: native.Device, description: SceneDescription, wanted: list[str],
-                   poll: Callable[[float], bool], tile_size: int) -> Picture:
-    """Six pictures, joined."""
-    panorama = native.Panorama(**asdict(description.panorama))
-    faces: list[Picture] = []
-    for face in range(panorama.FACES):
-        camera, side = panorama.camera(face)
-        settings = replace(description.settings, width=side, height=side, region=(0, 0, side, side))
-        faces.append(_draw_on(device, replace(description, panorama=None, camera=Camera(**camera), settings=settings), wanted,
-                              lambda share, face=face: poll((face + share) / panorama.FACES), tile_size))
-    planes = {name: panorama.join(name, [face.planes[name] for face in faces]) for name in wanted}
-    stats = faces[0].stats | {"ms": sum(face.stats["ms"] for face in faces),
-                              "layers": max(face.stats["layers"] for face in faces)}
-    return replace(faces[0], planes=planes, stats=stats)
-
-
-def _draw_tile(frame: native.Frame, description: SceneDescription, wanted: list[str],
-               stats: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Planes of one region. stats: milliseconds add up, the rest is of the last picture."""
-    with native.Scene() as scene:
-        describe(scene, description, wanted)
-        frame.render(scene)
-    before = stats.get("ms", 0.0)
-    stats.update(frame.stats())
-    stats["ms"] += before
-    return {name: frame.read_keys() if name == "KEYS" else frame.read(name) for name in wanted}
-
-
-def tiles(region: tuple[int, int, int, int], size: int, budget: int | None = None) -> list[tuple[int, int, int, int]]:
-    """Regions that make up a region, rows from the bottom. size 0: one, unless the picture is large; budget: bytes for planes,
-    None: as many as a large picture takes."""
-    x0, y0, x1, y1 = region
-    across, along = size or x1 - x0, size or y1 - y0
-    most = LARGE_PICTURE if budget is None else min(LARGE_PICTURE, budget // PIXEL_BYTES)
-    if not size and across * along > most:
-        side = max(math.isqrt(most) // TILE_STEP * TILE_STEP, LEAST_TILE)
-        across, along = (math.ceil(length / math.ceil(length / side)) for length in (across, along))  # none much smaller
-    return [(x, y, min(x + across, x1), min(y + along, y1)) for y in range(y0, y1, along) for x in range(x0, x1, across)]
+def _read(frame: native.Frame, name: str) -> np.ndarray:
+    return frame.read_keys() if name == "KEYS" else frame.read(name)
 
 
 def shifted(description: SceneDescription, shift: tuple[float, float]) -> SceneDescription:

@@ -91,6 +91,7 @@ def test_esc_keeps_the_picture():
     kept = stopped_when(lambda: calls.append(1) or len(calls) > 12)
     check(kept, "nothing was written")
     check("stopped" in stats[-1] and 1 <= taken() < 1024, stats[-1])
+    check(any(kind == 'INFO' and "stopped" in text for kind, text in reports), f"{reports}")
     check(taken() > 1, f"{stats[-1]}: nothing came after the first sample")
     check((kept["Depth"] == one["Depth"]).all(), "depth is that of one sample")
     soft = [((picture["Combined"][..., 3] > 0.01) & (picture["Combined"][..., 3] < 0.99)).sum() for picture in (one, kept)]
@@ -142,3 +143,71 @@ def test_holdouts_sample_by_sample():
     check(alpha.max() > 0.99 and ((alpha > 0.05) & (alpha < 0.95)).sum() > 60, "soft borders")
     held = [float(planes["COMBINED"][30:42, 54:60, 3].max()) for planes in found]
     check(max(held) < 0.02, f"something stands in the hole: {held}")
+
+
+def betters(found, last, one):
+    """Shown from one sample on, nearer to the last by and by; all planes come first."""
+    check(len(found) > 2, f"{len(found)} pictures were shown")
+    check({"COMBINED", "DEPTH"} <= set(found[0]) and all(set(planes) == {"COMBINED"} for planes in found[1:]), "planes")
+    check((last["Depth"] == one["Depth"]).all(), "depth is that of one sample")
+    check(taken() > 1 and "stopped" not in stats[-1], stats[-1])
+
+
+def test_tiles_sample_by_sample():
+    """A picture in tiles: one sample of each first, and then better tile by tile, to the pixels of the whole picture."""
+    scene = scene_of(1)
+    one = render()
+    scene.patina.samples = 300
+    whole = render()
+    scene.patina.tile_size = 40
+    found, last = shown_steps()
+    check((last["Combined"] == whole["Combined"]).all(), "the tiles are not the whole picture")
+    betters(found, last, one)
+
+
+def test_panoramas_sample_by_sample():
+    """All around: six faces of one sample each first, joined, and then face by face better."""
+    from check_panorama import stage as around
+    pictures = []
+    for samples in (1, 300):
+        scene = around(256, 128)
+        scene.patina.fill, scene.patina.surface, scene.patina.samples = 'CLOSED', 'FILL', samples
+        add_points(*sphere(6000, 1.0, (3.0, 2.0, 1.0)))
+        found, last = shown_steps()
+        pictures.append(last)
+    betters(found, last, pictures[0])
+    soft = [((picture["Combined"][..., 3] > 0.01) & (picture["Combined"][..., 3] < 0.99)).sum() for picture in pictures]
+    check(soft[1] > soft[0] + 20, f"{soft} soft pixels with one sample and many")
+    again = render()  # in the background nobody looks: at one go
+    check((again["Combined"] == last["Combined"]).all(), "at one go it is another picture")
+
+
+def test_esc_keeps_tiles():
+    """Esc in the midst of the tiles: those that are done are soft, the others have one sample; none is missing."""
+    scene = scene_of(1)
+    one = render()
+    scene.patina.samples, scene.patina.tile_size = 1024, 40
+    seen = []
+    draw, kept = drawing.draw, []
+
+    def watch(description, planes, poll, tile_size, _show):
+        return draw(description, planes, poll, tile_size, lambda shown: seen.append(shown))
+
+    drawing.draw = watch
+    try:
+        kept = stopped_when(lambda: len(seen) > 1)
+    finally:
+        drawing.draw = draw
+    check(kept and "stopped" in stats[-1], stats[-1])
+    check(((kept["Combined"][..., 3] > 0) == (one["Combined"][..., 3] > 0)).mean() > 0.97, "the points are there")
+    check((kept["Combined"] != one["Combined"]).any() and (kept["Depth"] == one["Depth"]).all(), "nothing is better than one sample")
+
+
+def test_noise_threshold_in_tiles():
+    """Each tile takes as many as it needs."""
+    scene = scene_of(1)
+    scene.patina.tile_size, scene.patina.noise = 40, 0.02
+    found, last = shown_steps()
+    check(found and 4 <= taken() <= 256, stats[-1])
+    again = render()
+    check((again["Combined"] == last["Combined"]).all(), "at one go it is another picture")
