@@ -68,7 +68,7 @@ def test_ramps_of_coloured_surveys_are_lit():
     shown = own.max(axis=2) > 0.2
     # 180 of sRGB, whatever the light; the rest is the world and outlines
     check(shown.mean() > 0.1 and abs(np.median(own[shown]) - 0.456) < 0.01, f"{shown.mean():.0%} show {np.median(own[shown]):.3f}")
-    obj.patina.color_source = 'HEIGHT'
+    obj.patina.colors.source = 'HEIGHT'
     ramp = render()["Combined"][..., :3].max(axis=2)
     check((ramp[shown] > 0.1).mean() > 0.8, f"{(ramp[shown] > 0.1).mean():.0%} of the points are bright")
 
