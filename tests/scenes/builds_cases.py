@@ -191,6 +191,8 @@ def _effects(to: _List) -> None:
     together = {"edl_strength": 1.0, "obscurance_strength": 1.0, "toon_bands": 4, "hatch_levels": 2, "fog_density": 0.6, "fog_start": 3.0,
                 "fog_end": 5.0, "focus_aperture": 0.05, "focus_distance": 3.4, "paper_grain": 0.3}
     to.add("effects together", effects=together)
+    to.add("effects together, color alone", effects=together, settings={"passes": 1})
+    to.add("effects together, depth beside it", effects=together, settings={"passes": 2})
     to.add("effects together, film, shadows, lines", TORUS, FLOOR, effects=together, settings={"film_transparent": 1}, light={**SUN, "shadows": 1}, lines={"width": 3.0})
     to.add("effects together, orthographic discs", {"of": "wide analysed", **LIT}, effects=together, camera={"kind": "parallel"})
     for name, lines in {

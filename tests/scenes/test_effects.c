@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const struct {
@@ -151,6 +152,38 @@ static void test_one_by_one(void **state)
     patina_device_destroy(device);
 }
 
+// Whatever is asked for beside it, the combined picture is the same: what a pass needs is there with and without its neighbours.
+static void test_passes_asked_for(void **state)
+{
+    (void)state;
+    static const uint32_t asked[] = {1u << PATINA_PASS_COMBINED, 1u << PATINA_PASS_DEPTH, 1u << PATINA_PASS_NORMAL,
+                                     1u << PATINA_PASS_SOURCE, 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_SHADOW};
+    patina_device *device = support_device_open("cpu", 0, 0);
+    for (uint32_t s = 0; s < ONE_LAYERED * SHOWS; s++) {
+        struct stage stage = build(s / SHOWS, s % SHOWS);
+        stage.settings.layer_passes = 0;
+        struct picture all = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        const size_t size = (size_t)all.width * all.height * 4 * sizeof(float);
+        float *combined = malloc(size);
+        assert_non_null(combined);
+        for (uint32_t i = 0; i < sizeof asked / sizeof asked[0]; i++) {
+            patina_frame *frame;
+            stage.settings.passes = asked[i];
+            CHECK(patina_frame_create(device, &frame), device);
+            CHECK(patina_scene_set_settings(stage.scene, &stage.settings), stage.scene);
+            CHECK(patina_frame_render(frame, stage.scene), frame);
+            CHECK(patina_frame_read(frame, PATINA_PASS_COMBINED, combined, size), frame);
+            if (memcmp(combined, all.combined, size))
+                fail_msg("%s, stage %u: passes %#x alone change the picture", shows[s % SHOWS].name, s / SHOWS, asked[i]);
+            patina_frame_destroy(frame);
+        }
+        free(combined);
+        picture_free(&all);
+        stage_free(&stage);
+    }
+    patina_device_destroy(device);
+}
+
 static double worst(const float *a, const float *b, uint64_t count)
 {
     double most = 0.0;
@@ -281,6 +314,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(test_regions),  cmocka_unit_test(test_threads),
         cmocka_unit_test(test_devices),  cmocka_unit_test(test_nothing_else_changes),
         cmocka_unit_test(test_refusals), cmocka_unit_test(test_one_by_one),
+        cmocka_unit_test(test_passes_asked_for),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

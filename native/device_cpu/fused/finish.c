@@ -328,7 +328,8 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.shows_normals |= (int)finish.extract->normal;
             finish.shading = finish.extract->normal ? PT_DATA(call, extract, shading) : NULL;
             finish.arrived = finish.extract->shadow ? PT_DATA(call, extract, arrived) : NULL;
-            finish.planes.from = PT_DATA(call, extract, from);
+            if (!finish.planes.from) // smoothing's, where nothing is shaded: extract has it for some passes alone
+                finish.planes.from = PT_DATA(call, extract, from);
             finish.depth = PT_DATA(call, extract, depth);
             finish.normals = PT_DATA(call, extract, normal);
             finish.source = PT_DATA(call, extract, source);
