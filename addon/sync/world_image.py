@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import count
 
@@ -29,11 +30,19 @@ class Image:
 
 
 def around(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places 0..1 in a picture all around: +x in its middle, -y at a quarter to the right of it, +z at the top."""
+    """Places 0..1 in a picture all around: +x in its middle, -y at a quarter to the right of it, +z at the top. float32."""
     x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
     level = np.sqrt(x * x + y * y)
-    return (np.float32(0.5) - np.arctan2(y, x) * np.float32(0.5 / math.pi),
-            np.arctan2(z, level) * np.float32(1.0 / math.pi) + np.float32(0.5))
+    return (np.float32(0.5) - angle(y, x) * np.float32(0.5 / math.pi), angle(z, level) * np.float32(1.0 / math.pi) + np.float32(0.5))
+
+
+def exact(function: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+    """A function of float32 values by way of float64: numpy's own of float32 may round by where arrays lie in memory, and a tile
+    would differ from the whole."""
+    return lambda *values: function(*(value.astype(np.float64) for value in values)).astype(np.float32)
+
+
+angle = exact(np.arctan2)
 
 
 def _ball(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

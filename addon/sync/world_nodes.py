@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from .world_image import Image, read_image
+from .world_image import Image, angle, exact, read_image
 
 Values = np.ndarray
 
@@ -31,9 +31,10 @@ Expression = Callable[[Rays], Values]
 
 GRAY = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear Rec. 709
 _ROUNDS = {'FLOOR': np.floor, 'CEIL': np.ceil, 'ROUND': np.rint, 'TRUNC': np.trunc, 'FRACT': lambda a: a - np.floor(a)}
-_ONE = {'SQRT': lambda a: np.sqrt(np.maximum(a, 0)), 'ABSOLUTE': np.abs, 'EXPONENT': np.exp, 'SINE': np.sin, 'COSINE': np.cos,
-        'TANGENT': np.tan, 'ARCSINE': lambda a: np.arcsin(np.clip(a, -1, 1)), 'ARCCOSINE': lambda a: np.arccos(np.clip(a, -1, 1)),
-        'ARCTANGENT': np.arctan, 'SIGN': np.sign, 'RADIANS': np.radians, 'DEGREES': np.degrees, **_ROUNDS}
+_ONE = {'SQRT': lambda a: np.sqrt(np.maximum(a, 0)), 'ABSOLUTE': np.abs, 'EXPONENT': exact(np.exp), 'SINE': exact(np.sin),
+        'COSINE': exact(np.cos), 'TANGENT': exact(np.tan), 'ARCSINE': exact(lambda a: np.arcsin(np.clip(a, -1, 1))),
+        'ARCCOSINE': exact(lambda a: np.arccos(np.clip(a, -1, 1))), 'ARCTANGENT': exact(np.arctan),
+        'SIGN': np.sign, 'RADIANS': np.radians, 'DEGREES': np.degrees, **_ROUNDS}
 
 
 def _quotient(a: Values, b: Values) -> Values:
@@ -41,12 +42,12 @@ def _quotient(a: Values, b: Values) -> Values:
 
 
 def _power(a: Values, b: Values) -> Values:
-    return np.where((a < 0) & (b != np.rint(b)), np.float32(0), np.power(a, b))
+    return np.where((a < 0) & (b != np.rint(b)), np.float32(0), exact(np.power)(a, b))
 
 
 _TWO = {'ADD': np.add, 'SUBTRACT': np.subtract, 'MULTIPLY': np.multiply, 'DIVIDE': _quotient, 'POWER': _power,
         'MINIMUM': np.minimum, 'MAXIMUM': np.maximum, 'LESS_THAN': lambda a, b: (a < b) * np.float32(1),
-        'GREATER_THAN': lambda a, b: (a > b) * np.float32(1), 'ARCTAN2': np.arctan2,
+        'GREATER_THAN': lambda a, b: (a > b) * np.float32(1), 'ARCTAN2': angle,
         'MODULO': lambda a, b: np.where(b != 0, np.fmod(a, np.where(b != 0, b, 1)), 0)}
 _BLENDS = {'MIX': lambda a, b: b, 'ADD': np.add, 'MULTIPLY': np.multiply, 'SUBTRACT': np.subtract,
            'SCREEN': lambda a, b: 1 - (1 - a) * (1 - b), 'DIVIDE': lambda a, b: np.where(b != 0, _quotient(a, b), a),
@@ -265,7 +266,7 @@ class Reader:
         def gradient(rays: Rays) -> Values:
             x, y, _ = np.split(place(rays), 3, axis=1)
             if kind == 'RADIAL':
-                t = np.arctan2(y, x) / np.float32(2 * math.pi) + np.float32(0.5)
+                t = angle(y, x) / np.float32(2 * math.pi) + np.float32(0.5)
             elif kind in {'SPHERICAL', 'QUADRATIC_SPHERE'}:
                 t = np.maximum(np.float32(0.999999) - _length(place(rays)), 0)
                 t = t * t if kind == 'QUADRATIC_SPHERE' else t
@@ -397,7 +398,7 @@ class Reader:
 
     def _ShaderNodeGamma(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
         color, gamma = self.value(node.inputs["Color"]), self.value(node.inputs["Gamma"])
-        return lambda rays: np.where((c := color(rays)) > 0, np.power(np.maximum(c, 1e-30), gamma(rays)), c)
+        return lambda rays: np.where((c := color(rays)) > 0, exact(np.power)(np.maximum(c, 1e-30), gamma(rays)), c)
 
     def _ShaderNodeBrightContrast(self, node: bpy.types.Node, _socket: bpy.types.NodeSocket) -> Expression:
         color, bright, contrast = (self.value(node.inputs[name]) for name in ("Color", "Bright", "Contrast"))
