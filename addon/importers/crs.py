@@ -54,6 +54,18 @@ def units(text: str, keys: Mapping[int, float] | None = None) -> Units | None:
     return Units(across or 1.0, up or across or 1.0)
 
 
+def name(text: str) -> str:
+    """For people: of WKT the system's own name, with its EPSG number where it says so; words as they are, without their marks."""
+    root = _parsed(text)
+    parts = root[1] if root and root[0] in _ROOTS else []
+    if not parts or not isinstance(parts[0], str):
+        return " ".join(text.replace("|", " ").split())
+    numbers = [str(item[1][1]).strip('"') for item in parts if isinstance(item, tuple) and item[0] in {"AUTHORITY", "ID"}
+               and len(item[1]) > 1 and str(item[1][0]).strip('"').upper() == "EPSG"]
+    plain = parts[0].strip('"').replace("_", " ")
+    return f"{plain} (EPSG {numbers[0]})" if numbers else plain
+
+
 def _in_words(text: str) -> float | None:
     if re.search(r"us[ _-]*(survey)?[ _-]*(ft|foot|feet)\b|\bft[ _-]*us\b", text, re.I):
         return US_FOOT

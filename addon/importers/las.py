@@ -184,7 +184,7 @@ def preview(path: Path) -> list[str]:
             *(["cannot be read yet: Install Readers in the add-on's preferences"] * (header.compressed and readers.lacks("laspy", "lazrs"))),
             *(["colors"] * ("red" in names)), *(["GPS time"] * ("gps_time" in names)),
             *(["extra: " + ", ".join(extra.name for extra in header.extras)] * bool(header.extras)),
-            *([f"units: {header.units}"] * bool(header.units)), *([header.crs[:60]] * bool(header.crs))]
+            *([f"units: {header.units}"] * bool(header.units)), *([crs.name(header.crs)[:80]] * bool(header.crs))]
 
 
 def _record(path: Path, header: Header) -> np.dtype:

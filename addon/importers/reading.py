@@ -59,6 +59,11 @@ class PointFile:
             return self
         return self.only(wanted.mask(0, self.positions, self.origin))
 
+    def finite(self) -> tuple[PointFile, int]:
+        """Without positions that are not finite, which no box could hold, and how many they were."""
+        left_out = self.invalid
+        return (self.only(np.isfinite(self.positions).all(axis=1)), left_out) if left_out else (self, 0)
+
     def only(self, keep: np.ndarray) -> PointFile:
         """(n,) bool."""
         return replace(

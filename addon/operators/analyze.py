@@ -91,8 +91,8 @@ def _write(data: bpy.types.ID, name: str, values: np.ndarray) -> None:
 
 
 class PATINA_OT_frame_points(Operator):
-    """Move the scene's camera, and views that do not look through it, without turning them, so that the selected points fill \
-their pictures; strays far off do not count"""
+    """Move the scene's camera, and views that do not look through it, without turning them, so that the selected points, or all where \
+none are selected, fill their pictures; strays far off do not count"""
 
     bl_idname = "object.patina_frame_points"
     bl_label = "Frame Points"
@@ -100,14 +100,16 @@ their pictures; strays far off do not count"""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return context.scene.camera is not None and any(_has_points(obj) for obj in context.selected_objects)
+        if context.scene.camera is None:
+            if hasattr(cls, "poll_message_set"):
+                cls.poll_message_set("the scene has no camera")
+            return False
+        return any(_has_points(obj) for obj in context.view_layer.objects)
 
     def execute(self, context: Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()
-        corners: list[Vector] = []
         try:
-            for obj in filter(_has_points, context.selected_objects):
-                corners += _corners(obj.evaluated_get(depsgraph), context.scene.frame_current)
+            corners = _corners_of(depsgraph, {obj for obj in context.selected_objects if _has_points(obj)}, context.scene.frame_current)
         except native.PatinaError as error:
             self.report({'ERROR'}, f"Patina: {error}")
             return {'CANCELLED'}
@@ -153,8 +155,27 @@ def _has_points(obj: bpy.types.Object) -> bool:
     return obj.type in {'MESH', 'POINTCLOUD'}
 
 
+def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], frame: int) -> list[Vector]:
+    """In the world: of the chosen objects and what they make, points of Geometry Nodes and instances; with none chosen of all that is
+    points, without such of all. PatinaError where a file cannot be read."""
+    points: list[Vector] = []
+    others: list[Vector] = []  # of faces, where points are looked for
+    boxes: dict[int, list[Vector]] = {}  # by datablock: a thousand instances share one
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        owner = instance.parent if instance.is_instance else obj
+        if not _has_points(obj) or chosen and owner.original not in chosen:
+            continue
+        key = obj.data.as_pointer()
+        if key not in boxes:
+            boxes[key] = _corners(obj, frame)
+        solid = not chosen and obj.type == 'MESH' and len(obj.data.polygons) and not obj.patina.linked_file
+        (others if solid else points).extend(instance.matrix_world @ corner for corner in boxes[key])
+    return points or others
+
+
 def _corners(obj: bpy.types.Object, frame: int) -> list[Vector]:
-    """Of the box without strays, in the world. Of a mesh with faces, of all of it."""
+    """Of the box without strays, in the object's space. Of a mesh with faces, of all of it."""
     if obj.patina.linked_file:
         source = linked.source_of(obj, frame, [])
         if source is None:
@@ -167,10 +188,10 @@ def _corners(obj: bpy.types.Object, frame: int) -> list[Vector]:
         if positions is None:
             return []
         if obj.type == 'MESH' and len(obj.data.polygons):
-            return [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+            return [Vector(corner) for corner in obj.bound_box]
         cloud = jobs.run(lambda: native.Cloud(positions), lambda: None, lambda: False)
     box = cloud.dense_box() if cloud.drawn else None
-    return [obj.matrix_world @ Vector(box[i >> k & 1][k] for k in range(3)) for i in range(8)] if box else []
+    return [Vector(box[i >> k & 1][k] for k in range(3)) for i in range(8)] if box else []
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_OT_analyze, PATINA_OT_frame_points))

@@ -104,6 +104,9 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                     column.label(text=part)
 
     def execute(self, context: Context) -> set[str]:
+        if any(path.is_dir() for path in self._paths()):  # of a dialog where none was chosen
+            self._tell('ERROR', "choose a file: a folder alone was given")
+            return {'CANCELLED'}
         self._progress = importers.Progress()
         return self.begin(context, self._link(context) if self.link else self._import(context))
 
@@ -119,13 +122,13 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                 found.append((importers.to_mesh(points), points.origin, units))
         if not found:
             return {'CANCELLED'}
-        bpy.ops.object.select_all(action='DESELECT') if bpy.ops.object.select_all.poll() else None
+        _select_none()
         for mesh, own, units in found:
             self._add(context, bpy.data.objects.new(mesh.name, mesh), own, units)
         self._finish(context)
         count = sum(len(mesh.vertices) for mesh, _, _ in found)
-        self.report({'INFO'}, f"Imported {count:,} points from {len(found)} file{'s' * (len(found) > 1)}. In the sidebar, Patina > "
-                              "Frame Points aims the camera")
+        self.report({'INFO'}, f"Imported {count:,} point{'s' * (count != 1)} from {len(found)} file{'s' * (len(found) > 1)}. "
+                              + _told_next(context))
         return {'FINISHED'}
 
     def _ended(self, meshes: list[bpy.types.Mesh]) -> set[str]:
@@ -182,6 +185,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                 return self._ended([])
             except native.PatinaError as error:
                 self._tell('ERROR', f"{first.name}: {error}")
+        if found:
+            _select_none()
         for path, item in found.items():
             name = told(name_of(path).replace("#", "").rstrip("_-. ") or path.stem if self.sequence else name_of(path))
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
@@ -191,8 +196,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, item.units)
         self._finish(context)
-        self.report({'INFO'}, f"Linked {sum(item.cloud.count for item in found.values()):,} points. In the sidebar, Patina > "
-                              "Frame Points aims the camera")
+        count = sum(item.cloud.count for item in found.values())
+        self.report({'INFO'}, f"Linked {count:,} point{'s' * (count != 1)}. {_told_next(context)}")
         return {'FINISHED'} if found else {'CANCELLED'}
 
     def _named(self, path: Path) -> tuple[Path, Path]:
@@ -228,13 +233,26 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             return None
         for text in points.warnings:
             self._tell('WARNING', text)
-        if points.invalid:
-            self._tell('WARNING', f"{path.name}: {points.invalid:,} points without a finite position are kept, but never drawn")
+        points, left_out = points.finite()
+        if left_out:
+            self._tell('WARNING', f"{path.name}: {left_out:,} points without a finite position left out")
         if not len(points.positions):
             left = "" if wanted.keeps_all() else " that the filters keep"
             self._tell('ERROR', f"{path.name} holds no points{left}")
             return None
         return points
+
+
+def _select_none() -> None:
+    if bpy.ops.object.select_all.poll():
+        bpy.ops.object.select_all(action='DESELECT')
+
+
+def _told_next(context: Context) -> str:
+    """What to do with new points, where this engine's own buttons are there or not."""
+    if context.engine == set_up.PatinaRenderEngine.bl_idname:
+        return "In the sidebar, Patina > Frame Points aims the camera"
+    return "In the sidebar, Patina > Set Up for Points renders them"
 
 
 def _preview(path: Path) -> list[str]:

@@ -78,8 +78,12 @@ class Editing:
         if new is None:
             return {'CANCELLED'}
         write(obj, new)
-        self.report({'INFO'}, said(new))
+        self.report({'INFO'}, ". ".join(filter(None, (self.came_back(old), said(new)))))
         return {'FINISHED'}
+
+    def came_back(self, old: edits.Edits) -> str:
+        """What an operator says first."""
+        return ""
 
     def _old(self, obj: Object, cloud: native.Cloud) -> edits.Edits:
         try:
@@ -197,6 +201,9 @@ class PATINA_OT_points_reveal(Editing, Operator):
 
     select: BoolProperty(name="Select", default=True, description="Select what comes back")
 
+    def came_back(self, old: edits.Edits) -> str:
+        return f"{old.totals['hidden']:,} shown again"
+
     def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
         return replace(old, hidden=np.zeros_like(old.hidden), selected=old.hidden & ~old.deleted if self.select else old.selected)
 
@@ -219,6 +226,9 @@ class PATINA_OT_points_restore(Editing, Operator):
 
     bl_idname = "object.patina_points_restore"
     bl_label = "Restore Deleted Points"
+
+    def came_back(self, old: edits.Edits) -> str:
+        return f"{old.totals['deleted']:,} restored"
 
     def change(self, context: Context, obj: Object, cloud: native.Cloud, old: edits.Edits) -> edits.Edits:
         return replace(old, deleted=np.zeros_like(old.deleted), selected=old.deleted & ~old.hidden)

@@ -93,4 +93,21 @@ def offer(context: Context) -> None:
     context.window_manager.popup_menu(draw, title="Render with Patina?", icon='QUESTION')
 
 
-register, unregister = bpy.utils.register_classes_factory((PATINA_OT_set_up,))
+def _menu(self: bpy.types.Menu, context: Context) -> None:
+    """Where it is found by its name too: F3 looks through menus."""
+    if any(map(is_points, context.view_layer.objects)):
+        self.layout.separator()
+        self.layout.operator(PATINA_OT_set_up.bl_idname)
+
+
+_register, _unregister = bpy.utils.register_classes_factory((PATINA_OT_set_up,))
+
+
+def register() -> None:
+    _register()
+    bpy.types.TOPBAR_MT_render.append(_menu)
+
+
+def unregister() -> None:
+    bpy.types.TOPBAR_MT_render.remove(_menu)
+    _unregister()

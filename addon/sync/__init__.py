@@ -79,7 +79,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
     """Lights, world and settings of a scene around clouds and meshes that the caller has."""
     scene = depsgraph.scene_eval
     points = [item for item in items if isinstance(item, CloudItem)]
-    notices += filter(None, [migrate.notice(scene), clipping.notice(points, view)])
+    notices += filter(None, [migrate.notice(scene), clipping.notice(points, view), view.notice])
     studio = scene.patina.studio
     replaced = studio.use_light and studio.use_background  # then nothing of the world is drawn
     around = world.read(None if replaced else scene.world, notices)

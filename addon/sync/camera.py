@@ -62,6 +62,7 @@ class View:
     camera: Camera
     focus: Focus | None = None  # None: all is sharp
     panorama: Panorama | None = None  # then the camera says no more than where it stands
+    notice: str = ""  # what of the camera is not drawn as it says
 
 
 def final_view(camera: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph,
@@ -115,12 +116,16 @@ def _panoramic(camera: bpy.types.Object, render: bpy.types.RenderSettings, place
     if getattr(settings, "panorama_type", "") == 'EQUIRECTANGULAR':
         longitude = (settings.longitude_min, settings.longitude_max)
         latitude = (settings.latitude_min, settings.latitude_max)
+    kind = getattr(data, "panorama_type", 'EQUIRECTANGULAR')  # where every engine's artists see the choice: from 5.0 on
+    notice = "" if kind == 'EQUIRECTANGULAR' else (
+        f"'{camera.name}' is drawn as an equirectangular panorama: Patina knows no "
+        f"{data.bl_rna.properties['panorama_type'].enum_items[kind].name}")
     width, height = picture_size(render)
     region = border_region(render, width, height)
     matrix = row_major(place)
     return View(width, height, region,
                 Camera(0, matrix, -1.0, 1.0, -1.0, 1.0, data.clip_start, data.clip_end),
-                panorama=Panorama(width, height, region, matrix, longitude, latitude, data.clip_start, data.clip_end))
+                panorama=Panorama(width, height, region, matrix, longitude, latitude, data.clip_start, data.clip_end), notice=notice)
 
 
 def viewport_view(region: bpy.types.Region, space: bpy.types.SpaceView3D, rv3d: bpy.types.RegionView3D,

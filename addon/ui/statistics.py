@@ -8,6 +8,7 @@ from bpy.types import Context, Panel
 
 from .. import pace, viewport
 from ..engine import PatinaRenderEngine
+from ..operators import set_up
 from ..sync.analyzing import ANALYSES
 from . import rows
 
@@ -26,6 +27,21 @@ class SidebarPanel:
     @classmethod
     def poll(cls, context: Context) -> bool:
         return context.engine == PatinaRenderEngine.bl_idname
+
+
+class PATINA_PT_sidebar_set_up(Panel):
+    bl_space_type = 'VIEW_3D'
+    bl_region_type = 'UI'
+    bl_category = "Patina"
+    bl_label = "Set Up"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return context.engine != PatinaRenderEngine.bl_idname and any(map(set_up.is_points, context.view_layer.objects))
+
+    def draw(self, context: Context) -> None:
+        self.layout.operator(set_up.PATINA_OT_set_up.bl_idname, icon='RESTRICT_RENDER_OFF')
+        rows.sentence(context, self.layout, "Renders points with Patina, from a camera that sees them", 'NONE')
 
 
 class PATINA_PT_sidebar_camera(SidebarPanel, Panel):
@@ -87,6 +103,6 @@ class PATINA_PT_statistics_passes(SidebarPanel, Panel):
             rows.sentence(context, self.layout, f"no {name}: {reason}", 'NONE')
 
 
-_CLASSES = (PATINA_PT_sidebar_camera, PATINA_PT_statistics, PATINA_PT_statistics_passes)
+_CLASSES = (PATINA_PT_sidebar_set_up, PATINA_PT_sidebar_camera, PATINA_PT_statistics, PATINA_PT_statistics_passes)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -215,3 +215,35 @@ def test_damaged_edits_are_told():
     yield newer(pictures)
     said = [text for text in shown().notices if "damaged" in text]
     check(len(said) == 1 and lit(screenshot("edit_damaged")).sum() > 5000, f"{shown().notices}")
+
+
+def test_keys_mean_selected_points():
+    """H with Blender's own tool active hides the points that are selected, not the object; X deletes points; without any, H is Blender's."""
+    if not bpy.app.use_event_simulate:
+        print("  without --enable-event-simulate: no key can be pressed", flush=True)
+        return
+    obj = begin("view_keys.ply")
+    yield lambda: settled(ROWS * ROWS)
+    window, region = bpy.context.window_manager.windows[0], window_region()
+
+    def press(key):
+        place = {"x": region.x + region.width // 2, "y": region.y + region.height // 2}
+        window.event_simulate('MOUSEMOVE', 'NOTHING', **place)
+        window.event_simulate(key, 'PRESS', **place)
+        window.event_simulate(key, 'RELEASE', **place)
+
+    corners = [{"name": "", "loc": place, "time": 0.0} for place in ((region.width / 2, 0), (region.width, region.height))]
+    for key, plane in (('H', "hidden"), ('X', "deleted")):
+        with override():
+            bpy.ops.object.patina_points_select(path=corners)
+        before = chosen(obj).sum()
+        check(before > 0, "nothing is selected")
+        press(key)
+        yield lambda plane=plane: chosen(obj, plane).any()
+        check(chosen(obj, plane).sum() == before and not obj.hide_get() and obj.name in bpy.data.objects, f"{key}: points are {plane}")
+        with override():
+            bpy.ops.object.patina_points_reveal(select=False)
+            bpy.ops.object.patina_points_restore()
+            bpy.ops.object.patina_points_select_all(action='DESELECT')
+    press('H')
+    yield obj.hide_get

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What somebody tripped over who was told nothing: first files, first buttons, first keys. Windows: check_newcomer.py."""
+
+import bpy
+import check_linked  # noqa: F401  no test leaves files with the user
+import numpy as np
+from check_edits import ROWS, chosen, right_half, scene_with_wall, select
+from check_import import columns, import_ply, write_ply
+from check_panorama import stage
+from check_points import mesh_to_points
+from harness import SCRATCH, add_points, check, new_scene, render, reports, sphere
+
+from patina.importers import crs
+from patina.operators import points_keys
+
+LAMBERT = ('PROJCS["NAD_1983_HARN_Lambert_Conformal_Conic",GEOGCS["GCS_North_American_1983_HARN",UNIT["Degree",0.0174532925199433],'
+           'AUTHORITY["EPSG","4152"]],UNIT["Foot",0.3048],AUTHORITY["EPSG","2993"]]')
+
+
+def test_what_is_not_finite_is_left_out():
+    """Imported, it made Blender's boxes infinite."""
+    new_scene()
+    data = columns((0, 0, 0))
+    data[0][2][3], data[1][2][5], data[2][2][9] = np.nan, np.inf, -np.inf
+    for kind, options in (("mesh", {}), ("linked", {"link": True})):
+        obj, = import_ply(write_ply(f"holes_{kind}.ply", data), **options)
+        bpy.context.view_layer.update()
+        check(np.isfinite(np.array(obj.dimensions)).all() and max(obj.dimensions) < 2.1, f"{kind}: {tuple(obj.dimensions)}")
+        if not options:
+            check(len(obj.data.vertices) == len(data[0][2]) - 3, f"{len(obj.data.vertices)} vertices")
+            check(len(obj.data.attributes["intensity"].data) == len(obj.data.vertices), "attributes are as many")
+
+
+def test_import_selects_the_points_alone():
+    new_scene()
+    path = write_ply("alone.ply", columns())
+    for options in ({}, {"link": True}):
+        bpy.context.scene.camera.select_set(True)
+        obj, = import_ply(path, **options)
+        check(bpy.context.selected_objects == [obj], f"{options}: {[other.name for other in bpy.context.selected_objects]} are selected")
+
+
+def test_import_of_a_folder():
+    """A dialog where no file was chosen."""
+    try:
+        bpy.ops.import_scene.patina_points(filepath=f"{SCRATCH}/")
+    except RuntimeError as error:
+        check("choose a file" in str(error), str(error))
+    else:
+        raise AssertionError("a folder was imported")
+
+
+def test_coordinate_systems_by_name():
+    check(crs.name(LAMBERT) == "NAD 1983 HARN Lambert Conformal Conic (EPSG 2993)", crs.name(LAMBERT))
+    check(crs.name('COMPD_CS["UTM 32 + height",PROJCS["WGS 84 / UTM zone 32N",UNIT["metre",1]],VERT_CS["h",UNIT["metre",1]]]')
+          == "UTM 32 + height", "a compound")
+    check(crs.name("NAD83 / UTM zone 12N|NAVD88|") == "NAD83 / UTM zone 12N NAVD88", "words")
+    check(crs.name("") == "" and crs.name("PROJCS[") == "PROJCS[", "nothing, and what is broken")
+
+
+def test_frame_points_of_nodes_and_of_all():
+    """Points that Geometry Nodes made; with nothing selected, all that is points; without any, what there is."""
+    scene = new_scene(160, 120)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=1.0, location=(30, 5, -7))
+    obj = bpy.context.object
+    mesh_to_points(obj)
+    for selected in (True, False):
+        obj.select_set(selected)
+        scene.camera.location = (0, 0, 0)
+        bpy.context.view_layer.update()
+        check(bpy.ops.object.patina_frame_points() == {'FINISHED'}, f"selected {selected}")
+        bpy.context.view_layer.update()
+        away = np.array(scene.camera.matrix_world.translation) - (30, 5, -7)
+        check(abs(away[:2]).max() < 0.2 and 1 < away[2] < 10, f"selected {selected}: {away} from the middle")
+    cloud = add_points(sphere(500, 1.0, (-30, 0, 0))[0])
+    cube = bpy.data.objects.new("faces", obj.data)
+    scene.collection.objects.link(cube)
+    cube.location = (0, 500, 0)
+    bpy.data.objects.remove(obj)
+    check(bpy.ops.object.patina_frame_points() == {'FINISHED'}, "all points")
+    check(abs(scene.camera.location.x + 30) < 0.2 and abs(scene.camera.location.y) < 0.2, f"{scene.camera.location[:]}: faces do not count")
+    bpy.data.objects.remove(cloud)
+    check(bpy.ops.object.patina_frame_points() == {'FINISHED'} and abs(scene.camera.location.y - 500) < 0.2, "faces, where there is no point")
+
+
+def test_keys_of_points():
+    """H, X and Alt H are Blender's own unless points of the active object are selected, or hidden."""
+    obj = scene_with_wall("keys.ply")
+    hide, reveal, delete = (getattr(bpy.ops.object, f"patina_points_key_{name}") for name in ("hide", "reveal", "delete"))
+    obj.select_set(True)
+    check(not hide.poll() and not reveal.poll() and not delete.poll(), "nothing of it is selected")
+    select(right_half())
+    check(hide.poll() and delete.poll() and not reveal.poll(), "selected")
+    obj.select_set(False)
+    check(not hide.poll() and not delete.poll(), "the object is not selected")
+    obj.select_set(True)
+    check(hide() == {'FINISHED'} and chosen(obj, "hidden").sum() == ROWS * ROWS // 2 and not obj.hide_get(), "points are hidden")
+    check(reveal.poll(), "hidden points")
+    other = add_points([(0, 0, 0)])
+    other.hide_set(True)
+    check(not reveal.poll(), "Blender's key brings the hidden object back first")
+    other.hide_set(False)
+    check(reveal() == {'FINISHED'} and not chosen(obj, "hidden").any(), "revealed")
+    check(delete() == {'FINISHED'} and chosen(obj, "deleted").sum() == ROWS * ROWS // 2 and obj.name in bpy.data.objects, "deleted")
+    names = {name for name, _, _ in points_keys.KEYS}
+    check(all(hasattr(bpy.ops.object, name.partition(".")[2]) for name in names), "the keys' operators")
+
+
+def test_other_panoramas_are_named():
+    """Where every engine's artists choose the panorama, from 5.0 on, those that Patina does not know are named."""
+    scene = stage()
+    add_points([(0, 0, 0)])
+    data = scene.camera.data
+    if hasattr(data, "panorama_type"):
+        data.panorama_type = 'FISHEYE_EQUIDISTANT'
+        render()
+        check(any("equirectangular" in text for _, text in reports), f"reports {reports}")
+        data.panorama_type = 'EQUIRECTANGULAR'
+    render()
+    check(not any("equirectangular" in text for _, text in reports), f"reports {reports}")
