@@ -4,6 +4,7 @@ yield means; PATINA_SCREENSHOTS names a folder that keeps the pictures."""
 
 import os
 import subprocess
+import time
 from pathlib import Path
 
 import bpy
@@ -81,3 +82,87 @@ def test_newcomers_path():
     rows, columns = np.nonzero(bright)
     check(0.1 < bright.mean() < 0.8, f"F12 shows points on {bright.mean():.0%} of the picture")
     check(abs(columns.mean() - 960) < 150 and abs(rows.mean() - 540) < 150, "the points are not in the middle")
+
+
+# Where Blender 3.4 puts things in a window of 1280 x 800 as it comes, from the top left; dialogs have windows of their own.
+MENU_FILE, MENU_IMPORT, MENU_POINTS = (46, 13), (80, 295), (350, 546)
+DIALOG_FILE, DIALOG_IMPORT = (312, 78), (1031, 603)
+RENDERED, RENDER_TAB, STYLE, MUSEUM = (1017, 40), (1074, 354), (1168, 468), (661, 170)
+MOST_CLICKS = 16
+
+
+class Hand:
+    """Clicks and keys, as the newcomer's, counted. Each is a generator: it ends when Blender had time for it."""
+
+    def __init__(self, before):
+        self.clicks = before
+
+    @staticmethod
+    def pause(seconds):
+        until = time.perf_counter() + seconds
+        return lambda: time.perf_counter() > until
+
+    def click(self, place):
+        """In the newest window."""
+        window = bpy.context.window_manager.windows[-1]
+        x, y = place[0], window.height - place[1]
+        for step in (6, 3, 0):
+            window.event_simulate('MOUSEMOVE', 'NOTHING', x=x - step, y=y)
+            yield self.pause(0.2)
+        for value in ('PRESS', 'RELEASE'):
+            window.event_simulate('LEFTMOUSE', value, x=x, y=y)
+            yield self.pause(0.1)
+        self.clicks += 1
+        yield self.pause(0.5)
+
+
+def whole_window(name):
+    """Kept where pictures are."""
+    if "PATINA_SCREENSHOTS" in os.environ:
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
+            bpy.ops.screen.screenshot(filepath=str(Path(os.environ["PATINA_SCREENSHOTS"]) / f"{name}.png"))
+
+
+def test_newcomers_clicks():
+    """The manual's list, click by click: from Blender as it comes to a picture in a style, with at most 16."""
+    window = bpy.context.window_manager.windows[0]
+    if not bpy.app.use_event_simulate or bpy.app.version[:2] != (3, 4) or (window.width, window.height) != (1280, 800):
+        print("  not gone: it wants --enable-event-simulate and Blender 3.4 in a window of 1280 x 800", flush=True)
+        return
+    path = SCRATCH / "clicks" / "relief.ply"
+    path.parent.mkdir()
+    subprocess.run(["/usr/bin/python3", str(REPOSITORY / "build/relief"), str(path), str(POINTS)], check=True)
+    in_view(bpy.ops.wm.read_homefile, use_factory_startup=True, use_empty=False, app_template="")
+    yield lambda: "Cube" in bpy.data.objects
+    hand, windows = Hand(1), bpy.context.window_manager.windows  # one that the splash takes
+    for place in (MENU_FILE, MENU_IMPORT, MENU_POINTS):
+        yield from hand.click(place)
+    yield lambda: len(windows) == 2
+    browser = windows[1].screen.areas[0].spaces[0]
+    yield lambda: browser.params is not None
+    browser.params.directory = str(path.parent).encode()  # where the newcomer keeps scans
+    yield hand.pause(2.0)
+    yield from hand.click(DIALOG_FILE)
+    yield from hand.click(DIALOG_IMPORT)
+    yield lambda: "relief" in bpy.data.objects and len(windows) == 1
+    yield hand.pause(1.0)
+    whole_window("path_1_imported")
+    yield from hand.click(MENU_POINTS)  # Set Up for Points is offered under the hand
+    yield lambda: bpy.context.scene.render.engine == 'PATINA'
+    yield from hand.click(RENDERED)
+    yield from hand.click(RENDER_TAB)
+    yield lambda: shown() and shown().shown.stats["points"] == POINTS
+    yield from hand.click(STYLE)
+    whole_window("path_2_styles")
+    yield from hand.click(MUSEUM)
+    yield lambda: bpy.context.scene.patina.style.chosen == "museum" and shown() and shown().shown.stats["points"] == POINTS
+    whole_window("path_3_style")
+    bpy.ops.render.render()  # F12
+    hand.clicks += 1
+    if "PATINA_SCREENSHOTS" in os.environ:
+        bpy.data.images['Render Result'].save_render(str(Path(os.environ["PATINA_SCREENSHOTS"]) / "path_4_f12.png"))
+    bright = saved('PNG')[..., :3].max(axis=2) > 0.2
+    check(0.1 < bright.mean() < 0.8, f"F12 shows points on {bright.mean():.0%} of the picture")
+    print(f"  {hand.clicks} clicks", flush=True)
+    check(hand.clicks <= MOST_CLICKS, f"{hand.clicks} clicks")
