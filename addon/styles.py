@@ -99,10 +99,15 @@ def entries() -> list[Entry]:
 
 
 def entry(key: str) -> Entry:
-    for found in entries():
+    """By the name of its file, else by the one that is shown, in letters of either case."""
+    known = entries()
+    for found in known:
         if found.key == key:
             return found
-    raise StyleError(f"there is no style '{key}'")
+    for found in known:
+        if found.label.lower() == key.strip().lower():
+            return found
+    raise StyleError(f"there is no style '{key}', only {', '.join(found.key for found in known)}")
 
 
 def _files(folder: Path) -> list[Path]:

@@ -235,6 +235,15 @@ def test_bad_files():
     check(scene.patina.style.chosen == styles.PLAIN, "a style that is gone shows as none")
 
 
+def test_styles_by_their_shown_names():
+    """As menus show them; who names none of them is told which there are."""
+    stage()
+    for name, key in (("Ink Line", "ink"), ("museum", "museum"), ("x-ray", "xray"), ("Watercolor", "watercolour")):
+        check(bpy.ops.patina.apply_style(style=name) == {'FINISHED'} and bpy.context.scene.patina.style.applied == key, name)
+    said = refusal(lambda: bpy.ops.patina.apply_style(style="rust"))
+    check("there is no style 'rust', only " in said and "museum" in said and "xray" in said, said)
+
+
 def test_unwritable():
     stage()
     wanted = styles.own_folder(create=True) / "in_the_way.json"
