@@ -116,10 +116,12 @@ def _panoramic(camera: bpy.types.Object, render: bpy.types.RenderSettings, place
     if getattr(settings, "panorama_type", "") == 'EQUIRECTANGULAR':
         longitude = (settings.longitude_min, settings.longitude_max)
         latitude = (settings.latitude_min, settings.latitude_max)
-    kind = getattr(data, "panorama_type", 'EQUIRECTANGULAR')  # where every engine's artists see the choice: from 5.0 on
-    notice = "" if kind == 'EQUIRECTANGULAR' else (
-        f"'{camera.name}' is drawn as an equirectangular panorama: Patina knows no "
-        f"{data.bl_rna.properties['panorama_type'].enum_items[kind].name}")
+    notice = ""
+    if hasattr(settings, "panorama_type"):
+        choice = settings.bl_rna.properties["panorama_type"]
+        if settings.panorama_type not in {'EQUIRECTANGULAR', choice.default}:  # Cycles' own default is nobody's choice here
+            notice = (f"'{camera.name}' is drawn as an equirectangular panorama: Patina knows no "
+                      f"{choice.enum_items[settings.panorama_type].name}")
     width, height = picture_size(render)
     region = border_region(render, width, height)
     matrix = row_major(place)
