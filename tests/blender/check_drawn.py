@@ -103,6 +103,10 @@ def test_panels_are_drawn_without_errors():
                     area().tag_redraw()
                     bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
             yield None
+        scene.render.engine = 'CYCLES'  # with another engine Set Up is offered
+        area().spaces[0].shading.type = 'SOLID'
+        area().tag_redraw()
+        bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)
         errors = [error for _, _, found in probes for error in found]
         check(not errors, f"{len(errors)}: {errors[:1]}")
         drawn = set().union(*(found for _, found, _ in probes))
@@ -139,8 +143,11 @@ def test_labels_fit_the_sidebar():
         for cls in sidebar():
             layout = Row()
             obj.patina.linked_file = ""
+            context.engine = 'PATINA'
             if not cls.poll(context):
                 obj.patina.linked_file = "scan.ply"  # some are of linked clouds alone
+            if not cls.poll(context):
+                context.engine = 'CYCLES'  # and what is offered with other engines
             check(cls.poll(context), cls.__name__)
             cls.draw(Drawing(cls, layout), context)
             must(cls.bl_label, rows.LEAST - 2 * ARROW, cls.__name__)

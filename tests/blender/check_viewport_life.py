@@ -342,7 +342,9 @@ def test_sidebar():
     said = []
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window, area=area(), region=window_region()):
-        for cls in statistics._CLASSES:
+        offer = statistics.PATINA_PT_sidebar_set_up
+        check(not offer.poll(bpy.context), "Set Up is offered, and Patina is the engine")
+        for cls in set(statistics._CLASSES) - {offer}:
             check(cls.poll(bpy.context), f"{cls.__name__} does not show")
             cls.draw(type("Panel", (), {"layout": _Layout(said)})(), bpy.context)
     check("20,000" in said and "scatter" in said, f"{said}")
