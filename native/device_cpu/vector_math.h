@@ -200,10 +200,16 @@ static inline vf vf_farthest(const uint64_t *keys, const uint32_t *from, vi cell
     return vf_select(shown, vi_float(vi_gather_z(keys, cell, shown)) + span * vf_rcp(inverse), z_q);
 }
 
+// Or as far as what lies beside a pixel at z, if no farther from z than z from z_q: a gap's other side, or what is to hide a rim.
+static inline vf vf_farther(vf farthest, vf beside, vf z_q, vf z)
+{
+    return vf_select(vf_le(beside, z + (z - z_q)), vf_max(farthest, beside), farthest);
+}
+
 // z at ray p of the plane with normal n through the point at (ray q, z_q), not nearer than z_q, not farther than
-// z_q + limit, nor than `farthest`. SPEC 2.2, refined filling.
+// z_q + limit. SPEC 2.2, refined filling.
 static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], const vf ray_q[2], vf z_q, const vf ray_p[2],
-                                vf limit, vf farthest)
+                                vf limit)
 {
     const vf zero = vf_zero(), one = vf_set(1.0f);
     vf z = z_q;
@@ -217,7 +223,7 @@ static inline vf vf_plane_depth(const struct view_args *view, const vf n[3], con
         vf rise = (n[0] * (ray_p[0] - ray_q[0]) + n[1] * (ray_p[1] - ray_q[1])) * sign;
         z = vf_select(good, z_q + rise * r, z);
     }
-    return vf_max(vf_min(z, vf_min(z_q + limit, farthest)), z_q);
+    return vf_min(vf_max(z, z_q), z_q + limit);
 }
 
 // Which of PT_LANES points face away.

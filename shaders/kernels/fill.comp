@@ -183,6 +183,20 @@ uvec2 least_key(view_args view, ivec2 place, bool reach, float threshold, inout 
     return key;
 }
 
+// z at a pixel of the surface that its neighbour `best` shows at z_q: of its tangent plane, within the cloud.
+float refined_z(view_args view, ivec2 place, ivec2 best, uint source, float z_q)
+{
+    ivec2 size = ivec2(view.width, view.height);
+    vec4 normal = read_float4(source);
+    float z = pt_plane_depth(view, normal.xyz, pt_ray(view, best.x, best.y), z_q, pt_ray(view, place.x, place.y),
+                             pt_level_distance(view, read_span(source), normal.w, z_q));
+    float farthest = pt_farthest(pt_cell_of(source, args.from_width, view.level, view.width), source, z_q);
+    if (farthest < z)
+        for (int d = 0; d < 8; d++)
+            farthest = pt_farther(farthest, z_at(size, place.x + ring[d].x, place.y + ring[d].y), z_q, z);
+    return pt_max(pt_min(z, farthest), z_q);
+}
+
 // 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
 void main()
 {
@@ -208,14 +222,8 @@ void main()
         source = texelFetch(from_plane, best.y * size.x + best.x).x;
         taken = key != uvec2(0xFFFFFFFFu);
     }
-    if (refined && taken) {
-        float z = pt_float(key.y);
-        z = pt_plane_depth(view, read_float4(source).xyz, pt_ray(view, best.x, best.y), z,
-                           pt_ray(view, place.x, place.y),
-                           pt_level_distance(view, read_span(source), read_float4(source).w, z),
-                           pt_farthest(pt_cell_of(source, args.from_width, view.level, view.width), source, z));
-        key.y = pt_bits(z);
-    }
+    if (refined && taken)
+        key.y = pt_bits(refined_z(view, place, best, source, pt_float(key.y)));
     changed[index] = change(taken ? pixel : NO_PIXEL, key.x, key.y, source);
     if (!unfills || (!taken && all_new == 0u))
         return;

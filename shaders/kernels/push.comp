@@ -19,14 +19,14 @@ layout(std430, binding = BIND_from) buffer from_block { uint from[]; };
 layout(std430, binding = BIND_counters) buffer counters_block { uint taken_count; };
 layout(std430, binding = BIND_taken) buffer taken_block { uint taken[]; };
 
-#if STEP == 0
-
 float coarse_z(ivec2 size, int x, int y)
 {
     bool inside = x >= 0 && y >= 0 && x < size.x && y < size.y;
     float z = read_z(inside ? uint(y * size.x + x) : 0u);
     return inside ? z : pt_float(PT_KEY_EMPTY_Z);
 }
+
+#if STEP == 0
 
 // Coarse z of a pixel's parent and of the cell beside it, on the pixel's side.
 vec2 coarse_pair(ivec2 size, ivec2 cell, int side)
@@ -121,8 +121,14 @@ void take(view_args view, uint coarse_width, bool refined, uint at)
         coarse.level++;
         float limit = pt_level_distance(coarse, read_span(source), normal.w, z);
         float farthest = pt_farthest(pt_cell_of(source, args.from_width, coarse.level, coarse_width), source, z);
-        z = pt_plane_depth(view, normal.xyz, pt_ray(coarse, cell.x, cell.y), z, pt_ray(view, place.x, place.y), limit, farthest);
-        key.y = pt_bits(z);
+        float plane = pt_plane_depth(view, normal.xyz, pt_ray(coarse, cell.x, cell.y), z, pt_ray(view, place.x, place.y), limit);
+        ivec2 size = ivec2(coarse_width, args.coarse_height), side = (place & 1) * 2 - 1;
+        if (farthest < plane) {
+            farthest = pt_farther(farthest, coarse_z(size, cell.x + side.x, cell.y), z, plane);
+            farthest = pt_farther(farthest, coarse_z(size, cell.x, cell.y + side.y), z, plane);
+            farthest = pt_farther(farthest, coarse_z(size, cell.x + side.x, cell.y + side.y), z, plane);
+        }
+        key.y = pt_bits(pt_max(pt_min(plane, farthest), z));
     }
     keys[at] = key;
     from[at] = source;

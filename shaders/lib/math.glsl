@@ -170,8 +170,8 @@ float pt_level_distance(view_args view, float deff, float inverse, float z)
 }
 
 // z at ray p of the plane with normal n through the point at (ray q, z_q), not nearer than z_q, not farther than
-// z_q + limit, nor than `farthest`. SPEC 2.2, refined filling.
-float pt_plane_depth(view_args view, vec3 n, vec2 ray_q, float z_q, vec2 ray_p, float limit, float farthest)
+// z_q + limit. SPEC 2.2, refined filling.
+float pt_plane_depth(view_args view, vec3 n, vec2 ray_q, float z_q, vec2 ray_p, float limit)
 {
     precise float z = z_q;
     if (view.perspective != 0u) {
@@ -190,8 +190,8 @@ float pt_plane_depth(view_args view, vec3 n, vec2 ray_q, float z_q, vec2 ray_p, 
         if (size > 1e-6)
             z = plane;
     }
-    precise float next = z_q + limit;
-    return pt_max(pt_min(z, pt_min(next, farthest)), z_q);
+    precise float farthest = z_q + limit;
+    return pt_min(pt_max(z, z_q), farthest);
 }
 
 // Column and row of a pixel's index in a plane of this width (at most 2^22 rows): integer division costs llvmpipe 20

@@ -39,6 +39,13 @@ float pt_farthest(uint cell, uint source, float z_q)
     return texelFetch(from_plane, int(cell)).x == source ? farthest : z_q;
 }
 
+// Or as far as what lies beside a pixel at z, if no farther from z than z from z_q: a gap's other side, or what is to hide a rim.
+float pt_farther(float farthest, float beside, float z_q, float z)
+{
+    precise float step = z - z_q, next = z + step;
+    return beside <= next ? pt_max(farthest, beside) : farthest;
+}
+
 // Of kernels that visit every pixel, 32 invocations a workgroup: 64 x 4 pixels a workgroup, as in native/device_gl/kernels.c,
 // and eight of a row an invocation, PT_APART from one to the next.
 #define PT_APART 8u

@@ -234,13 +234,12 @@ struct ref_range ref_farthest(struct ref_range measured, double span, double inv
 }
 
 struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q,
-                                 struct ref_range z, struct ref_ray p, struct ref_range limit, struct ref_range farthest)
+                                 struct ref_range z, struct ref_ray p, struct ref_range limit)
 {
     int open = 0;
     struct ref_range depth = view->perspective ? perspective_plane(normal, q, z, p, &open)
                                                : orthographic_plane(normal, q, z, p, &open);
-    double far_lo = fmin((z.lo + limit.lo) * (1.0 - TOL_SUM), farthest.lo);
-    double far_hi = fmax(fmin((z.hi + limit.hi) * (1.0 + TOL_SUM), farthest.hi), z.hi);
+    double far_lo = (z.lo + limit.lo) * (1.0 - TOL_SUM), far_hi = (z.hi + limit.hi) * (1.0 + TOL_SUM);
     if (open) {
         struct ref_range any = {z.lo, far_hi};
         return any;
@@ -255,6 +254,19 @@ struct ref_range ref_plane_depth(const struct view_args *view, const float norma
     if (kept.lo < z.lo) // z + limit rounds to z or above
         kept.lo = z.lo;
     return kept;
+}
+
+struct ref_range ref_within(struct ref_range z, struct ref_range plane, struct ref_range farthest, const struct ref_range *beside,
+                            int count)
+{
+    const double least = (2.0 * plane.lo - z.hi) * (1.0 - 2.0 * TOL_SUM), most = (2.0 * plane.hi - z.lo) * (1.0 + 2.0 * TOL_SUM);
+    for (int i = 0; i < count; i++) {
+        if (beside[i].hi <= least)
+            farthest.lo = fmax(farthest.lo, beside[i].lo);
+        if (beside[i].lo <= most)
+            farthest.hi = fmax(farthest.hi, beside[i].hi);
+    }
+    return (struct ref_range){fmax(fmin(plane.lo, farthest.lo), z.lo), fmax(fmin(plane.hi, farthest.hi), z.hi)};
 }
 
 double ref_clip_row(const struct clip_view *clip, int k, const double p[3], double *error)

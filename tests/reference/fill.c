@@ -95,10 +95,13 @@ static struct ref_range taken_depth(const struct phase *phase, const struct ref_
     const struct view_args *view = &phase->args->view;
     if (!phase->args->refined)
         return source->z;
-    return ref_plane_depth(view, phase->normal + 4 * (size_t)source->from, ref_ray(view, qx, qy), source->z,
-                           ref_ray(view, x, y),
-                           ref_level_distance(view, phase->normal, phase->span, source->from, source->z),
-                           farthest_of(phase, pixels, source));
+    const struct ref_range limit = ref_level_distance(view, phase->normal, phase->span, source->from, source->z);
+    const struct ref_range plane = ref_plane_depth(view, phase->normal + 4 * (size_t)source->from, ref_ray(view, qx, qy), source->z,
+                                                   ref_ray(view, x, y), limit);
+    struct ref_range beside[8];
+    for (int i = 0; i < 8; i++)
+        beside[i] = at(phase->args, pixels, x + ring_x[i], y + ring_y[i]).z;
+    return ref_within(source->z, plane, farthest_of(phase, pixels, source), beside, 8);
 }
 
 // Whether the neighbour's surface reaches the pixel: its own pixel lies near enough.

@@ -55,11 +55,11 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
         return pixel;
     struct ref_range parent = coarse_depth(args, coarse_keys, px, py);
     enum ref_truth parent_before = ref_less(parent, threshold);
-    enum ref_truth before[3] = {
-        ref_less(coarse_depth(args, coarse_keys, px + sx, py), threshold),
-        ref_less(coarse_depth(args, coarse_keys, px, py + sy), threshold),
-        ref_less(coarse_depth(args, coarse_keys, px + sx, py + sy), threshold),
-    };
+    const struct ref_range beside[3] = {coarse_depth(args, coarse_keys, px + sx, py), coarse_depth(args, coarse_keys, px, py + sy),
+                                        coarse_depth(args, coarse_keys, px + sx, py + sy)};
+    enum ref_truth before[3];
+    for (int i = 0; i < 3; i++)
+        before[i] = ref_less(beside[i], threshold);
     enum ref_truth around = two_of(before);
     if (parent_before == REF_NO || around == REF_NO)
         return pixel;
@@ -82,8 +82,9 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
         const struct ref_range measured = ref_exactly(ref_key_z(coarse_keys[cell]));
         const struct ref_range farthest = coarse_from[cell] != taken.from
             ? taken.z : ref_farthest(measured, planes->span[taken.from], planes->normal[4 * (size_t)taken.from + 3]);
-        taken.z = ref_plane_depth(view, planes->normal + 4 * (size_t)taken.from, ref_ray(&above, px, py), taken.z,
-                                  ref_ray(view, x, y), limit, farthest);
+        const struct ref_range plane = ref_plane_depth(view, planes->normal + 4 * (size_t)taken.from, ref_ray(&above, px, py), taken.z,
+                                                       ref_ray(view, x, y), limit);
+        taken.z = ref_within(taken.z, plane, farthest, beside, 3);
     }
     return taken;
 }

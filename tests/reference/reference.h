@@ -65,10 +65,12 @@ struct ref_range ref_level_distance(const struct view_args *view, const float *n
 int ref_decode_normal(uint32_t word, struct ref_vec *normal);
 double ref_srgb(uint8_t value); // sRGB to linear
 
-// Depth at ray p of the plane with this normal through the point at ray q and depth z, kept in [z, z + limit], and before
-// `farthest` where that is not nearer than z.
+// Depth at ray p of the plane with this normal through the point at ray q and depth z, kept in [z, z + limit].
 struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q,
-                                 struct ref_range z, struct ref_ray p, struct ref_range limit, struct ref_range farthest);
+                                 struct ref_range z, struct ref_ray p, struct ref_range limit);
+// That depth, `plane`, kept before `farthest`, or before what lies beside the pixel and no farther from it than z is: `beside`,
+// `count` depths.
+struct ref_range ref_within(struct ref_range z, struct ref_range plane, struct ref_range farthest, const struct ref_range *beside, int count);
 // How far z of a filled surface goes at most: beyond `measured`, its z in the cell that holds `from`, as far as its span reaches along it.
 struct ref_range ref_farthest(struct ref_range measured, double span, double inverse);
 // The cell of a level that holds a pixel of level 0.

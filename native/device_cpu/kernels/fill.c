@@ -53,6 +53,18 @@ static void take_least(const struct fill *fill, size_t at, size_t end)
     }
 }
 
+// How far z of the entries' surfaces, now z, goes at most, given how far it goes by itself.
+static vf farthest_beside(const struct fill *fill, size_t at, vf farthest, vf z_q, vf z, vm lanes)
+{
+    const vi x = vi_load(fill->entries.x + at), y = vi_load(fill->entries.y + at);
+    for (int d = 0; d < RING; d++) {
+        const struct pixels q = neighbours(fill, x, y, d, lanes);
+        const vf beside = vi_float(vi_gather_z(fill->keys, q.at, q.inside));
+        farthest = vf_select(q.inside, vf_farther(farthest, beside, z_q, z), farthest);
+    }
+    return farthest;
+}
+
 // 2. Refined: the depth of that surface's tangent plane at the entries' pixels.
 static void refine(const struct fill *fill, size_t at, size_t end)
 {
@@ -60,14 +72,18 @@ static void refine(const struct fill *fill, size_t at, size_t end)
     const struct entries *e = &fill->entries;
     const vm lanes = entry_lanes(at, end);
     vi source = vi_load(e->from + at);
-    vf z = vi_float(vi_load_z(e->key + at)), n[4], ray_p[2], ray_q[2];
+    vf z_q = vi_float(vi_load_z(e->key + at)), n[4], ray_p[2], ray_q[2];
     vf_gather4(fill->normals, source, lanes, n);
     vf_ray_of(view, vi_load(e->x + at), vi_load(e->y + at), ray_p);
     vf_ray_of(view, vi_load(e->qx + at), vi_load(e->qy + at), ray_q);
-    const vf span = vf_gather(fill->span, source, lanes), limit = vf_level_distance(view, span, n[3], z);
+    const vf span = vf_gather(fill->span, source, lanes), limit = vf_level_distance(view, span, n[3], z_q);
     const vi cell = vi_cell_of(source, fill->args->from_width, view->level, view->width);
-    z = vf_plane_depth(view, n, ray_q, z, ray_p, limit, vf_farthest(fill->keys, fill->from, cell, source, lanes, z, span, n[3]));
-    vi_store_keys(e->key + at, vf_bits(z), vi_load_id(e->key + at), vm_bits(lanes));
+    const vf z = vf_plane_depth(view, n, ray_q, z_q, ray_p, limit);
+    vf farthest = vf_farthest(fill->keys, fill->from, cell, source, lanes, z_q, span, n[3]);
+    const vm beyond = vm_and(lanes, vf_lt(farthest, z));
+    if (vm_bits(beyond))
+        farthest = farthest_beside(fill, at, farthest, z_q, z, beyond);
+    vi_store_keys(e->key + at, vf_bits(vf_max(vf_min(z, farthest), z_q)), vi_load_id(e->key + at), vm_bits(lanes));
 }
 
 // ---- reach -----------------------------------------------------------------------------------------------------------------

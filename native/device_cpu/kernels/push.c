@@ -114,24 +114,34 @@ static void load_parents(const struct push *push, uint32_t x, uint32_t y, vf z, 
     }
 }
 
+struct sides { // rows of coarse cells: the parents', and the one on the pixels' side
+    struct pt_row_z own, next;
+};
+
 // z of the cells' pixels of column 0 or 1, row y: refined, of the surface's tangent plane there.
-static inline vi pixel_z(const struct push *push, const struct parents *p, uint32_t column, uint32_t y)
+static inline vi pixel_z(const struct push *push, const struct parents *p, const struct sides *sides, uint32_t column, uint32_t y)
 {
     if (!push->args->refined)
         return vf_bits(p->z);
-    vf ray[2];
+    vf ray[2], z, farthest = p->farthest;
     pixel_ray(push, p, column, y, ray);
-    if (!push->args->view.perspective)
-        return vf_bits(vf_plane_depth(&push->args->view, p->n, p->ray, p->z, ray, p->limit, p->farthest));
-    const vf z = vf_meet(p->z, p->dot, (p->across[column] + p->n[1] * ray[1]) - p->n[2]); // as vf_plane_depth does
-    return vf_bits(vf_max(vf_min(z, vf_min(p->z + p->limit, p->farthest)), p->z));
+    if (push->args->view.perspective) { // as vf_plane_depth does
+        z = vf_meet(p->z, p->dot, (p->across[column] + p->n[1] * ray[1]) - p->n[2]);
+        z = vf_min(vf_max(z, p->z), p->z + p->limit);
+    } else {
+        z = vf_plane_depth(&push->args->view, p->n, p->ray, p->z, ray, p->limit);
+    }
+    farthest = vf_farther(farthest, column ? sides->own.east : sides->own.west, p->z, z);
+    farthest = vf_farther(farthest, sides->next.own, p->z, z);
+    farthest = vf_farther(farthest, column ? sides->next.east : sides->next.west, p->z, z);
+    return vf_bits(vf_max(vf_min(z, farthest), p->z));
 }
 
 // 4. The pixels of row y that `bits` names, PT_LANES in each half, take their parents' keys.
-static void take(const struct push *push, const struct parents *p, uint32_t y, const uint32_t bits[2])
+static void take(const struct push *push, const struct parents *p, const struct sides *sides, uint32_t y, const uint32_t bits[2])
 {
     vi z[2], id[2], source[2];
-    vi_zip(pixel_z(push, p, 0, y), pixel_z(push, p, 1, y), z);
+    vi_zip(pixel_z(push, p, sides, 0, y), pixel_z(push, p, sides, 1, y), z);
     vi_zip(p->id, p->id, id);
     vi_zip(p->source, p->source, source);
     const uint32_t width = push->args->view.width;
@@ -203,14 +213,14 @@ static void push_cells(const struct push *push, uint32_t x, uint32_t y)
     const uint32_t give = twice(parents.give);
     for_pixels(own.west, own.east, beside);
     for (uint32_t row = 0; give && row < 2; row++) {
-        const struct pt_row_z next = load_cells(push, x, row ? y + 1 : y - 1);
-        for_pixels(next.own, next.own, above);
-        for_pixels(next.west, next.east, corner);
+        const struct sides sides = { own, load_cells(push, x, row ? y + 1 : y - 1) };
+        for_pixels(sides.next.own, sides.next.own, above);
+        for_pixels(sides.next.west, sides.next.east, corner);
         for (uint32_t half = 0; half < 2; half++)
             bits[row][half] = covered(push, &pixels[row][half], beside[half], above[half], corner[half],
                                       bits[row][half] & give >> half * PT_LANES);
         if (bits[row][0] | bits[row][1])
-            take(push, &parents, 2 * y + row, bits[row]);
+            take(push, &parents, &sides, 2 * y + row, bits[row]);
     }
 }
 
