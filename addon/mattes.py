@@ -15,14 +15,14 @@ import numpy as np
 
 from . import backdrop
 from .sync import CloudItem, Effects, MeshItem, SceneDescription
-from .sync.clouds import LIT, NOTHING
+from .sync.clouds import LIT
 from .sync.colors import FIXED
 from .sync.roles import CATCHER, HOLDOUT
 
 UNLIT = 1  # PATINA_LIGHTING_UNLIT
 NO_CAST, NO_SELF = 1, 4  # of patina_shadow_off
-BLACK, WHITE = (NOTHING,) * 3, (1.0,) * 3
-CHANNELS = RED, GREEN, BLUE = (1.0, NOTHING, NOTHING), (NOTHING, 1.0, NOTHING), (NOTHING, NOTHING, 1.0)
+BLACK, WHITE = (0.0,) * 3, (1.0,) * 3
+CHANNELS = RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 Item = CloudItem | MeshItem
 

@@ -136,13 +136,13 @@ class CloudStyle(Descriptor):
                 ("ramp_count", c_uint32), ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
                 ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
                 ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float), ("mask", c_void_p),
-                ("grade", c_void_p)]
+                ("grade", c_void_p), ("exact", c_uint32)]
 
 
 class MeshStyle(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("color", c_float * 3),
                 ("shadow_off", c_uint32), ("unlit", c_uint32), ("texture", c_void_p), ("alpha", c_uint32),
-                ("alpha_least", c_float)]
+                ("alpha_least", c_float), ("exact", c_uint32)]
 
 
 class Clip(Descriptor):
@@ -182,13 +182,14 @@ class Effects(Descriptor):
                 ("hatch_opacity", c_float), ("hatch_ground", c_float), ("hatch_color", c_float * 3),
                 ("fog_density", c_float), ("fog_start", c_float), ("fog_end", c_float), ("fog_fixed", c_uint32),
                 ("fog_color", c_float * 3), ("focus_aperture", c_float), ("focus_distance", c_float),
-                ("paper_color", c_float * 3), ("paper_grain", c_float)]
+                ("paper_color", c_float * 3), ("paper_grain", c_float), ("exact", c_uint32)]
 
 
 class Lines(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("width", c_float), ("world", c_uint32), ("offset", c_float),
                 ("source", c_uint32), ("color", c_float * 3), ("far_color", c_float * 3), ("range", c_float * 2),
-                ("transparency", c_float), ("soft", c_float), ("surface", c_uint32), ("paper", c_float * 3)]
+                ("transparency", c_float), ("soft", c_float), ("surface", c_uint32), ("paper", c_float * 3),
+                ("exact", c_uint32)]
 
 
 class ExpectedError(Structure):

@@ -32,8 +32,6 @@ SMALL = 1 << 14  # points: fewer are worked on by one thread each, in the librar
 AT_ONCE = 16  # small clouds
 MOST_WAITING = 1 << 22  # points of small clouds that are held beside Blender's own
 
-NOTHING = 1e-20  # stands for zero where zero would mean "default" to the library
-
 
 @dataclass(frozen=True)
 class PointArrays:
@@ -83,6 +81,7 @@ class CloudStyle:
     free_space: int = 0
     hidden_kinds: int = 0
     least_certainty: float = 0.0
+    exact: int = 1  # black is black
 
 
 class Pending:
@@ -565,15 +564,13 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
     patina = obj.patina
-    color = materials.color(obj)
-    dark = not (patina.ambient or patina.diffuse or patina.specular)
     return CloudStyle(
         world_from_object=row_major(matrix),
         lighting=enum_number(patina, "lighting"),
         cull_back=int(patina.cull_back),
         d_min=patina.d_min,
-        color=color if any(color) else (NOTHING,) * 3,
-        ambient=NOTHING if dark else patina.ambient,
+        color=materials.color(obj),
+        ambient=patina.ambient,
         diffuse=patina.diffuse,
         specular=patina.specular,
         shininess=patina.shininess,
@@ -588,8 +585,8 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
 
 
 def _mesh_style(obj: bpy.types.Object, matrix: Matrix, surface: images.Surface) -> meshes.MeshStyle:
-    color, use = surface.color[:3], surface.use
-    return meshes.MeshStyle(world_from_object=row_major(matrix), color=color if any(color) else (NOTHING,) * 3,
+    use = surface.use
+    return meshes.MeshStyle(world_from_object=row_major(matrix), color=surface.color[:3],
                             shadow_off=_shadow_off(obj) & 3, unlit=int(surface.unlit), alpha=use.alpha if use else images.NONE,
                             alpha_least=use.alpha_least if use else 0.0)
 

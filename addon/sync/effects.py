@@ -34,6 +34,7 @@ class Effects:
     focus_distance: float
     paper_color: tuple[float, float, float]
     paper_grain: float
+    exact: int = 1
 
     def through(self, focus: Focus | None) -> Effects:
         """With the depth of field of a view."""
@@ -71,10 +72,5 @@ def read(scene: bpy.types.Scene, focus: Focus | None, notices: list[str]) -> Eff
         fog_color=tuple(effects.fog_color),
         focus_aperture=0.0,
         focus_distance=0.0,
-        paper_color=_paper(effects.paper_color) if effects.use_paper else (1.0, 1.0, 1.0),
+        paper_color=tuple(effects.paper_color) if effects.use_paper else (1.0, 1.0, 1.0),
         paper_grain=effects.paper_grain if effects.use_paper else 0.0).through(focus)
-
-
-def _paper(color: bpy.types.bpy_prop_array) -> tuple[float, float, float]:
-    """All zero would mean white."""
-    return tuple(color) if any(color) else (1e-20, 1e-20, 1e-20)

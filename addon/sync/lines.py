@@ -10,8 +10,6 @@ import bpy
 from ..properties import enum_number
 from .camera import Camera
 
-NOT_BLACK = 1e-20  # the library takes three zeros of these two for "default"
-
 
 @dataclass(frozen=True)
 class Lines:
@@ -28,6 +26,7 @@ class Lines:
     soft: float
     surface: int
     paper: tuple[float, float, float]
+    exact: int = 1
 
 
 def read(scene: bpy.types.Scene, camera: Camera) -> Lines | None:
@@ -37,7 +36,7 @@ def read(scene: bpy.types.Scene, camera: Camera) -> Lines | None:
         return None
     start = camera.near_clip if camera.orthographic else 0.0  # where the library counts depth from
     world = lines.units == 'WORLD'
-    color = (max(lines.tint, NOT_BLACK),) * 3 if lines.source == 'POINT' else tuple(lines.color)
+    color = (lines.tint,) * 3 if lines.source == 'POINT' else tuple(lines.color)
     return Lines(
         width=lines.width_world if world else lines.width,
         world=int(world),
@@ -49,4 +48,4 @@ def read(scene: bpy.types.Scene, camera: Camera) -> Lines | None:
         transparency=1.0 - lines.opacity,
         soft=lines.soft,
         surface=enum_number(lines, "surface"),
-        paper=tuple(max(value, NOT_BLACK) for value in lines.paper))
+        paper=tuple(lines.paper))

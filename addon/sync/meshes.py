@@ -32,6 +32,7 @@ class MeshStyle:
     unlit: int = 0
     alpha: int = images.NONE
     alpha_least: float = 0.0
+    exact: int = 1
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 // Devices, frames and progress as callers see them: check, delegate. The other exported functions stand with what they
 // concern: scene/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
 #include "run/frame_samples.h"
+#include "base/descriptor.h"
 #include "base/progress.h"
 
 #include <math.h>
@@ -76,15 +77,12 @@ static int create_named(const patina_device_desc *desc, const char *name, patina
 
 int patina_device_create(const patina_device_desc *desc, patina_device **out)
 {
-    patina_device_desc defaults = { .struct_size = sizeof defaults };
+    patina_device_desc checked;
     if (!out)
         return fail("patina_device_create: out is NULL");
     *out = NULL;
-    if (desc && desc->struct_size != sizeof *desc)
-        return fail("patina_device_create: desc->struct_size is wrong");
-    if (!desc)
-        desc = &defaults;
-    int error = create_named(desc, desc->name ? desc->name : "auto", out);
+    int error = pt_take(NULL, "patina_device_create", desc, &checked, sizeof checked);
+    error = error ? error : create_named(&checked, checked.name ? checked.name : "auto", out);
     if (!error) {
         pthread_mutex_init(&(*out)->turns, NULL);
         pthread_cond_init(&(*out)->changed, NULL);
@@ -103,10 +101,9 @@ void patina_device_destroy(patina_device *device)
 
 int patina_device_get_info(const patina_device *device, patina_device_info *info)
 {
-    if (!device || !info || info->struct_size != sizeof *info)
-        return fail("patina_device_get_info: bad arguments");
-    *info = device->info;
-    return PATINA_OK;
+    if (!device)
+        return fail("patina_device_get_info: device is NULL");
+    return pt_give(&device->handle, "patina_device_get_info", &device->info, sizeof device->info, info);
 }
 
 // ---- frames ------------------------------------------------------------------------------------------------------------
@@ -235,12 +232,11 @@ int patina_frame_read_layer(const patina_frame *frame, uint32_t layer, uint32_t 
 
 int patina_frame_get_stats(const patina_frame *frame, patina_frame_stats *stats)
 {
-    if (!frame || !stats || stats->struct_size != sizeof *stats)
-        return fail("patina_frame_get_stats: bad arguments");
+    if (!frame)
+        return fail("patina_frame_get_stats: frame is NULL");
     if (!frame->shown.picture_valid)
         return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_get_stats: no finished render");
-    *stats = frame->shown.stats;
-    return PATINA_OK;
+    return pt_give(&frame->handle, "patina_frame_get_stats", &frame->shown.stats, sizeof frame->shown.stats, stats);
 }
 
 size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Equirectangular pictures, joined from the six sides of a cube around the eye. Sides overlap by a guard band, in which
 // colours go over from one to the other: what image space decides differently in two views leaves no seam.
+#include "base/descriptor.h"
 #include "base/error.h"
 #include "base/pool.h"
 
@@ -171,9 +172,11 @@ static void rows(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 static int read_panorama(const patina_panorama *given, const char *call, patina_panorama *out)
 {
     static const double whole[2][2] = {{-PI, PI}, {-PI / 2, PI / 2}};
-    if (!given || given->struct_size != sizeof *given)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: panorama->struct_size is not %zu", call, sizeof *given);
-    *out = *given;
+    if (!given)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: panorama is NULL", call);
+    const int error = pt_take(NULL, call, given, out, sizeof *out);
+    if (error)
+        return error;
     if (!out->longitude[0] && !out->longitude[1])
         memcpy(out->longitude, whole[0], sizeof whole[0]);
     if (!out->latitude[0] && !out->latitude[1])
@@ -214,23 +217,22 @@ int patina_panorama_camera(const patina_panorama *panorama, uint32_t face, patin
         return code;
     if (face >= 6 || !camera || !size)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_panorama_camera: face %u of 6, or camera or size is NULL", face);
-    *camera = (patina_camera){.struct_size = sizeof *camera,
-                              .left = -1 - GUARD,
-                              .right = 1 + GUARD,
-                              .bottom = -1 - GUARD,
-                              .top = 1 + GUARD,
-                              .near_clip = p.near_clip / (1.7320508 * (1 + GUARD)), // a corner is so much farther
-                              .far_clip = p.far_clip};
+    patina_camera found = {.left = -1 - GUARD,
+                           .right = 1 + GUARD,
+                           .bottom = -1 - GUARD,
+                           .top = 1 + GUARD,
+                           .near_clip = p.near_clip / (1.7320508 * (1 + GUARD)), // a corner is so much farther
+                           .far_clip = p.far_clip};
     for (int row = 0; row < 3; row++) {
         const double *from = p.world_from_camera + 4 * row;
-        double *to = camera->world_from_camera + 4 * row;
+        double *to = found.world_from_camera + 4 * row;
         for (int i = 0; i < 3; i++)
             to[i] = from[0] * AXES[face][i][0] + from[1] * AXES[face][i][1] + from[2] * AXES[face][i][2];
         to[3] = from[3];
     }
-    camera->world_from_camera[15] = 1;
+    found.world_from_camera[15] = 1;
     *size = side_of(&p);
-    return PATINA_OK;
+    return pt_give(NULL, "patina_panorama_camera", &found, sizeof found, camera);
 }
 
 static int run(const patina_panorama *panorama, const char *call, struct join *join, uint32_t bytes, size_t size)

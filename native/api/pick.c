@@ -2,6 +2,7 @@
 // Picking: which points of an instance an outline on the picture holds, and pixels that show selected ones. Decided in float64, point
 // by point, in chunks that may have any; a row of pixels knows which edges of the outline cross it.
 #include "run/frame.h"
+#include "base/descriptor.h"
 #include "base/progress.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
@@ -279,8 +280,8 @@ static void pick_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 static int check(const patina_scene *scene, const patina_pick *desc, const uint8_t *bits, size_t size)
 {
-    if (!scene || !desc || !bits || desc->struct_size != sizeof *desc || desc->instance >= scene->instance_count)
-        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_scene_pick: bad arguments, or no such instance");
+    if (!bits || desc->instance >= scene->instance_count)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: bits is NULL, or no such instance");
     const uint64_t count = scene->instances[desc->instance].cloud->info.count;
     if (size != (count + 7) / 8)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: %zu bytes for %llu points", size,
@@ -341,10 +342,15 @@ static int run(struct pick *pick, const struct patina_frame *frame, struct pt_in
     return error;
 }
 
-int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, const patina_pick *desc, patina_progress *progress,
+int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, const patina_pick *given, patina_progress *progress,
                       uint8_t *bits, size_t size)
 {
-    int error = check(scene, desc, bits, size);
+    patina_pick taken;
+    const patina_pick *const desc = &taken;
+    if (!scene || !given)
+        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_scene_pick: scene or what to pick is NULL");
+    int error = pt_take(&scene->handle, "patina_scene_pick", given, &taken, sizeof taken);
+    error = error ? error : check(scene, desc, bits, size);
     if (error)
         return error;
     struct pick pick = { .scene = scene, .instance = &scene->instances[desc->instance], .desc = desc, .bits = bits,

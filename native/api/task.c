@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Long calls on threads of their own, for hosts that must go on meanwhile and start no threads themselves.
+#include "base/descriptor.h"
 #include "base/error.h"
 #include "scene/analysis.h"
 #include "scene/fingerprint.h"
@@ -131,9 +132,11 @@ int patina_task_refine(patina_frame *frame, const patina_scene *scene, double ms
 
 int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress, patina_task **out)
 {
-    if (!desc || desc->struct_size != sizeof *desc)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_build: desc->struct_size is not %zu", sizeof *desc);
-    return start(&(struct patina_task){ .work = build, .desc = *desc, .progress = progress }, out);
+    struct patina_task task = { .work = build, .progress = progress };
+    if (!desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_build: desc is NULL");
+    const int error = pt_take(NULL, "patina_task_build", desc, &task.desc, sizeof task.desc);
+    return error ? error : start(&task, out);
 }
 
 int patina_task_set_colors(patina_cloud *cloud, const patina_array *color, patina_task **out)
@@ -145,9 +148,9 @@ int patina_task_set_colors(patina_cloud *cloud, const patina_array *color, patin
 
 int patina_task_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress, patina_task **out)
 {
-    const patina_analysis_desc automatic = { .struct_size = sizeof automatic };
-    struct patina_task task = { .work = analyse, .painted = cloud, .analyse = desc ? *desc : automatic, .progress = progress };
-    const int error = pt_analysis_check(cloud, &task.analyse);
+    struct patina_task task = { .work = analyse, .painted = cloud, .progress = progress };
+    int error = pt_take(NULL, "patina_task_analyse", desc, &task.analyse, sizeof task.analyse);
+    error = error ? error : pt_analysis_check(cloud, &task.analyse);
     return error ? error : start(&task, out);
 }
 
@@ -166,16 +169,20 @@ int patina_task_apply(patina_task *task)
 
 int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out)
 {
-    if (!desc || desc->struct_size != sizeof *desc || !values)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: bad arguments");
-    return start(&(struct patina_task){ .work = fingerprint, .desc = *desc, .fingerprint = values }, out);
+    struct patina_task task = { .work = fingerprint, .fingerprint = values };
+    if (!desc || !values)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: desc or values is NULL");
+    const int error = pt_take(NULL, "patina_task_fingerprint", desc, &task.desc, sizeof task.desc);
+    return error ? error : start(&task, out);
 }
 
 int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals, patina_task **out)
 {
-    if (!grid || grid->struct_size != sizeof *grid)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_grid_normals: grid->struct_size is not %zu", sizeof *grid);
-    return start(&(struct patina_task){ .work = grid_normals, .grid = *grid, .progress = progress, .normals = normals }, out);
+    struct patina_task task = { .work = grid_normals, .progress = progress, .normals = normals };
+    if (!grid)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_grid_normals: grid is NULL");
+    const int error = pt_take(NULL, "patina_task_grid_normals", grid, &task.grid, sizeof task.grid);
+    return error ? error : start(&task, out);
 }
 
 // Starts a task that has a path.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // patina_file_*: opens files by mapping them, hands columns out. Formats are told apart by content, not by name.
 #include "file.h"
+#include "base/descriptor.h"
 #include "base/progress.h"
 
 #include <errno.h>
@@ -179,17 +180,6 @@ void patina_file_destroy(patina_file *file)
 
 // ---- what is in it -------------------------------------------------------------------------------------------------
 
-// Fills as much of a caller's struct as the caller knows of; its struct_size stays.
-static int hand_out(const patina_file *file, const char *call, void *caller, size_t caller_size, const void *ours,
-                    size_t our_size)
-{
-    if (caller_size <= sizeof(size_t))
-        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: struct_size is not set", call);
-    size_t size = caller_size < our_size ? caller_size : our_size;
-    memcpy((char *)caller + sizeof(size_t), (const char *)ours + sizeof(size_t), size - sizeof(size_t));
-    return PATINA_OK;
-}
-
 // Stations are told by scan, so all scans must have one.
 static uint32_t count_stations(const patina_file *file)
 {
@@ -215,7 +205,7 @@ int patina_file_get_info(const patina_file *file, patina_file_info *info)
     memcpy(ours.origin, file->origin, sizeof ours.origin);
     memcpy(ours.box_min, file->box_min, sizeof ours.box_min);
     memcpy(ours.box_max, file->box_max, sizeof ours.box_max);
-    return hand_out(file, "patina_file_get_info", info, info->struct_size, &ours, sizeof ours);
+    return pt_give(&file->handle, "patina_file_get_info", &ours, sizeof ours, info);
 }
 
 static int check_index(const patina_file *file, const char *call, uint32_t index)
@@ -236,7 +226,7 @@ int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_fi
         return code;
     patina_file_attribute ours = { .type = file->attributes[index].type };
     memcpy(ours.name, file->attributes[index].name, sizeof ours.name);
-    return hand_out(file, "patina_file_get_attribute", attribute, attribute->struct_size, &ours, sizeof ours);
+    return pt_give(&file->handle, "patina_file_get_attribute", &ours, sizeof ours, attribute);
 }
 
 // ---- columns -------------------------------------------------------------------------------------------------------

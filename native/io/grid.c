@@ -8,6 +8,7 @@
 // grows where sigma is large beside the way from cell to cell, until the slope is known to LOOSE.
 #include "file.h"
 
+#include "base/descriptor.h"
 #include "base/progress.h"
 
 #include <math.h>
@@ -265,9 +266,14 @@ int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input)
     return code;
 }
 
-int patina_grid_normals(const patina_grid_desc *desc, patina_progress *progress, float *normals)
+int patina_grid_normals(const patina_grid_desc *given, patina_progress *progress, float *normals)
 {
-    if (!desc || desc->struct_size != sizeof *desc || (desc->count && !(desc->position && desc->column && desc->row && normals)))
+    patina_grid_desc taken;
+    const patina_grid_desc *const desc = &taken;
+    const int wrong = given ? pt_take(NULL, "patina_grid_normals", given, &taken, sizeof taken) : PATINA_OK;
+    if (wrong)
+        return wrong;
+    if (!given || (desc->count && !(desc->position && desc->column && desc->row && normals)))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grid_normals: bad arguments");
     struct pt_scan scan = { .count = desc->count };
     struct grid g = { .scan = &scan, .position = desc->position };

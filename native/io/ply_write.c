@@ -2,6 +2,7 @@
 // patina_write_ply: binary little-endian, the columns of a cloud's descriptor. Written beside the target and renamed
 // over it when whole, so that a full disk never costs the file that was there.
 #include "ply.h"
+#include "base/descriptor.h"
 
 #include <errno.h>
 #include <math.h>
@@ -45,9 +46,6 @@ static int check_array(const patina_array *array, uint64_t count, bool types_fit
 
 static int check_desc(const patina_cloud_desc *desc)
 {
-    if (!desc || desc->struct_size < sizeof *desc)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: %s",
-                       desc ? "the descriptor's struct_size is not set" : "the descriptor is NULL");
     const patina_array *p = &desc->position, *n = &desc->normal, *c = &desc->color;
     if (!p->data && desc->count)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: there are no positions");
@@ -153,11 +151,14 @@ static int fail_to_write(const char *path, int error)
     return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be written: %s", name, reason);
 }
 
-int patina_write_ply(const char *path, const patina_cloud_desc *desc)
+int patina_write_ply(const char *path, const patina_cloud_desc *given)
 {
-    if (!path)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: path is NULL");
-    int code = check_desc(desc);
+    patina_cloud_desc taken;
+    const patina_cloud_desc *const desc = &taken;
+    if (!path || !given)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: path or desc is NULL");
+    int code = pt_take(NULL, "patina_write_ply", given, &taken, sizeof taken);
+    code = code ? code : check_desc(desc);
     if (code)
         return code;
     struct stat status;

@@ -3,6 +3,7 @@
 #include "beams.h"
 #include "free_space.h"
 #include "kernel_args.h"
+#include "base/descriptor.h"
 #include "base/memory.h"
 #include "orient.h"
 #include "base/progress.h"
@@ -295,8 +296,8 @@ static int check_arrays(patina_analysis_desc *desc)
 
 int pt_analysis_check(const patina_cloud *cloud, const patina_analysis_desc *desc)
 {
-    if (!cloud || !desc || desc->struct_size != sizeof *desc)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: no cloud, or desc->struct_size is not %zu", sizeof *desc);
+    if (!cloud)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: cloud is NULL");
     if (desc->neighbours > PT_NEIGHBOURS_MOST || (desc->neighbours && desc->neighbours < 3))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_analyse: neighbours: 3 to %d, not %u", PT_NEIGHBOURS_MOST,
                        desc->neighbours);
@@ -476,12 +477,12 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
 
 int patina_cloud_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress)
 {
-    const patina_analysis_desc automatic = { .struct_size = sizeof automatic };
+    patina_analysis_desc checked;
     struct pt_analysis analysis;
-    desc = desc ? desc : &automatic;
-    int error = pt_analysis_check(cloud, desc);
+    int error = pt_take(NULL, "patina_cloud_analyse", desc, &checked, sizeof checked);
+    error = error ? error : pt_analysis_check(cloud, &checked);
     if (!error)
-        error = pt_analysis_compute(cloud, desc, progress, &analysis);
+        error = pt_analysis_compute(cloud, &checked, progress, &analysis);
     if (!error) {
         error = pt_analysis_apply(cloud, &analysis);
         pt_analysis_free(&analysis);

@@ -2,6 +2,7 @@
 // What an analysed cloud knows, back in the caller's order; neighbours themselves, and [S]'s radius and uncertainty from them.
 #include "analysis.h"
 #include "kernel_args.h"
+#include "base/descriptor.h"
 #include "base/memory.h"
 #include "base/progress.h"
 
@@ -169,10 +170,15 @@ static int read_all(struct reading *reading, struct pt_pool *pool)
     return to->uncertainty ? normalize(to->uncertainty, reading->cloud->order, reading->cloud) : PATINA_OK;
 }
 
-int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbourhoods *wanted, patina_progress *progress)
+int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbourhoods *given, patina_progress *progress)
 {
-    if (!cloud || !wanted || wanted->struct_size != sizeof *wanted)
-        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_neighbourhoods: bad arguments");
+    patina_neighbourhoods taken;
+    const patina_neighbourhoods *const wanted = &taken;
+    if (!cloud || !given)
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_neighbourhoods: cloud or wanted is NULL");
+    int error = pt_take(&cloud->handle, "patina_cloud_neighbourhoods", given, &taken, sizeof taken);
+    if (error)
+        return error;
     const int walks = wanted->numbers || wanted->distances || wanted->soft_radius || wanted->uncertainty;
     if (walks && (wanted->neighbours < 1 || wanted->neighbours > PT_NEIGHBOURS_MOST))
         return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT, "patina_cloud_neighbourhoods: neighbours: 1 to %d, not %u",
@@ -180,7 +186,7 @@ int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbou
     struct reading reading = { .cloud = cloud, .wanted = wanted, .progress = progress };
     struct pt_pool *pool = pt_pool_create(wanted->threads, 0);
     clear(wanted, cloud->info.count);
-    int error = pool ? read_all(&reading, pool) : PATINA_ERROR_MEMORY;
+    error = pool ? read_all(&reading, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
     if (!error)
         pt_progress_set(progress, 1.0);

@@ -2,6 +2,7 @@
 // Building a cloud: box -> Morton order -> chunks (strata, boxes, spacing) -> surface words and cones -> colours.
 #include "cloud.h"
 #include "base/color.h"
+#include "base/descriptor.h"
 #include "kernel_args.h"
 #include "base/memory.h"
 #include "base/progress.h"
@@ -645,16 +646,16 @@ int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress
     if (!out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: out is NULL");
     *out = NULL;
-    if (!desc || desc->struct_size != sizeof *desc)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: desc->struct_size is not %zu", sizeof *desc);
-    build.desc = *desc;
-    int error = check_desc(&build.desc);
+    if (!desc)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: desc is NULL");
+    int error = pt_take(NULL, "patina_cloud_create", desc, &build.desc, sizeof build.desc);
+    error = error ? error : check_desc(&build.desc);
     if (error)
         return error;
 
     struct patina_cloud *cloud = calloc(1, sizeof *cloud);
     struct pt_alive *alive = calloc(1, sizeof *alive);
-    build.pool = pt_pool_create(pt_pool_threads_for(desc->threads, desc->count), 0);
+    build.pool = pt_pool_create(pt_pool_threads_for(build.desc.threads, build.desc.count), 0);
     error = PATINA_ERROR_MEMORY;
     if (cloud && alive && build.pool) {
         pt_handle_init(&cloud->handle);
@@ -772,8 +773,7 @@ void patina_cloud_destroy(patina_cloud *cloud)
 
 int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info)
 {
-    if (!cloud || !info || info->struct_size != sizeof *info)
-        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_get_info: bad arguments");
-    *info = cloud->info;
-    return PATINA_OK;
+    if (!cloud)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_get_info: cloud is NULL");
+    return pt_give(&cloud->handle, "patina_cloud_get_info", &cloud->info, sizeof cloud->info, info);
 }

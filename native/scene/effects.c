@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A scene's effects: checked, defaults made explicit.
 #include "scene.h"
+#include "base/descriptor.h"
 
 static int within(float value, float least, float most)
 {
@@ -33,7 +34,9 @@ static int check_drawing(const patina_scene *scene, patina_effects *e)
     if (!within(e->focus_aperture, 0.0f, 1e30f) ||
         (e->focus_aperture > 0.0f && !within(e->focus_distance, 1e-30f, 1e30f)))
         return refuse(scene, "focus_aperture must be 0 or more, focus_distance above 0");
-    if (e->paper_color[0] == 0.0f && e->paper_color[1] == 0.0f && e->paper_color[2] == 0.0f)
+    if (e->exact > 1)
+        return refuse(scene, "exact is 0 or 1");
+    if (!e->exact && e->paper_color[0] == 0.0f && e->paper_color[1] == 0.0f && e->paper_color[2] == 0.0f)
         e->paper_color[0] = e->paper_color[1] = e->paper_color[2] = 1.0f;
     if (!within(e->paper_grain, 0.0f, 1.0f))
         return refuse(scene, "paper_grain must be within 0 and 1");
@@ -60,13 +63,11 @@ static int check(const patina_scene *scene, patina_effects *e)
 
 int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects)
 {
-    if (!scene || (effects && effects->struct_size != sizeof *effects))
-        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT,
-                       "patina_scene_set_effects: scene is NULL or effects->struct_size is wrong");
-    patina_effects checked = {.struct_size = sizeof checked};
-    if (effects)
-        checked = *effects;
-    int error = check(scene, &checked);
+    patina_effects checked;
+    if (!scene)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_scene_set_effects: scene is NULL");
+    int error = pt_take(&scene->handle, "patina_scene_set_effects", effects, &checked, sizeof checked);
+    error = error ? error : check(scene, &checked);
     if (!error)
         scene->effects = checked;
     return error;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A camera that frames the scene: what is dense of its clouds fills the picture, strays are only kept within the clip range.
 #include "clip.h"
+#include "base/descriptor.h"
 #include "dense.h"
 #include "scene.h"
 
@@ -87,7 +88,7 @@ static void reach(void *context, const double corner[3])
 int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
                               patina_camera *camera)
 {
-    if (!scene || !camera || camera->struct_size != sizeof *camera || !isfinite(azimuth + elevation + fov_degrees))
+    if (!scene || !camera || !isfinite(azimuth + elevation + fov_degrees))
         return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_scene_frame_camera: bad arguments");
     const double degree = 3.14159265358979323846 / 180.0;
     const double ca = cos(azimuth * degree), sa = sin(azimuth * degree);
@@ -108,21 +109,20 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
         return pt_fail(&scene->handle, error, "framing the scene: out of memory");
     const double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
     const double radius = framing.radius > 0.0 ? 1.01 * framing.radius : distance;
-    *camera = (patina_camera){ .struct_size = sizeof *camera,
-                               .left = -framing.half_x,
-                               .right = framing.half_x,
-                               .bottom = -framing.half_y,
-                               .top = framing.half_y,
-                               .near_clip = fmax(distance - radius, 1e-3 * distance),
-                               .far_clip = distance + radius };
+    patina_camera found = { .left = -framing.half_x,
+                            .right = framing.half_x,
+                            .bottom = -framing.half_y,
+                            .top = framing.half_y,
+                            .near_clip = fmax(distance - radius, 1e-3 * distance),
+                            .far_clip = distance + radius };
     for (int k = 0; k < 3; k++) {
-        camera->world_from_camera[4 * k] = x[k];
-        camera->world_from_camera[4 * k + 1] = y[k];
-        camera->world_from_camera[4 * k + 2] = z[k];
-        camera->world_from_camera[4 * k + 3] = framing.center[k] + distance * z[k];
+        found.world_from_camera[4 * k] = x[k];
+        found.world_from_camera[4 * k + 1] = y[k];
+        found.world_from_camera[4 * k + 2] = z[k];
+        found.world_from_camera[4 * k + 3] = framing.center[k] + distance * z[k];
     }
-    camera->world_from_camera[15] = 1.0;
-    return PATINA_OK;
+    found.world_from_camera[15] = 1.0;
+    return pt_give(&scene->handle, "patina_scene_frame_camera", &found, sizeof found, camera);
 }
 
 int patina_cloud_dense_box(const patina_cloud *cloud, double box_min[3], double box_max[3])

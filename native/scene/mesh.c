@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mesh.h"
+#include "base/descriptor.h"
 
 #include "fingerprint.h"
 
@@ -136,11 +137,12 @@ static void release(struct patina_mesh *mesh)
 
 int patina_mesh_create(const patina_mesh_desc *desc, patina_mesh **out)
 {
-    if (!desc || !out || desc->struct_size != sizeof *desc)
-        return fail("desc or out is NULL, or desc->struct_size is wrong");
-    patina_mesh_desc checked = *desc;
+    patina_mesh_desc checked;
+    if (!desc || !out)
+        return fail("desc or out is NULL");
     *out = NULL;
-    int error = check_desc(&checked);
+    int error = pt_take(NULL, "patina_mesh_create", desc, &checked, sizeof checked);
+    error = error ? error : check_desc(&checked);
     if (error)
         return error;
     struct patina_mesh *mesh = calloc(1, sizeof *mesh);
@@ -168,8 +170,7 @@ void patina_mesh_destroy(patina_mesh *mesh)
 
 int patina_mesh_get_info(const patina_mesh *mesh, patina_mesh_info *info)
 {
-    if (!mesh || !info || info->struct_size != sizeof *info)
-        return pt_fail(mesh ? &mesh->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_mesh_get_info: bad arguments");
-    *info = mesh->info;
-    return PATINA_OK;
+    if (!mesh)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mesh_get_info: mesh is NULL");
+    return pt_give(&mesh->handle, "patina_mesh_get_info", &mesh->info, sizeof mesh->info, info);
 }

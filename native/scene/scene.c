@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "scene.h"
+#include "base/descriptor.h"
 
 #include "clip.h"
 #include "mask.h"
@@ -41,7 +42,7 @@ int patina_scene_create(patina_scene **out)
     if (!scene)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "a scene: out of memory");
     pt_handle_init(&scene->handle);
-    patina_settings defaults = { .struct_size = sizeof defaults };
+    const patina_settings defaults = { .struct_size = sizeof defaults };
     patina_scene_set_effects(scene, NULL);
     return patina_scene_set_settings(scene, &defaults);
 }
@@ -124,9 +125,14 @@ static int check_matrix(double matrix[16])
     return all_finite(matrix, 16);
 }
 
+static int is_zero(const float color[3])
+{
+    return color[0] == 0.0f && color[1] == 0.0f && color[2] == 0.0f;
+}
+
 static void default_grey(float color[3])
 {
-    if (color[0] == 0.0f && color[1] == 0.0f && color[2] == 0.0f)
+    if (is_zero(color))
         color[0] = color[1] = color[2] = 0.8f;
 }
 
@@ -159,8 +165,11 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
     if (style->lighting == PATINA_LIGHTING_AUTO)
         style->lighting = cloud->info.has_colors && style->color_source == PATINA_COLOR_OWN ? PATINA_LIGHTING_UNLIT
                                                                                            : PATINA_LIGHTING_LIT;
-    default_grey(style->color);
-    if (style->ambient == 0.0f && style->diffuse == 0.0f && style->specular == 0.0f)
+    if (style->exact > 1)
+        return fail(scene, "cloud style: exact is 0 or 1");
+    if (!style->exact)
+        default_grey(style->color);
+    if (!style->exact && style->ambient == 0.0f && style->diffuse == 0.0f && style->specular == 0.0f)
         style->ambient = style->diffuse = 1.0f;
     if (!(style->transparency >= 0.0f) || !(style->transparency <= 1.0f))
         return fail(scene, "cloud style: transparency must be between 0 and 1");
@@ -188,15 +197,11 @@ static int copy_ramp(patina_cloud_style *style)
 
 int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style)
 {
-    patina_cloud_style checked = { .struct_size = sizeof checked };
+    patina_cloud_style checked;
     if (!scene || !cloud || cloud->handle.magic != PT_MAGIC)
         return fail(scene, "patina_scene_add_cloud: scene or cloud is NULL or destroyed");
-    if (style && style->struct_size != sizeof *style)
-        return fail(scene, "patina_scene_add_cloud: style->struct_size is wrong");
-    if (style)
-        checked = *style;
-    int error = check_style(scene, &checked, cloud);
-    if (error || (error = too_many(scene, cloud->slots, cloud->info.count)))
+    int error = pt_take(&scene->handle, "patina_scene_add_cloud", style, &checked, sizeof checked);
+    if (error || (error = check_style(scene, &checked, cloud)) || (error = too_many(scene, cloud->slots, cloud->info.count)))
         return error;
     void *grown = grow(scene->instances, scene->instance_count, &scene->instance_room, sizeof *scene->instances);
     if (!grown)
@@ -214,13 +219,12 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
 
 int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const patina_mesh_style *style)
 {
-    patina_mesh_style checked = { .struct_size = sizeof checked };
+    patina_mesh_style checked;
     if (!scene || !mesh || mesh->handle.magic != PT_MAGIC)
         return fail(scene, "patina_scene_add_mesh: scene or mesh is NULL or destroyed");
-    if (style && style->struct_size != sizeof *style)
-        return fail(scene, "patina_scene_add_mesh: style->struct_size is wrong");
-    if (style)
-        checked = *style;
+    int error = pt_take(&scene->handle, "patina_scene_add_mesh", style, &checked, sizeof checked);
+    if (error)
+        return error;
     if (!check_matrix(checked.world_from_object))
         return fail(scene, "mesh style: world_from_object is not finite");
     if (!isfinite(checked.color[0] + checked.color[1] + checked.color[2]))
@@ -236,8 +240,11 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
     checked.alpha_least = checked.alpha_least > 0.0f ? checked.alpha_least : 0.5f;
     if (!checked.texture || checked.texture->opaque)
         checked.alpha = PATINA_ALPHA_NONE;
-    default_grey(checked.color);
-    int error = too_many(scene, mesh->info.triangle_count, mesh->info.triangle_count);
+    if (checked.exact > 1)
+        return fail(scene, "mesh style: exact is 0 or 1");
+    if (!checked.exact)
+        default_grey(checked.color);
+    error = too_many(scene, mesh->info.triangle_count, mesh->info.triangle_count);
     if (error)
         return error;
     void *grown = grow(scene->meshes, scene->mesh_count, &scene->mesh_room, sizeof *scene->meshes);
@@ -264,7 +271,7 @@ static int check_light(const patina_scene *scene, patina_light_desc *light)
     if (!(light->radius >= 0.0f) || !(light->size[0] >= 0.0f) || !(light->size[1] >= 0.0f) ||
         !isfinite(light->radius + light->size[0] + light->size[1]))
         return fail(scene, "light: radius and size must be finite and 0 or more");
-    if (light->color[0] == 0.0f && light->color[1] == 0.0f && light->color[2] == 0.0f)
+    if (is_zero(light->color))
         light->color[0] = light->color[1] = light->color[2] = 1.0f;
     light->cone = light->cone == 0.0f ? (float)(pi / 4.0) : light->cone;
     for (int k = 0; k < 2; k++)
@@ -282,11 +289,11 @@ static int check_light(const patina_scene *scene, patina_light_desc *light)
 
 int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
 {
-    if (!scene || !light || light->struct_size != sizeof *light)
-        return fail(scene, "patina_scene_add_light: bad arguments");
-    patina_light_desc checked = *light;
-    int error = check_light(scene, &checked);
-    if (error)
+    patina_light_desc checked;
+    if (!scene || !light)
+        return fail(scene, "patina_scene_add_light: scene or light is NULL");
+    int error = pt_take(&scene->handle, "patina_scene_add_light", light, &checked, sizeof checked);
+    if (error || (error = check_light(scene, &checked)))
         return error;
     if (scene->light_count == PT_MAX_LIGHTS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "the scene has %d lights already, the most there can be",
@@ -302,9 +309,12 @@ int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
 int patina_scene_add_clip(patina_scene *scene, const patina_clip *clip)
 {
     static const double zero[16];
-    if (!scene || !clip || clip->struct_size != sizeof *clip)
-        return fail(scene, "patina_scene_add_clip: bad arguments");
-    patina_clip checked = *clip;
+    patina_clip checked;
+    if (!scene || !clip)
+        return fail(scene, "patina_scene_add_clip: scene or clip is NULL");
+    const int error = pt_take(&scene->handle, "patina_scene_add_clip", clip, &checked, sizeof checked);
+    if (error)
+        return error;
     if (!memcmp(checked.world_from_clip, zero, sizeof zero))
         memcpy(checked.world_from_clip, identity, sizeof identity);
     if (!all_finite(checked.world_from_clip, 16))
@@ -322,11 +332,16 @@ int patina_scene_add_clip(patina_scene *scene, const patina_clip *clip)
     return PATINA_OK;
 }
 
-int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera)
+int patina_scene_set_camera(patina_scene *scene, const patina_camera *given)
 {
     double axes[9], position[3];
-    if (!scene || !camera || camera->struct_size != sizeof *camera)
-        return fail(scene, "patina_scene_set_camera: bad arguments");
+    patina_camera taken;
+    const patina_camera *const camera = &taken;
+    if (!scene || !given)
+        return fail(scene, "patina_scene_set_camera: scene or camera is NULL");
+    const int error = pt_take(&scene->handle, "patina_scene_set_camera", given, &taken, sizeof taken);
+    if (error)
+        return error;
     if (!all_finite(camera->world_from_camera, 16) || pt_camera_axes(camera, axes, position))
         return fail(scene, "camera: world_from_camera is singular or not finite");
     if (!(camera->right > camera->left) || !(camera->top > camera->bottom) || !isfinite(camera->right - camera->left) ||
@@ -346,9 +361,12 @@ int patina_scene_set_camera(patina_scene *scene, const patina_camera *camera)
 
 int patina_scene_set_settings(patina_scene *scene, const patina_settings *settings)
 {
-    if (!scene || !settings || settings->struct_size != sizeof *settings)
-        return fail(scene, "patina_scene_set_settings: bad arguments");
-    patina_settings s = *settings;
+    patina_settings s;
+    if (!scene || !settings)
+        return fail(scene, "patina_scene_set_settings: scene or settings is NULL");
+    const int error = pt_take(&scene->handle, "patina_scene_set_settings", settings, &s, sizeof s);
+    if (error)
+        return error;
     s.width = s.width ? s.width : 1024;
     s.height = s.height ? s.height : 1024;
     if (s.width > 65536 || s.height > 65536)
@@ -406,13 +424,13 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
 
 int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines)
 {
-    if (!scene || (lines && lines->struct_size != sizeof *lines))
-        return fail(scene, "patina_scene_set_lines: bad arguments");
-    scene->has_lines = lines != NULL;
-    if (!lines)
-        return PATINA_OK;
+    patina_lines l;
+    if (!scene)
+        return fail(scene, "patina_scene_set_lines: scene is NULL");
     scene->has_lines = 0;
-    patina_lines l = *lines;
+    const int error = lines ? pt_take(&scene->handle, "patina_scene_set_lines", lines, &l, sizeof l) : PATINA_OK;
+    if (error || !lines)
+        return error;
     if (!(l.width >= 0.0f) || !isfinite(l.width) || !(l.offset >= 0.0f) || !isfinite(l.offset))
         return fail(scene, "lines: width and offset must be finite and 0 or more");
     if (l.world && l.width == 0.0f)
@@ -421,15 +439,14 @@ int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "lines: %g pixels wide; the most is %d", (double)l.width, PT_LINE_MOST);
     if (!(l.transparency >= 0.0f && l.transparency <= 1.0f) || !(l.soft >= 0.0f && l.soft <= 1.0f))
         return fail(scene, "lines: transparency and soft must be between 0 and 1");
-    if (l.source > PATINA_LINE_DEPTH || l.surface > PATINA_LINE_SURFACE_NONE)
-        return fail(scene, "lines: no such source or surface");
+    if (l.exact > 1 || l.source > PATINA_LINE_DEPTH || l.surface > PATINA_LINE_SURFACE_NONE)
+        return fail(scene, "lines: no such source or surface, or exact is neither 0 nor 1");
     if (!isfinite(l.color[0] + l.color[1] + l.color[2] + l.far_color[0] + l.far_color[1] + l.far_color[2]) ||
         !isfinite(l.paper[0] + l.paper[1] + l.paper[2] + l.range[0] + l.range[1]))
         return fail(scene, "lines: colours and range must be finite");
     l.width = l.width == 0.0f ? 2.0f : l.width;
+    const int black = !l.exact && is_zero(l.color), no_paper = !l.exact && is_zero(l.paper);
     for (int k = 0; k < 3; k++) {
-        int black = lines->color[0] == 0.0f && lines->color[1] == 0.0f && lines->color[2] == 0.0f;
-        int no_paper = lines->paper[0] == 0.0f && lines->paper[1] == 0.0f && lines->paper[2] == 0.0f;
         l.color[k] = black && l.source == PATINA_LINE_POINT ? 0.25f : l.color[k];
         l.paper[k] = no_paper ? 1.0f : l.paper[k];
     }

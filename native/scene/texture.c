@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Takes an image in, and makes the coarser levels that it is drawn from where it is small on screen.
 #include "texture.h"
+#include "base/descriptor.h"
 
 #include "fingerprint.h"
 
@@ -212,11 +213,12 @@ static int build(const patina_texture_desc *desc, struct patina_texture *texture
 
 int patina_texture_create(const patina_texture_desc *desc, patina_texture **out)
 {
-    if (!desc || !out || desc->struct_size != sizeof *desc)
-        return fail("desc or out is NULL, or desc->struct_size is wrong");
-    patina_texture_desc checked = *desc;
+    patina_texture_desc checked;
+    if (!desc || !out)
+        return fail("desc or out is NULL");
     *out = NULL;
-    int error = check_desc(&checked);
+    int error = pt_take(NULL, "patina_texture_create", desc, &checked, sizeof checked);
+    error = error ? error : check_desc(&checked);
     if (error)
         return error;
     struct patina_texture *texture = calloc(1, sizeof *texture);

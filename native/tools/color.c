@@ -101,7 +101,7 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
         color->source = PATINA_COLOR_FIXED;
         const int count = parse_numbers(value, n, 3, 3);
         for (int k = 0; k < count; k++)
-            color->fixed[k] = n[k] > 0 ? (float)n[k] : 1e-20f;
+            color->fixed[k] = n[k] > 0 ? (float)n[k] : 0.0f;
         return count < 0 ? -1 : 0;
     }
     if (!strcmp(name, "--exposure"))
@@ -179,7 +179,8 @@ int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, fl
 {
     const int classes = color->ramp && !strcmp(color->ramp, "classes");
     style->color_source = color->source;
-    memcpy(style->color, color->fixed, sizeof style->color);
+    if (color->source == PATINA_COLOR_FIXED)
+        memcpy(style->color, color->fixed, sizeof style->color);
     style->exposure = color->exposure;
     style->contrast = color->contrast;
     memcpy(style->hidden_classes, color->hidden, sizeof style->hidden_classes);

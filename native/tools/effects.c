@@ -80,7 +80,7 @@ static int parse_paper(const char *value, patina_effects *effects)
     if (count != 1 && count != 4)
         return -1;
     effects->paper_grain = (float)n[0];
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; count == 4 && k < 3; k++)
         effects->paper_color[k] = (float)n[1 + k];
     return 0;
 }

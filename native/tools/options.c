@@ -318,7 +318,7 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
 {
     *options = (struct tool_options){
         .files = arguments,
-        .effects = {.struct_size = sizeof options->effects},
+        .effects = PATINA_EFFECTS_INIT,
         .azimuth = 30, // three-quarter view
         .elevation = 40,
         .lines = {.struct_size = sizeof options->lines},

@@ -44,7 +44,7 @@ int tool_draw_panorama(const struct tool_options *options, const patina_panorama
                        patina_frame *frame, float **pixels, patina_frame_stats *stats)
 {
     patina_settings settings = options->settings;
-    patina_camera camera;
+    patina_camera camera = {.struct_size = sizeof camera};
     float *faces[6] = {0};
     uint32_t side = 0;
     int code = patina_panorama_camera(panorama, 0, &camera, &side);

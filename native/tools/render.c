@@ -107,7 +107,8 @@ static int load_clouds(struct job *job)
     if (code)
         return tool_failed("scene", NULL, code);
 
-    patina_cloud_style style = {.struct_size = sizeof style, .lighting = options->lighting};
+    patina_cloud_style style = PATINA_CLOUD_STYLE_INIT;
+    style.lighting = options->lighting;
     style.cull_back = options->cull ? 1 : 0;
     style.radius = (float)options->radius;
     style.largest_gap = (float)options->largest_gap;
@@ -151,7 +152,7 @@ static int set_view(struct job *job, double turn, patina_camera *camera)
 
 static int set_scene(struct job *job)
 {
-    patina_camera camera;
+    patina_camera camera = {.struct_size = sizeof camera};
     int code = patina_scene_set_settings(job->scene, &job->options.settings);
     if (!code)
         code = patina_scene_set_effects(job->scene, &job->options.effects);
@@ -228,7 +229,7 @@ static int measure(struct job *job)
     struct tool_times *times = tool_times_create(job->options.repeat);
     int code = times ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (int i = 1; i <= job->options.repeat && !code; i++) {
-        patina_camera camera;
+        patina_camera camera = {.struct_size = sizeof camera};
         code = tool_cancelled() ? PATINA_ERROR_CANCELLED : set_view(job, i, &camera);
         const double start = now_ms();
         if (!code)

@@ -293,7 +293,7 @@ static void shadow_behind_glass(void **state)
     points_free(&points);
     patina_mesh *floor = square(2.0, -0.5, 1.0), *beam = mesh_box(middle, half);
     const patina_cloud_style style = {.struct_size = sizeof style, .transparency = 0.5f, .lighting = PATINA_LIGHTING_UNLIT,
-                                      .color = {1e-20f, 1e-20f, 1e-20f}, .shadow_off = PATINA_SHADOW_NO_CAST};
+                                      .exact = 1, .shadow_off = PATINA_SHADOW_NO_CAST};
     patina_scene *scene = scene_of(cloud, &style);
     mesh_add(scene, floor, 1.0f, 1.0f, 1.0f);
     mesh_add(scene, beam, 1.0f, 1.0f, 1.0f);

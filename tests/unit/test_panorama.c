@@ -61,7 +61,7 @@ static struct pictures draw(const patina_panorama *panorama, const float (*point
     patina_cloud *cloud = NULL;
     patina_scene *scene = NULL;
     patina_frame *frame = NULL;
-    patina_camera camera;
+    patina_camera camera = {.struct_size = sizeof camera};
     struct pictures out = {0};
     float *color[6], *depth[6];
     uint64_t *keys[6];
@@ -250,7 +250,7 @@ static void test_ranges(void **state)
 static void test_refusals(void **state)
 {
     (void)state;
-    patina_camera camera;
+    patina_camera camera = {.struct_size = sizeof camera};
     uint32_t side;
     patina_panorama panorama = around();
     assert_int_equal(patina_panorama_camera(&panorama, 6, &camera, &side), PATINA_ERROR_ARGUMENT);

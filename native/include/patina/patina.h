@@ -21,6 +21,12 @@
 //   handle (patina_message), or at the thread (patina_message(NULL)) when no handle came to be.
 //   A descriptor's first field is struct_size = sizeof of it; every other field's zero means "default".
 //   Passing NULL for a descriptor means all defaults. Inputs are copied before the call returns.
+//   Where a descriptor has `exact`, 0 takes a colour of three zeros, and Phong factors of three zeros, for "default"; with 1 they are
+//   black, and none. PATINA_*_INIT begins such a descriptor: exact, with every default spelled out.
+//   Programs and libraries may be of different age. A descriptor that is shorter than the library's is taken as if the rest were
+//   zero; of a longer one what the library does not know must be zero, else PATINA_ERROR_UNSUPPORTED. Structures that are handed
+//   out are filled as far as they reach; what the library does not know becomes 0. struct_size at or below sizeof(size_t) is
+//   PATINA_ERROR_ARGUMENT. New fields stand at the end, and never in what was padding; fields neither move nor go.
 //   Pictures are row-major float32, row 0 at the BOTTOM (as Blender's and OpenGL's), colour scene-linear and
 //   premultiplied. Matrices are float64, row-major, column vectors: world = M * object.
 //   View space is right-handed and looks down -z. "z" in passes is linear distance: to the camera plane in
@@ -425,7 +431,7 @@ typedef struct patina_cloud_style {
     uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals and where the cloud
                                   // is transparent
     float d_min;                  // the paper's d~, world units: least distance of two layers; 0 = automatic
-    float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8); for black 1e-20
+    float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8), unless exact
     float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
     uint32_t shininess;           // Phong exponent; 0 = 32
     float transparency;           // share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn at all.
@@ -453,7 +459,13 @@ typedef struct patina_cloud_style {
     const patina_mask *mask;      // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
                                   // the scene or the next patina_scene_clear, as the cloud must; the grade too
     const patina_grade *grade;    // of this cloud: its colours in place of the cloud's own. NULL = none
+    uint32_t exact;               // 1 = black is black, and three Phong factors of 0 are none
 } patina_cloud_style;
+#define PATINA_CLOUD_STYLE_INIT                                                                                                \
+    {                                                                                                                          \
+        .struct_size = sizeof(patina_cloud_style), .color = {0.8f, 0.8f, 0.8f}, .ambient = 1.0f, .diffuse = 1.0f,              \
+        .shininess = 32, .contrast = 1.0f, .exact = 1                                                                          \
+    }
 
 enum patina_alpha {
     PATINA_ALPHA_NONE = 0,  // nothing: all is opaque, its colours times the opacity
@@ -465,14 +477,19 @@ enum patina_alpha {
 typedef struct patina_mesh_style {
     size_t struct_size;
     double world_from_object[16]; // row-major; all zero = identity
-    float color[3];               // linear, of meshes without colours; all zero = 0.8 grey (for black use 1e-20)
+    float color[3];               // linear, of meshes without colours; all zero = 0.8 grey, unless exact
     uint32_t shadow_off;          // bits of patina_shadow_off: NO_CAST, NO_RECEIVE
     uint32_t unlit;               // 1 = the colour as it is, as if it shone by itself; lights and shadows change nothing
     const patina_texture *texture; // in place of color and the mesh's colours; the mesh has uv. Outlives the scene or the next
                                    // patina_scene_clear. NULL = none
     uint32_t alpha;               // patina_alpha: what the texture's opacity does
     float alpha_least;            // CLIP: what is less opaque is not there, 0..1; 0 = 0.5
+    uint32_t exact;               // 1 = black is black
 } patina_mesh_style;
+#define PATINA_MESH_STYLE_INIT                                                                                   \
+    {                                                                                                            \
+        .struct_size = sizeof(patina_mesh_style), .color = {0.8f, 0.8f, 0.8f}, .alpha_least = 0.5f, .exact = 1   \
+    }
 
 enum patina_clip_shape { PATINA_CLIP_BOX = 0, PATINA_CLIP_PLANE = 1 };
 
@@ -618,9 +635,15 @@ typedef struct patina_effects {
                           // have a radius of at most 32 pixels
     float focus_distance; // along the view from the camera, world units
     // Paper: the picture is multiplied by a colour and a grain, which lies still on screen.
-    float paper_color[3]; // linear; all zero = white
+    float paper_color[3]; // linear; all zero = white, unless exact
     float paper_grain;    // 0..1; 0 = none
+    uint32_t exact;       // 1 = black paper is black
 } patina_effects;
+#define PATINA_EFFECTS_INIT                                                                                                    \
+    {                                                                                                                          \
+        .struct_size = sizeof(patina_effects), .edl_radius = 1.4f, .hatch_spacing = 6.0f, .hatch_opacity = 1.0f,               \
+        .paper_color = {1.0f, 1.0f, 1.0f}, .exact = 1                                                                          \
+    }
 
 enum patina_line_source { PATINA_LINE_FIXED = 0, PATINA_LINE_POINT = 1, PATINA_LINE_DEPTH = 2 };
 enum patina_line_surface { PATINA_LINE_SURFACE_SHOWN = 0, PATINA_LINE_SURFACE_PAPER = 1, PATINA_LINE_SURFACE_NONE = 2 };
@@ -636,14 +659,19 @@ typedef struct patina_lines {
                           // draw creases too. 0 = automatic: that which makes two layers (d_min, twice the local spacing, ..)
     uint32_t source;      // patina_line_source: `color`; that of the outline's own points (of meshes white), times `color`; from
                           // `color` near to `far_color` far
-    float color[3];       // linear; all zero = black, of POINT a quarter
+    float color[3];       // linear; all zero = black, of POINT a quarter unless exact
     float far_color[3];   // DEPTH
     float range[2];       // DEPTH: z of near and far; far not beyond near = those of everything's boxes
     float transparency;   // 0 = opaque, 1 = not drawn
     float soft;           // share of the width over which a line fades outwards, 0..1; 0 = hard, anti-aliased where the picture is
     uint32_t surface;     // patina_line_surface: what lies under the lines. NONE hides what is behind it still, where opaque
-    float paper[3];       // PAPER: linear; all zero = white
+    float paper[3];       // PAPER: linear; all zero = white, unless exact
+    uint32_t exact;       // 1 = black is black
 } patina_lines;
+#define PATINA_LINES_INIT                                                                                                  \
+    {                                                                                                                      \
+        .struct_size = sizeof(patina_lines), .width = 2.0f, .paper = {1.0f, 1.0f, 1.0f}, .exact = 1                        \
+    }
 
 PATINA_API int patina_scene_create(patina_scene **out);
 PATINA_API void patina_scene_destroy(patina_scene *scene); // clouds stay
