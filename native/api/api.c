@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Devices, frames and progress as callers see them: check, delegate. The other exported functions stand with what they
 // concern: scene/cloud.c, scene/scene.c, io/file.c, task.c, error.c, log.c.
+#include "run/execute.h"
 #include "run/frame_samples.h"
 #include "base/descriptor.h"
 #include "base/progress.h"
@@ -249,9 +250,18 @@ size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, ch
     struct pt_plan plan;
     if (!frame || !scene || pt_plan_create(scene, &plan))
         return 0;
+    pt_plan_share_planes(&plan, pt_passes_together, frame->device, frame->planes.apart); // without memory it stays untold
     size_t length = pt_plan_text(scene, &plan, buffer, size);
     pt_plan_destroy(&plan);
     return length;
+}
+
+int patina_frame_keep_planes(patina_frame *frame, uint32_t keep)
+{
+    if (!frame)
+        return fail("patina_frame_keep_planes: frame is NULL");
+    frame->planes.apart = keep != 0;
+    return PATINA_OK;
 }
 
 int patina_frame_dump_planes(const patina_frame *frame, const char *folder)

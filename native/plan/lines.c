@@ -119,6 +119,10 @@ static void plan_ink(struct pt_builder *builder, struct ink_args args, const str
         if (!instance->chunk_count)
             continue;
         args.view = pt_view_of(plan, instance, ((plan->iterations + 2) << plan->levels) + pt_line_reach(plan));
+        for (int k = 0; k < 2; k++) { // nothing says beyond it where lines are
+            args.view.rect[k] = args.view.rect[k] > all.view.rect[k] ? args.view.rect[k] : all.view.rect[k];
+            args.view.rect[2 + k] = args.view.rect[2 + k] < all.view.rect[2 + k] ? args.view.rect[2 + k] : all.view.rect[2 + k];
+        }
         args.instance = instance->args;
         add_ink(builder, &args, pt_buffer_of(PT_COLORS, i), targets);
     }

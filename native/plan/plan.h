@@ -181,6 +181,18 @@ struct pt_receiver {
     uint32_t chunk_count;
 };
 
+// From when to when a plane is needed, in the plan's order, and which slab of memory holds it.
+struct pt_life {
+    enum pt_plane plane;
+    uint32_t index, first, last, slab;
+    size_t bytes;
+};
+
+struct pt_slab {
+    size_t bytes;
+    uint32_t last; // when its last plane is done with
+};
+
 struct pt_plan {
     struct view_args view;  // level 0; rect: union over instances and meshes
     uint32_t levels;        // coarse levels
@@ -200,6 +212,11 @@ struct pt_plan {
     uint32_t pass_count;
     struct pt_step *steps; // what of them runs when
     uint32_t step_count;
+    struct pt_life *lives; // of planes that are not kept, in the order of their first uses
+    uint32_t life_count;
+    struct pt_slab *slabs;
+    uint32_t slab_count;
+    uint64_t peak; // bytes of all planes together, those of light maps apart
     struct pt_shadow_group *groups; // of casters
     uint32_t group_count;
     struct pt_receiver *receivers; // of a light's map
@@ -254,6 +271,14 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_
 
 // Whether the picture that readers see has this plane.
 int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane);
+
+// lifetimes.c. How many passes from one on a device runs as one: device.h, finishes.
+typedef uint32_t pt_together(const void *device, const struct pt_pass *passes);
+// Finds plan->lives, and which of them share slabs; apart: none do, for all are to be looked at afterwards. together: NULL: every pass
+// runs alone. PATINA_ERROR_MEMORY, or 0.
+int pt_plan_share_planes(struct pt_plan *plan, pt_together *together, const void *device, int apart);
+// Has memory of its own from render to render: readers, or the next render, need it.
+int pt_plane_is_kept(enum pt_plane which, uint32_t index);
 
 // A line a step or pass, of loops their ends, of each light's maps the first, and a line for each pass that is left out. Finds what the
 // lights' maps are like. Returns the full length.

@@ -59,6 +59,8 @@ struct pt_step {
     uint32_t bytes;
     uint32_t light, group; // LIGHT and what is inside
     uint32_t most, ends;   // of loops
+    uint32_t when;         // pt_plan_share_planes: its place in time
+    uint64_t idle;         // LIGHT, likewise: bits of slabs that its maps may use
     char reason[112];
 };
 

@@ -137,6 +137,9 @@ size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char
     if (plan->chunks_clipped || plan->chunks_cut)
         put_line(&text, 0, "chunks clipped %llu, cut %llu", (unsigned long long)plan->chunks_clipped,
                  (unsigned long long)plan->chunks_cut);
+    if (plan->peak)
+        put_line(&text, 0, "memory %.1f MB of planes at most: %u of them share %u slabs", 1e-6 * (double)plan->peak, plan->life_count,
+                 plan->slab_count);
     put_steps(&text, scene, plan, plan->steps, plan->steps + plan->step_count, 0);
     for (uint32_t i = 0; i < plan->skipped_count; i++)
         put_line(&text, 0, "skip %-10s %s", plan->skipped[i].name, plan->skipped[i].reason);

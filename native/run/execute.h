@@ -33,6 +33,8 @@ struct pt_execution {
     uint32_t maps, map_size[2];           // drawn; of the largest
 };
 
+uint32_t pt_passes_together(const void *device, const struct pt_pass *passes); // pt_together; device: struct patina_device
+
 // binder, times, cancel, scene, plan, device, progress and layers are set by the caller, who keeps them.
 int pt_execute(struct pt_execution *execution);
 // Frees what the execution holds, the binder too.

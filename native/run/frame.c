@@ -24,6 +24,7 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .chunks_cut = plan->chunks_cut,
                                          .pixel_samples = 1,
                                          .ms = ms };
+    shown->peak = plan->peak;
     shown->stats.plane_bytes = pt_planes_total(&frame->planes);
     shown->stats.spacing_px = (float)plan->spacing_px;
     shown->stats.expected = plan->expected;
@@ -61,6 +62,13 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
 
 // ---- rendering -----------------------------------------------------------------------------------------------------------
 
+static void link_planes(struct patina_frame *frame)
+{
+    frame->planes.other = &frame->shadows.planes;
+    frame->shadows.planes.other = &frame->planes;
+    frame->shadows.planes.varies = 1;
+}
+
 // The plan of a picture, or of textures alone, on the frame's planes.
 static int execute(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan)
 {
@@ -82,9 +90,7 @@ static int execute(struct patina_frame *frame, const struct patina_scene *scene,
                                                   .clips = &frame->clips,
                                                   .shadows = &frame->shadows } };
     frame->keys_valid = 0;
-    frame->planes.other = &frame->shadows.planes;
-    frame->shadows.planes.other = &frame->planes;
-    frame->shadows.planes.varies = 1;
+    link_planes(frame);
     frame->layers[0] = (struct pt_layer){ .points = plan->points_scattered };
     int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
     if (!error)
@@ -109,7 +115,15 @@ int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
     if (error)
         return pt_fail_again(&frame->handle, error);
     pt_note_time(&frame->times, "plan", pt_milliseconds() - start);
-    error = execute(frame, scene, &plan);
+    frame->keys_valid = 0;
+    link_planes(frame);
+    error = pt_plan_share_planes(&plan, pt_passes_together, frame->device, frame->planes.apart);
+    if (error)
+        pt_fail(&frame->device->handle, error, "planning the frame: out of memory");
+    if (!error)
+        error = pt_planes_open(frame->device, &frame->planes, &plan);
+    if (!error)
+        error = execute(frame, scene, &plan);
     if (!error)
         keep_statistics(frame, scene, &plan, pt_milliseconds() - start);
     pt_plan_destroy(&plan);

@@ -165,7 +165,8 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         unsigned long long parts = (unsigned long long)((double)light->error * 1e6 + 0.5);
         PUT("%s{\"samples\":%u,\"error\":%llu.%06llu}", i ? "," : "", light->samples, parts / 1000000, parts % 1000000);
     }
-    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u}}", frame->sampling[0], frame->sampling[1]);
+    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u},\"planes\":{\"peak\":%llu}}", frame->sampling[0], frame->sampling[1],
+        (unsigned long long)frame->shown.peak);
 #undef PUT
     return length;
 }
@@ -177,7 +178,7 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
         for (int level = 0; level < PT_SLOTS; level++) {
             const struct pt_buffer *plane = &frame->planes.at[p][level];
             char path[4096];
-            if (!plane->size || (sampled && p != PT_PLANE_KEYS && pt_plane_rows[p].size != PT_SIZE_CROP))
+            if (!plane->size || frame->planes.lost[p][level] || (sampled && p != PT_PLANE_KEYS && pt_plane_rows[p].size != PT_SIZE_CROP))
                 continue;
             void *copy = malloc(plane->size);
             if (!copy)

@@ -212,5 +212,10 @@ int pt_run_light(struct pt_execution *e, const struct pt_step *step)
     if (e->plan->mesh_shadows && e->begun != 1 + (int)step->layer)
         error = pt_pixels_begin(e->device, &e->binder.shadows->pixels, e->binder.planes, e->plan, &e->shown);
     e->begun = 1 + (int)step->layer;
-    return error ? error : test_light(e, step, step->layer <= 1 && e->stale);
+    if (error)
+        return error;
+    pt_planes_borrow(&e->binder.shadows->planes, step->idle);
+    error = test_light(e, step, step->layer <= 1 && e->stale);
+    pt_planes_borrow(&e->binder.shadows->planes, 0);
+    return error;
 }

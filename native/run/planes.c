@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "planes.h"
 
-uint64_t pt_planes_total(const struct pt_planes *planes)
+static uint64_t total_of(const struct pt_planes *planes)
 {
     uint64_t total = 0;
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int level = 0; level < PT_SLOTS; level++)
-            total += planes->at[p][level].room + (planes->other ? planes->other->at[p][level].room : 0);
+            total += planes->view[p][level] ? 0 : planes->at[p][level].room;
+    for (int s = 0; s < PT_SLABS; s++)
+        total += planes->slabs[s].room;
     return total;
 }
+
+uint64_t pt_planes_total(const struct pt_planes *planes) { return total_of(planes) + (planes->other ? total_of(planes->other) : 0); }
 
 static size_t size_of(const struct pt_plan *plan, enum pt_plane which, uint32_t level)
 {
@@ -35,22 +39,113 @@ static size_t room_for(const struct patina_device *device, const struct pt_plane
     return cap && total + total / 4 > cap ? bytes : bytes + bytes / 8;
 }
 
+// Makes room, unless there is, and not much too much.
+static int ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, struct pt_buffer *buffer, size_t bytes)
+{
+    if (buffer->room < bytes || buffer->room >= 2 * bytes) {
+        const size_t room = planes->varies || buffer->room ? room_for(device, planes, bytes) : bytes;
+        device->ops->buffer_destroy(device, buffer);
+        int error = check_cap(device, plan, pt_planes_total(planes) + room);
+        if (!error)
+            error = device->ops->buffer_create(device, room, NULL, 0, buffer);
+        if (error)
+            return error;
+    }
+    buffer->size = bytes;
+    return PATINA_OK;
+}
+
+// ---- slabs ---------------------------------------------------------------------------------------------------------------
+
+static void set_view(struct pt_planes *planes, enum pt_plane which, uint32_t index, const struct pt_buffer *slab, uint32_t number, size_t bytes)
+{
+    struct pt_buffer *view = &planes->at[which][index];
+    *view = *slab;
+    view->size = view->room = bytes;
+    view->clean[0] = view->clean[1] = 0;
+    planes->view[which][index] = (uint8_t)(1 + number);
+    planes->lost[which][index] = 0;
+}
+
+static void drop_views(struct pt_planes *planes)
+{
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int k = 0; k < PT_SLOTS; k++)
+            if (planes->view[p][k]) {
+                planes->at[p][k] = (struct pt_buffer){ 0 };
+                planes->view[p][k] = 0;
+            }
+}
+
+// Whether another plane, or a light's map, takes the slab behind the life.
+static int is_lost(const struct pt_plan *plan, uint32_t i)
+{
+    const struct pt_life *life = &plan->lives[i];
+    int lost = 0;
+    for (uint32_t k = i + 1; k < plan->life_count; k++)
+        lost |= plan->lives[k].slab == life->slab;
+    for (uint32_t k = 0; k < plan->step_count && life->slab < 64; k++)
+        lost |= plan->steps[k].when > life->last && (plan->steps[k].idle >> life->slab & 1u);
+    return lost;
+}
+
+int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan)
+{
+    int error = PATINA_OK;
+    drop_views(planes);
+    for (uint32_t s = plan->slab_count; s < PT_SLABS; s++)
+        device->ops->buffer_destroy(device, &planes->slabs[s]);
+    for (uint32_t s = 0; s < plan->slab_count && !error; s++)
+        error = s < PT_SLABS ? ensure(device, planes, plan, &planes->slabs[s], plan->slabs[s].bytes) : PATINA_ERROR_INTERNAL;
+    for (uint32_t i = 0; i < plan->life_count && !error; i++) {
+        const struct pt_life *life = &plan->lives[i];
+        set_view(planes, life->plane, life->index, &planes->slabs[life->slab], life->slab, life->bytes);
+        planes->lost[life->plane][life->index] = (uint8_t)is_lost(plan, i);
+    }
+    return error;
+}
+
+void pt_planes_borrow(struct pt_planes *planes, uint64_t slabs)
+{
+    drop_views(planes);
+    planes->borrowed = slabs;
+}
+
+// A plane in the least slab that is lent, large enough, and not taken. 0: there is none.
+static int borrow(struct pt_planes *planes, enum pt_plane which, uint32_t index, size_t bytes)
+{
+    uint64_t free = planes->borrowed;
+    uint32_t best = 64;
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int k = 0; k < PT_SLOTS; k++)
+            if (planes->view[p][k])
+                free &= ~((uint64_t)1 << (planes->view[p][k] - 1));
+    for (uint32_t s = 0; s < 64 && planes->other; s++)
+        if ((free >> s & 1u) && planes->other->slabs[s].room >= bytes &&
+            (best == 64 || planes->other->slabs[s].room < planes->other->slabs[best].room))
+            best = s;
+    if (best < 64)
+        set_view(planes, which, index, &planes->other->slabs[best], best, bytes);
+    return best < 64;
+}
+
 int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, enum pt_plane which,
                      uint32_t level)
 {
     struct pt_buffer *plane = &planes->at[which][level];
     const size_t bytes = size_of(plan, which, level);
-    if (plane->room < bytes || plane->room >= 2 * bytes) {
-        const size_t room = planes->varies || plane->room ? room_for(device, planes, bytes) : bytes;
-        device->ops->buffer_destroy(device, plane);
-        int error = check_cap(device, plan, pt_planes_total(planes) + room);
-        if (!error)
-            error = device->ops->buffer_create(device, room, NULL, 0, plane);
-        if (error)
-            return error;
+    if (planes->view[which][level]) {
+        if (plane->size == bytes)
+            return PATINA_OK;
+        *plane = (struct pt_buffer){ 0 };
+        planes->view[which][level] = 0;
     }
-    plane->size = bytes;
-    return PATINA_OK;
+    if (planes->borrowed && plane->room < bytes) {
+        device->ops->buffer_destroy(device, plane);
+        if (borrow(planes, which, level, bytes))
+            return PATINA_OK;
+    }
+    return ensure(device, planes, plan, plane, bytes);
 }
 
 // Of keys all but what is known to be empty still.
@@ -105,5 +200,9 @@ void pt_planes_release(struct patina_device *device, struct pt_planes *planes)
 {
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int level = 0; level < PT_SLOTS; level++)
-            device->ops->buffer_destroy(device, &planes->at[p][level]);
+            if (!planes->view[p][level])
+                device->ops->buffer_destroy(device, &planes->at[p][level]);
+    drop_views(planes);
+    for (int s = 0; s < PT_SLABS; s++)
+        device->ops->buffer_destroy(device, &planes->slabs[s]);
 }

@@ -5,14 +5,25 @@
 
 #include "plan/plan.h"
 
+enum { PT_SLABS = 128 };
+
 // Those of a frame's pictures, or of its lights' maps. `other`: of the same frame, for the device's memory cap counts both.
 struct pt_planes {
-    struct pt_buffer at[PT_PLANE_COUNT][PT_SLOTS];
+    struct pt_buffer at[PT_PLANE_COUNT][PT_SLOTS]; // kept, or views of slabs
+    struct pt_buffer slabs[PT_SLABS];
+    uint8_t view[PT_PLANE_COUNT][PT_SLOTS]; // 1 + its slab; 0: it has memory of its own
+    uint8_t lost[PT_PLANE_COUNT][PT_SLOTS]; // another plane took its slab since
+    int apart;         // no slab is shared
+    uint64_t borrowed; // bits of the other's slabs that planes may be views of: pt_planes_borrow
     const struct pt_planes *other;
     int varies; // in size from plan to plan, from the beginning
 };
 
 uint64_t pt_planes_total(const struct pt_planes *planes); // bytes that both hold
+// Room for a picture's plan, whose planes share memory as it says; before any of it runs.
+int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan);
+// Until the next call planes may lie in these slabs of the other's.
+void pt_planes_borrow(struct pt_planes *planes, uint64_t slabs);
 // Room for a plane of the plan; what it holds is anything, or what it held where the size is the same. Messages are at the device.
 int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, enum pt_plane which,
                      uint32_t level);

@@ -55,9 +55,9 @@ static int bind_between(struct pt_binder *binder, const struct pt_ref *ref, stru
     return pt_bind(binder, is_made(ref) ? ref : &as_it_is, out);
 }
 
-// How many passes from here on the device runs as one; 0: none.
-static uint32_t together(const struct patina_device *device, const struct pt_pass *passes)
+uint32_t pt_passes_together(const void *of, const struct pt_pass *passes)
 {
+    const struct patina_device *device = of;
     struct pt_bound_pass some[64]; // not bound yet
     if (!passes->together || !device->ops->finish_picture ||
         (device->ops->finishes && passes->together > sizeof some / sizeof *some))
@@ -113,7 +113,7 @@ int pt_run_passes(struct pt_execution *e, uint32_t first, uint32_t count)
     int error = PATINA_OK;
     for (uint32_t i = first; i < end && !error;) {
         const struct pt_pass *pass = &e->plan->passes[i];
-        const uint32_t some = together(e->device, pass), taken = some ? some : 1;
+        const uint32_t some = pt_passes_together(e->device, pass), taken = some ? some : 1;
         const char *name = taken > 1 ? "finish" : pass->name;
         error = run_some(e, i, taken);
         i += taken;

@@ -206,7 +206,9 @@ static int draw(struct job *job, double *ms)
         *ms = now_ms() - start;
         return bad ? tool_failed("panorama", job->frame, bad) : TOOL_OK;
     }
-    int code = patina_frame_render(job->frame, job->scene);
+    int code = job->options.planes ? patina_frame_keep_planes(job->frame, 1) : PATINA_OK;
+    if (!code)
+        code = patina_frame_render(job->frame, job->scene);
     *ms = now_ms() - start;
     job->stats.struct_size = sizeof job->stats;
     if (!code)

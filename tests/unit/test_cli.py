@@ -658,6 +658,7 @@ def test_plan():
     for expected in ("fill KEYS", "loop samples", "loop faces", "plan map", "run scatter", "run lit", "loop layers", "layer 2:",
                      "read TILES", "run peel", "layer 3:", "run compose"):
         assert expected in lines, (expected, text)
+    assert "memory" in text and "slabs" in text, text
     assert "at most 2, until a layer is empty" in text, text
     done = run("render", "plan.ply", "--dump-plan", "--stats", "json")
     json.loads(done.stdout)
@@ -670,6 +671,7 @@ def test_planes():
     run("render", "planes.ply", "--dump-planes", "planes", "--size", "40x30")
     files = sorted(path.name for path in (FOLDER / "planes").iterdir())
     assert any(name.endswith(".txt") for name in files) and len(files) >= 4, files
+    assert {"KEYS_0.raw", "FROM_0.raw", "NORMAL_0.raw", "DEFF_0.raw", "COMBINED_0.raw"} <= set(files), files
     run("render", "planes.ply", "--dump-planes", "no/such/folder", code=1)
 
 

@@ -228,6 +228,77 @@ static void test_planes_of_the_picture(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// Passes that read what lines wrote stay where they wrote: what lies beyond is of no one, or of another picture.
+static void test_ink_stays_within_lines(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(cloud, 4.0, 1, 0);
+    const patina_lines lines = { .struct_size = sizeof lines, .width = 2.0f, .source = PATINA_LINE_POINT };
+    const uint32_t *rect = NULL;
+    uint32_t inks = 0;
+    assert_int_equal(patina_scene_set_lines(scene, &lines), PATINA_OK);
+    struct pt_plan plan = plan_of(scene);
+    for (uint32_t i = 0; i < plan.pass_count; i++) {
+        const struct pt_pass *pass = &plan.passes[i];
+        const uint32_t *ink = ((const struct ink_args *)pass->arguments)->view.rect;
+        if (pass->kernel == PT_KERNEL_lines)
+            rect = ((const struct lines_args *)pass->arguments)->view.rect;
+        if (pass->kernel != PT_KERNEL_ink)
+            continue;
+        assert_non_null(rect);
+        assert_true(ink[0] >= rect[0] && ink[1] >= rect[1] && ink[2] <= rect[2] && ink[3] <= rect[3]);
+        inks++;
+    }
+    assert_int_equal(inks, 2); // the pass of shares, and the points' colours
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
+// Planes that are needed at the same time share no memory, and every plane that a pass alone binds is in one or is kept.
+static void test_planes_share_memory(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
+    const patina_cloud_style style = { .struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT };
+    const patina_effects effects = { .struct_size = sizeof effects, .obscurance_strength = 1.0f };
+    assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
+    assert_int_equal(patina_scene_set_effects(scene, &effects), PATINA_OK);
+    uint64_t peaks[2];
+    for (int apart = 0; apart < 2; apart++) {
+        struct pt_plan plan = plan_of(scene);
+        uint32_t shared = 0;
+        assert_int_equal(pt_plan_share_planes(&plan, NULL, NULL, apart), PATINA_OK);
+        for (uint32_t i = 0; i < plan.life_count; i++) {
+            const struct pt_life *a = &plan.lives[i];
+            assert_false(pt_plane_is_kept(a->plane, a->index));
+            assert_true(a->first <= a->last && a->bytes <= plan.slabs[a->slab].bytes);
+            for (uint32_t k = 0; k < i; k++) {
+                const struct pt_life *b = &plan.lives[k];
+                shared += a->slab == b->slab;
+                assert_true(a->slab != b->slab || b->last < a->first || a->last < b->first);
+                assert_true(a->plane != b->plane || a->index != b->index);
+            }
+        }
+        for (uint32_t i = 0; i < plan.pass_count; i++)
+            for (uint32_t k = 0; k < plan.passes[i].ref_count; k++) {
+                const struct pt_ref *ref = &plan.passes[i].refs[k];
+                int known = ref->of != PT_OF_FRAME || pt_plane_is_kept(ref->which, ref->index);
+                for (uint32_t l = 0; l < plan.life_count && !known; l++)
+                    known = plan.lives[l].plane == ref->which && plan.lives[l].index == ref->index;
+                assert_true(known);
+            }
+        assert_true(apart ? !shared && plan.slab_count == plan.life_count : shared > 0);
+        peaks[apart] = plan.peak;
+        pt_plan_destroy(&plan);
+    }
+    assert_true(peaks[0] < peaks[1]);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 static void test_spacing_chooses_levels(void **state)
 {
     (void)state;
@@ -542,7 +613,8 @@ int main(void)
         cmocka_unit_test(test_every_pass_runs_or_has_a_reason), cmocka_unit_test(test_missing_normals_are_estimated),
         cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
         cmocka_unit_test(test_steps_hold_the_whole_plan),       cmocka_unit_test(test_maps_are_plans),
-        cmocka_unit_test(test_planes_of_the_picture),
+        cmocka_unit_test(test_planes_of_the_picture),         cmocka_unit_test(test_ink_stays_within_lines),
+        cmocka_unit_test(test_planes_share_memory),
         cmocka_unit_test(test_chunks_around_the_camera),        cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
         cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),

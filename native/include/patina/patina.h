@@ -800,12 +800,15 @@ PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_st
 // Milliseconds by pass, why each other pass was left out, and of each layer the points in chunks that were scattered and
 // the pixels that it covers, as JSON: {"passes":{..},"skipped":{..},"layers":[{"points":..,"pixels":..},..]}; one layer
 // that was not peeled has no pixel count. "lights":[{"samples":..,"error":..},..] of the casting lights' shadows;
+// "planes":{"peak":..}: bytes that the plan came to before it ran, light maps apart.
 // "samples":{"grid":..,"shifts":..}: how pixel_samples were taken, pixels on each side of one, times shifted.
 // Returns the full length; truncates to size.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
 // The plan as text, a line a pass, without rendering. Returns the full length.
 PATINA_API size_t patina_frame_plan_text(patina_frame *frame, const patina_scene *scene, char *buffer, size_t size);
-// Writes every plane of the last render as raw little-endian files with a .txt line of their shape into a folder.
+// 1: from the next render on no planes share memory, so that patina_frame_dump_planes has them all; takes more of it. 0: as at first.
+PATINA_API int patina_frame_keep_planes(patina_frame *frame, uint32_t keep);
+// Writes every plane of the last render, those that others took the place of left out, as raw little-endian files with a .txt line of their shape into a folder.
 PATINA_API int patina_frame_dump_planes(const patina_frame *frame, const char *folder);
 
 // ---- panoramas: equirectangular pictures around an eye, as Blender's -------------------------------------------------------
