@@ -118,6 +118,7 @@ int patina_frame_create(patina_device *device, patina_frame **out)
         return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     pt_handle_init(&(*out)->handle);
     (*out)->device = device;
+    (*out)->planes.poisoned = getenv("PATINA_POISON_PLANES") != NULL;
     return PATINA_OK;
 }
 

@@ -42,13 +42,15 @@ static void use(struct builder_of_lives *b, enum pt_plane which, uint32_t index)
 
 static void use_passes(struct builder_of_lives *b, uint32_t first, uint32_t count, int as_one)
 {
-    for (uint32_t i = first; i < first + count; i++)
+    for (uint32_t i = first; i < first + count; i++) {
+        b->plan->passes[i].when = b->clock;
         for (uint32_t k = 0; k < b->plan->passes[i].ref_count; k++) {
             const struct pt_ref *ref = &b->plan->passes[i].refs[k];
             const int known = ref->of == PT_OF_FRAME && b->of[ref->which][ref->index] != NO_LIFE;
             if (ref->of == PT_OF_FRAME && (!as_one || known || pt_plane_rows[ref->which].carried))
                 use(b, ref->which, ref->index);
         }
+    }
     b->clock++;
 }
 

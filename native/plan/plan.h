@@ -114,6 +114,7 @@ struct pt_pass {
     uint32_t ref_count;
     enum pt_late late; // pt_plan_late
     int output;        // writes the picture that readers see
+    uint32_t when;     // pt_plan_share_planes: its place in time
     uint32_t together; // so many passes from this one on may run as one: nothing else reads the planes between them. 0: alone
 };
 

@@ -122,6 +122,24 @@ static void put_steps(struct text *text, const struct patina_scene *scene, const
     }
 }
 
+// Slabs of memory with the planes that lie in them one after another, from a time to a time.
+static void put_memory(struct text *text, const struct pt_plan *plan)
+{
+    put_line(text, 0, "memory %.1f MB of planes at most: %u of them share %u slabs", 1e-6 * (double)plan->peak, plan->life_count,
+             plan->slab_count);
+    for (uint32_t s = 0; s < plan->slab_count; s++) {
+        char names[512];
+        size_t length = 0;
+        for (uint32_t i = 0; i < plan->life_count; i++) {
+            const struct pt_life *life = &plan->lives[i];
+            if (life->slab == s && length + 64 < sizeof names)
+                length += (size_t)snprintf(names + length, sizeof names - length, ", %s %u (%u to %u)", pt_plane_rows[life->plane].name, life->index,
+                                           life->first, life->last);
+        }
+        put_line(text, 1, "slab %.1f MB: %s", 1e-6 * (double)plan->slabs[s].bytes, names + 2);
+    }
+}
+
 size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char *buffer, size_t size)
 {
     struct text text = { buffer, size, 0 };
@@ -138,8 +156,7 @@ size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char
         put_line(&text, 0, "chunks clipped %llu, cut %llu", (unsigned long long)plan->chunks_clipped,
                  (unsigned long long)plan->chunks_cut);
     if (plan->peak)
-        put_line(&text, 0, "memory %.1f MB of planes at most: %u of them share %u slabs", 1e-6 * (double)plan->peak, plan->life_count,
-                 plan->slab_count);
+        put_memory(&text, plan);
     put_steps(&text, scene, plan, plan->steps, plan->steps + plan->step_count, 0);
     for (uint32_t i = 0; i < plan->skipped_count; i++)
         put_line(&text, 0, "skip %-10s %s", plan->skipped[i].name, plan->skipped[i].reason);

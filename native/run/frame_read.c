@@ -165,8 +165,8 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         unsigned long long parts = (unsigned long long)((double)light->error * 1e6 + 0.5);
         PUT("%s{\"samples\":%u,\"error\":%llu.%06llu}", i ? "," : "", light->samples, parts / 1000000, parts % 1000000);
     }
-    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u},\"planes\":{\"peak\":%llu}}", frame->sampling[0], frame->sampling[1],
-        (unsigned long long)frame->shown.peak);
+    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u},\"planes\":{\"peak\":%llu,\"held\":%llu}}", frame->sampling[0], frame->sampling[1],
+        (unsigned long long)frame->shown.peak, (unsigned long long)frame->shown.stats.plane_bytes);
 #undef PUT
     return length;
 }

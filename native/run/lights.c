@@ -214,8 +214,12 @@ int pt_run_light(struct pt_execution *e, const struct pt_step *step)
     e->begun = 1 + (int)step->layer;
     if (error)
         return error;
+    error = pt_planes_poison_slabs(e->device, e->binder.planes, step->idle);
     pt_planes_borrow(&e->binder.shadows->planes, step->idle);
-    error = test_light(e, step, step->layer <= 1 && e->stale);
+    if (!error)
+        error = test_light(e, step, step->layer <= 1 && e->stale);
     pt_planes_borrow(&e->binder.shadows->planes, 0);
+    if (!error)
+        error = pt_planes_poison_slabs(e->device, e->binder.planes, step->idle);
     return error;
 }

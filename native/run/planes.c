@@ -89,19 +89,56 @@ static int is_lost(const struct pt_plan *plan, uint32_t i)
     return lost;
 }
 
-int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan)
+// Frees what the plan has no use for, so that what it needs finds room below the cap.
+static void make_way(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan)
 {
-    int error = PATINA_OK;
     drop_views(planes);
+    for (int p = 0; p < PT_PLANE_COUNT; p++)
+        for (int k = 0; k < PT_SLOTS; k++)
+            if (!pt_plane_is_kept((enum pt_plane)p, (uint32_t)k))
+                device->ops->buffer_destroy(device, &planes->at[p][k]);
     for (uint32_t s = plan->slab_count; s < PT_SLABS; s++)
         device->ops->buffer_destroy(device, &planes->slabs[s]);
-    for (uint32_t s = 0; s < plan->slab_count && !error; s++)
-        error = s < PT_SLABS ? ensure(device, planes, plan, &planes->slabs[s], plan->slabs[s].bytes) : PATINA_ERROR_INTERNAL;
+}
+
+int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan)
+{
+    if (plan->slab_count > PT_SLABS)
+        return pt_fail(&device->handle, PATINA_ERROR_INTERNAL, "the plan has %u slabs, of at most %d", plan->slab_count, PT_SLABS);
+    int error = PATINA_OK;
+    make_way(device, planes, plan);
+    for (int again = 0; again < 2; again++) // those that shrink first
+        for (uint32_t s = 0; s < plan->slab_count && !error; s++)
+            if (again || planes->slabs[s].room >= plan->slabs[s].bytes)
+                error = ensure(device, planes, plan, &planes->slabs[s], plan->slabs[s].bytes);
     for (uint32_t i = 0; i < plan->life_count && !error; i++) {
         const struct pt_life *life = &plan->lives[i];
         set_view(planes, life->plane, life->index, &planes->slabs[life->slab], life->slab, life->bytes);
         planes->lost[life->plane][life->index] = (uint8_t)is_lost(plan, i);
     }
+    return error;
+}
+
+static const uint64_t poison = 0x7FA5A5A5; // not a number; as an index, beyond every plane
+
+int pt_planes_poison(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, uint32_t when, int ends)
+{
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < plan->life_count && planes->poisoned && !error; i++) {
+        const struct pt_life *life = &plan->lives[i];
+        struct pt_buffer *view = &planes->at[life->plane][life->index];
+        if (when == (ends ? life->last : life->first) && planes->view[life->plane][life->index])
+            error = device->ops->buffer_fill(device, view, 0, view->size, poison, 4);
+    }
+    return error;
+}
+
+int pt_planes_poison_slabs(struct patina_device *device, struct pt_planes *planes, uint64_t slabs)
+{
+    int error = PATINA_OK;
+    for (uint32_t s = 0; s < 64 && planes->poisoned && !error; s++)
+        if (slabs >> s & 1u)
+            error = device->ops->buffer_fill(device, &planes->slabs[s], 0, planes->slabs[s].size, poison, 4);
     return error;
 }
 

@@ -14,6 +14,7 @@ struct pt_planes {
     uint8_t view[PT_PLANE_COUNT][PT_SLOTS]; // 1 + its slab; 0: it has memory of its own
     uint8_t lost[PT_PLANE_COUNT][PT_SLOTS]; // another plane took its slab since
     int apart;         // no slab is shared
+    int poisoned;      // pt_planes_poison writes: a test of lifetimes
     uint64_t borrowed; // bits of the other's slabs that planes may be views of: pt_planes_borrow
     const struct pt_planes *other;
     int varies; // in size from plan to plan, from the beginning
@@ -22,6 +23,11 @@ struct pt_planes {
 uint64_t pt_planes_total(const struct pt_planes *planes); // bytes that both hold
 // Room for a picture's plan, whose planes share memory as it says; before any of it runs.
 int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan);
+// Where planes are poisoned: what holds nothing yet is overwritten before a pass at `when`, what is no longer needed behind it (`ends`),
+// so that a picture that depends on it differs.
+int pt_planes_poison(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, uint32_t when, int ends);
+// The same of slabs: bits.
+int pt_planes_poison_slabs(struct patina_device *device, struct pt_planes *planes, uint64_t slabs);
 // Until the next call planes may lie in these slabs of the other's.
 void pt_planes_borrow(struct pt_planes *planes, uint64_t slabs);
 // Room for a plane of the plan; what it holds is anything, or what it held where the size is the same. Messages are at the device.

@@ -95,6 +95,7 @@ static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
 static int run_some(struct pt_execution *e, uint32_t first, uint32_t count)
 {
     const int output = is_output(&e->plan->passes[first + count - 1]);
+    const uint32_t when = e->plan->passes[first].when;
     if (!e->writing && e->cancel && atomic_load(e->cancel))
         return PATINA_ERROR_CANCELLED;
     if (!e->writing && output) {
@@ -103,7 +104,10 @@ static int run_some(struct pt_execution *e, uint32_t first, uint32_t count)
             return error;
         e->writing = 1;
     }
-    return count > 1 ? run_together(e, first, count) : run_pass(e, first);
+    int error = pt_planes_poison(e->device, e->binder.planes, e->plan, when, 0);
+    if (!error)
+        error = count > 1 ? run_together(e, first, count) : run_pass(e, first);
+    return error ? error : pt_planes_poison(e->device, e->binder.planes, e->plan, when, 1);
 }
 
 int pt_run_passes(struct pt_execution *e, uint32_t first, uint32_t count)

@@ -15,7 +15,7 @@ struct tool_times {
     int pass_count;
     char pass_names[MAX_PASSES][MAX_NAME];
     double *pass_ms[MAX_PASSES]; // a frame; 0 where the pass did not run
-    char *skipped;               // of the last frame, as JSON
+    char *skipped, *planes;      // of the last frame, as JSON
 };
 
 struct tool_times *tool_times_create(int frames)
@@ -38,6 +38,7 @@ void tool_times_destroy(struct tool_times *times)
     for (int i = 0; i < times->pass_count; i++)
         free(times->pass_ms[i]);
     free(times->skipped);
+    free(times->planes);
     free(times->ms);
     free(times);
 }
@@ -117,6 +118,11 @@ int tool_times_add(struct tool_times *times, double ms, const patina_frame *fram
         free(times->skipped);
         times->skipped = strndup(object, length);
     }
+    object = find_object(json, "\"planes\":", &length);
+    if (object) {
+        free(times->planes);
+        times->planes = strndup(object, length);
+    }
     free(json);
     times->ms[times->frames++] = ms;
     return 0;
@@ -194,8 +200,8 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
         print_string(times->pass_names[i]);
         printf(": %.4f", median(times->pass_ms[i], times->frames));
     }
-    printf("}, \"layers\": %u, \"skipped\": %s, \"peak_mb\": %.1f", stats->layers,
-           times->skipped ? times->skipped : "{}", peak_megabytes());
+    printf("}, \"layers\": %u, \"skipped\": %s, \"planes\": %s, \"peak_mb\": %.1f", stats->layers,
+           times->skipped ? times->skipped : "{}", times->planes ? times->planes : "{}", peak_megabytes());
     const patina_expected_error *expected = &stats->expected;
     printf(", \"spacing_px\": %.4f, \"expected_error\": ", (double)stats->spacing_px);
     if (isfinite(expected->color))

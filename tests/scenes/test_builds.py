@@ -8,9 +8,11 @@ fast.
 from __future__ import annotations
 
 import copy
+import os
 import sys
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +41,14 @@ class Altered(compare_builds.Process):
         if case.get("name") == self.name:
             case.setdefault("settings", {}).update(self.settings)
         super().tell(**asked)
+
+
+class Poisoned(compare_builds.Process):
+    """A build that overwrites planes when their lifetimes begin and end."""
+
+    def __init__(self, device: str) -> None:
+        with unittest.mock.patch.dict(os.environ, PATINA_POISON_PLANES="1"):
+            super().__init__(compare_builds.located(LIBRARY), device)
 
 
 class Builds(unittest.TestCase):
@@ -82,6 +92,10 @@ class Builds(unittest.TestCase):
         counts, lines = self.compared(Altered("light sun", strata=3), ["plain", "light sun"])
         self.assertEqual(counts, (1, 1, 0))
         self.assertIn("KEYS: ", lines[0])
+
+    def test_planes_are_read_within_their_lifetimes(self) -> None:
+        counts, lines = self.compared(Poisoned("cpu"), [case["name"] for case in self.cases])
+        self.assertEqual(counts, (len(self.cases), 0, 0), lines)
 
     def test_what_fails_is_told(self) -> None:
         counts, lines = self.compared(Altered("plain", width=1 << 31), ["plain"])
