@@ -142,6 +142,15 @@ void pt_plan_meshes(struct pt_builder *builder, int shown)
     }
 }
 
+// One colour in place of images', whose opacity stays: of pixels, beside their colours, which a ramp of nothing else takes the place of.
+static void paper_with_holes(struct shade_args *args)
+{
+    args->instance.color_format = PT_COLOR_OF_PLANE;
+    args->recolor = (struct recolor_args){.source = PT_RAMP_PLACE, .entries = 2};
+    for (int k = 0; k < 6; k++)
+        args->recolor.ramp[k] = args->instance.color[k % 3];
+}
+
 // unlit: those that light does not change.
 static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unlit)
 {
@@ -165,7 +174,8 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
                                            .diffuse = 1.0f,
                                            .opacity = 1.0f};
     pt_own_colors(color, &args);
-    pt_line_surface(builder, &args.instance);
+    if (!pt_line_surface(builder, &args.instance) && args.instance.has_opacities)
+        paper_with_holes(&args);
     struct pt_pass *pass = PT_ADD(builder, shade, args,
                      {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
                       pt_span_of(plan), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
