@@ -235,7 +235,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             self._tell('WARNING', text)
         points, left_out = points.finite()
         if left_out:
-            self._tell('WARNING', f"{path.name}: {left_out:,} points without a finite position left out")
+            self._tell('WARNING', f"{path.name}: {left_out:,} point{'s' * (left_out != 1)} without a finite position left out")
         if not len(points.positions):
             left = "" if wanted.keeps_all() else " that the filters keep"
             self._tell('ERROR', f"{path.name} holds no points{left}")

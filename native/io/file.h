@@ -53,7 +53,7 @@ struct pt_input {
 // Readers: fill a zeroed file. On failure the caller destroys what was filled.
 int pt_ply_read(struct patina_file *file, const struct pt_input *input);
 int pt_text_read(struct patina_file *file, const struct pt_input *input); // XYZ, CSV, PTS, PTX
-// Whether the first line that is no comment begins with a number, or names x, y and z.
+// Whether the first line that is no comment begins with a number, or names x, y and z; or the file is called a text, and is no PLY.
 bool pt_text_is(const struct pt_input *input);
 
 // Takes over `staged`, 3 float64 a point from malloc: chooses the origin, narrows to file->position in place.

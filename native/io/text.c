@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Points as lines of numbers: XYZ and CSV with or without a line of names, PTS (a line of how many points follow), PTX
-// (scans with a matrix each, after Leica's description of the format). Words are parted by blanks, commas or semicolons.
+// (scans with a matrix each, after Leica's description of the format). What parts their words: cells.h.
 //
 // What a column is follows from its name, else from how many columns there are and what the first rows hold: 4: x y z
 // intensity; 6: x y z and colour bytes, or unit normals; 7: x y z intensity colour; 9: colour bytes and normals. What is
 // none of these becomes an attribute.
 #include "base/progress.h"
+#include "cells.h"
 #include "file.h"
 #include "number.h"
 
@@ -23,10 +24,11 @@ enum role { ATTRIBUTE, X, Y, Z, NX, NY, NZ, RED, GREEN, BLUE, ALPHA };
 struct text {
     const struct pt_input *input;
     struct patina_file *file;
-    locale_t c_locale;
+    struct pt_cells cells;
     const uint8_t *at, *end;
     uint64_t line;    // of `at`, from 1
     uint32_t columns; // words of a row
+    uint32_t name_count;
     char names[MOST_COLUMNS][NAME_SIZE];
     bool named, ptx, pts;
     enum role roles[MOST_COLUMNS];
@@ -42,54 +44,27 @@ struct text {
 
 // ---- lines -----------------------------------------------------------------------------------------------------------
 
-static bool parts(uint8_t c)
-{
-    return pt_is_blank(c) || c == ',' || c == ';';
-}
-
-static bool is_comment(const uint8_t *at, const uint8_t *end)
-{
-    return at < end && (*at == '#' || *at == '!' || (*at == '/' && at + 1 < end && at[1] == '/'));
-}
-
 // Comes to the next line that holds something; false at the end.
 static bool find_line(struct text *t)
 {
     for (;;) {
-        while (t->at < t->end && (parts(*t->at) || pt_is_line_end(*t->at))) {
+        while (t->at < t->end && (pt_cells_skips(t->cells.parting, *t->at) || pt_is_line_end(*t->at))) {
             t->line += *t->at == '\n' || (*t->at == '\r' && (t->at + 1 == t->end || t->at[1] != '\n'));
             t->at++;
         }
-        if (t->at == t->end || !is_comment(t->at, t->end))
+        if (t->at == t->end || !pt_is_comment(t->at, t->end))
             return t->at < t->end;
         while (t->at < t->end && !pt_is_line_end(*t->at))
             t->at++;
     }
 }
 
-// The words of the line at t->at as numbers; t->at comes to its end. Words that are no numbers are counted in *strange.
-static uint32_t read_line(struct text *t, double values[MOST_COLUMNS], uint32_t *strange)
+// The words of the line at t->at as numbers; t->at comes to its end.
+static struct pt_line read_line(struct text *t, double values[MOST_COLUMNS])
 {
-    uint32_t count = 0;
-    *strange = 0;
-    while (t->at < t->end && !pt_is_line_end(*t->at)) {
-        if (parts(*t->at)) {
-            t->at++;
-            continue;
-        }
-        const uint8_t *word = t->at;
-        while (t->at < t->end && !parts(*t->at) && !pt_is_line_end(*t->at))
-            t->at++;
-        double value = NAN;
-        if (pt_parse_number(word, t->at, t->c_locale, &value) != t->at) {
-            value = NAN;
-            (*strange)++;
-        }
-        if (count < MOST_COLUMNS)
-            values[count] = value;
-        count++;
-    }
-    return count < MOST_COLUMNS ? count : MOST_COLUMNS;
+    struct pt_line line;
+    t->at = pt_cells_read(&t->cells, t->at, t->end, values, MOST_COLUMNS, &line);
+    return line;
 }
 
 static int fail_at(const struct text *t, const char *what)
@@ -101,19 +76,12 @@ static int fail_at(const struct text *t, const char *what)
 
 static void read_names(struct text *t, const uint8_t *at)
 {
-    uint32_t column = 0;
+    char name[NAME_SIZE];
     t->named = true;
-    while (at < t->end && !pt_is_line_end(*at) && column < MOST_COLUMNS) {
-        if (parts(*at) || *at == '"') {
-            at++;
-            continue;
-        }
-        size_t length = 0;
-        for (; at < t->end && !parts(*at) && !pt_is_line_end(*at) && *at != '"'; at++)
-            if (length + 1 < NAME_SIZE)
-                t->names[column][length++] = (char)*at;
-        column++;
-    }
+    for (t->name_count = 0; (at = pt_cells_name(t->cells.parting, at, t->end, name, sizeof name)); t->name_count++)
+        if (t->name_count < MOST_COLUMNS)
+            memcpy(t->names[t->name_count], name, NAME_SIZE);
+    t->name_count = t->name_count < MOST_COLUMNS ? t->name_count : MOST_COLUMNS;
 }
 
 static const struct {
@@ -158,15 +126,17 @@ static void set_three(struct text *t, uint32_t column, enum role first)
         t->roles[column + k] = first + k;
 }
 
-// Whether three columns of the sampled rows look like unit normals: nine of ten have a length within 2% of 1.
+// Whether three columns of the sampled rows look like unit normals: nine of ten have a length within 2% of 1. Rows of NaN do
+// not count.
 static bool are_normals(double (*rows)[MOST_COLUMNS], uint32_t count, uint32_t column)
 {
-    uint32_t good = 0;
+    uint32_t good = 0, finite = 0;
     for (uint32_t i = 0; i < count; i++) {
-        const double *n = rows[i] + column;
-        good += fabs(sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) - 1.0) < 0.02;
+        const double *n = rows[i] + column, length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        finite += isfinite(length) != 0;
+        good += fabs(length - 1.0) < 0.02;
     }
-    return 10 * good >= 9 * count;
+    return 10 * good >= 9 * finite && finite;
 }
 
 static void guess_roles(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t count)
@@ -214,10 +184,12 @@ struct scan {
 static bool read_scan(struct text *t, struct scan *scan)
 {
     double values[MOST_COLUMNS], size[2] = {0};
-    uint32_t strange;
     for (int i = 0; i < 10; i++) {
         uint32_t wanted = i < 2 ? 1 : i < 6 ? 3 : 4;
-        if (!find_line(t) || read_line(t, values, &strange) != wanted || strange)
+        if (!find_line(t))
+            return false;
+        struct pt_line line = read_line(t, values);
+        if (line.count != wanted || line.strange)
             return false;
         if (i < 2)
             size[i] = values[0];
@@ -308,7 +280,6 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
     struct scan scan = {0};
     uint64_t i = 0, polled = 0;
     uint32_t scans = 0;
-    uint32_t strange;
     while (find_line(t)) {
         double values[MOST_COLUMNS] = {0};
         if (++polled % POLL_LINES == 0) {
@@ -328,17 +299,21 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
                 return PATINA_ERROR_MEMORY;
             continue;
         }
-        uint32_t words = read_line(t, values, &strange);
-        if (t->pts && words == 1 && !strange)
+        struct pt_line line = read_line(t, values);
+        if (t->pts && line.count == 1 && !line.strange)
             continue; // how many points follow: the lines say it themselves
+        if (line.empty == line.count)
+            continue; // a table's last lines
         if (!t->columns)
-            t->columns = words;
-        if (strange || words < t->columns) {
+            t->columns = line.count;
+        if (line.strange || line.count < t->columns) {
             char what[96];
-            snprintf(what, sizeof what, strange ? "a word is no number" : "%u numbers; %u were expected", words,
+            snprintf(what, sizeof what, line.strange ? "a word is no number" : "%u numbers; %u were expected", line.count,
                      t->columns);
             return fail_at(t, what);
         }
+        if (t->cells.commas && t->cells.points)
+            return fail_at(t, "decimals behind a comma, and others in this file behind a point: which is which cannot be told");
         if (t->ptx) {
             scan.left--;
             scan.cell++;
@@ -424,35 +399,71 @@ static int make_columns(struct text *t)
 
 // ---- the whole -----------------------------------------------------------------------------------------------------------------
 
+// Whether there are names of x, y and z among the names.
+static bool names_points(const struct text *t)
+{
+    struct text named = *t;
+    named.columns = t->name_count;
+    name_roles(&named);
+    return has(&named, X);
+}
+
+static int fail_names(const struct text *t)
+{
+    char names[128] = "";
+    uint32_t c = 0;
+    for (; c < t->name_count && strlen(names) + strlen(t->names[c]) + 8 < sizeof names; c++)
+        snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", c ? ", " : "", t->names[c]);
+    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: no columns x, y and z in its line of names: %s%s", t->input->name, names,
+                   c < t->name_count ? ", ..." : "");
+}
+
 // Looks at the first lines: which of the formats this is, and where its rows begin.
 static int look(struct text *t, const uint8_t **body, uint64_t *line)
 {
     double values[MOST_COLUMNS];
-    uint32_t strange;
     struct scan scan;
+    const uint8_t *start = t->at;
     if (!find_line(t))
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: neither a PLY file nor lines of numbers: there is nothing in it",
                        t->input->name);
+    while (t->at > start && !pt_is_line_end(t->at[-1]))
+        t->at--; // a table's first cell may be empty
     const uint8_t *first = *body = t->at;
     *line = t->line;
     t->ptx = read_scan(t, &scan);
     rewind_text(t, first, *line);
     if (t->ptx)
         return PATINA_OK;
-    uint32_t words = read_line(t, values, &strange);
-    t->pts = words == 1 && !strange;
-    if (!t->pts && strange) {
-        if (words < 3 || strange < 3)
+    struct pt_line words = read_line(t, values);
+    t->pts = words.count == 1 && !words.strange;
+    if (t->pts)
+        return PATINA_OK;
+    t->cells.parting = pt_cells_look(first, t->end, t->cells.c_locale);
+    t->at = first;
+    words = read_line(t, values);
+    t->cells.commas = t->cells.points = 0;
+    if (words.strange) {
+        if (words.count < 3 || words.strange < 3)
             return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: neither a PLY file nor lines of numbers", t->input->name);
         read_names(t, first);
+        if (!names_points(t))
+            return fail_names(t);
         find_line(t);
         *body = t->at;
         *line = t->line;
         return PATINA_OK;
     }
-    if (!t->pts)
-        rewind_text(t, first, *line);
+    rewind_text(t, first, *line);
     return PATINA_OK;
+}
+
+static bool always_empty(double (*sample)[MOST_COLUMNS], uint32_t count, uint32_t column)
+{
+    bool empty = true;
+    for (uint32_t i = 0; i < count; i++)
+        empty &= isnan(sample[i][column]);
+    return empty;
 }
 
 static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
@@ -460,9 +471,13 @@ static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
     uint32_t count = t->file->count < SAMPLES ? (uint32_t)t->file->count : SAMPLES;
     if (t->columns < 3)
         return fail_at(t, "fewer than three numbers");
+    while (!t->named && t->columns > 3 && always_empty(sample, count, t->columns - 1))
+        t->columns--; // each line ends with a separator
     name_roles(t);
     if (t->named && !has(t, X))
-        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: the line of names has no x, y and z", t->input->name);
+        return fail_names(t);
+    if (t->named && t->cells.parting == PT_PARTED_LOOSELY && t->columns == 2 * t->name_count)
+        return fail_at(t, "twice as many numbers as names: commas between them and decimal commas cannot be told apart");
     if (!t->named)
         guess_roles(t, sample, count);
     guess_colors(t, sample, count);
@@ -499,13 +514,13 @@ static int read_all(struct text *t)
 int pt_text_read(struct patina_file *file, const struct pt_input *input)
 {
     struct text t = {.input = input, .file = file, .at = input->data, .end = input->data + input->size, .line = 1};
-    t.c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (!t.c_locale)
+    t.cells.c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    if (!t.cells.c_locale)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
     int code = read_all(&t);
-    freelocale(t.c_locale);
+    freelocale(t.cells.c_locale);
     free(t.attributes);
     if (code || !t.staged) {
         free(t.staged);
@@ -524,19 +539,32 @@ int pt_text_read(struct patina_file *file, const struct pt_input *input)
     return code;
 }
 
+// By the name alone: then a first line that is neither numbers nor names is told as such.
+static bool is_called_text(const char *name)
+{
+    static const char *const endings[] = {".xyz", ".txt", ".csv", ".asc", ".pts", ".ptx"};
+    size_t length = strlen(name);
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+        if (length > 4 && !strcasecmp(name + length - 4, endings[i]))
+            return true;
+    return false;
+}
+
 bool pt_text_is(const struct pt_input *input)
 {
-    if (!input->size)
+    static const uint8_t gzip[] = {0x1f, 0x8b};
+    if (!input->size || !memcmp(input->data, gzip, input->size < 2 ? input->size : 2))
         return false;
     struct text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
-    if (!find_line(&t))
+    char word[NAME_SIZE];
+    if (!find_line(&t) || !pt_cells_name(PT_PARTED_LOOSELY, t.at, t.end, word, sizeof word))
         return false;
-    if ((*t.at >= '0' && *t.at <= '9') || *t.at == '-' || *t.at == '+' || *t.at == '.')
+    if ((word[0] && strchr("0123456789-+.", word[0])) || !strncasecmp(word, "nan", 3) || !strncasecmp(word, "inf", 3))
         return true;
+    if (!strcmp(word, "ply"))
+        return false;
     read_names(&t, t.at);
-    t.columns = MOST_COLUMNS;
-    name_roles(&t);
-    return has(&t, X);
+    return names_points(&t) || is_called_text(input->name);
 }

@@ -4,9 +4,11 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 enum { MAX_SIZE = 65536, MAX_REPEAT = 100000 };
 
@@ -314,6 +316,17 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     return bad ? BAD_VALUE : GOOD;
 }
 
+// Whether a name ends as that of a picture which is no PNG.
+static bool is_other_picture(const char *path)
+{
+    static const char *const endings[] = {"jpg", "jpeg", "tif", "tiff", "exr", "hdr", "bmp", "tga", "webp", "gif", "jp2"};
+    const char *dot = strrchr(path, '.');
+    for (size_t i = 0; dot && i < sizeof endings / sizeof *endings; i++)
+        if (!strcasecmp(dot + 1, endings[i]))
+            return true;
+    return false;
+}
+
 int tool_parse_render(int count, char **arguments, struct tool_options *options)
 {
     *options = (struct tool_options){
@@ -374,6 +387,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)
         return tool_misuse("render: nothing to do; name the picture with -o OUT.png");
+    if (options->output && is_other_picture(options->output))
+        return tool_misuse("-o %s: pictures are written as PNG; name it .png", options->output);
     if (options->pass != PATINA_PASS_COMBINED && (options->panorama[0] || !options->output))
         return tool_misuse("--pass makes a picture, without --panorama: -o OUT.png");
     if (options->pass == PATINA_PASS_CERTAINTY || options->pass == PATINA_PASS_THICKNESS) {

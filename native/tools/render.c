@@ -125,6 +125,8 @@ static int load_clouds(struct job *job)
             code = patina_cloud_get_info(job->clouds[i], &info);
         if (code)
             return tool_failed(options->files[i], NULL, code);
+        if (!info.count)
+            tool_say("warning: %s holds no points", options->files[i]);
         grow_box(&job->box, info.box_min, info.box_max);
         if (options->opacity_count)
             style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);

@@ -8,7 +8,7 @@ from check_edits import ROWS, chosen, right_half, scene_with_wall, select
 from check_import import columns, import_ply, write_ply
 from check_panorama import stage
 from check_points import mesh_to_points
-from harness import SCRATCH, Skip, add_points, check, new_scene, render, reports, sphere
+from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, render, reports, sphere
 
 from patina.importers import crs
 from patina.operators import points_keys
@@ -117,3 +117,28 @@ def test_other_panoramas_are_named():
         data.panorama_type = kind
         render()
         check(any("equirectangular" in text for _, text in reports) == said, f"{kind}: {reports}")
+
+
+def test_tables_of_spreadsheets():
+    """A table with decimal commas was a diagonal line of 1 to 999,414, a first row of NaN "not a PLY file"."""
+    new_scene()
+    rows = np.random.default_rng(5).uniform(-2, 2, (200, 3)).round(4)
+    comma = "\n".join(";".join(f"{value:.4f}".replace(".", ",") for value in row) for row in rows)
+    tables = {"comma.csv": f"X;Y;Z\n{comma}\n", "plain.txt": comma.replace(";", "  "),
+              "quoted.csv": "x,y,z,Wert\n" + "".join(f'"{x}","{y}","{z}",\n' for x, y, z in rows),
+              "nan.xyz": "nan nan nan\n" + "".join(f"{x} {y} {z}\n" for x, y, z in rows)}
+    for name, text in tables.items():
+        (SCRATCH / name).write_text(text)
+        obj, = import_ply(SCRATCH / name)
+        found = np.empty((len(obj.data.vertices), 3), np.float32)
+        obj.data.vertices.foreach_get("co", found.ravel())
+        check_close(found, rows, 1e-5, name)
+    for name, text, word in (("lonlat.csv", "id,lon,lat,elev\n1,2,3,4\n", "no columns x, y and z in its line of names: id, lon, lat, elev"),
+                             ("both.csv", "x;y;z\n1.5;2;3\n1,5;2;3\n", "decimals behind a comma")):
+        (SCRATCH / name).write_text(text)
+        try:
+            import_ply(SCRATCH / name)
+        except RuntimeError as error:
+            check(word in str(error), str(error))
+        else:
+            raise AssertionError(f"{name} was imported")

@@ -223,6 +223,25 @@ def test_wrong_use_is_told():
     assert not (FOLDER / "x.png").exists()
 
 
+def test_pictures_are_png():
+    """Whoever asks for another kind of picture is told, before anything is drawn; a file called JPEG that holds a PNG is no answer."""
+    ball("kind.ply", 100)
+    for name in ("x.jpg", "x.JPEG", "x.exr", "folder.png/x.tif"):
+        assert f"-o {name}: pictures are written as PNG" in run("render", "kind.ply", "-o", name, code=2).stderr
+        assert not (FOLDER / name).exists()
+    for name in ("x.PNG", "plain"):
+        assert run("render", "kind.ply", "-o", name, "--size", "8x8") and (FOLDER / name).read_bytes()[1:4] == b"PNG"
+
+
+def test_tables_of_spreadsheets():
+    """Decimals behind a comma, as half of Europe writes them, are no columns of their own."""
+    (FOLDER / "comma.csv").write_text("X;Y;Z\n2,051640;0,143959;-0,918971\n1,5;1;0\n")
+    said = run("info", "comma.csv").stdout
+    assert "2.05164" in said and "1.5" in said and "column" not in said, said
+    (FOLDER / "lonlat.csv").write_text("id,lon,lat,elev\n1,2,3,4\n")
+    assert "no columns x, y and z in its line of names: id, lon, lat, elev" in run("info", "lonlat.csv", code=1).stderr
+
+
 def test_missing_and_broken_files():
     (FOLDER / "broken.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
                                        "property float y\nproperty float z\nend_header\n1 2 3\n4 five 6\n7 8 9\n")
@@ -559,7 +578,7 @@ def test_several_files():
 
 def test_empty_cloud_is_background():
     write_ply("void.ply", [])
-    run("render", "void.ply", "-o", "void.png", "--size", "16x16")
+    assert "warning: void.ply holds no points" in run("render", "void.ply", "-o", "void.png", "--size", "16x16").stderr
     assert {pixel for row in read_png("void.png")[3] for pixel in row} == {(63, 63, 63)}
 
 

@@ -83,6 +83,75 @@ static void test_values(void **state)
     patina_file_destroy(file);
 }
 
+// Positions and the last attribute of a file, all of it to compare with.
+static void expect_rows(const char *text, const char *format, uint64_t count, const char *last, const double *wanted)
+{
+    patina_file *file = read(text);
+    patina_file_info info = info_of(file);
+    float xyz[12], values[4];
+    assert_true(count <= 4);
+    assert_string_equal(info.format, format);
+    assert_int_equal(info.count, count);
+    assert_int_equal(patina_file_read_positions(file, xyz, count * 3 * sizeof *xyz), PATINA_OK);
+    assert_int_equal(info.attributes, last ? 1 : 0);
+    if (last) {
+        patina_file_attribute attribute = {.struct_size = sizeof attribute};
+        assert_int_equal(patina_file_get_attribute(file, 0, &attribute), PATINA_OK);
+        assert_string_equal(attribute.name, last);
+        assert_int_equal(patina_file_read_attribute(file, 0, values, count * sizeof *values), PATINA_OK);
+    }
+    for (uint64_t i = 0; i < count; i++)
+        for (int k = 0; k < (last ? 4 : 3); k++) {
+            double found = k < 3 ? (double)xyz[3 * i + (uint64_t)k] + info.origin[k] : (double)values[i], want = *wanted++;
+            if (!(fabs(found - want) < 1e-6) && !(isnan(found) && isnan(want)))
+                fail_msg("'%s': row %d, column %d is %g, not %g", text, (int)i, k, found, want);
+        }
+    patina_file_destroy(file);
+}
+
+// A table as spreadsheets write it where decimals stand behind a comma, by semicolons, tabs, blanks, or in quotes.
+static void test_decimal_commas(void **state)
+{
+    (void)state;
+    const double wanted[8] = {2.05164, 0.143959, -0.918971, 7, -1, 2.5, 3, 0.25};
+    expect_rows("X;Y;Z;Wert\n2,051640;0,143959;-0,918971;7\n-1;2,5;3;0,25\n", "CSV", 2, "Wert", wanted);
+    expect_rows("X\tY\tZ\tWert\n2,051640\t0,143959\t-0,918971\t7\n-1\t2,5\t3\t0,25\n", "CSV", 2, "Wert", wanted);
+    expect_rows("x y z Wert\n2,051640 0,143959 -0,918971 7\n-1   2,5 3 0,25\n", "CSV", 2, "Wert", wanted);
+    expect_rows("\"X\",\"Y\",\"Z\",\"Wert\"\r\n\"2,051640\",\"0,143959\",\"-0,918971\",7\r\n-1,\"2,5\",\"3\",\"0,25\"\r\n", "CSV", 2,
+                "Wert", wanted);
+    expect_rows("2,051640;0,143959;-0,918971;7;\n-1;2,5;3;2,5e-1;\n", "XYZ", 2, "intensity", wanted);
+    expect_rows("2,051640 0,143959 -0,918971 7\n-1 2,5 3 0,25\n", "XYZ", 2, "intensity", wanted);
+    const double points[8] = {1.5, 2, 3, 4, 5, 6, 7.25, 8};
+    expect_rows("x;y;z;t\n1.5;2;3;4\n5;6;7.25;8\n", "CSV", 2, "t", points);
+    expect_rows("1.5, 2, 3, 4\n5, 6, 7.25, 8\n", "XYZ", 2, "intensity", points);
+    expect_rows("1.5,2 3;4\n5,6 7.25;8\n", "XYZ", 2, "intensity", points); // whatever parts them
+}
+
+// Quotes are taken off, an empty cell is not known, lines of nothing but separators end a table, tabs may align.
+static void test_tables(void **state)
+{
+    (void)state;
+    const double wanted[8] = {1, 2, 3, NAN, 4, 5, 6, 0.5};
+    expect_rows("x,y,z,Intensity\n1,2,3,\n4,5,6,0.5\n,,,\n", "CSV", 2, "Intensity", wanted);
+    expect_rows("\"x\";\"y\";\"z\";\"Scan Angle\"\n\"1.0\";\"2.0\";\"3.0\";\"\"\n\"4\";\"5\";\"6\";\"0.5\"\n", "CSV", 2, "Scan Angle", wanted);
+    expect_rows("\"1.0\",\"2.0\",\"3.0\",\n4,5,6,0.5\n", "XYZ", 2, "intensity", wanted);
+    const double indexed[8] = {1, 2, 3, 0, 4, 5, 6, 1};
+    expect_rows(",x,y,z\n0,1,2,3\n1,4,5,6\n", "CSV", 2, "column_1", indexed);
+    const double aligned[6] = {1, 2, 3, 4, 5, 6};
+    expect_rows("1\t\t2\t\t3\n4\t\t5\t\t6\n", "XYZ", 2, NULL, aligned);
+}
+
+// A first row without a place is a row like another, and says nothing of what the columns are.
+static void test_first_row_of_nan(void **state)
+{
+    (void)state;
+    const double wanted[6] = {NAN, NAN, NAN, 4, 5, 6};
+    expect_rows("nan nan nan\n4 5 6\n", "XYZ", 2, NULL, wanted);
+    expect_rows("NaN,NaN,NaN\n4,5,6\n", "XYZ", 2, NULL, wanted);
+    expect("nan nan nan nan nan nan\n4 5 6 0 0.6 0.8\n7 8 9 1 0 0\n", "XYZ", 3, PATINA_NONE, 1, "");
+    expect("inf 1 2\n4 5 6\n", "XYZ", 2, PATINA_NONE, 0, "");
+}
+
 // Two scans: the second is turned by 90 degrees around z and moved; a beam that met nothing is left out.
 static void test_ptx(void **state)
 {
@@ -191,6 +260,23 @@ static void refuse(const char *text, const char *part)
         fail_msg("'%s' is not in '%s'", part, message);
 }
 
+// The same of a file on disk, whose name says what it is meant to be.
+static void refuse_file(const char *name, const char *text, const char *part)
+{
+    const char *folder = getenv("TMPDIR");
+    char path[512], message[512] = "";
+    snprintf(path, sizeof path, "%s/%s", folder ? folder : "/tmp", name);
+    FILE *stream = fopen(path, "w");
+    assert_non_null(stream);
+    assert_true(fputs(text, stream) >= 0 && fclose(stream) == 0);
+    patina_file *file = NULL;
+    assert_int_not_equal(patina_file_open(path, NULL, &file), PATINA_OK);
+    remove(path);
+    patina_message(NULL, message, sizeof message);
+    if (!strstr(message, part))
+        fail_msg("'%s' is not in '%s'", part, message);
+}
+
 static void test_refused(void **state)
 {
     (void)state;
@@ -199,6 +285,12 @@ static void test_refused(void **state)
     refuse("1 2\n3 4\n", "fewer than three numbers");
     refuse("1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 0 0 1\n1 2 3 0.5\n", "within a scan");
     refuse("hello world\n", "not a PLY file");
+    refuse("X,Y,Z\n2,051640,0,143959,-0,918971\n", "decimal commas cannot be told apart");
+    refuse("X;Y;Z\n1.234,5;2;3\n", "line 2: a word is no number");
+    refuse("X;Y;Z\n1.5;2;3\n1,5;2;3\n", "line 3: decimals behind a comma");
+    refuse_file("patina_text.csv", "id,lon,lat,elev\n1,2,3,4\n", "no columns x, y and z in its line of names: id, lon, lat, elev");
+    refuse_file("patina_text.txt", "Dear all, this is a letter\nwithout points\n", "names: Dear, all, this");
+    refuse_file("patina_text.xyz", "hello world\n", "neither a PLY file nor lines of numbers");
 }
 
 int main(void)
@@ -206,6 +298,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_columns),
         cmocka_unit_test(test_values),
+        cmocka_unit_test(test_decimal_commas),
+        cmocka_unit_test(test_tables),
+        cmocka_unit_test(test_first_row_of_nan),
         cmocka_unit_test(test_ptx),
         cmocka_unit_test(test_ptx_grid),
         cmocka_unit_test(test_grid_normals),

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cells.h"
+#include "number.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { LOOKED_AT = 1000, LONGEST_NUMBER = 64 };
+
+bool pt_is_comment(const uint8_t *at, const uint8_t *end)
+{
+    return at < end && (*at == '#' || *at == '!' || (*at == '/' && at + 1 < end && at[1] == '/'));
+}
+
+// What parts cells; 0 where there are none.
+static uint8_t separator(enum pt_parting parting)
+{
+    return parting == PT_PARTED_BY_COMMA       ? ','
+           : parting == PT_PARTED_BY_SEMICOLON ? ';'
+           : parting == PT_PARTED_BY_TAB       ? '\t'
+                                               : 0;
+}
+
+static bool parts(enum pt_parting parting, uint8_t c)
+{
+    return pt_is_blank(c) || (parting == PT_PARTED_LOOSELY && (c == ',' || c == ';'));
+}
+
+bool pt_cells_skips(enum pt_parting parting, uint8_t c)
+{
+    return parts(parting, c) && c != separator(parting);
+}
+
+struct span {
+    const uint8_t *begin, *end;
+};
+
+// The cell or word at `at`, without blanks around it and without its quotes; *next: behind it and, of a cell, before the
+// separator. Quotes keep separators.
+static struct span take(enum pt_parting parting, const uint8_t *at, const uint8_t *end, const uint8_t **next)
+{
+    uint8_t between = separator(parting);
+    bool quoted = at < end && *at == '"';
+    struct span found = { at + quoted, at };
+    if (quoted) {
+        for (at++; at < end && *at != '"' && !pt_is_line_end(*at); at++)
+            ;
+        found.end = at;
+    }
+    while (at < end && !pt_is_line_end(*at) && (between ? *at != between : !parts(parting, *at)))
+        at++;
+    if (!quoted)
+        for (found.end = at; found.end > found.begin && pt_is_blank(found.end[-1]); found.end--)
+            ;
+    *next = at;
+    return found;
+}
+
+// A number whose decimals stand behind a comma.
+static bool read_comma(struct span word, locale_t c_locale, double *value)
+{
+    char text[LONGEST_NUMBER];
+    size_t length = (size_t)(word.end - word.begin);
+    if (length >= sizeof text || memchr(word.begin, '.', length))
+        return false;
+    memcpy(text, word.begin, length);
+    char *comma = memchr(text, ',', length);
+    if (!comma || comma == text || comma + 1 == text + length) // "1," and ",1" stand in lists
+        return false;
+    *comma = '.';
+    const uint8_t *end = (const uint8_t *)text + length;
+    return pt_parse_number((const uint8_t *)text, end, c_locale, value) == end;
+}
+
+static bool read_number(struct pt_cells *cells, struct span word, double *value)
+{
+    if (pt_parse_number(word.begin, word.end, cells->c_locale, value) == word.end) {
+        cells->points += cells->parting != PT_PARTED_LOOSELY && memchr(word.begin, '.', (size_t)(word.end - word.begin));
+        return true;
+    }
+    bool comma = cells->parting != PT_PARTED_LOOSELY && read_comma(word, cells->c_locale, value);
+    cells->commas += comma;
+    return comma;
+}
+
+const uint8_t *pt_cells_read(struct pt_cells *cells, const uint8_t *at, const uint8_t *end, double *values, uint32_t most,
+                             struct pt_line *line)
+{
+    uint8_t between = separator(cells->parting);
+    *line = (struct pt_line){ 0 };
+    for (;;) {
+        while (at < end && pt_cells_skips(cells->parting, *at))
+            at++;
+        if (!between && (at == end || pt_is_line_end(*at)))
+            return at;
+        struct span word = take(cells->parting, at, end, &at);
+        double value = NAN;
+        if (word.begin == word.end) {
+            line->empty++;
+        } else if (!read_number(cells, word, &value)) {
+            value = NAN;
+            line->strange++;
+        }
+        if (line->count < most)
+            values[line->count++] = value;
+        if (between && (at == end || *at != between))
+            return at;
+        at += between != 0;
+    }
+}
+
+const uint8_t *pt_cells_name(enum pt_parting parting, const uint8_t *at, const uint8_t *end, char *name, size_t size)
+{
+    while (at < end && pt_cells_skips(parting, *at))
+        at++;
+    if (at >= end || pt_is_line_end(*at))
+        return NULL;
+    struct span word = take(parting, at, end, &at);
+    size_t length = (size_t)(word.end - word.begin);
+    length = length < size ? length : size - 1;
+    memcpy(name, word.begin, length);
+    name[length] = 0;
+    return at + (at < end && separator(parting) && *at == separator(parting));
+}
+
+// ---- which parting ---------------------------------------------------------------------------------------------------------
+
+static const uint8_t *line_end(const uint8_t *at, const uint8_t *end)
+{
+    while (at < end && !pt_is_line_end(*at))
+        at++;
+    return at;
+}
+
+// The next line that holds something and is no comment, behind its first blanks; `end` where there is none.
+static const uint8_t *next_line(enum pt_parting parting, const uint8_t *at, const uint8_t *end)
+{
+    for (;;) {
+        while (at < end && (pt_cells_skips(parting, *at) || pt_is_line_end(*at)))
+            at++;
+        if (!pt_is_comment(at, end))
+            return at;
+        at = line_end(at, end);
+    }
+}
+
+// Separators of one line outside quotes.
+static uint32_t count_separators(const uint8_t *at, const uint8_t *end, uint8_t separator)
+{
+    uint32_t count = 0;
+    bool quoted = false;
+    for (; at < end && !pt_is_line_end(*at); at++) {
+        quoted ^= *at == '"';
+        count += !quoted && *at == separator;
+    }
+    return count;
+}
+
+// Whether the lines are a table of that parting: equally many separators, and below the first line no words within a cell. Tabs
+// also align words: then cells of the first line are empty.
+static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *end)
+{
+    uint32_t wanted = 0, lines = 0;
+    at = next_line(parting, at, end);
+    for (; at < end && lines < LOOKED_AT; at = next_line(parting, line_end(at, end), end), lines++) {
+        uint32_t found = count_separators(at, end, separator(parting));
+        wanted = lines ? wanted : found;
+        if (found < 2 || found != wanted)
+            return false;
+        for (const uint8_t *p = at; p < end && !pt_is_line_end(*p);) {
+            while (p < end && pt_cells_skips(parting, *p))
+                p++;
+            struct span word = take(parting, p, end, &p);
+            if (!lines && parting == PT_PARTED_BY_TAB && word.begin == word.end)
+                return false;
+            for (const uint8_t *c = word.begin; lines && c < word.end; c++)
+                if (pt_is_blank(*c))
+                    return false;
+            p += p < end && !pt_is_line_end(*p);
+        }
+    }
+    return lines > 0;
+}
+
+// Whether blanks part numbers of which some have decimals behind a comma: equally many in each line, at least three. The first
+// line does not count where it holds names.
+static bool has_decimal_commas(const uint8_t *at, const uint8_t *end, locale_t c_locale)
+{
+    struct pt_cells cells = { .parting = PT_PARTED_BY_BLANKS, .c_locale = c_locale };
+    uint32_t wanted = 0, lines = 0;
+    at = next_line(cells.parting, at, end);
+    for (; at < end && lines < LOOKED_AT; at = next_line(cells.parting, line_end(at, end), end), lines++) {
+        struct pt_line line;
+        double values[1];
+        uint32_t words = 0;
+        pt_cells_read(&cells, at, end, values, 1, &line);
+        char name[2];
+        for (const uint8_t *p = at; (p = pt_cells_name(PT_PARTED_BY_BLANKS, p, end, name, sizeof name));)
+            words++;
+        if (!lines && line.strange)
+            continue;
+        wanted = wanted ? wanted : words;
+        if (line.strange || words < 3 || words != wanted)
+            return false;
+    }
+    return cells.commas > 0;
+}
+
+enum pt_parting pt_cells_look(const uint8_t *at, const uint8_t *end, locale_t c_locale)
+{
+    static const enum pt_parting tables[] = { PT_PARTED_BY_SEMICOLON, PT_PARTED_BY_TAB, PT_PARTED_BY_COMMA };
+    for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
+        if (is_table(tables[i], at, end))
+            return tables[i];
+    return has_decimal_commas(at, end, c_locale) ? PT_PARTED_BY_BLANKS : PT_PARTED_LOOSELY;
+}
