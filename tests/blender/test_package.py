@@ -9,6 +9,8 @@ BLENDER_USER_SCRIPTS, _CONFIG and _EXTENSIONS must name throwaway folders, PATIN
 import math
 import os
 import re
+import signal
+import subprocess
 import sys
 import tempfile
 import traceback
@@ -27,6 +29,15 @@ def package():
     zips = [path for path in zips if path.stem.endswith("-legacy") == LEGACY]
     assert len(zips) == 1, f"run build/package first: {zips}"
     return str(zips[0])
+
+
+def test_says_what_it_does():
+    """Packing compiles for minutes the first time: it says so before."""
+    with subprocess.Popen([ROOT / "build/package"], stdout=subprocess.PIPE, text=True, start_new_session=True,
+                          env=os.environ | {"PATINA_NINJA_FLAGS": "-n"}) as packing:  # nothing is compiled meanwhile
+        said = packing.stdout.readline()
+        os.killpg(packing.pid, signal.SIGKILL)
+    assert said.startswith("package: compiling"), said
 
 
 def folder():
@@ -118,7 +129,7 @@ def test_remove():
 
 def main():
     passed = failed = 0
-    for test in (test_install, test_render, test_remove):
+    for test in (test_says_what_it_does, test_install, test_render, test_remove):
         try:
             test()
             passed += 1
