@@ -37,7 +37,7 @@ struct span {
 
 // The cell or word at `at`, without blanks around it and without its quotes; *next: behind it and, of a cell, before the
 // separator. Quotes keep separators.
-static struct span take(enum pt_parting parting, const uint8_t *at, const uint8_t *end, const uint8_t **next)
+static inline struct span take(enum pt_parting parting, const uint8_t *at, const uint8_t *end, const uint8_t **next)
 {
     uint8_t between = separator(parting);
     bool quoted = at < end && *at == '"';
@@ -72,40 +72,55 @@ static bool read_comma(struct span word, locale_t c_locale, double *value)
     return pt_parse_number((const uint8_t *)text, end, c_locale, value) == end;
 }
 
-static bool read_number(struct pt_cells *cells, struct span word, double *value)
+static inline bool read_number(struct pt_cells *cells, enum pt_parting parting, struct span word, double *value)
 {
     if (pt_parse_number(word.begin, word.end, cells->c_locale, value) == word.end) {
-        cells->points += cells->parting != PT_PARTED_LOOSELY && memchr(word.begin, '.', (size_t)(word.end - word.begin));
+        if (parting != PT_PARTED_LOOSELY && !cells->points)
+            cells->points = memchr(word.begin, '.', (size_t)(word.end - word.begin)) != NULL;
         return true;
     }
-    bool comma = cells->parting != PT_PARTED_LOOSELY && read_comma(word, cells->c_locale, value);
-    cells->commas += comma;
+    bool comma = parting != PT_PARTED_LOOSELY && read_comma(word, cells->c_locale, value);
+    cells->commas |= comma;
     return comma;
+}
+
+// For one parting each, which the compiler knows: words are read in four fifths of the time.
+static inline __attribute__((always_inline)) const uint8_t *read_line(struct pt_cells *cells, enum pt_parting parting, const uint8_t *at,
+                                                                      const uint8_t *end, double *values, uint32_t most,
+                                                                      struct pt_line *line)
+{
+    uint8_t between = separator(parting);
+    struct pt_line found = { 0 };
+    for (;;) {
+        while (at < end && pt_cells_skips(parting, *at))
+            at++;
+        if (!between && (at == end || pt_is_line_end(*at)))
+            break;
+        struct span word = take(parting, at, end, &at);
+        double value = NAN;
+        if (word.begin == word.end) {
+            found.empty++;
+        } else if (!read_number(cells, parting, word, &value)) {
+            value = NAN;
+            found.strange++;
+        }
+        if (found.count < most)
+            values[found.count++] = value;
+        if (between && (at == end || *at != between))
+            break;
+        at += between != 0;
+    }
+    *line = found;
+    return at;
 }
 
 const uint8_t *pt_cells_read(struct pt_cells *cells, const uint8_t *at, const uint8_t *end, double *values, uint32_t most,
                              struct pt_line *line)
 {
-    uint8_t between = separator(cells->parting);
-    *line = (struct pt_line){ 0 };
-    for (;;) {
-        while (at < end && pt_cells_skips(cells->parting, *at))
-            at++;
-        if (!between && (at == end || pt_is_line_end(*at)))
-            return at;
-        struct span word = take(cells->parting, at, end, &at);
-        double value = NAN;
-        if (word.begin == word.end) {
-            line->empty++;
-        } else if (!read_number(cells, word, &value)) {
-            value = NAN;
-            line->strange++;
-        }
-        if (line->count < most)
-            values[line->count++] = value;
-        if (between && (at == end || *at != between))
-            return at;
-        at += between != 0;
+    switch (cells->parting) {
+    case PT_PARTED_LOOSELY: return read_line(cells, PT_PARTED_LOOSELY, at, end, values, most, line);
+    case PT_PARTED_BY_COMMA: return read_line(cells, PT_PARTED_BY_COMMA, at, end, values, most, line);
+    default: return read_line(cells, cells->parting, at, end, values, most, line);
     }
 }
 

@@ -20,7 +20,7 @@ enum pt_parting {
 struct pt_cells {
     enum pt_parting parting;
     locale_t c_locale;       // from newlocale(LC_ALL_MASK, "C", 0)
-    uint64_t commas, points; // decimals so far, of either sign; not counted where parted loosely
+    bool commas, points;      // whether there were decimals of either sign so far; not told where parted loosely
 };
 
 // What one line held.
