@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import backdrop
-from .sync import CloudItem, Effects, MeshItem, SceneDescription
+from .sync import CloudItem, MeshItem, SceneDescription
 from .sync.clouds import LIT
 from .sync.colors import FIXED
 from .sync.roles import CATCHER, HOLDOUT
@@ -79,7 +79,7 @@ def unlit(description: SceneDescription, color_of: Callable[[Item], tuple[float,
 
 
 def _plain(description: SceneDescription) -> SceneDescription:
-    plain = replace(description, lines=None, effects=_focus_alone(description.effects), shadow_file="", clips=[
+    plain = replace(description, lines=None, effects=description.effects.focus_alone(), shadow_file="", clips=[
         replace(clip, tint_strength=0.0) for clip in description.clips])
     return replace(plain, settings=replace(plain.settings, film_transparent=1))
 
@@ -105,8 +105,3 @@ def _lit(item: Item) -> Item:
         return replace(white, style=replace(white.style, shadow_off=white.style.shadow_off & ~2 | NO_CAST))  # nor on itself
     style = white.style
     return replace(white, style=replace(style, lighting=LIT, specular=0.0, shadow_off=style.shadow_off & ~2 | NO_SELF))
-
-
-def _focus_alone(effects: Effects) -> Effects:
-    return replace(effects, edl_strength=0.0, obscurance_strength=0.0, toon_bands=0, hatch_levels=0, fog_density=0.0,
-                   paper_color=WHITE, paper_grain=0.0)

@@ -37,6 +37,7 @@ SURFACE = {"AUTO": 0, "SPLATS": 1, "FILL": 2}
 DEPTH = {"POINT": 0, "SURFACE": 1}
 SMOOTH = {"ALLEVIATED": 0, "GAUSSIAN": 1, "BOX": 2, "OFF": 3}
 ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
+EFFECT_CHOICE = {"NO_CHOICE": 0}
 LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
 LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
 
@@ -177,11 +178,11 @@ class Settings(Descriptor):
 
 class Effects(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("edl_strength", c_float), ("edl_radius", c_float),
-                ("obscurance_strength", c_float), ("obscurance_radius", c_float), ("toon_bands", c_uint32),
-                ("toon_softness", c_float), ("hatch_levels", c_uint32), ("hatch_spacing", c_float),
-                ("hatch_opacity", c_float), ("hatch_ground", c_float), ("hatch_color", c_float * 3),
-                ("fog_density", c_float), ("fog_start", c_float), ("fog_end", c_float), ("fog_fixed", c_uint32),
-                ("fog_color", c_float * 3), ("focus_aperture", c_float), ("focus_distance", c_float),
+                ("obscurance_strength", c_float), ("obscurance_radius", c_float), ("fog_start", c_float),
+                ("fog_end", c_float), ("fog_density", c_float), ("fog_fixed", c_uint32), ("fog_color", c_float * 3),
+                ("toon_bands", c_uint32), ("toon_softness", c_float), ("hatch_levels", c_uint32),
+                ("hatch_spacing", c_float), ("hatch_color", c_float * 3), ("hatch_opacity", c_float),
+                ("hatch_ground", c_float), ("focus_aperture", c_float), ("focus_distance", c_float),
                 ("paper_color", c_float * 3), ("paper_grain", c_float), ("exact", c_uint32)]
 
 
@@ -335,3 +336,95 @@ RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_me
            "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
            "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
            "patina_task_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None}
+
+# effects.def: what Blender shows of each effect, and how
+EFFECTS = (
+    {"name": "edl", "label": "Eye-Dome Lighting", "panel": "CUES",
+     "about": "What lies behind its neighbors on screen is darker: shape shows without light and normals",
+     "fields": (
+         {"name": "edl_strength", "kind": "NUMBER", "property": "edl_strength", "when": "STRENGTH", "label": "Strength",
+          "about": "How dark edges and slopes become", "least": 0, "zero": 0, "unit": "NONE", "start": 1, "low": 0,
+          "usual": 3, "high": 10},
+         {"name": "edl_radius", "kind": "NUMBER", "property": "edl_radius", "when": "PART", "label": "Radius",
+          "about": "How far away the neighbors lie that are compared", "least": 1, "zero": 1.4, "unit": "PIXELS",
+          "start": 1.4, "low": 1, "usual": 16, "high": 16},
+     )},
+    {"name": "obscurance", "label": "Ambient Obscurance", "panel": "CUES",
+     "about": "Folds and corners are darker, by what surrounds them",
+     "fields": (
+         {"name": "obscurance_strength", "kind": "NUMBER", "property": "obscurance_strength", "when": "STRENGTH",
+          "label": "Strength", "about": "How dark folds and corners become", "least": 0, "zero": 0, "unit": "NONE",
+          "start": 1, "low": 0, "usual": 3, "high": 10},
+         {"name": "obscurance_radius", "kind": "NUMBER", "property": "obscurance_radius", "when": "PART", "label": "Radius",
+          "about": "How far around a point others darken it, at most 32 pixels", "least": 0, "zero": 0, "unit": "LENGTH",
+          "start": 0, "low": 0, "usual": 10, "high": 1e+30,
+          "automatic": (0.1, "A fixed radius; else it is a 32nd of the clouds' diagonal")},
+     )},
+    {"name": "fog", "label": "Fog", "panel": "CUES",
+     "about": "Points fade with their distance",
+     "fields": (
+         {"name": "fog_start", "kind": "NUMBER", "property": "fog_start", "when": "PART", "label": "Start",
+          "about": "Distance from the camera at which fog begins", "least": -1e+30, "zero": 0, "unit": "LENGTH", "start": 5,
+          "low": 0, "usual": 1e+30, "high": 1e+30},
+         {"name": "fog_end", "kind": "NUMBER", "property": "fog_end", "when": "PART", "label": "End",
+          "about": "Distance from the camera at which fog is as dense as it becomes", "least": -1e+30, "zero": 0,
+          "unit": "LENGTH", "start": 25, "low": 0, "usual": 1e+30, "high": 1e+30},
+         {"name": "fog_density", "kind": "NUMBER", "property": "fog_density", "when": "STRENGTH", "label": "Density",
+          "about": "How much fog hides at its end and beyond", "least": 0, "zero": 0, "unit": "SHARE", "start": 1, "low": 0,
+          "usual": 1, "high": 1},
+         {"name": "fog_fixed", "kind": "SWITCH", "property": "fog_use_color", "when": "PART", "label": "Own Color",
+          "about": "A color of its own; else points fade into the background"},
+         {"name": "fog_color", "kind": "COLOR", "property": "fog_color", "when": "fog_fixed", "label": "Color",
+          "about": "Color of the fog", "zero": 0, "unit": "COLOR", "start": (0.7, 0.75, 0.8), "low": 0, "usual": 1,
+          "high": 1e+30},
+     )},
+    {"name": "toon", "label": "Toon", "panel": "DRAWING",
+     "about": "Light goes in bands, with obscurance and eye-dome lighting; the points' own colors stay",
+     "fields": (
+         {"name": "toon_bands", "kind": "COUNT", "property": "toon_bands", "when": "STRENGTH", "label": "Bands",
+          "about": "How many lights there are", "least": 2, "zero": 0, "unit": "NONE", "start": 3, "low": 2, "usual": 16,
+          "high": 16},
+         {"name": "toon_softness", "kind": "NUMBER", "property": "toon_softness", "when": "PART", "label": "Softness",
+          "about": "Share of a band that its edge takes", "least": 0, "zero": 0, "unit": "SHARE", "start": 0.15, "low": 0,
+          "usual": 1, "high": 1},
+     )},
+    {"name": "hatch", "label": "Hatching", "panel": "DRAWING",
+     "about": "Strokes that follow the surface, wider where the picture is darker",
+     "fields": (
+         {"name": "hatch_levels", "kind": "COUNT", "property": "hatch_levels", "when": "STRENGTH", "label": "Directions",
+          "about": "Strokes in so many directions, each from darker tones on", "least": 1, "zero": 0, "unit": "NONE",
+          "start": 2, "low": 1, "usual": 3, "high": 3},
+         {"name": "hatch_spacing", "kind": "NUMBER", "property": "hatch_spacing", "when": "PART", "label": "Spacing",
+          "about": "Distance of two strokes on screen", "least": 3, "zero": 6, "unit": "PIXELS", "start": 6, "low": 3,
+          "usual": 40, "high": 1000},
+         {"name": "hatch_color", "kind": "COLOR", "property": "hatch_color", "when": "PART", "label": "Ink",
+          "about": "Color of the strokes", "zero": 0, "unit": "COLOR", "start": (0.01, 0.01, 0.012), "low": 0, "usual": 1,
+          "high": 1e+30},
+         {"name": "hatch_opacity", "kind": "NUMBER", "property": "hatch_opacity", "when": "PART", "label": "Opacity",
+          "about": "How much the ink hides", "least": 0, "zero": 1, "unit": "SHARE", "start": 1, "low": 0.01, "usual": 1,
+          "high": 1},
+         {"name": "hatch_ground", "kind": "NUMBER", "property": "hatch_ground", "when": "PART", "label": "White Ground",
+          "about": "How far the points' colors give way to white beneath the strokes", "least": 0, "zero": 0,
+          "unit": "SHARE", "start": 0, "low": 0, "usual": 1, "high": 1},
+     )},
+    {"name": "focus", "label": "Depth of Field", "panel": "CAMERA",
+     "about": "",
+     "fields": (
+         {"name": "focus_aperture", "kind": "NUMBER", "property": "focus_aperture", "when": "STRENGTH", "label": "Aperture",
+          "about": "Diameter of the lens: focal length / f-number", "least": 0, "zero": 0, "unit": "LENGTH", "start": 0,
+          "low": 0, "usual": 1e+30, "high": 1e+30},
+         {"name": "focus_distance", "kind": "NUMBER", "property": "focus_distance", "when": "PART", "label": "Distance",
+          "about": "What is sharp, along the view", "least": 0, "zero": 0, "unit": "LENGTH", "start": 0, "low": 0,
+          "usual": 1e+30, "high": 1e+30},
+     )},
+    {"name": "paper", "label": "Paper", "panel": "DRAWING",
+     "about": "The whole picture is tinted and grained as if it were on paper",
+     "fields": (
+         {"name": "paper_color", "kind": "COLOR", "property": "paper_color", "when": "STRENGTH", "label": "Tint",
+          "about": "Color of the paper", "zero": 1, "unit": "COLOR", "start": (0.93, 0.88, 0.78), "low": 0, "usual": 1,
+          "high": 1},
+         {"name": "paper_grain", "kind": "NUMBER", "property": "paper_grain", "when": "STRENGTH", "label": "Grain",
+          "about": "How uneven the paper is", "least": 0, "zero": 0, "unit": "SHARE", "start": 0.15, "low": 0, "usual": 1,
+          "high": 1},
+     )},
+)

@@ -3,39 +3,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import make_dataclass, replace
+from typing import Any
 
 import bpy
 
+from ..native.abi import EFFECTS
+from ..properties import enum_number
 from .camera import Focus
 
+_FIELDS = [field for effect in EFFECTS for field in effect["fields"]]
+_TYPES = {"NUMBER": float, "COLOR": tuple[float, float, float], "AXIS": tuple[float, float, float]}
 
-@dataclass(frozen=True)
-class Effects:
-    """patina_effects; what is switched off has no strength."""
 
-    edl_strength: float
-    edl_radius: float
-    obscurance_strength: float
-    obscurance_radius: float
-    toon_bands: int
-    toon_softness: float
-    hatch_levels: int
-    hatch_spacing: float
-    hatch_opacity: float
-    hatch_ground: float
-    hatch_color: tuple[float, float, float]
-    fog_density: float
-    fog_start: float
-    fog_end: float
-    fog_fixed: int
-    fog_color: tuple[float, float, float]
-    focus_aperture: float
-    focus_distance: float
-    paper_color: tuple[float, float, float]
-    paper_grain: float
-    exact: int = 1
-
+class _Effects:
     def through(self, focus: Focus | None) -> Effects:
         """With the depth of field of a view."""
         return replace(self, focus_aperture=focus.aperture if focus else 0.0,
@@ -43,34 +24,43 @@ class Effects:
 
     def shrunk(self, factor: int) -> Effects:
         """For a picture of larger pixels, as far as lengths in pixels may become less."""
-        return replace(self, edl_radius=max(self.edl_radius / factor, 1.0),
-                       hatch_spacing=max(self.hatch_spacing / factor, 3.0))
+        return replace(self, **{field["name"]: max(getattr(self, field["name"]) / factor, field["least"])
+                                for field in _FIELDS if field.get("unit") == "PIXELS"})
+
+    def focus_alone(self) -> Effects:
+        """All others off."""
+        return replace(self, **{name: value for effect in EFFECTS if effect["panel"] != "CAMERA"
+                                for name, value in _off(effect).items()})
+
+
+# patina_effects; what is switched off has no strength.
+Effects = make_dataclass("Effects", [(field["name"], _TYPES.get(field["kind"], int)) for field in _FIELDS]
+                         + [("exact", int, 1)], bases=(_Effects,), frozen=True)
 
 
 def read(scene: bpy.types.Scene, focus: Focus | None, notices: list[str]) -> Effects:
     effects = scene.patina.effects
-    fog = effects.use_fog
-    if fog and effects.fog_end <= effects.fog_start:
+    values: dict[str, Any] = {}
+    for effect in EFFECTS:
+        shown = effect["panel"] != "CAMERA"
+        values |= {field["name"]: _value(effects, field) if shown else 0 for field in effect["fields"]}
+        if shown and not getattr(effects, f"use_{effect['name']}"):
+            values |= _off(effect)
+    if values["fog_density"] and values["fog_end"] <= values["fog_start"]:
         notices.append("fog is left out: its end is not beyond its start")
-        fog = False
-    return Effects(
-        edl_strength=effects.edl_strength if effects.use_edl else 0.0,
-        edl_radius=effects.edl_radius,
-        obscurance_strength=effects.obscurance_strength if effects.use_obscurance else 0.0,
-        obscurance_radius=effects.obscurance_radius,
-        toon_bands=effects.toon_bands if effects.use_toon else 0,
-        toon_softness=effects.toon_softness,
-        hatch_levels=effects.hatch_levels if effects.use_hatch else 0,
-        hatch_spacing=effects.hatch_spacing,
-        hatch_opacity=effects.hatch_opacity,
-        hatch_ground=effects.hatch_ground,
-        hatch_color=tuple(effects.hatch_color),
-        fog_density=effects.fog_density if fog else 0.0,
-        fog_start=effects.fog_start,
-        fog_end=effects.fog_end,
-        fog_fixed=int(effects.fog_use_color),
-        fog_color=tuple(effects.fog_color),
-        focus_aperture=0.0,
-        focus_distance=0.0,
-        paper_color=tuple(effects.paper_color) if effects.use_paper else (1.0, 1.0, 1.0),
-        paper_grain=effects.paper_grain if effects.use_paper else 0.0).through(focus)
+        values["fog_density"] = 0.0
+    return Effects(**values).through(focus)
+
+
+def _off(effect: dict[str, Any]) -> dict[str, Any]:
+    return {field["name"]: (field.get("zero") or 0.0,) * 3 if field["kind"] == "COLOR" else 0
+            for field in effect["fields"] if field["when"] == "STRENGTH"}
+
+
+def _value(effects: bpy.types.PropertyGroup, field: dict[str, Any]) -> Any:
+    value = getattr(effects, field["property"])
+    if field["kind"] == "CHOICE":
+        return enum_number(effects, field["property"])
+    if field["kind"] in ("COLOR", "AXIS"):
+        return tuple(value)
+    return int(value) if field["kind"] == "SWITCH" else value

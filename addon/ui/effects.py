@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.types import Context, Panel
 
+from ..native.abi import EFFECTS
 from . import rows
 from .panels import PatinaPanel
 
@@ -33,73 +36,36 @@ class _EffectPanel(PatinaPanel):
 
     bl_context = "render"
     bl_options = {'DEFAULT_CLOSED'}
-    switch = ""
-    names: tuple[str, ...] = ()
+    effect: dict[str, Any] = {}
 
     def draw_header(self, context: Context) -> None:
-        self.layout.prop(context.scene.patina.effects, self.switch, text="")
+        self.layout.prop(context.scene.patina.effects, f"use_{self.effect['name']}", text="")
 
     def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         effects = context.scene.patina.effects
-        layout.active = getattr(effects, self.switch)
-        for name in self.names:
-            if f"use_{name}" in effects.bl_rna.properties:
-                rows.automatic(layout, effects, name)
-            else:
-                layout.prop(effects, name)
+        layout.active = getattr(effects, f"use_{self.effect['name']}")
+        names = {field["name"]: field["property"] for field in self.effect["fields"]}
+        for field in self.effect["fields"]:
+            on, _, choice = field["when"].partition("=")
+            if choice and getattr(effects, names[on]) != choice:
+                continue
+            if "automatic" in field:
+                rows.automatic(layout, effects, field["property"])
+                continue
+            row = layout.row()
+            row.active = bool(getattr(effects, names[on])) if on in names else True
+            row.prop(effects, field["property"])
 
 
-class PATINA_PT_edl(_EffectPanel, Panel):
-    bl_label = "Eye-Dome Lighting"
-    bl_parent_id = "PATINA_PT_depth_cues"
-    switch = "use_edl"
-    names = ("edl_strength", "edl_radius")
+def _panel(effect: dict[str, Any]) -> type:
+    """The panel of an effect."""
+    parent = "PATINA_PT_depth_cues" if effect["panel"] == "CUES" else "PATINA_PT_drawing"
+    return type(f"PATINA_PT_{effect['name']}", (_EffectPanel, Panel), {
+        "bl_label": effect["label"], "bl_parent_id": parent, "effect": effect, "__module__": __name__})
 
 
-class PATINA_PT_obscurance(_EffectPanel, Panel):
-    bl_label = "Ambient Obscurance"
-    bl_parent_id = "PATINA_PT_depth_cues"
-    switch = "use_obscurance"
-    names = ("obscurance_strength", "obscurance_radius")
-
-
-class PATINA_PT_fog(_EffectPanel, Panel):
-    bl_label = "Fog"
-    bl_parent_id = "PATINA_PT_depth_cues"
-    switch = "use_fog"
-    names = ("fog_start", "fog_end", "fog_density", "fog_use_color")
-
-    def draw(self, context: Context) -> None:
-        _EffectPanel.draw(self, context)
-        row = self.layout.row()
-        row.active = context.scene.patina.effects.fog_use_color
-        row.prop(context.scene.patina.effects, "fog_color")
-
-
-class PATINA_PT_toon(_EffectPanel, Panel):
-    bl_label = "Toon"
-    bl_parent_id = "PATINA_PT_drawing"
-    switch = "use_toon"
-    names = ("toon_bands", "toon_softness")
-
-
-class PATINA_PT_hatching(_EffectPanel, Panel):
-    bl_label = "Hatching"
-    bl_parent_id = "PATINA_PT_drawing"
-    switch = "use_hatch"
-    names = ("hatch_levels", "hatch_spacing", "hatch_color", "hatch_opacity", "hatch_ground")
-
-
-class PATINA_PT_paper(_EffectPanel, Panel):
-    bl_label = "Paper"
-    bl_parent_id = "PATINA_PT_drawing"
-    switch = "use_paper"
-    names = ("paper_color", "paper_grain")
-
-
-_CLASSES = (PATINA_PT_depth_cues, PATINA_PT_drawing, PATINA_PT_edl, PATINA_PT_obscurance, PATINA_PT_fog, PATINA_PT_toon,
-            PATINA_PT_hatching, PATINA_PT_paper)
+_CLASSES = (PATINA_PT_depth_cues, PATINA_PT_drawing, *(_panel(effect) for effect in EFFECTS if effect["panel"] != "CAMERA"))
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

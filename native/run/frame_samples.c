@@ -116,8 +116,7 @@ void pt_finer_scene(const struct patina_scene *scene, const struct pt_sampling *
     settings->passes = 1u << PATINA_PASS_COMBINED;
     settings->layer_passes = 0;
     out->finer = grid;
-    out->effects.edl_radius *= (float)grid;
-    out->effects.hatch_spacing *= (float)grid;
+    pt_effects_scale(&out->effects, (float)grid);
     if (!out->lines.world)
         out->lines.width *= (float)grid;
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A scene's effects: checked, defaults made explicit.
+// A scene's effects: checked by the table of effects, defaults made explicit.
 #include "scene.h"
 #include "base/descriptor.h"
+
+#include <stdio.h>
 
 static int within(float value, float least, float most)
 {
@@ -13,52 +15,59 @@ static int refuse(const patina_scene *scene, const char *what)
     return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "effects: %s", what);
 }
 
-static int colored(const float color[3])
+static int out_of_range(const patina_scene *scene, const char *field, double least, double most, double zero)
 {
-    return within(color[0], 0.0f, 65504.0f) && within(color[1], 0.0f, 65504.0f) && within(color[2], 0.0f, 65504.0f);
+    char what[160], or_zero[32] = "";
+    if (least > 0.0)
+        snprintf(or_zero, sizeof or_zero, zero != 0.0 ? ", or 0 for %g" : ", or 0", zero);
+    snprintf(what, sizeof what, "%s must be within %g and %g%s", field, least, most, or_zero);
+    return refuse(scene, what);
 }
 
-static int check_drawing(const patina_scene *scene, patina_effects *e)
+static int all_zero(const float v[3])
 {
-    e->hatch_spacing = e->hatch_spacing == 0.0f ? 6.0f : e->hatch_spacing;
-    e->hatch_opacity = e->hatch_opacity == 0.0f ? 1.0f : e->hatch_opacity;
-    if (e->hatch_levels > 3 || !within(e->hatch_spacing, 3.0f, 1000.0f))
-        return refuse(scene, "hatch_levels must be within 0 and 3, hatch_spacing at least 3 pixels, or 0");
-    if (!within(e->hatch_opacity, 0.0f, 1.0f) || !within(e->hatch_ground, 0.0f, 1.0f))
-        return refuse(scene, "hatch_opacity and hatch_ground must be within 0 and 1");
-    if (!within(e->fog_density, 0.0f, 1.0f) || e->fog_fixed > 1)
-        return refuse(scene, "fog_density must be within 0 and 1, fog_fixed 0 or 1");
-    if (e->fog_density > 0.0f &&
-        !(within(e->fog_start, -1e30f, 1e30f) && within(e->fog_end, -1e30f, 1e30f) && e->fog_end > e->fog_start))
-        return refuse(scene, "fog_end must be beyond fog_start");
-    if (!within(e->focus_aperture, 0.0f, 1e30f) ||
-        (e->focus_aperture > 0.0f && !within(e->focus_distance, 1e-30f, 1e30f)))
-        return refuse(scene, "focus_aperture must be 0 or more, focus_distance above 0");
-    if (e->exact > 1)
-        return refuse(scene, "exact is 0 or 1");
-    if (!e->exact && e->paper_color[0] == 0.0f && e->paper_color[1] == 0.0f && e->paper_color[2] == 0.0f)
-        e->paper_color[0] = e->paper_color[1] = e->paper_color[2] = 1.0f;
-    if (!within(e->paper_grain, 0.0f, 1.0f))
-        return refuse(scene, "paper_grain must be within 0 and 1");
-    if (!colored(e->hatch_color) || !colored(e->fog_color) || !colored(e->paper_color))
-        return refuse(scene, "colours must be within 0 and 65504");
-    return PATINA_OK;
+    return v[0] == 0.0f && v[1] == 0.0f && v[2] == 0.0f;
 }
 
+static int all_within(const float v[3], float least, float most)
+{
+    return within(v[0], least, most) && within(v[1], least, most) && within(v[2], least, most);
+}
+
+// A table row each, in the order of the struct.
 static int check(const patina_scene *scene, patina_effects *e)
 {
-    if (!within(e->edl_strength, 0.0f, 10.0f))
-        return refuse(scene, "edl_strength must be within 0 and 10");
-    e->edl_radius = e->edl_radius == 0.0f ? 1.4f : e->edl_radius;
-    if (!within(e->edl_radius, 1.0f, 16.0f))
-        return refuse(scene, "edl_radius must be within 1 and 16 pixels, or 0");
-    if (!within(e->obscurance_strength, 0.0f, 10.0f))
-        return refuse(scene, "obscurance_strength must be within 0 and 10");
-    if (!within(e->obscurance_radius, 0.0f, 1e30f))
-        return refuse(scene, "obscurance_radius must be 0 or more");
-    if (e->toon_bands == 1 || e->toon_bands > 16 || !within(e->toon_softness, 0.0f, 1.0f))
-        return refuse(scene, "toon_bands must be 0 or within 2 and 16, toon_softness within 0 and 1");
-    return check_drawing(scene, e);
+#define PATINA_EFFECT_NUMBER(field, when, least, most, zero, ...)                                                      \
+    if (e->field == 0.0f)                                                                                              \
+        e->field = zero;                                                                                               \
+    else if (!within(e->field, least, most))                                                                           \
+        return out_of_range(scene, #field, (double)(least), (double)(most), (double)(zero));
+#define PATINA_EFFECT_COUNT(field, when, least, most, zero, ...)                                                       \
+    if (e->field == 0)                                                                                                 \
+        e->field = zero;                                                                                               \
+    else if (e->field < least || e->field > most)                                                                      \
+        return out_of_range(scene, #field, least, most, zero);
+#define PATINA_EFFECT_COLOR(field, when, zero, ...)                                                                    \
+    if (!all_within(e->field, 0.0f, 65504.0f))                                                                         \
+        return out_of_range(scene, #field, 0.0, 65504.0, zero);                                                        \
+    if (!e->exact && all_zero(e->field))                                                                               \
+        e->field[0] = e->field[1] = e->field[2] = zero;
+#define PATINA_EFFECT_AXIS(field, ...)                                                                                 \
+    if (!all_within(e->field, -1e15f, 1e15f))                                                                          \
+        return out_of_range(scene, #field, -1e15, 1e15, 0.0);                                                          \
+    if (all_zero(e->field))                                                                                            \
+        e->field[2] = 1.0f;
+#define PATINA_EFFECT_SWITCH(field, ...)                                                                               \
+    if (e->field > 1)                                                                                                  \
+        return refuse(scene, #field " must be 0 or 1");
+#define PATINA_EFFECT_CHOICE(field, when, count, ...)                                                                  \
+    if (e->field >= count)                                                                                             \
+        return refuse(scene, #field " is none of its choices");
+#define PATINA_EFFECT_RULE(while_, holds, message)                                                                     \
+    if ((while_) && !(holds))                                                                                          \
+        return refuse(scene, message);
+#include "patina/effects.def"
+    return e->exact > 1 ? refuse(scene, "exact must be 0 or 1") : PATINA_OK;
 }
 
 int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects)
@@ -71,4 +80,15 @@ int patina_scene_set_effects(patina_scene *scene, const patina_effects *effects)
     if (!error)
         scene->effects = checked;
     return error;
+}
+
+void pt_effects_scale(patina_effects *e, float factor)
+{
+#define PT_SCALE_NONE(field)
+#define PT_SCALE_SHARE(field)
+#define PT_SCALE_LENGTH(field)
+#define PT_SCALE_HEIGHT(field)
+#define PT_SCALE_PIXELS(field) e->field *= factor;
+#define PATINA_EFFECT_NUMBER(field, when, least, most, zero, unit, ...) PT_SCALE_##unit(field)
+#include "patina/effects.def"
 }

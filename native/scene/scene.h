@@ -40,6 +40,9 @@ struct patina_scene {
     uint32_t finer; // pixels on each side of one that the caller asked for: of its samples. 0 or 1: it is one
 };
 
+// Lengths in pixels, of a picture of so many times finer ones.
+void pt_effects_scale(patina_effects *effects, float factor);
+
 static inline uint32_t pt_finer(const struct patina_scene *scene) { return scene->finer > 1 ? scene->finer : 1; }
 
 // Small 3 x 3 algebra in float64, row-major.

@@ -1,101 +1,190 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The options of `patina render` that draw effects; what their values may be, the library says.
+// The options of `patina render` that draw effects, as the table of effects lists them; what their values may be, the library says.
 #include "tool.h"
 
+#include <ctype.h>
+#include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
-static int parse_edl(const char *value, patina_effects *effects)
+// ---- the table -----------------------------------------------------------------------------------------------------
+
+enum kind { NUMBER, COUNT, COLOR, AXIS, SWITCH, CHOICE };
+
+static const struct field {
+    const char *name;
+    enum kind kind;
+    size_t offset;
+} fields[] = {
+#define ROW(field, kind) {#field, kind, offsetof(patina_effects, field)},
+#define PATINA_EFFECT_NUMBER(field, ...) ROW(field, NUMBER)
+#define PATINA_EFFECT_COUNT(field, ...) ROW(field, COUNT)
+#define PATINA_EFFECT_COLOR(field, ...) ROW(field, COLOR)
+#define PATINA_EFFECT_AXIS(field, ...) ROW(field, AXIS)
+#define PATINA_EFFECT_SWITCH(field, ...) ROW(field, SWITCH)
+#define PATINA_EFFECT_CHOICE(field, ...) ROW(field, CHOICE)
+#include "patina/effects.def"
+    {NULL, NUMBER, 0},
+};
+
+static const struct {
+    const char *name; // CONTOUR_HEIGHT of contour_source
+    uint32_t value;
+} items[] = {
+#define PATINA_EFFECT_ITEM(constant, value, label, about) {#constant, value},
+#include "patina/effects.def"
+    {NULL, 0},
+};
+
+static const struct {
+    const char *name, *values, *help;
+} options[] = {
+#define PATINA_EFFECT(name, label, panel, option, values, help, about) {option, values, help},
+#include "patina/effects.def"
+    {NULL, NULL, NULL},
+};
+
+// ---- an option's values ----------------------------------------------------------------------------------------------
+
+// What an option's list of fields says of one of them.
+struct value {
+    const struct field *field;
+    const struct field *with; // becomes 1 with it; or NULL
+    double otherwise;         // where the value is left out
+    int optional;
+};
+
+static const struct field *find(const char *name, size_t length)
 {
-    double n[2] = {0};
-    if (parse_numbers(value, n, 1, 2) < 0)
-        return -1;
-    effects->edl_strength = (float)n[0];
-    effects->edl_radius = (float)n[1];
+    for (const struct field *field = fields; field->name; field++)
+        if (strlen(field->name) == length && !memcmp(field->name, name, length))
+            return field;
+    return NULL;
+}
+
+// The next of the list, and behind it; NULL at its end.
+static const char *next_value(const char *list, int *optional, struct value *out)
+{
+    if (*list == '[') {
+        *optional = 1;
+        list++;
+    }
+    if (*list == ',')
+        list++;
+    if (!*list)
+        return NULL;
+    size_t length = strcspn(list, "[,+=");
+    *out = (struct value){.field = find(list, length), .optional = *optional};
+    list += length;
+    if (*list == '=')
+        out->otherwise = strtod(list + 1, NULL);
+    else if (*list == '+')
+        out->with = find(list + 1, strcspn(list + 1, "[,"));
+    return list + strcspn(list, "[,");
+}
+
+static int put(patina_effects *effects, const struct field *field, const double *numbers)
+{
+    char *at = (char *)effects + field->offset;
+    if (field->kind == NUMBER) {
+        *(float *)(void *)at = (float)numbers[0];
+    } else if (field->kind == COLOR || field->kind == AXIS) {
+        for (int k = 0; k < 3; k++)
+            ((float *)(void *)at)[k] = (float)numbers[k];
+    } else {
+        if (!(numbers[0] >= 0.0 && numbers[0] <= 1e6) || numbers[0] != (double)(uint32_t)numbers[0])
+            return -1;
+        *(uint32_t *)(void *)at = (uint32_t)numbers[0];
+    }
     return 0;
 }
 
-static int parse_obscurance(const char *value, patina_effects *effects)
+static int parse(const char *list, const char *text, patina_effects *effects)
 {
-    double n[2] = {0};
-    if (parse_numbers(value, n, 1, 2) < 0)
-        return -1;
-    effects->obscurance_strength = (float)n[0];
-    effects->obscurance_radius = (float)n[1];
-    return 0;
+    enum { MOST = 32 };
+    static const double one[3] = {1.0};
+    double numbers[MOST];
+    struct value value;
+    int optional = 0, at = 0;
+    const int count = parse_numbers(text, numbers, 1, MOST);
+    while (count > 0 && (list = next_value(list, &optional, &value))) {
+        const int wide = value.field->kind == COLOR || value.field->kind == AXIS ? 3 : 1;
+        const double *given = at < count ? numbers + at : wide == 1 ? &value.otherwise : NULL;
+        if ((at < count && at + wide > count) || (at >= count && !value.optional))
+            return -1;
+        if (given && put(effects, value.field, given))
+            return -1;
+        if (at < count && value.with)
+            put(effects, value.with, one);
+        at += at < count ? wide : 0;
+    }
+    return at == count ? 0 : -1;
 }
 
-static int parse_toon(const char *value, patina_effects *effects)
+// The item of a choice by its word, in any case; -1: none.
+static double item_of(const struct field *field, const char *word)
 {
-    double n[2] = {0};
-    if (parse_numbers(value, n, 1, 2) < 0 || n[0] < 0 || n[0] > 255 || n[0] != (uint32_t)n[0])
-        return -1;
-    effects->toon_bands = (uint32_t)n[0];
-    effects->toon_softness = (float)n[1];
-    return 0;
+    const size_t prefix = strcspn(field->name, "_") + 1;
+    for (size_t i = 0; items[i].name; i++)
+        if (!strncasecmp(items[i].name, field->name, prefix) && !strcasecmp(items[i].name + prefix, word))
+            return items[i].value;
+    return -1.0;
 }
 
-static int parse_hatch(const char *value, patina_effects *effects)
+// FIELD=VALUE, of any field.
+static int parse_field(const char *text, patina_effects *effects)
 {
-    double n[7] = {0};
-    if (parse_numbers(value, n, 1, 7) < 0 || n[0] < 0 || n[0] > 255 || n[0] != (uint32_t)n[0])
+    double numbers[3] = {0};
+    const size_t length = strcspn(text, "=");
+    const struct field *field = find(text, length);
+    if (!field || text[length] != '=')
         return -1;
-    effects->hatch_levels = (uint32_t)n[0];
-    effects->hatch_spacing = (float)n[1];
-    effects->hatch_opacity = (float)n[2];
-    effects->hatch_ground = (float)n[3];
-    for (int k = 0; k < 3; k++)
-        effects->hatch_color[k] = (float)n[4 + k];
-    return 0;
-}
-
-static int parse_fog(const char *value, patina_effects *effects)
-{
-    double n[6] = {0};
-    int count = parse_numbers(value, n, 2, 6);
-    if (count != 2 && count != 3 && count != 6)
+    const int wide = field->kind == COLOR || field->kind == AXIS ? 3 : 1;
+    if (field->kind == CHOICE)
+        numbers[0] = item_of(field, text + length + 1);
+    else if (parse_numbers(text + length + 1, numbers, wide, wide) < 0)
         return -1;
-    effects->fog_start = (float)n[0];
-    effects->fog_end = (float)n[1];
-    effects->fog_density = count > 2 ? (float)n[2] : 1.0f;
-    effects->fog_fixed = count == 6;
-    for (int k = 0; k < 3; k++)
-        effects->fog_color[k] = (float)n[3 + k];
-    return 0;
-}
-
-static int parse_focus(const char *value, patina_effects *effects)
-{
-    double n[2];
-    if (parse_numbers(value, n, 2, 2) < 0)
-        return -1;
-    effects->focus_distance = (float)n[0];
-    effects->focus_aperture = (float)n[1];
-    return 0;
-}
-
-static int parse_paper(const char *value, patina_effects *effects)
-{
-    double n[4] = {0};
-    int count = parse_numbers(value, n, 1, 4);
-    if (count != 1 && count != 4)
-        return -1;
-    effects->paper_grain = (float)n[0];
-    for (int k = 0; count == 4 && k < 3; k++)
-        effects->paper_color[k] = (float)n[1 + k];
-    return 0;
+    return put(effects, field, numbers);
 }
 
 int tool_parse_effect(const char *name, const char *value, patina_effects *effects)
 {
-    static const struct {
-        const char *name;
-        int (*parse)(const char *value, patina_effects *effects);
-    } options[] = {
-        {"--edl", parse_edl}, {"--obscurance", parse_obscurance}, {"--toon", parse_toon},   {"--hatch", parse_hatch},
-        {"--fog", parse_fog}, {"--focus", parse_focus},           {"--paper", parse_paper},
-    };
-    for (size_t i = 0; i < sizeof options / sizeof *options; i++)
+    if (!strcmp(name, "--effect"))
+        return parse_field(value, effects);
+    for (size_t i = 0; options[i].name; i++)
         if (!strcmp(name, options[i].name))
-            return options[i].parse(value, effects);
+            return parse(options[i].values, value, effects);
     return 1;
+}
+
+// ---- help ------------------------------------------------------------------------------------------------------------
+
+// edl_strength -> STRENGTH, fog_color -> R,G,B. Returns how many characters.
+static int print_name(FILE *out, const struct field *field)
+{
+    if (field->kind == COLOR || field->kind == AXIS)
+        return fprintf(out, "%s", field->kind == COLOR ? "R,G,B" : "X,Y,Z");
+    const char *name = strchr(field->name, '_') + 1;
+    for (const char *c = name; *c; c++)
+        fputc(toupper((unsigned char)*c), out);
+    return (int)strlen(name);
+}
+
+void tool_print_effects(FILE *out)
+{
+    enum { COLUMN = 37 };
+    for (size_t i = 0; options[i].name; i++) {
+        struct value value;
+        int optional = 0, wide = fprintf(out, "  %s ", options[i].name), first = 1, opened = 0;
+        for (const char *list = options[i].values; (list = next_value(list, &optional, &value)); first = 0) {
+            wide += first ? 0 : fprintf(out, optional && !opened ? "[," : ",");
+            opened |= optional;
+            wide += print_name(out, value.field);
+        }
+        wide += opened ? fprintf(out, "]") : 0;
+        fprintf(out, "%*s%s\n", wide + 2 > COLUMN ? 2 : COLUMN - wide, "", options[i].help);
+    }
+    fprintf(out, "  --effect FIELD=VALUE               any field of an effect by its name, as patina/effects.def lists them; VALUE:\n"
+                 "                                     a number, three of a color or an axis, or a choice's word\n");
 }

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static const char usage[] =
+static const char usage_before[] =
     "patina info FILE                     what a file of points holds\n"
     "patina convert IN.ply OUT.ply        writes a binary PLY\n"
     "patina analyse FILE -o OUT.ply       normal, spacing, radii, thickness, kind and certainty of every point, as columns\n"
@@ -48,15 +48,11 @@ static const char usage[] =
     "  --clip-tint R,G,B,WIDTH            colours the surface that near to a cut, world units\n"
     "  --mesh FILE.obj                    triangles among the points, in grey; may be repeated\n"
     "  --layers N                         at most so many layers of surface (0: 8 where something is transparent)\n"
-    "  --edl STRENGTH[,RADIUS]            eye-dome lighting (1 = well seen), neighbours RADIUS pixels away (1.4)\n"
     "  --background R,G,B                 linear; also the ambient light, unless told\n"
-    "  --ambient R,G,B                    linear; the ambient light\n"
-    "  --obscurance STRENGTH[,RADIUS]     ambient obscurance (1 = well seen), RADIUS in world units (a 32nd of all)\n"
-    "  --toon N[,SOFTNESS]                light in N bands, SOFTNESS 0 to 1\n"
-    "  --hatch N[,SPACING,OPACITY,GROUND,R,G,B]  strokes in N directions, 1 to 3, SPACING pixels apart; GROUND 1: on white\n"
-    "  --fog START,END[,DENSITY,R,G,B]    distances from the camera; without a colour into the background's\n"
-    "  --focus DISTANCE,APERTURE          depth of field: what is sharp, diameter of the lens, world units\n"
-    "  --paper GRAIN[,R,G,B]              grain 0 to 1, and a tint\n"
+    "  --ambient R,G,B                    linear; the ambient light\n";
+
+// Options of effects stand between the two.
+static const char usage_behind[] =
     "  --headlight                        one light from the camera in place of the two, without shadows\n"
     "  --shadows                          the brighter light casts shadows\n"
     "  --sun AZIMUTH,HEIGHT[,DIAMETER]    where from and how wide, degrees (default: over the left shoulder, sharp)\n"
@@ -87,6 +83,13 @@ static const char usage[] =
     "  --verbose                          the library's log too\n"
     "patina version\n"
     "Exit status: 0 done, 1 failed, 2 wrong use, 130 cancelled.\n";
+
+static void print_usage(FILE *out)
+{
+    fputs(usage_before, out);
+    tool_print_effects(out);
+    fputs(usage_behind, out);
+}
 
 // ---- messages ----------------------------------------------------------------------------------------------------
 
@@ -204,12 +207,12 @@ int tool_cancelled(void)
 int main(int count, char **arguments)
 {
     if (count < 2) {
-        fputs(usage, stderr);
+        print_usage(stderr);
         return TOOL_USAGE;
     }
     const char *command = arguments[1];
     if (!strcmp(command, "help") || !strcmp(command, "--help") || !strcmp(command, "-h")) {
-        fputs(usage, stdout);
+        print_usage(stdout);
         return TOOL_OK;
     }
     if (!strcmp(command, "version") || !strcmp(command, "--version")) {

@@ -5,6 +5,8 @@
 
 #include "patina/patina.h"
 
+#include <stdio.h>
+
 enum tool_exit { TOOL_OK = 0, TOOL_FAILED = 1, TOOL_USAGE = 2, TOOL_CANCELLED = 130 };
 
 // Each takes the arguments after its own name and returns a tool_exit.
@@ -90,6 +92,7 @@ struct tool_options {
 int parse_numbers(const char *text, double *numbers, int least, int most);
 // Options of effects (effects.c): 0 good, -1 a bad value, 1 no such option.
 int tool_parse_effect(const char *name, const char *value, patina_effects *effects);
+void tool_print_effects(FILE *out); // the lines that tell of them
 
 // NAME[,MIN,MAX] of a pass. 0, or -1 for a bad value.
 int tool_parse_pass(const char *value, struct tool_options *options);

@@ -10,6 +10,7 @@ from mathutils import Matrix
 from patina import native, sync
 
 POINT = (0.01, 0.01, -3.0)
+SHOWN = [effect for effect in native.abi.EFFECTS if effect["panel"] != "CAMERA"]
 
 
 def one_point(color=(200, 120, 60)):
@@ -40,6 +41,20 @@ def test_off_is_nothing():
     effects = scene.patina.effects
     effects.edl_strength, effects.fog_start, effects.hatch_spacing, effects.paper_grain = 3.0, 1.0, 20.0, 0.9
     check((render()["Combined"] == first).all(), "what is switched off drew something")
+
+
+def test_each_does_something():
+    """As it is switched on first, every effect of the table changes the picture, and switched off nothing is left of it."""
+    scene = dense_scene()
+    scene.patina.effects.fog_start, scene.patina.effects.fog_end = 1.0, 5.0
+    bpy.data.objects["points"].patina.lighting = 'LIT'
+    add_light('SUN', 3.0, direction=(-0.5, -0.4, -1))
+    first = render()["Combined"]
+    for effect in SHOWN:
+        setattr(scene.patina.effects, f"use_{effect['name']}", True)
+        check((render()["Combined"] != first).any(), f"{effect['name']} changes nothing")
+        setattr(scene.patina.effects, f"use_{effect['name']}", False)
+        check((render()["Combined"] == first).all(), f"{effect['name']} is not wholly off")
 
 
 def test_fields_are_the_library_s():
@@ -209,8 +224,8 @@ def test_tiles_and_layers():
     scene = dense_scene(97, 71)
     bpy.data.objects["points"].patina.opacity = 0.5
     effects = scene.patina.effects
-    for name in ("use_edl", "use_obscurance", "use_fog", "use_toon", "use_hatch", "use_paper"):
-        setattr(effects, name, True)
+    for effect in SHOWN:
+        setattr(effects, f"use_{effect['name']}", True)
     scene.camera.data.dof.use_dof, scene.camera.data.dof.aperture_fstop = True, 0.2
     scene.camera.data.dof.focus_distance = 3.0
     whole = render()["Combined"]

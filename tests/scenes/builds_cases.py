@@ -10,7 +10,12 @@ Text like "SURFACE.SPLATS" stands for the header's constant, so that a scene out
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "build"))
+import effects as table  # noqa: E402
 
 Case = dict[str, Any]
 
@@ -23,6 +28,7 @@ GLASS = {**LIT, "transparency": 0.5}
 RAMP = [0.1, 0.0, 0.4, 0.9, 0.3, 0.1, 1.0, 1.0, 0.6]
 FLOOR = {"of": "ground", **LIT}
 TORUS = {"of": "torus", **LIT}
+GLASS_TORUS = {**TORUS, "transparency": 0.5}
 
 
 def _moved(x: float, y: float, z: float, scale: tuple[float, float, float] = (1, 1, 1)) -> list[float]:
@@ -188,6 +194,11 @@ def _effects(to: _List) -> None:
     }
     for name, effect in effects.items():
         to.add(f"effect {name}", effects=effect)
+    for effect in table.read():
+        begins = {field["name"]: list(field["start"]) if field["kind"] == "COLOR" else field["start"] for field in effect["fields"] if "start" in field}
+        if effect["panel"] != "CAMERA":
+            to.add(f"effect {effect['name']} as it begins", effects=begins)
+            to.add(f"effect {effect['name']}, layers, orthographic", GLASS_TORUS, FLOOR, effects=begins, camera={"kind": "parallel"})
     together = {"edl_strength": 1.0, "obscurance_strength": 1.0, "toon_bands": 4, "hatch_levels": 2, "fog_density": 0.6, "fog_start": 3.0,
                 "fog_end": 5.0, "focus_aperture": 0.05, "focus_distance": 3.4, "paper_grain": 0.3}
     to.add("effects together", effects=together)

@@ -63,6 +63,21 @@ class Abi(unittest.TestCase):
         self.assertEqual(sorted(name for name in exported if name.startswith("patina_")), sorted(abi.CALLS))
         self.assertLessEqual(set(abi.RESULTS), set(abi.CALLS))
 
+    def test_effects_are_the_table_s(self) -> None:
+        """Every row of effects.def is a field of the structure, in its order; ranges hold what Blender begins with."""
+        fields = [field for effect in abi.EFFECTS for field in effect["fields"]]
+        self.assertEqual([field["name"] for field in fields], [name for name, *_ in abi.Effects._fields_[1:]])
+        self.assertEqual(len({field["property"] for field in fields}), len(fields))
+        for effect in abi.EFFECTS:
+            self.assertTrue(any(field["when"] == "STRENGTH" for field in effect["fields"]), effect["name"])
+        for field in fields:
+            on, _, word = field["when"].partition("=")
+            known = {each["name"]: [name for name, *_ in each.get("items", ())] for each in fields}
+            self.assertTrue(on in ("STRENGTH", "PART") or (on in known and (not word or word in known[on])), field["name"])
+            if field["kind"] in ("NUMBER", "COUNT"):
+                self.assertTrue(field["start"] == 0 or field["least"] <= field["start"], field["name"])
+                self.assertLessEqual(field["low"], field["start"], field["name"])
+
     def test_constants(self) -> None:
         self.assertEqual(abi.PASSES["COMBINED"], (0, 4))
         self.assertEqual(abi.ERROR["ERROR_CANCELLED"], -7)

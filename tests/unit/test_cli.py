@@ -554,6 +554,13 @@ def test_effects():
         picture = (FOLDER / "effect.png").read_bytes()
         assert picture not in seen, (choice, seen[picture])
         seen[picture] = choice
+    run(*base, "--effect", "hatch_levels=1", "--effect", "hatch_spacing=8", "--effect", "hatch_opacity=0.5", "--effect",
+        "hatch_ground=1", "--effect", "hatch_color=0.2,0,0")
+    assert seen[(FOLDER / "effect.png").read_bytes()] == ("--hatch", "1,8,0.5,1,0.2,0,0"), "by their names fields are others"
+    help_text = run("help").stdout
+    for option in ("--edl STRENGTH[,RADIUS] ", "--hatch LEVELS[,SPACING,OPACITY,GROUND,R,G,B] ", "--fog START,END[,DENSITY,R,G,B] ",
+                   "--focus DISTANCE,APERTURE ", "--paper GRAIN[,R,G,B] "):
+        assert option in help_text, option
     every = [word for choice in effects[::2] for word in choice]
     run(*base, *every)
     whole = read_png("effect.png")
@@ -561,7 +568,9 @@ def test_effects():
     assert read_png("effect.png")[3] == [row[30:77] for row in whole[3][100 - 63:100 - 20]]
     for option, value, code in (("--edl", "1,2,3", 2), ("--toon", "2.5", 2), ("--fog", "3", 2), ("--focus", "2", 2),
                                 ("--paper", "0.1,1", 2), ("--edl", "-1", 1), ("--toon", "1", 1), ("--fog", "5,5", 1),
-                                ("--hatch", "4", 1), ("--focus", "0,1", 1)):
+                                ("--hatch", "4", 1), ("--focus", "0,1", 1), ("--hatch", "2,6,1,0,0.5", 2), ("--fog", "1,6,1,0,0", 2),
+                                ("--effect", "hatch", 2), ("--effect", "hatch_levels=1.5", 2), ("--effect", "none=1", 2),
+                                ("--effect", "fog_color=1", 2), ("--effect", "toon_bands=17", 1)):
         said = run("render", "effects.ply", "-o", "y.png", option, value, code=code).stderr
         assert said.startswith("patina: ") and not (FOLDER / "y.png").exists(), (option, value, said)
 

@@ -605,39 +605,25 @@ typedef struct patina_settings {
 
 #define PATINA_MAX_LAYERS 16
 
-// Effects in image space, on the colours of every layer. A zero strength leaves an effect out. Lengths in pixels are those of the
-// picture, lengths along the view are those from the camera.
+// Of the choices among the fields of effects.
+enum patina_effect_choice {
+    PATINA_NO_CHOICE = 0,
+#define PATINA_EFFECT_ITEM(constant, value, ...) PATINA_##constant = value,
+#include "effects.def"
+};
+
+// Effects in image space, on the colours of every layer: effects.def lists them, with what each field may be, what its zero stands for
+// and its unit. Zero leaves an effect out. Lengths in pixels are those of the picture, lengths along the view are those from the camera.
 typedef struct patina_effects {
     size_t struct_size;
-    // Eye-dome lighting: what lies behind its neighbours on screen is darker, so that shape shows without light or normals.
-    float edl_strength; // 0..10, 1 = well seen; 0 = none
-    float edl_radius;   // pixels to the neighbours, 1..16; 0 = 1.4
-    // Ambient obscurance: folds and corners are darker, by what surrounds a point within a radius.
-    float obscurance_strength; // 0..10, 1 = well seen; 0 = none
-    float obscurance_radius;   // world units, at most 32 pixels on screen; 0 = a 32nd of the diagonal of all clouds
-    // Toon: light, with obscurance and eye-dome lighting, goes in bands; the points' own colours stay. Full light changes nothing.
-    uint32_t toon_bands; // 2..16; 0 = none
-    float toon_softness; // 0..1: share of a band that its edge takes
-    // Hatching: strokes where parallel planes cut the surface: they follow its form and lie still in the scene. Wider where the
-    // picture is darker; each further level in another direction, from darker tones on.
-    uint32_t hatch_levels; // 1..3; 0 = none
-    float hatch_spacing;   // pixels between strokes, 3 or more; 0 = 6
-    float hatch_opacity;   // of the ink, 0..1; 0 = 1
-    float hatch_ground;    // 0..1: share by which the colours give way to white beneath
-    float hatch_color[3];  // linear; all zero = black
-    // Fog, over the points and not over the background.
-    float fog_density;         // share that it hides at its end and beyond, 0..1; 0 = none
-    float fog_start, fog_end;  // distances from the eye; in orthographic views from the camera's plane
-    uint32_t fog_fixed;        // 1 = fog_color; 0 = the background's
-    float fog_color[3];        // linear
-    // Depth of field of a thin lens, on the composed picture by the depth of the nearest layer.
-    float focus_aperture; // diameter of the lens, world units: focal length / f-number; 0 = all is in focus. Circles of confusion
-                          // have a radius of at most 32 pixels
-    float focus_distance; // along the view from the camera, world units
-    // Paper: the picture is multiplied by a colour and a grain, which lies still on screen.
-    float paper_color[3]; // linear; all zero = white, unless exact
-    float paper_grain;    // 0..1; 0 = none
-    uint32_t exact;       // 1 = black paper is black
+#define PATINA_EFFECT_NUMBER(field, ...) float field;
+#define PATINA_EFFECT_COUNT(field, ...) uint32_t field;
+#define PATINA_EFFECT_COLOR(field, ...) float field[3];
+#define PATINA_EFFECT_AXIS(field, ...) float field[3];
+#define PATINA_EFFECT_SWITCH(field, ...) uint32_t field;
+#define PATINA_EFFECT_CHOICE(field, ...) uint32_t field;
+#include "effects.def"
+    uint32_t exact; // 1 = black paper is black
 } patina_effects;
 #define PATINA_EFFECTS_INIT                                                                                                    \
     {                                                                                                                          \
