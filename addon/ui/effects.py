@@ -66,6 +66,7 @@ def _panel(effect: dict[str, Any]) -> type:
         "bl_label": effect["label"], "bl_parent_id": parent, "effect": effect, "__module__": __name__})
 
 
-_CLASSES = (PATINA_PT_depth_cues, PATINA_PT_drawing, *(_panel(effect) for effect in EFFECTS if effect["panel"] != "CAMERA"))
+PANELS = tuple(_panel(effect) for effect in EFFECTS if effect["panel"] != "CAMERA")
+_CLASSES = (PATINA_PT_depth_cues, PATINA_PT_drawing, *PANELS)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

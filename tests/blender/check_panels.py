@@ -37,11 +37,51 @@ def test_there_are_many():
     check(len(list(properties())) > 40 and len(panels()) > 10, f"{len(list(properties()))}, {len(panels())}")
 
 
+class Drawn:
+    """A layout that writes down which properties it is given."""
+
+    use_property_decorate = False
+
+    def __init__(self):
+        self.names = set()
+
+    def row(self, **_):
+        return self
+
+    def label(self, **_):
+        pass
+
+    def prop(self, _group, name, **_):
+        self.names.add(name)
+
+
+def names_of_effects():
+    """Properties in the panels of effects, which are made of the library's table; every item of a choice is tried."""
+    found, effects = set(), bpy.context.scene.patina.effects
+    for panel in patina.ui.effects.PANELS:
+        choices = [field for field in panel.effect["fields"] if field["kind"] == "CHOICE"] or [None]
+        for choice in choices:
+            for item, *_ in choice["items"] if choice else [("",)]:
+                if choice:
+                    setattr(effects, choice["property"], item)
+                drawn = Drawn()
+                drawing = SimpleNamespace(layout=drawn, effect=panel.effect)
+                panel.draw_header(drawing, bpy.context)
+                panel.draw(drawing, bpy.context)
+                found |= drawn.names
+    return found
+
+
 def test_every_property_is_in_a_panel():
     """A switch stands in the row of its number."""
+    new_scene()
     source = "\n".join(path.read_text(encoding="utf-8") for path in (REPOSITORY / "addon/ui").glob("*.py"))
+    effects = names_of_effects()
     for path, kind in properties():
         name = path.rpartition(".")[2]
+        if path.startswith("Scene.patina.effects."):
+            check(name in effects or f"use_{name}" in effects, f"{path} is in no panel")
+            continue
         if kind.is_skip_save:
             name = name.removeprefix("use_")
         check(f'"{name}"' in source, f"{path} is in no panel")
