@@ -341,9 +341,7 @@ struct ref_ink {
 struct ref_ink ref_ink(const struct ink_args *args, const struct ref_planes *planes, const float *line, const uint32_t *nearest,
                        const float color[4], float depth, int x, int y);
 
-struct ref_color ref_toon(const struct toon_args *args, const struct ref_planes *planes, int x, int y);
-struct ref_color ref_hatch(const struct hatch_args *args, const struct ref_planes *planes, int x, int y);
-struct ref_color ref_fog(const struct fog_args *args, const struct ref_planes *planes, int x, int y);
+#include "pointwise_references.h" // made of the list: of pointwise kernels that change a plane's colours
 struct ref_color ref_focus(const struct focus_args *args, const struct ref_planes *planes, int x, int y); // in the crop
 // x, y: in the crop, as combined.
 struct ref_color ref_paper(const struct paper_args *args, const float *combined, int x, int y);
