@@ -37,7 +37,7 @@ SURFACE = {"AUTO": 0, "SPLATS": 1, "FILL": 2}
 DEPTH = {"POINT": 0, "SURFACE": 1}
 SMOOTH = {"ALLEVIATED": 0, "GAUSSIAN": 1, "BOX": 2, "OFF": 3}
 ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
-EFFECT_CHOICE = {"NO_CHOICE": 0}
+EFFECT_CHOICE = {"NO_CHOICE": 0, "CONTOUR_HEIGHT": 0, "CONTOUR_PLANE": 1}
 LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
 LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
 
@@ -182,7 +182,10 @@ class Effects(Descriptor):
                 ("fog_end", c_float), ("fog_density", c_float), ("fog_fixed", c_uint32), ("fog_color", c_float * 3),
                 ("toon_bands", c_uint32), ("toon_softness", c_float), ("hatch_levels", c_uint32),
                 ("hatch_spacing", c_float), ("hatch_color", c_float * 3), ("hatch_opacity", c_float),
-                ("hatch_ground", c_float), ("focus_aperture", c_float), ("focus_distance", c_float),
+                ("hatch_ground", c_float), ("contour_source", c_uint32), ("contour_axis", c_float * 3),
+                ("contour_start", c_float), ("contour_interval", c_float), ("contour_width", c_float),
+                ("contour_every", c_uint32), ("contour_bold", c_float), ("contour_color", c_float * 3),
+                ("contour_opacity", c_float), ("focus_aperture", c_float), ("focus_distance", c_float),
                 ("paper_color", c_float * 3), ("paper_grain", c_float), ("exact", c_uint32)]
 
 
@@ -406,6 +409,37 @@ EFFECTS = (
          {"name": "hatch_ground", "kind": "NUMBER", "property": "hatch_ground", "when": "PART", "label": "White Ground",
           "about": "How far the points' colors give way to white beneath the strokes", "least": 0, "zero": 0,
           "unit": "SHARE", "start": 0, "low": 0, "usual": 1, "high": 1},
+     )},
+    {"name": "contour", "label": "Contour Lines", "panel": "DRAWING",
+     "about": "Lines of equal height, as on maps, equally wide on screen whatever the slope",
+     "fields": (
+         {"name": "contour_source", "kind": "CHOICE", "property": "contour_source", "when": "PART", "label": "Along",
+          "about": "What is equal on a line",
+          "items": (("HEIGHT", "Height", "The world's height"), ("PLANE", "Distance from a Plane", "The distance from a plane through the world's origin"))},
+         {"name": "contour_axis", "kind": "AXIS", "property": "contour_axis", "when": "contour_source=PLANE",
+          "label": "Plane's Normal", "about": "What the plane stands across"},
+         {"name": "contour_start", "kind": "NUMBER", "property": "contour_start", "when": "PART", "label": "Start",
+          "about": "Height, or distance, of one of the bold lines, from which the others are counted",
+          "least": -1000000000000.0, "zero": 0, "unit": "HEIGHT", "start": 0, "low": -1e+30, "usual": 1e+30, "high": 1e+30},
+         {"name": "contour_interval", "kind": "NUMBER", "property": "contour_interval", "when": "PART", "label": "Interval",
+          "about": "From one line to the next in height", "least": 1e-09, "zero": 0, "unit": "LENGTH", "start": 0, "low": 0,
+          "usual": 100, "high": 1000000000.0,
+          "automatic": (1, "A fixed interval; else it is a round number that makes 10 to 25 lines of all clouds")},
+         {"name": "contour_width", "kind": "NUMBER", "property": "contour_width", "when": "PART", "label": "Width",
+          "about": "Of a line on screen", "least": 0.1, "zero": 1, "unit": "PIXELS", "start": 1, "low": 0.1, "usual": 10,
+          "high": 100},
+         {"name": "contour_every", "kind": "COUNT", "property": "contour_every", "when": "PART", "label": "Bold Every",
+          "about": "One line of so many is bold; 1: none is", "least": 1, "zero": 5, "unit": "NONE", "start": 5, "low": 1,
+          "usual": 20, "high": 1000},
+         {"name": "contour_bold", "kind": "NUMBER", "property": "contour_bold", "when": "PART", "label": "Bold Width",
+          "about": "Of a bold line on screen", "least": 0.1, "zero": 2, "unit": "PIXELS", "start": 2, "low": 0.1,
+          "usual": 10, "high": 100},
+         {"name": "contour_color", "kind": "COLOR", "property": "contour_color", "when": "PART", "label": "Ink",
+          "about": "Color of the lines", "zero": 0, "unit": "COLOR", "start": (0.09, 0.03, 0.01), "low": 0, "usual": 1,
+          "high": 1e+30},
+         {"name": "contour_opacity", "kind": "NUMBER", "property": "contour_opacity", "when": "STRENGTH",
+          "label": "Opacity", "about": "How much a line hides", "least": 0, "zero": 0, "unit": "SHARE", "start": 1,
+          "low": 0.01, "usual": 1, "high": 1},
      )},
     {"name": "focus", "label": "Depth of Field", "panel": "CAMERA",
      "about": "",

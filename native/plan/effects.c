@@ -175,6 +175,70 @@ static void plan_hatch(struct pt_builder *builder, enum pt_plane color)
               "strokes in %u directions, %.1f pixels apart", args.levels, (double)args.spacing);
 }
 
+// ---- contour lines -------------------------------------------------------------------------------------------------------
+
+// A round number, 1, 2 or 5 times a power of ten, of which 10 to 25 make the length.
+static double usual_interval(double length)
+{
+    if (!(length > 0.0) || !isfinite(length))
+        return 1.0;
+    double least = length / 25.0, ten = pow(10.0, floor(log10(least)));
+    double interval = least <= ten ? ten : least <= 2.0 * ten ? 2.0 * ten : least <= 5.0 * ten ? 5.0 * ten : 10.0 * ten;
+    return fmin(fmax(interval, 1e-9), 1e9);
+}
+
+// Of a box along an axis.
+static double extent(const struct box *box, const double axis[3])
+{
+    double length = 0.0;
+    for (int k = 0; k < 3; k++)
+        length += fabs(axis[k]) * (box->upper[k] - box->lower[k]);
+    return length;
+}
+
+static void plan_contour(struct pt_builder *builder, enum pt_plane color)
+{
+    const struct patina_scene *scene = builder->scene;
+    const patina_effects *effects = &scene->effects;
+    if (!(effects->contour_opacity > 0.0f)) {
+        pt_skip(builder, "contour", "no contour lines are asked for");
+        return;
+    }
+    const int bold = effects->contour_every > 1;
+    struct contour_args args = {.view = builder->plan->view,
+                                .eye_z = pt_eye_z(scene),
+                                .opacity = effects->contour_opacity,
+                                .kinds = bold ? 2 : 1};
+    double axis[3] = {0.0, 0.0, 1.0}, camera[9], position[3], view[3];
+    for (int k = 0; k < 3 && effects->contour_source == PATINA_CONTOUR_PLANE; k++)
+        axis[k] = (double)effects->contour_axis[k];
+    double length = sqrt(pt_dot(axis, axis));
+    for (int k = 0; k < 3; k++)
+        axis[k] /= length;
+    const struct box box = scene_box(scene);
+    double interval = (double)effects->contour_interval;
+    interval = interval > 0.0 ? interval : usual_interval(extent(&box, axis));
+    pt_camera_axes(&scene->camera, camera, position);
+    pt_apply(camera, axis, view);
+    // counted in float64 from the bold line next to the camera: what float32 adds to it is the distance from the camera
+    args.offset = (float)remainder(pt_dot(axis, position) - (double)effects->contour_start, interval * effects->contour_every);
+    const float widths[PT_CONTOUR_KINDS] = {effects->contour_width, effects->contour_bold};
+    for (uint32_t i = 0; i < PT_CONTOUR_KINDS; i++) {
+        double apart = i ? interval * effects->contour_every : interval, even = 2.0 * fmax((double)widths[i], 1.0);
+        args.interval[i] = (float)apart;
+        args.inverse[i] = (float)(1.0 / apart);
+        args.width[i] = widths[i];
+        args.even[i] = (float)even;
+        args.per_even[i] = (float)(1.0 / even);
+    }
+    for (int k = 0; k < 3; k++) {
+        args.axis[k] = (float)view[k];
+        args.color[k] = effects->contour_color[k];
+    }
+    PT_REASON(PT_ADD(builder, contour, args, {pt_keys_of(builder, 0), pt_shading_of(builder), pt_plane_at(color, 0)}),
+              "contour lines %.4g apart, %.1f pixels wide", interval, (double)args.width[0]);
+}
+
 // ---- fog ---------------------------------------------------------------------------------------------------------------
 
 static void plan_fog(struct pt_builder *builder, enum pt_plane color)
@@ -273,7 +337,7 @@ void pt_plan_paper(struct pt_builder *builder)
 
 int pt_effects_want_normals(const struct patina_scene *scene)
 {
-    return scene->effects.obscurance_strength > 0.0f || scene->effects.hatch_levels;
+    return scene->effects.obscurance_strength > 0.0f || scene->effects.hatch_levels || scene->effects.contour_opacity > 0.0f;
 }
 
 int pt_effects_want_albedo(const struct patina_scene *scene)
@@ -291,6 +355,7 @@ void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color)
 void pt_plan_drawn_effects(struct pt_builder *builder, enum pt_plane color)
 {
     plan_hatch(builder, color);
+    plan_contour(builder, color);
     plan_fog(builder, color);
 }
 

@@ -660,6 +660,30 @@ struct hatch_args {
     float axes[3 * PT_HATCH_LEVELS]; // unit, view space
 };
 
+#define PT_CONTOUR_KINDS 2       // all lines; of every few of them one, bold
+#define PT_CONTOUR_GRAZING 1e-3f // least (n . r)^2: 88 degrees
+#define PT_CONTOUR_FLAT 1.6e-5f  // sin^2 of 0.23 degrees: a flatter surface is level. Else a floor whose height is that of a line would be
+                                 // one blot
+#define PT_CONTOUR_RISE 3472.2222f // 1 / (sin^2 of a degree - FLAT): from there on lines are wholly seen
+
+// contour: lines where the height h = axis . p + offset is a multiple of an interval, as wide on screen at any slope: the surface goes on
+// in its tangent plane, so that from pixel to pixel h grows by |g|, g = w (a - (a . r) n / (n . r)) along x and y, w a pixel's width at p.
+// With d = |h / interval - round| interval / |g|, pixels, a line covers clamp(width / 2 - d + 1/2, 0, 1) min(width, 1). Where lines are
+// less than 2 `even` pixels apart (even = 2 max(width, 1)) that goes over into an even tone, width / apart, which at `even` and less is
+// width / even. What kinds of lines cover most counts; times opacity, less on what is nearly level.
+struct contour_args {
+    struct view_args view;
+    float eye_z;   // orthographic: near, as in shade
+    float axis[3]; // unit, view space
+    float offset;  // of the camera along the axis, less whole bold intervals
+    float opacity;
+    float color[3];
+    uint32_t kinds; // 1, 2
+    float interval[PT_CONTOUR_KINDS], inverse[PT_CONTOUR_KINDS]; // 1 / interval
+    float width[PT_CONTOUR_KINDS];                               // pixels
+    float even[PT_CONTOUR_KINDS], per_even[PT_CONTOUR_KINDS];    // 1 / even
+};
+
 // fog: colour (1 - s) + fog alpha s with s = density clamp((d - start) inverse, 0, 1), d the distance from the eye; in orthographic
 // views z.
 struct fog_args {

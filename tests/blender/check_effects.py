@@ -160,6 +160,57 @@ def test_hatching():
         check(inside.min() > -1e-6 and inside.max() < 1.0 + 1e-5, f"{inside.min()} to {inside.max()}")
 
 
+def slope_scene(slope):
+    """White points on z = -3 + slope x, seen from above; 24 pixels a unit."""
+    scene = new_scene(96, 48)
+    x, y = np.meshgrid(np.linspace(-2.5, 2.5, 400), np.linspace(-1.5, 1.5, 240))
+    normal = np.array((-slope, 0.0, 1.0)) / np.hypot(slope, 1.0)
+    add_points(np.stack([x.ravel(), y.ravel(), -3.0 + slope * x.ravel()], 1), np.full((x.size, 4), 255, np.uint8),
+               np.tile(normal, (x.size, 1)))
+    scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', 4.0
+    effects = scene.patina.effects
+    effects.use_contour, effects.contour_color, effects.contour_every = True, (0, 0, 0), 1
+    effects.contour_width = 2.0
+    return scene
+
+
+def ink_of(scene):
+    """Pixels' worth of ink on each column of the picture, (width,)."""
+    picture = render()["Combined"]
+    check((picture[..., 3] > 0.99).all(), "holes")
+    return 1.0 - picture[..., :3].mean(axis=(0, 2))
+
+
+def test_contour():
+    """Lines lie where the height is a multiple of the interval, equally wide at any slope; a level floor has none."""
+    for slope in (0.1, 0.5, 1.2):
+        scene = slope_scene(slope)
+        scene.patina.effects.contour_interval = slope  # a line a unit, at whole x less what -3 is off
+        ink = ink_of(scene)
+        first = (-(-3.0) / slope) % 1.0
+        at = (np.arange(96) + 0.5) / 24.0 - 2.0
+        away = np.abs((at - first + 0.5) % 1.0 - 0.5) * 24.0  # pixels from the next line
+        check(ink[away > 2.6].max() < 0.01, f"slope {slope}: ink {ink[away > 2.6].max():.3f} between lines")
+        middle = [ink[np.abs(at - line) * 24.0 < 2.6].sum() for line in (first - 1.0, first)]
+        check(max(np.abs(np.array(middle) - 2.0)) < 0.3, f"slope {slope}: {middle} pixels of ink about lines")
+        check(abs(ink.sum() / 4.0 - 2.0) < 0.3, f"slope {slope}: a line is {ink.sum() / 4.0:.2f} pixels wide")
+    effects = scene.patina.effects
+    effects.contour_every, effects.contour_bold = 2, 6.0
+    check(abs(ink_of(scene).sum() / 4.0 - 4.0) < 0.5, "every second line is not bold")
+    effects.contour_every, effects.contour_interval = 1, slope / 1000.0
+    ink = ink_of(scene)
+    check(0.4 < ink.min() and ink.max() - ink.min() < 1e-3, f"too fine lines: {ink.min():.3f} to {ink.max():.3f}")
+    effects.contour_interval = 0.0
+    check(0.0 < ink_of(scene).mean() < 0.4, "Automatic draws none, or all")
+    effects.contour_source, effects.contour_axis, effects.contour_interval = 'PLANE', (1.0, 0.0, 0.0), 0.5
+    ink = ink_of(scene)  # eight lines, across x
+    check(abs(ink.sum() / 8.0 - 2.0) < 0.3, f"from a plane: {ink.sum() / 8.0:.2f} pixels wide")
+    effects.contour_axis = (0.0, 0.0, 0.0)  # means z
+    level = slope_scene(0.0)
+    level.patina.effects.contour_interval = 1.0
+    check(ink_of(level).max() == 0.0, "a level floor at a line's height is inked")
+
+
 def test_paper():
     """Tint and grain over all of an opaque film, deterministic; a transparent film keeps its alpha."""
     scene = dense_scene()
