@@ -33,6 +33,9 @@ enum pt_gl_scratch_use {
     PT_GL_SCRATCH_TILES,  // what each tile holds
     PT_GL_SCRATCH_TILE_LISTS,
     PT_GL_SCRATCH_TILE_COUNTS,
+    PT_GL_SCRATCH_SOFT_COUNTS, // soft: of each tile's list
+    PT_GL_SCRATCH_SOFT_BEGINS,
+    PT_GL_SCRATCH_SOFT_STATES, // soft: what pixels have come to
     PT_GL_SCRATCH_COUNT
 };
 
@@ -145,13 +148,17 @@ int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t 
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 
-// raster.c, scatter.c, fill.c, pixels.c: kernels of several dispatches. They find their buffers bound, and tiles listed where
-// that is their domain. pt_gl_points: one dispatch over the points of an instance.
+// The lights of a program with lib/phong.glsl.
+void pt_gl_set_lights(struct pt_gl_device *d, GLuint program, const struct shade_args *args);
+
+// raster.c, scatter.c, fill.c, pixels.c, soft.c: kernels of several dispatches. They find their buffers bound, and tiles listed where
+// that is their domain. pt_gl_points: one dispatch over the points of an instance; pt_gl_points_of: of this program.
 typedef int pt_gl_runner(struct pt_gl_device *d, const struct pt_gl_work *work);
 int pt_gl_is_pointwise(enum pt_kernel kernel); // pointwise.c runs it
 pt_gl_runner pt_gl_pointwise;
 pt_gl_runner pt_gl_raster, pt_gl_scatter, pt_gl_splat, pt_gl_blend, pt_gl_average, pt_gl_points, pt_gl_fill, pt_gl_shade,
-    pt_gl_antialias, pt_gl_push, pt_gl_lines;
+    pt_gl_antialias, pt_gl_push, pt_gl_lines, pt_gl_gather, pt_gl_soft;
+int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant);
 // shade, of any number of instances, smooth, antialias and compose, without the planes between them.
 int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count);
 // The coarse cells over the rectangle of a push.

@@ -220,6 +220,7 @@ static pt_gl_runner *const runners[PT_KERNEL_COUNT] = {
     [PT_KERNEL_lines] = pt_gl_lines,         [PT_KERNEL_shade] = pt_gl_shade,     [PT_KERNEL_obscure] = run_obscure,
     [PT_KERNEL_antialias] = pt_gl_antialias, [PT_KERNEL_peel] = run_peel,         [PT_KERNEL_focus] = run_focus,
     [PT_KERNEL_extract] = run_extract,       [PT_KERNEL_ink] = run_ink,
+    [PT_KERNEL_gather] = pt_gl_gather,       [PT_KERNEL_soft] = pt_gl_soft,
 };
 
 static int run_once(struct pt_gl_device *d, const struct pt_gl_work *work)

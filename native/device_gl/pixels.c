@@ -96,7 +96,7 @@ static int shade_program(struct pt_gl_device *d, const char *definitions, uint32
 }
 
 // In a uniform array: read once for all lanes, where a block would be read once a lane.
-static void set_lights(struct pt_gl_device *d, const struct shade_args *args, uint32_t variant)
+void pt_gl_set_lights(struct pt_gl_device *d, GLuint program, const struct shade_args *args)
 {
     GLfloat lights[PT_MAX_LIGHTS][12] = {{0}};
     for (uint32_t i = 0; i < args->light_count && i < PT_MAX_LIGHTS; i++) {
@@ -111,7 +111,7 @@ static void set_lights(struct pt_gl_device *d, const struct shade_args *args, ui
         lights[i][10] = (GLfloat)light->shadow;
         lights[i][11] = light->shadow_scale;
     }
-    d->gl.ProgramUniform4fv(d->programs[PT_KERNEL_shade][variant], 16, 3 * PT_MAX_LIGHTS, &lights[0][0]);
+    d->gl.ProgramUniform4fv(program, 16, 3 * PT_MAX_LIGHTS, &lights[0][0]);
 }
 
 // What a wide blend of normals fetches, once for all instances.
@@ -145,7 +145,7 @@ int pt_gl_shade(struct pt_gl_device *d, const struct pt_gl_work *work)
     if (result == PATINA_OK && args->blend > 1)
         result = bind_shown(d, &args->view, work->buffers[PT_BUF_shade_keys]);
     if (result == PATINA_OK && args->instance.lit)
-        set_lights(d, args, variant);
+        pt_gl_set_lights(d, d->programs[PT_KERNEL_shade][variant], args);
     return result == PATINA_OK ? pt_gl_dispatch_tiles(d, PT_KERNEL_shade, variant, PT_GL_TILES_POINTS) : result;
 }
 

@@ -314,13 +314,18 @@ int pt_gl_average(struct pt_gl_device *d, const struct pt_gl_work *work)
     return result;
 }
 
-int pt_gl_points(struct pt_gl_device *d, const struct pt_gl_work *work)
+int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant)
 {
     const struct pt_kernel_row *row = &pt_kernels[work->kernel];
     uint32_t chunks = 0;
     while (!(row->buffers[chunks].formats & 1u << PT_FORMAT_chunk))
         chunks++;
     const struct instance_buffers b = instance_of(work, chunks, 0);
+    return run_instance(d, &b, variant);
+}
+
+int pt_gl_points(struct pt_gl_device *d, const struct pt_gl_work *work)
+{
     int result = pt_gl_kernel_program(d, work->kernel, 0, "");
-    return result == PATINA_OK ? run_instance(d, &b, 0) : result;
+    return result == PATINA_OK ? pt_gl_points_of(d, work, 0) : result;
 }

@@ -693,6 +693,8 @@ static void plan_points(struct pt_builder *builder)
     if (plan->layers == 1)
         pt_skip(builder, "peel",
                 plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");
+    pt_skip(builder, "gather", "pictures show no soft points yet");
+    pt_skip(builder, "soft", "pictures show no soft points yet");
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
     set_background(&builder->scene->settings, background);
     pt_plan_ink(builder, background);

@@ -801,6 +801,10 @@ struct station_args {
 #define PT_SOFT_FULLEST 0.9999847f // 1 - 2^-16: more opacity than this has no density
 #define PT_SOFT_SPENT 0.000244140625f // 2^-12: what lies behind is not looked at; a quarter of a step of 10 bits
 #define PT_SOFT_TILE 16u
+#define PT_SOFT_PART 16384u // OpenGL: steps through a list from one dispatch to the next
+#define PT_SOFT_FARTHEST 1e30f // a place beyond is none
+#define PT_SOFT_WIDEST 1e18f   // no radius is more
+#define PT_SOFT_BEFORE 1e-30f  // z of what is before the eye; what is not is lit as if it lay on the view's axis
 #define PT_SOFT_EXPRESS 0u // models
 #define PT_SOFT_CONCENTRIC 1u
 #define PT_SOFT_BASE 2u

@@ -401,4 +401,17 @@ struct ref_ball ref_ball_at(const struct soft_args *args, const uint32_t *record
 // A pixel: reached is that of its plane, z its key's.
 struct ref_soft ref_soft(const struct soft_args *args, const uint32_t *records, int x, int y, double reached, double z);
 
+// ---- gather.c ---------------------------------------------------------------------------------------------------------------
+
+struct ref_record {
+    enum ref_truth drawn;
+    double place[3], place_error[3], radius, radius_error;
+    double color[3], color_error[3];
+    double opacity, opacity_error, weight; // weight: W of [S Eq. 22]
+    int unsure, singular;                  // as of ref_shade
+};
+// points: surface, colors, opacities, shadows by slot.
+struct ref_record ref_gather(const struct gather_args *args, const struct chunk_view *chunk, const float *positions, const uint32_t *field,
+                             const uint32_t *drawn, const struct ref_planes *points, uint32_t slot);
+
 #endif

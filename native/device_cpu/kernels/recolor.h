@@ -6,14 +6,13 @@
 #include "device_cpu/rows.h"
 
 // Where the colours lie on the ramp. scalars: of the points, where they are its source.
-static inline vf pt_place_on_ramp(const struct shade_args *args, uint32_t x, uint32_t y, vf z, vf scalars)
+static inline vf pt_place_on_ramp(const struct shade_args *args, const vf towards[2], vf z, vf scalars)
 {
     const struct recolor_args *recolor = &args->recolor;
     const vf zero = vf_set(recolor->zero), slope = vf_set(recolor->along[0]);
-    vf ray[2];
+    vf ray[2] = { towards[0], towards[1] };
     if (recolor->source == PT_RAMP_SCALAR)
         return (scalars - zero) * slope;
-    vf_ray(&args->view, x, y, ray);
     vf depth = z + vf_set(args->eye_z);
     if (recolor->source == PT_RAMP_DISTANCE) {
         vf square = (ray[0] * ray[0] + ray[1] * ray[1]) + vf_set(1.0f);
@@ -56,11 +55,11 @@ static inline vf pt_grade(const struct recolor_args *recolor, vf c)
 }
 
 // In and out: the points' own colours; where scalars are the ramp's source, these in the first.
-static inline void pt_recolor(const struct shade_args *args, uint32_t x, uint32_t y, vf z, vm ours, vf color[3])
+static inline void pt_recolor_at(const struct shade_args *args, const vf ray[2], vf z, vm ours, vf color[3])
 {
     const struct recolor_args *recolor = &args->recolor;
     if (recolor->source) {
-        vf scalars = color[0], t = pt_place_on_ramp(args, x, y, z, scalars);
+        vf scalars = color[0], t = pt_place_on_ramp(args, ray, z, scalars);
         pt_ramp(recolor, t, ours, color);
         vm number = vf_le(scalars, scalars);
         for (uint32_t k = 0; k < 3 && recolor->source == PT_RAMP_SCALAR; k++)
@@ -68,6 +67,14 @@ static inline void pt_recolor(const struct shade_args *args, uint32_t x, uint32_
     }
     for (uint32_t k = 0; k < 3 && recolor->graded; k++)
         color[k] = pt_grade(recolor, color[k]);
+}
+
+// Of PT_LANES pixels from (x, y) on.
+static inline void pt_recolor(const struct shade_args *args, uint32_t x, uint32_t y, vf z, vm ours, vf color[3])
+{
+    vf ray[2];
+    vf_ray(&args->view, x, y, ray);
+    pt_recolor_at(args, ray, z, ours, color);
 }
 
 static inline int pt_recolors(const struct shade_args *args) { return args->recolor.source || args->recolor.graded; }

@@ -212,16 +212,14 @@ static inline vf pt_ambient(const float *k, const vf n[3])
 // the light. In and out: albedo. Returns the mean m of the lights that cast; 1 where none does.
 // plain: what pt_plain says, as a constant: the compiler leaves out all else, and spills nothing. Shading takes a tenth less.
 static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args *args, int plain, const uint32_t *shadows,
-                                                         uint32_t x, uint32_t y, vi id, vm ours, vf z, const vf n[3],
-                                                         vf color[3])
+                                                         const vf ray[2], vi id, vm ours, vf z, const vf n[3], vf color[3])
 {
     const struct instance_args *instance = &args->instance;
     struct pt_surface_point point;
-    vf ray[2], diffuse[3], specular[3], arrived = vf_zero();
+    vf diffuse[3], specular[3], arrived = vf_zero();
     uint32_t casting = 0;
     if (plain && (instance->specular > 0.0f || args->directed))
         __builtin_unreachable();
-    vf_ray(&args->view, x, y, ray);
     pt_place(args, ray, z, n, &point);
     for (int k = 0; k < 3; k++)
         diffuse[k] = specular[k] = vf_zero();
@@ -279,9 +277,11 @@ pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes, c
             pt_blend_normals(sum, filled, normal);
         }
     }
-    if (args->instance.lit)
-        return pt_phong(args, plain, shadows, x, y, id, ours, vf_load(own->z + x), normal, color);
-    return vf_set(1.0f);
+    if (!args->instance.lit)
+        return vf_set(1.0f);
+    vf ray[2];
+    vf_ray(&args->view, x, y, ray);
+    return pt_phong(args, plain, shadows, ray, id, ours, vf_load(own->z + x), normal, color);
 }
 
 #endif

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Runners of soft points: gather, and soft, whose tiles are drawn in batches as large as their lists fit the bins.
+#include "device_gl.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+int pt_gl_gather(struct pt_gl_device *d, const struct pt_gl_work *work)
+{
+    const struct shade_args *args = &((const struct gather_args *)work->arguments)->shade;
+    const struct instance_args *instance = &args->instance;
+    const uint32_t opacity = instance->has_opacities != 0, lit = !instance->lit ? 0 : instance->specular > 0.0f ? 2 : 1;
+    const uint32_t directed = args->directed && lit, variant = instance->color_format % 5 + 5 * (lit + 3 * (opacity + 2 * directed));
+    char definitions[128];
+    snprintf(definitions, sizeof definitions, "#define COLOR_FORMAT %u\n#define LIT %u\n#define OPACITY %u\n#define DIRECTED %u\n",
+             instance->color_format % 5, lit, opacity, directed);
+    int result = pt_gl_kernel_program(d, PT_KERNEL_gather, variant, definitions);
+    if (result != PATINA_OK)
+        return result;
+    if (lit)
+        pt_gl_set_lights(d, d->programs[PT_KERNEL_gather][variant], args);
+    return pt_gl_points_of(d, work, variant);
+}
+
+// Variants of soft, drawing last: by model.
+enum { COUNT, FILL, SORT, DRAW };
+enum { RUN = 256, GROUP = 64 }; // tiles between two looks at cancel; invocations that share out records, as in soft.comp
+enum { TOLD = 64, ENTRY = 8, STATE = 32 }; // bytes: what is counted; an entry of a list; a pixel, as in soft.comp
+enum { SORTED_AT_ONCE = 1 << 16 };         // entries of a list: 17 * 8 rounds of 128 steps
+enum { STEPS = 60000 };                    // through loops, that llvmpipe takes: it ends them beyond 65,535
+
+struct soft {
+    const struct pt_gl_work *work;
+    const struct soft_args *args;
+    uint32_t columns, tiles, model;
+    uint32_t *counts, *begins; // of every tile; of the batch's, and the end of the last
+};
+
+static int programs(struct pt_gl_device *d, const struct soft *soft)
+{
+    int result = PATINA_OK;
+    for (uint32_t step = COUNT; step <= DRAW && result == PATINA_OK; step++) {
+        const uint32_t variant = step < DRAW ? step : DRAW + soft->model;
+        char definitions[64];
+        snprintf(definitions, sizeof definitions, "#define STEP %u\n#define MODEL %u\n", step, soft->model);
+        result = pt_gl_kernel_program(d, PT_KERNEL_soft, variant, definitions);
+        if (result == PATINA_OK)
+            d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_soft][variant], 2, soft->columns);
+    }
+    return result;
+}
+
+static int make_room(struct pt_gl_device *d, const struct soft *soft)
+{
+    const struct {
+        enum pt_gl_scratch_use use;
+        uint32_t binding;
+        size_t size;
+    } rooms[] = {{PT_GL_SCRATCH_SOFT_COUNTS, PT_BIND_soft_counts, ((size_t)soft->tiles + 1) * 4},
+                 {PT_GL_SCRATCH_SOFT_BEGINS, PT_BIND_soft_begins, ((size_t)soft->tiles + 1) * 4},
+                 {PT_GL_SCRATCH_SOFT_STATES, PT_BIND_soft_states, (size_t)RUN * PT_SOFT_TILE * PT_SOFT_TILE * STATE},
+                 {PT_GL_SCRATCH_COUNTERS, PT_BIND_soft_unfinished, 4}};
+    int result = PATINA_OK;
+    for (size_t i = 0; i < sizeof rooms / sizeof rooms[0] && result == PATINA_OK; i++) {
+        result = pt_gl_scratch(d, rooms[i].use, rooms[i].size, 0);
+        if (result == PATINA_OK)
+            result = pt_gl_bind(d, rooms[i].binding, d->scratch[rooms[i].use].name, 0, rooms[i].size, "soft");
+    }
+    return result;
+}
+
+static void clear(struct pt_gl_device *d, GLuint name, size_t size)
+{
+    const uint32_t zero = 0;
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, name);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, GL_R32UI, 0, (GLsizeiptr)size, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+}
+
+static int run_records(struct pt_gl_device *d, const struct soft *soft, uint32_t step)
+{
+    uint32_t x, y;
+    clear(d, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name, (size_t)soft->tiles * 4);
+    pt_gl_grid((soft->args->records + GROUP - 1) / GROUP, &x, &y);
+    return pt_gl_dispatch(d, PT_KERNEL_soft, step, x, y);
+}
+
+static uint32_t longest(const struct soft *soft, uint32_t first, uint32_t end)
+{
+    uint32_t most = 0;
+    for (uint32_t tile = first; tile < end; tile++)
+        most = soft->counts[tile] > most ? soft->counts[tile] : most;
+    return most;
+}
+
+// A workgroup for each of these tiles.
+static int run_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end, uint32_t part)
+{
+    const GLuint program = d->programs[PT_KERNEL_soft][variant];
+    if (soft->work->cancel && atomic_load(soft->work->cancel))
+        return pt_gl_fail(d, PATINA_ERROR_CANCELLED, "cancelled");
+    d->gl.ProgramUniform1ui(program, 0, first);
+    d->gl.ProgramUniform1ui(program, 1, end);
+    d->gl.ProgramUniform1ui(program, 3, part);
+    return pt_gl_dispatch(d, PT_KERNEL_soft, variant, end - first, 1);
+}
+
+static int sort_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end)
+{
+    const uint32_t most = longest(soft, first, end);
+    int result = PATINA_OK;
+    if (most < 2)
+        return result;
+    if (most <= SORTED_AT_ONCE)
+        return run_tiles(d, soft, SORT, first, end, 0);
+    for (uint64_t run = 2; run < 2 * (uint64_t)most && result == PATINA_OK; run *= 2)
+        for (uint64_t apart = run / 2; apart && result == PATINA_OK; apart /= 2) {
+            d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_soft][SORT], 4, (GLuint)apart);
+            result = run_tiles(d, soft, SORT, first, end, (uint32_t)run);
+        }
+    return result;
+}
+
+// In parts, until no pixel is left unfinished.
+static int draw_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t first, uint32_t end)
+{
+    const GLuint flag = d->scratch[PT_GL_SCRATCH_COUNTERS].name;
+    uint32_t unfinished = 1;
+    int result = PATINA_OK;
+    for (uint32_t part = 0; unfinished && result == PATINA_OK; part++) {
+        clear(d, flag, sizeof unfinished);
+        result = run_tiles(d, soft, DRAW + soft->model, first, end, part);
+        d->gl.BindBuffer(GL_COPY_READ_BUFFER, flag);
+        d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, sizeof unfinished, &unfinished);
+    }
+    return result;
+}
+
+// The tiles from `first` on whose lists fit; *end: behind the last of them.
+static int run_batch(struct pt_gl_device *d, struct soft *soft, uint32_t first, uint32_t *end)
+{
+    const size_t room = (soft->work->buffers[PT_BUF_soft_bins]->size - TOLD) / ENTRY;
+    size_t used = 0;
+    for (*end = first; *end < soft->tiles && used + soft->counts[*end] <= room; ++*end) {
+        soft->begins[*end] = (uint32_t)used;
+        used += soft->counts[*end];
+    }
+    soft->begins[*end] = (uint32_t)used;
+    if (*end == first)
+        return pt_gl_fail(d, PATINA_ERROR_MEMORY, "soft: the bins have no room for a tile's %u points", soft->counts[first]);
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->scratch[PT_GL_SCRATCH_SOFT_BEGINS].name);
+    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)(((size_t)soft->tiles + 1) * 4), soft->begins);
+    d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_soft][FILL], 0, first);
+    d->gl.ProgramUniform1ui(d->programs[PT_KERNEL_soft][FILL], 1, *end);
+    int result = used ? run_records(d, soft, FILL) : PATINA_OK;
+    for (uint32_t tile = first; tile < *end && result == PATINA_OK; tile += RUN) {
+        const uint32_t last = *end - tile < RUN ? *end : tile + RUN;
+        result = sort_tiles(d, soft, tile, last);
+        if (result == PATINA_OK)
+            result = draw_tiles(d, soft, tile, last);
+    }
+    return result;
+}
+
+// Software ends loops that take too many steps, without a word: of a box over tiles; of a piece of a ray through a list, twice, and
+// of counting before it.
+static int can_loop(struct pt_gl_device *d, const struct soft *soft)
+{
+    const uint32_t most = longest(soft, 0, soft->tiles);
+    if (d->base.info.hardware)
+        return PATINA_OK;
+    if (soft->tiles > STEPS)
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "soft points: a picture of %u tiles; OpenGL in software takes %d", soft->tiles, STEPS);
+    if (soft->model != PT_SOFT_EXPRESS && most > (STEPS - PT_SOFT_PART) / 2)
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "soft points: %u balls on a tile; OpenGL in software takes %u, but for the Express model",
+                          most, (STEPS - PT_SOFT_PART) / 2);
+    return PATINA_OK;
+}
+
+int pt_gl_soft(struct pt_gl_device *d, const struct pt_gl_work *work)
+{
+    const struct soft_args *args = work->arguments;
+    const uint32_t *rect = args->view.rect;
+    struct soft soft = {.work = work, .args = args, .model = args->model};
+    soft.columns = (rect[2] - rect[0] + PT_SOFT_TILE - 1) / PT_SOFT_TILE;
+    soft.tiles = soft.columns * ((rect[3] - rect[1] + PT_SOFT_TILE - 1) / PT_SOFT_TILE);
+    soft.counts = calloc(2 * ((size_t)soft.tiles + 1), sizeof *soft.counts);
+    if (!soft.counts)
+        return pt_gl_fail(d, PATINA_ERROR_MEMORY, "out of memory");
+    soft.begins = soft.counts + soft.tiles + 1;
+    int result = programs(d, &soft);
+    if (result == PATINA_OK)
+        result = make_room(d, &soft);
+    clear(d, work->buffers[PT_BUF_soft_bins]->name, TOLD);
+    if (result == PATINA_OK)
+        result = run_records(d, &soft, COUNT);
+    if (result == PATINA_OK) {
+        d->gl.BindBuffer(GL_COPY_READ_BUFFER, d->scratch[PT_GL_SCRATCH_SOFT_COUNTS].name);
+        d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, (GLsizeiptr)((size_t)soft.tiles * 4), soft.counts);
+        result = pt_gl_check(d, "counting soft points");
+    }
+    if (result == PATINA_OK)
+        result = can_loop(d, &soft);
+    for (uint32_t tile = 0; tile < soft.tiles && result == PATINA_OK;)
+        result = run_batch(d, &soft, tile, &tile);
+    free(soft.counts);
+    return result;
+}
