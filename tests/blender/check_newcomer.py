@@ -98,9 +98,10 @@ class Hand:
         self.clicks = before
 
     @staticmethod
-    def pause(seconds):
-        until = time.perf_counter() + seconds
-        return lambda: time.perf_counter() > until
+    def pause(seconds, rounds=5):
+        """So long, and so many rounds of Blender's own: on a slow machine one may take seconds."""
+        until, left = time.perf_counter() + seconds, iter(range(rounds))
+        return lambda: next(left, None) is None and time.perf_counter() > until
 
     def click(self, place):
         """In the newest window."""
@@ -114,6 +115,23 @@ class Hand:
             yield self.pause(0.1)
         self.clicks += 1
         yield self.pause(0.5)
+
+    def clicks_until(self, done, *places):
+        """Again where Blender missed one while it drew, as it does on a slow machine; they count once."""
+        for _ in range(3):
+            before = self.clicks
+            for place in places:
+                yield from self.click(place)
+            enough = self.pause(10.0)
+            yield lambda enough=enough: done() or enough()
+            if done():
+                return
+            self.clicks = before
+            window = bpy.context.window_manager.windows[0]
+            for value in ('PRESS', 'RELEASE'):
+                window.event_simulate('ESC', value, x=20, y=20)
+            yield self.pause(1.0)
+        check(False, f"clicks at {places} had no effect")
 
 
 def whole_window(name):
@@ -136,9 +154,8 @@ def test_newcomers_clicks():
     in_view(bpy.ops.wm.read_homefile, use_factory_startup=True, use_empty=False, app_template="")
     yield lambda: "Cube" in bpy.data.objects
     hand, windows = Hand(1), bpy.context.window_manager.windows  # one that the splash takes
-    for place in (MENU_FILE, MENU_IMPORT, MENU_POINTS):
-        yield from hand.click(place)
-    yield lambda: len(windows) == 2
+    scene = bpy.context.scene
+    yield from hand.clicks_until(lambda: len(windows) == 2, MENU_FILE, MENU_IMPORT, MENU_POINTS)
     browser = windows[1].screen.areas[0].spaces[0]
     yield lambda: browser.params is not None
     browser.params.directory = str(path.parent).encode()  # where the newcomer keeps scans
@@ -147,21 +164,20 @@ def test_newcomers_clicks():
     yield from hand.click(DIALOG_IMPORT)
     yield lambda: "relief" in bpy.data.objects and len(windows) == 1
     yield hand.pause(1.0)
-    whole_window("path_1_imported")
-    yield from hand.click(MENU_POINTS)  # Set Up for Points is offered under the hand
-    yield lambda: bpy.context.scene.render.engine == 'PATINA'
-    yield from hand.click(RENDERED)
-    yield from hand.click(RENDER_TAB)
+    whole_window("clicks_1_imported")
+    # Set Up for Points is offered under the hand
+    yield from hand.clicks_until(lambda: scene.render.engine == 'PATINA', MENU_POINTS)
+    yield from hand.clicks_until(lambda: area().spaces[0].shading.type == 'RENDERED', RENDERED)
+    editor = next(found for found in windows[0].screen.areas if found.type == 'PROPERTIES')
+    yield from hand.clicks_until(lambda: editor.spaces[0].context == 'RENDER', RENDER_TAB)
     yield lambda: shown() and shown().shown.stats["points"] == POINTS
-    yield from hand.click(STYLE)
-    whole_window("path_2_styles")
-    yield from hand.click(MUSEUM)
-    yield lambda: bpy.context.scene.patina.style.chosen == "museum" and shown() and shown().shown.stats["points"] == POINTS
-    whole_window("path_3_style")
+    yield from hand.clicks_until(lambda: scene.patina.style.chosen == "museum", STYLE, MUSEUM)
+    yield lambda: shown() and shown().shown.stats["points"] == POINTS
+    whole_window("clicks_2_style")
     bpy.ops.render.render()  # F12
     hand.clicks += 1
     if "PATINA_SCREENSHOTS" in os.environ:
-        bpy.data.images['Render Result'].save_render(str(Path(os.environ["PATINA_SCREENSHOTS"]) / "path_4_f12.png"))
+        bpy.data.images['Render Result'].save_render(str(Path(os.environ["PATINA_SCREENSHOTS"]) / "clicks_3_f12.png"))
     bright = saved('PNG')[..., :3].max(axis=2) > 0.2
     check(0.1 < bright.mean() < 0.8, f"F12 shows points on {bright.mean():.0%} of the picture")
     print(f"  {hand.clicks} clicks", flush=True)
