@@ -432,6 +432,19 @@ static void test_black_is_black(void **state)
     assert_memory_equal(black, same, sizeof same);
 }
 
+// What the table of effects says that zero stands for, the header spells out.
+static void test_effects_begin_as_the_table_says(void **state)
+{
+    (void)state;
+    const patina_effects begun = PATINA_EFFECTS_INIT;
+#define PATINA_EFFECT_NUMBER(field, when, least, most, zero, ...) assert_true(begun.field == (float)(zero));
+#define PATINA_EFFECT_COUNT(field, when, least, most, zero, ...) assert_int_equal(begun.field, zero);
+#define PATINA_EFFECT_COLOR(field, when, zero, ...) \
+    assert_true(begun.field[0] == (float)(zero) && begun.field[1] == (float)(zero) && begun.field[2] == (float)(zero));
+#define PATINA_EFFECT_AXIS(field, ...) assert_true(begun.field[0] == 0.0f && begun.field[1] == 0.0f && begun.field[2] == 1.0f);
+#include "patina/effects.def"
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -472,6 +485,7 @@ int main(void)
         cmocka_unit_test(test_what_is_read),
         cmocka_unit_test(test_what_is_written),
         cmocka_unit_test(test_black_is_black),
+        cmocka_unit_test(test_effects_begin_as_the_table_says),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -628,7 +628,8 @@ typedef struct patina_effects {
 #define PATINA_EFFECTS_INIT                                                                                                    \
     {                                                                                                                          \
         .struct_size = sizeof(patina_effects), .edl_radius = 1.4f, .hatch_spacing = 6.0f, .hatch_opacity = 1.0f,               \
-        .paper_color = {1.0f, 1.0f, 1.0f}, .exact = 1                                                                          \
+        .paper_color = {1.0f, 1.0f, 1.0f}, .contour_axis = {0.0f, 0.0f, 1.0f}, .contour_width = 1.0f, .contour_every = 5,      \
+        .contour_bold = 2.0f, .exact = 1                                                                                       \
     }
 
 enum patina_line_source { PATINA_LINE_FIXED = 0, PATINA_LINE_POINT = 1, PATINA_LINE_DEPTH = 2 };
