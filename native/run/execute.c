@@ -38,7 +38,7 @@ int pt_execute(struct pt_execution *e)
     if (!error && (!e->late || !e->behind))
         error = pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     e->stale = plan->light_count && pt_shadows_stale(e->binder.shadows, e->scene, plan);
-    return error ? error : pt_walk(e, plan->steps, plan->steps + plan->step_count);
+    return error || !plan->step_count ? error : pt_walk(e, plan->steps, plan->steps + plan->step_count);
 }
 
 void pt_execution_close(struct pt_execution *e)

@@ -640,19 +640,20 @@ static enum pt_color_format color_format(const patina_array *color)
     return !color->data ? PT_COLOR_NONE : color->type == PATINA_UINT8 ? PT_COLOR_SRGB8 : PT_COLOR_FLOAT;
 }
 
-int patina_cloud_create(const patina_cloud_desc *desc, patina_progress *progress, patina_cloud **out)
+int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progress, patina_cloud **out)
 {
     struct build build = { .progress = progress };
     if (!out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: out is NULL");
     *out = NULL;
-    if (!desc)
+    if (!given)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: desc is NULL");
-    int error = pt_take(NULL, "patina_cloud_create", desc, &build.desc, sizeof build.desc);
+    int error = pt_take(NULL, "patina_cloud_create", given, &build.desc, sizeof build.desc);
     error = error ? error : check_desc(&build.desc);
     if (error)
         return error;
 
+    const patina_cloud_desc *desc = &build.desc;
     struct patina_cloud *cloud = calloc(1, sizeof *cloud);
     struct pt_alive *alive = calloc(1, sizeof *alive);
     build.pool = pt_pool_create(pt_pool_threads_for(build.desc.threads, build.desc.count), 0);
