@@ -56,7 +56,8 @@ static int prepare(struct fill *f)
 {
     const struct view_args *view = &f->args->view;
     const GladGLContext *gl = &f->d->gl;
-    int refills = f->args->unfills && f->phase == PT_FILL_OCCLUDED; // an empty pixel is filled once
+    // an empty pixel is filled once, but what was there before says what is a stray
+    int refills = f->args->unfills && (f->phase == PT_FILL_OCCLUDED || f->args->alone);
     size_t bits = ((size_t)view->width * view->height + 31) / 32 * 4;
     size_t tiles = (size_t)f->d->tiles.columns * f->d->tiles.rows * 4;
     int result = programs(f);
@@ -102,7 +103,7 @@ static int dispatch_entries(struct fill *f, enum program p, uint32_t entries)
         f->d->gl.ProgramUniform1ui(program, 1, f->d->stamp);
     if (p == APPLY || p == RESTORE || p == SELECT)
         f->d->gl.ProgramUniform1ui(program, 2, f->d->tiles.columns);
-    if (p == DECIDE || p == APPLY)
+    if (p == DECIDE || p == APPLY || p == MARK)
         f->d->gl.ProgramUniform1ui(program, 5, f->phase);
     return pt_gl_dispatch(f->d, PT_KERNEL_fill, p, x, y);
 }

@@ -139,7 +139,8 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
                              .refined = plan->quality == PATINA_QUALITY_REFINED,
                              .least = least_distance(plan),
                              .least_share = least_share(plan, level),
-                             .from_width = plan->view.width};
+                             .from_width = plan->view.width,
+                             .alone = !level && plan->fill == PATINA_FILL_CLOSED};
     if (plan->reaches) {
         args.reach = REACH;
         args.disc_reach = DISC_REACH;

@@ -87,14 +87,15 @@ void pt_choose_layers(const patina_settings *settings, struct pt_plan *plan)
     plan->layers = plan->transparent || settings->layer_passes ? wanted : 1;
 }
 
-// How far, in pixels, anything can carry influence: fills and un-fills of both phases and the push at every level, the
+// How far, in pixels, anything can carry influence: fills and un-fills of both phases, of background twice as far (is
+// what lies beside alone?), and the push at every level, the
 // window of estimated normals, the blend of normals, smoothing, anti-aliasing and lines. Every layer starts from the filled
 // depth of the one before, and so does what is drawn again. Behind the last, averages take from points in the pixels around.
 static uint32_t reach_of(const struct pt_plan *plan, const patina_settings *settings)
 {
     uint32_t layer = PT_REACH_normals;
     for (uint32_t level = 0; level <= plan->levels; level++)
-        layer += (4 * plan->iterations * PT_REACH_fill + PT_REACH_push) << level;
+        layer += (5 * plan->iterations * PT_REACH_fill + PT_REACH_push) << level;
     return (plan->reopens ? plan->reopens : plan->layers) * layer + (settings->average ? PT_REACH_average : 0) + PT_REACH_shade +
            PT_REACH_smooth + PT_REACH_antialias + pt_line_reach(plan);
 }

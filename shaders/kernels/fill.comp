@@ -42,7 +42,7 @@ layout(location = 1) uniform uint stamp;   // of this step
 layout(location = 2) uniform uint columns; // tiles in a row
 layout(location = 3) uniform uint all_new; // STEP 1: no entry was filled before in this phase; STEP 4: look at all
 layout(location = 4) uniform uint kept;    // STEP 1: entries saved before this step
-layout(location = 5) uniform uint phase;   // STEP 1, 2: PT_FILL_*
+layout(location = 5) uniform uint phase;   // STEP 1, 2, 4: PT_FILL_*
 
 // The ring, anticlockwise from east.
 const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(1, 1), ivec2(0, 1), ivec2(-1, 1), ivec2(-1, 0), ivec2(-1, -1),
@@ -65,7 +65,48 @@ float own_distance(view_args view, uint source, float z)
 #endif
 }
 
+#if (STEP == 0 && OCCLUDED == 0) || STEP == 4
+
+// Now; to un-fill, before the phase.
+bool is_covered(ivec2 size, ivec2 place)
+{
+    bool covered = z_at(size, place.x, place.y) < pt_float(PT_KEY_EMPTY_Z);
+#if STEP == 4
+    uint pixel = covered ? uint(place.y * size.x + place.x) : 0u;
+    covered = covered && (filled[pixel >> 5] >> (pixel & 31u) & 1u) == 0u;
+#endif
+    return covered;
+}
+
+// Whether a pixel stands alone where its surface is dense: a stray.
+bool is_stray(view_args view, ivec2 place)
+{
+    ivec2 size = ivec2(view.width, view.height);
+    bool alone = place.x >= int(view.rect[0]) && place.y >= int(view.rect[1]) && place.x < int(view.rect[2]) &&
+                 place.y < int(view.rect[3]) && is_covered(size, place);
+    for (int d = 0; d < 8 && alone; d++)
+        alone = !is_covered(size, place + ring[d]);
+    uint pixel = alone ? uint(place.y * size.x + place.x) : 0u, source = alone ? read_from(pixel) : 0u;
+    precise float dense = (PT_DENSE * pt_footprint(view, read_z(pixel))) * read_float4(source).w;
+    return alone && read_span(source) < dense;
+}
+
+#endif
+
 #if STEP == 0
+
+#if OCCLUDED == 0
+
+// 4. Strays are white too.
+uint with_strays(view_args view, ivec2 place, uint white)
+{
+    for (int d = 0; d < 8; d++)
+        if ((white >> d & 1u) == 0u && is_stray(view, place + ring[d].x * ivec2(PT_ACROSS) + ring[d].y * ivec2(PT_STEP)))
+            white |= 1u << d;
+    return white;
+}
+
+#endif
 
 vec3 z_across(ivec2 size, ivec2 p)
 {
@@ -107,7 +148,12 @@ void main()
         uint white = uint(!(row.z < t)) | uint(!(ahead.z < t)) << 1 | uint(!(ahead.y < t)) << 2 |
                      uint(!(ahead.x < t)) << 3 | uint(!(row.x < t)) << 4 | uint(!(behind.x < t)) << 5 |
                      uint(!(behind.y < t)) << 6 | uint(!(behind.z < t)) << 7;
-        fills |= uint(fill && !pt_five_white(white)) << i;
+        fill = fill && !pt_five_white(white);
+#if OCCLUDED == 0
+        if (fill && args.alone != 0u)
+            fill = !pt_five_white(with_strays(view, here, white));
+#endif
+        fills |= uint(fill) << i;
         behind = row;
         row = ahead;
         here += ivec2(PT_STEP);
@@ -131,10 +177,10 @@ uint entry_index()
 
 #if STEP == 2 || STEP == 5
 
-// The tiles that a change at this pixel concerns.
+// The tiles that a change at this pixel concerns: pixels beside it, and those beside what stood alone.
 void wake_tiles(uvec4 rect, uvec2 place)
 {
-    uvec2 low = (max(place, rect.xy + 1u) - 1u - rect.xy) / 8u, high = (min(place + 1u, rect.zw - 1u) - rect.xy) / 8u;
+    uvec2 low = (max(place, rect.xy + 2u) - 2u - rect.xy) / 8u, high = (min(place + 2u, rect.zw - 1u) - rect.xy) / 8u;
     stamps[low.y * columns + low.x] = stamp;
     stamps[low.y * columns + high.x] = stamp;
     stamps[high.y * columns + low.x] = stamp;
@@ -197,7 +243,7 @@ float refined_z(view_args view, ivec2 place, ivec2 best, uint source, float z_q)
     return pt_max(pt_min(z, farthest), z_q);
 }
 
-// 4. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
+// 5. The least key among the neighbours; refined: its surface's tangent plane at this pixel.
 void main()
 {
     view_args view = args.view;
@@ -243,7 +289,8 @@ void main()
 {
     uvec4 rect = uvec4(args.view.rect[0], args.view.rect[1], args.view.rect[2], args.view.rect[3]);
     uint width = args.view.width, index = entry_index();
-    bool refills = phase == PT_FILL_OCCLUDED && args.unfills != 0u; // a pixel can be filled twice in the phase
+    // a pixel can be filled twice in the phase; and what was there before says what is a stray
+    bool refills = args.unfills != 0u && (phase == PT_FILL_OCCLUDED || args.alone != 0u);
     if (index >= entries)
         return;
     change c = changed[index];
@@ -267,7 +314,7 @@ void main()
 
 #else
 
-// 5. Un-filling. changed[].id lists the entries to look at (all: the phase's first step), changed[].pixel those marked:
+// 6. Un-filling. changed[].id lists the entries to look at (all: the phase's first step), changed[].pixel those marked:
 // an entry whose pixel shows four consecutive white cells ...
 #if STEP == 4
 
@@ -285,6 +332,10 @@ void main()
     uint white = 0u;
     for (int d = 0; d < 8; d++)
         white |= uint(!(z_at(size, place.x + ring[d].x, place.y + ring[d].y) < threshold)) << d;
+    if (args.alone != 0u && phase == PT_FILL_BACKGROUND && !pt_four_white(white))
+        for (int d = 0; d < 8; d++) // strays are white
+            if ((white >> d & 1u) == 0u && is_stray(args.view, place + ring[d]))
+                white |= 1u << d;
     if (pt_four_white(white))
         changed[atomicAdd(changed_count, 1u)].pixel = entry;
 }

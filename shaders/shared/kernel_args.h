@@ -380,6 +380,9 @@ struct push_args {
 // reach it, in the occluded phase of those that hide it; where none does it stays as it is. A surface reaches as far as
 // reach d_eff max(|n.v|, C) / footprint pixels of level 0, off the middle of a perspective view max(|ray.x|, |ray.y|, 1) times as
 // far, and PT_FILL_SLACK pixels of this level from where it was measured.
+// With `alone`, a covered pixel with nothing in its ring, of a surface that is dense at this level (as in push), is a stray: in the
+// background phase it is as white as an empty one. Fills go by what their step finds, so that holes around a lone point close;
+// un-fills by the state before the phase.
 struct fill_args {
     struct view_args view;
     uint32_t phases;     // PT_FILL_*, in their order
@@ -391,6 +394,7 @@ struct fill_args {
     float reach, disc_reach; // of points, and of discs beyond themselves; reach 0: as far as may be
     uint32_t discs_first;    // ids from here on are discs'
     uint32_t from_width;     // of the planes at level 0
+    uint32_t alone;          // 1: strays close nothing
 };
 
 // Lights in view space.

@@ -60,7 +60,7 @@ static struct planes check(struct harness *h, const struct picture *picture, con
 
 // reach: 0, or of points; discs, half of the ids, reach half as far.
 static void both_phases_within(struct harness *h, struct picture *picture, uint32_t level, uint32_t iterations,
-                               uint32_t unfills, uint32_t refined, float reach)
+                               uint32_t unfills, uint32_t refined, float reach, uint32_t alone)
 {
     // Extrapolated depths that nearly agree: made to be undecidable.
     int hard = refined && picture->kind != PICTURE_SURFACES && picture->kind != PICTURE_NOISE;
@@ -73,7 +73,8 @@ static void both_phases_within(struct harness *h, struct picture *picture, uint3
                              .reach = reach,
                              .disc_reach = 0.5f * reach,
                              .discs_first = picture->id_base + (uint32_t)(picture->count / 2),
-                             .from_width = picture->view.width};
+                             .from_width = picture->view.width,
+                             .alone = alone};
     uint64_t *keys = picture->keys;
     uint32_t *from = picture->from;
     for (uint32_t l = 0; l < level; l++)
@@ -91,15 +92,15 @@ static void both_phases_within(struct harness *h, struct picture *picture, uint3
                          (unsigned long long)filled.keys[i], filled.from[i]);
 }
 
-// As far as may be, and no farther than points reach.
+// As far as may be, and no farther than points reach; with strays and without.
 static void both_phases(struct harness *h, struct picture *picture, uint32_t level, uint32_t iterations,
                         uint32_t unfills, uint32_t refined)
 {
     struct picture same = *picture;
-    both_phases_within(h, &same, level, iterations, unfills, refined, 0.0f);
+    both_phases_within(h, &same, level, iterations, unfills, refined, 0.0f, 0);
     same = *picture;
-    both_phases_within(h, &same, level, iterations, unfills, refined, 0.43f);
-    both_phases_within(h, picture, level, iterations, unfills, refined, 1.37f);
+    both_phases_within(h, &same, level, iterations, unfills, refined, 0.43f, 1);
+    both_phases_within(h, picture, level, iterations, unfills, refined, 1.37f, 0);
 }
 
 static void kinds(struct harness *h)
@@ -227,6 +228,49 @@ static void disc(struct harness *h)
     harness_note(h, "disc of radius 60, 6 iterations: closed +%zu, paper +%zu pixels", grown, paper);
 }
 
+// Wherever points lie, some of them alone.
+static void strays_anywhere(struct harness *h)
+{
+    for (int kind = 0; kind < PICTURE_KINDS; kind++)
+        for (uint32_t n = 1; n <= 4; n += 3) {
+            struct rng rng = {40 + (uint64_t)kind};
+            struct picture picture = picture_random(h, &rng, picture_view(70, 90, kind % 2), (enum picture_kind)kind, 0.2);
+            for (size_t i = 0; i < picture.count; i++) // a third wide apart
+                picture.span[i] *= i % 3 ? 1.0f : 4.0f;
+            both_phases_within(h, &picture, 0, n, n - 1, 0, 0.0f, 1);
+        }
+}
+
+// What stands alone beside a disc is no part of it, unless its points lie as far apart.
+static void strays(struct harness *h)
+{
+    static const float spans[] = {0.5f, 3.0f}; // of pixels a unit wide
+    size_t grown[2] = {0, 0};
+    for (int sparse = 0; sparse < 2; sparse++) {
+        struct rng rng = {6};
+        struct picture picture = picture_random(h, &rng, picture_view(141, 141, 0), PICTURE_FLAT, 1.0);
+        picture.view.footprint = 1.0f;
+        for (size_t i = 0; i < picture.count; i++) {
+            const double x = (double)(i % 141) - 70.0, y = (double)(i / 141) - 70.0;
+            picture.deff[i] = picture.span[i] = spans[sparse];
+            picture.normal[4 * i + 3] = 1.0f;
+            if (x * x + y * y > 60.0 * 60.0)
+                picture.keys[i] = REF_EMPTY_KEY;
+        }
+        for (int i = 0; i < 40; i++) { // 3.5 pixels from its edge
+            const double angle = 6.283185307179586 * i / 40.0;
+            const size_t at = (size_t)(70.5 + 63.5 * sin(angle)) * 141 + (size_t)(70.5 + 63.5 * cos(angle));
+            picture.keys[at] = ref_key(5.0f, picture.id_base + (uint32_t)at);
+        }
+        struct fill_args args = {.view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 4, .unfills = 4, .from_width = 141, .alone = 1};
+        struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
+        for (size_t i = 0; i < picture.count; i++)
+            grown[sparse] += got.keys[i] != picture.keys[i];
+    }
+    harness_note(h, "40 strays beside a disc close %zu pixels, points that lie wide apart %zu", grown[0], grown[1]);
+    HARNESS_CHECK(h, grown[0] == 0 && grown[1] > 20);
+}
+
 // Reference alone: the masks as [D Figure 3] draws them, 223 of 256 patterns filled.
 static void sanity(struct harness *h)
 {
@@ -265,6 +309,8 @@ int main(int argc, char **argv)
         {"shapes of planes", shapes, 0},
         {"rectangle", rectangle, 0},
         {"a disc", disc, 0},
+        {"strays", strays, 0},
+        {"strays anywhere", strays_anywhere, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

@@ -50,15 +50,41 @@ static struct ref_range threshold_of(const struct phase *phase, const struct ref
     return ref_difference(pixel->z, distance(phase, pixel));
 }
 
-// Are `run` consecutive ring neighbours all white?
-static enum ref_truth has_white_run(const struct fill_args *args, const struct ref_pixel *pixels, int x, int y,
+// Whether a pixel within the rectangle stands alone in these: nothing is beside it, though its surface is dense at this level.
+static enum ref_truth is_stray(const struct phase *phase, const struct ref_pixel *pixels, int x, int y)
+{
+    const struct fill_args *args = phase->args;
+    const struct ref_pixel pixel = at(args, pixels, x, y);
+    const uint32_t *rect = args->view.rect;
+    if (!args->alone || phase->occluded || is_empty(&pixel) || x < (int)rect[0] || y < (int)rect[1] || x >= (int)rect[2] || y >= (int)rect[3])
+        return REF_NO;
+    int unsure = pixel.unsure;
+    for (int i = 0; i < 8; i++) {
+        const struct ref_pixel beside = at(args, pixels, x + ring_x[i], y + ring_y[i]);
+        if (!beside.unsure && !is_empty(&beside))
+            return REF_NO;
+        unsure |= beside.unsure;
+    }
+    if (unsure)
+        return REF_UNSURE;
+    const double limit = (double)PT_DENSE * ref_footprint(&args->view, pixel.z.lo) * (double)phase->normal[4 * (size_t)pixel.from + 3];
+    const double span = (double)phase->span[pixel.from];
+    if (fabs(span - limit) <= (TOL_LEVEL + TOL_UNIT) * limit)
+        return REF_UNSURE;
+    return span < limit ? REF_YES : REF_NO;
+}
+
+// Are `run` consecutive ring neighbours all white? Strays of `alone` are.
+static enum ref_truth has_white_run(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel *alone, int x, int y,
                                     struct ref_range threshold, int run)
 {
     enum ref_truth white[8], found = REF_NO;
     for (int i = 0; i < 8; i++) {
-        struct ref_pixel neighbour = at(args, pixels, x + ring_x[i], y + ring_y[i]);
+        struct ref_pixel neighbour = at(phase->args, pixels, x + ring_x[i], y + ring_y[i]);
         enum ref_truth dark = neighbour.unsure ? REF_UNSURE : ref_less(neighbour.z, threshold);
         white[i] = dark == REF_UNSURE ? REF_UNSURE : dark == REF_YES ? REF_NO : REF_YES;
+        if (white[i] == REF_NO)
+            white[i] = is_stray(phase, alone, x + ring_x[i], y + ring_y[i]);
     }
     for (int first = 0; first < 8; first++) {
         enum ref_truth all = REF_YES;
@@ -199,7 +225,7 @@ static struct ref_pixel fill_pixel(const struct phase *phase, const struct ref_p
     }
     if (is_empty(&pixel) == phase->occluded)
         return pixel;
-    enum ref_truth border = has_white_run(phase->args, pixels, x, y, threshold_of(phase, &pixel), 5);
+    enum ref_truth border = has_white_run(phase, pixels, pixels, x, y, threshold_of(phase, &pixel), 5);
     if (border == REF_YES)
         return pixel;
     *changed = border == REF_NO ? REF_YES : REF_UNSURE;
@@ -250,7 +276,7 @@ static int unfill_all(const struct phase *phase, const struct ref_pixel *origina
             after[i] = before[i];
             if (phase->filled[i] != 1)
                 continue;
-            enum ref_truth shown = has_white_run(phase->args, before, x, y, phase->threshold[i], 4);
+            enum ref_truth shown = has_white_run(phase, before, original, x, y, phase->threshold[i], 4);
             if (shown == REF_UNSURE)
                 after[i].unsure = 1;
             if (shown == REF_YES) {

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { SIZE = 288, ROUND = 4096, SEEDS = 3 };
 static const double radius = 120.0; // pixels
@@ -143,9 +144,51 @@ static void test_stray(void **state)
     patina_device_destroy(device);
 }
 
+// What a dense ball shows with `strays` points three pixels off its outline.
+static struct picture beside(patina_device *device, uint64_t strays)
+{
+    enum { COUNT = 500000, ACROSS = 160 };
+    const double eye[3] = {0.0, -3.0, 0.0}, target[3] = {0.0, 0.0, 0.0}, pixel = 2.0 * 3.0 * tan(22.9 * M_PI / 180.0) / ACROSS;
+    struct points ball = points_sphere(COUNT, 1.0, POINTS_NORMALS, 5), points = points_create(COUNT + strays, POINTS_NORMALS);
+    memcpy(points.position, ball.position, 3 * COUNT * sizeof *points.position);
+    memcpy(points.normal, ball.normal, 3 * COUNT * sizeof *points.normal);
+    for (uint64_t i = 0; i < strays; i++) {
+        const double angle = 2.0 * M_PI * (double)i / (double)strays, r = 3.0 / sqrt(3.0 * 3.0 - 1.0) + 3.0 * pixel;
+        points.position[3 * (COUNT + i)] = (float)(r * cos(angle));
+        points.position[3 * (COUNT + i) + 2] = (float)(r * sin(angle));
+        points.normal[3 * (COUNT + i) + 1] = -1.0f;
+    }
+    patina_cloud *cloud = points_upload(&points);
+    CHECK(patina_cloud_analyse(cloud, NULL, NULL), cloud);
+    patina_scene *scene = scene_of(cloud, NULL);
+    patina_camera camera = camera_perspective(eye, target, 45.8, ACROSS, ACROSS, 0.1, 1000.0);
+    patina_settings settings = settings_default(ACROSS, ACROSS);
+    struct picture picture = picture_render(device, scene, &camera, &settings);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+    points_free(&points);
+    points_free(&ball);
+    return picture;
+}
+
+// A stray beside an outline lights its own pixel and no other. Before, what lay between was closed.
+static void test_strays_beside(void **state)
+{
+    (void)state;
+    enum { STRAYS = 30 };
+    patina_device *device = support_device_first();
+    struct picture without = beside(device, 0), with = beside(device, STRAYS);
+    const uint64_t more = picture_count(&with) - picture_count(&without);
+    print_message("  %u strays light %u pixels\n", (unsigned)STRAYS, (unsigned)more);
+    picture_free(&with);
+    picture_free(&without);
+    assert_int_equal(more, STRAYS);
+    patina_device_destroy(device);
+}
+
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_density), cmocka_unit_test(test_stray)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_density), cmocka_unit_test(test_stray), cmocka_unit_test(test_strays_beside)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

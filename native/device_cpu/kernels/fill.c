@@ -289,7 +289,7 @@ static void restore_band(struct fill *fill, uint32_t band)
 
 // ---- steps -------------------------------------------------------------------------------------------------------------
 
-enum step { SCAN, DECIDE, APPLY, MARK, RESTORE };
+enum step { SCAN, FIND_STRAYS, LEAVE_ALONE, LEAVE_STRAYS, DECIDE, APPLY, MARK, RESTORE };
 
 struct step_job {
     struct fill *fill;
@@ -303,6 +303,9 @@ static void step_bands(void *context, uint32_t begin, uint32_t end, uint32_t thr
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(job->fill->call); band++)
         switch (job->step) {
         case SCAN: scan_band(job->fill, band); break;
+        case FIND_STRAYS: find_strays(job->fill, band); break;
+        case LEAVE_ALONE: leave_strays(job->fill, band, 1); break;
+        case LEAVE_STRAYS: leave_strays(job->fill, band, 0); break;
         case DECIDE: decide_band(job->fill, band); break;
         case APPLY: apply_band(job->fill, band); break;
         case MARK: mark_band(job->fill, band); break;
@@ -322,6 +325,8 @@ static void repeat(struct fill *fill, enum step look, enum step act, uint32_t mo
     fill->first = 1;
     for (uint32_t i = 0; i < most && !pt_cpu_cancelled(fill->call); i++) {
         atomic_store_explicit(&fill->changed, 0, memory_order_relaxed);
+        if (!fill->occluded && fill->closing != fill->covered)
+            run_step(fill, look == DECIDE ? LEAVE_ALONE : LEAVE_STRAYS);
         run_step(fill, look);
         run_step(fill, act);
         if (!atomic_load_explicit(&fill->changed, memory_order_relaxed))
@@ -338,7 +343,7 @@ static int allocate(struct fill *fill)
     const struct view_args *view = fill->view;
     struct entries *e = &fill->entries;
     size_t count = bands(fill);
-    uint64_t **const planes[] = { &fill->covered, &fill->suspect, &fill->filled, &fill->dirty, &fill->touched };
+    uint64_t **const planes[] = { &fill->covered, &fill->suspect, &fill->filled, &fill->dirty, &fill->touched, &fill->strays, &fill->closing };
     enum { PLANES = sizeof planes / sizeof *planes };
     fill->words = ((view->width + 65) / 64 + WORDS - 1) / WORDS * WORDS;
     // every pixel may be kept, and be filled again in this step
@@ -362,6 +367,20 @@ static int allocate(struct fill *fill)
     e->old_from = e->from + room;
     e->threshold = (float *)(e->old_from + room);
     return PATINA_OK;
+}
+
+// The background is closed by what is no stray.
+static void tell_strays(struct fill *fill, const size_t words)
+{
+    uint64_t *const own = fill->closing;
+    atomic_store_explicit(&fill->alone, 0, memory_order_relaxed);
+    if (fill->args->alone)
+        run_step(fill, FIND_STRAYS);
+    fill->closing = fill->covered;
+    if (!atomic_load_explicit(&fill->alone, memory_order_relaxed))
+        return;
+    fill->closing = own;
+    memset(own - fill->words - 1, 0, words * 8); // beyond the rectangle
 }
 
 static void run_phase(struct fill *fill, int occluded)
@@ -389,8 +408,10 @@ int PT_KERNEL_ENTRY(fill)(const struct pt_cpu_call *call)
     if (error)
         return error;
     run_step(&fill, SCAN);
-    if (args->phases & PT_FILL_BACKGROUND)
+    if (args->phases & PT_FILL_BACKGROUND) {
+        tell_strays(&fill, fill.words * (args->view.height + 2) + 2);
         run_phase(&fill, 0);
+    }
     if (args->phases & PT_FILL_OCCLUDED)
         run_phase(&fill, 1);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;

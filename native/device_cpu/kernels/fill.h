@@ -29,6 +29,7 @@ struct fill {
     // or the plane: words that follow each other are neighbours, whatever the row.
     uint64_t *covered, *suspect; // not empty; maybe occluded: as the planes were before, or filled since
     uint64_t *filled;            // in this phase
+    uint64_t *strays, *closing;  // alone before the phase where the surface is dense; covered, and no stray: the same where there are none
     uint64_t *dirty, *touched;   // changed by the last step; by this one
     size_t words;                // in a row; a multiple of WORDS
     struct entries entries;      // of all bands
@@ -36,7 +37,7 @@ struct fill {
     uint32_t *kept, *listed; // per band: entries of earlier steps, of occluded pixels; with those of this step
     int occluded;            // the phase
     int first;               // its first step
-    atomic_uint changed;
+    atomic_uint changed, alone; // alone: there are strays
 };
 
 static uint32_t bands(const struct fill *fill)
@@ -97,6 +98,13 @@ static inline void wider(const uint64_t *at, size_t words, vi_words *out)
 {
     const struct trio below = trio_of(at - words), own = trio_of(at), above = trio_of(at + words);
     *out = below.west | below.own | below.east | own.west | own.own | own.east | above.west | above.own | above.east;
+}
+
+// Which of 64 WORDS pixels have neighbours with bits.
+static inline void ring_of(const uint64_t *at, size_t words, vi_words *out)
+{
+    const struct trio below = trio_of(at - words), own = trio_of(at), above = trio_of(at + words);
+    *out = below.west | below.own | below.east | own.west | own.east | above.west | above.own | above.east;
 }
 
 // Which of 64 WORDS pixels have `length` consecutive ring neighbours without bits.

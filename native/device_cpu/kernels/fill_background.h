@@ -14,6 +14,69 @@ static inline uint32_t next_word(const struct fill *fill, uint32_t y, uint32_t w
     return word;
 }
 
+// ---- strays ----------------------------------------------------------------------------------------------------------------
+
+// Whether points of what the pixel shows lie closer than a pixel of this level or so.
+static int is_dense(const struct fill *fill, uint32_t x, uint32_t y)
+{
+    const struct view_args *view = fill->view;
+    const size_t at = (size_t)y * view->width + x;
+    const float z = pt_float((uint32_t)(fill->keys[at] >> 32)), width = view->footprint * (float)(1u << view->level);
+    const uint32_t source = fill->from[at];
+    return fill->span[source] < (PT_DENSE * (view->perspective ? width * z : width)) * fill->normals[4 * (size_t)source + 3];
+}
+
+// Finds what stands alone.
+static void find_strays(struct fill *fill, uint32_t band)
+{
+    const struct span span = band_words(fill, band);
+    const uint32_t *rect = fill->view->rect;
+    vi_words any = { 0 };
+    for (size_t i = span.begin; i < span.end; i += WORDS) {
+        vi_words beside;
+        ring_of(fill->covered + i, fill->words, &beside);
+        any |= *words_at(fill->strays + i) = *words_at(fill->covered + i) & ~beside;
+    }
+    if (!(any[0] | any[1] | any[2] | any[3]))
+        return;
+    uint32_t first, last, count = 0;
+    band_rows(fill, band, &first, &last);
+    for (uint32_t y = first; y < last; y++)
+        for (uint32_t word = 0; word < fill->words; word++) {
+            uint64_t *strays = fill->strays + y * fill->words + word;
+            for (uint64_t some = *strays; some; some &= some - 1) {
+                const uint32_t x = 64 * word + (uint32_t)__builtin_ctzll(some);
+                if (x < rect[0] || x >= rect[2] || !is_dense(fill, x, y))
+                    *strays &= ~bit_of(x);
+                else
+                    count++;
+            }
+        }
+    if (count)
+        atomic_store_explicit(&fill->alone, 1, memory_order_relaxed);
+}
+
+// What is covered, without them; `still`: without those that still stand alone.
+static void leave_strays(const struct fill *fill, uint32_t band, int still)
+{
+    uint32_t first, last;
+    band_rows(fill, band, &first, &last);
+    const size_t begin = (first - (first && !band)) * fill->words;
+    const size_t end = (last + (last == fill->view->rect[3] && last < fill->view->height)) * fill->words;
+    const struct span span = band_words(fill, band);
+    for (size_t i = begin; i < end; i += WORDS) {
+        vi_words beside = { 0 }, own = *words_at(fill->covered + i);
+        if (i >= span.begin && i < span.end) {
+            if (still)
+                ring_of(fill->covered + i, fill->words, &beside);
+            own &= ~(*words_at(fill->strays + i) & ~beside);
+        }
+        *words_at(fill->closing + i) = own;
+    }
+}
+
+// ---- filling ---------------------------------------------------------------------------------------------------------------
+
 // Lists what is to be filled.
 static size_t list_empty(const struct fill *fill, uint32_t band, size_t count)
 {
@@ -22,7 +85,7 @@ static size_t list_empty(const struct fill *fill, uint32_t band, size_t count)
     uint32_t first, last;
     for (size_t i = span.begin; i < span.end; i += WORDS) {
         vi_words run;
-        white_run(fill->covered + i, fill->words, 5, &run);
+        white_run(fill->closing + i, fill->words, 5, &run);
         *words_at(fill->touched + i) = ~(*words_at(fill->covered + i) | run);
     }
     band_rows(fill, band, &first, &last);
@@ -41,7 +104,7 @@ static void mark_empty(const struct fill *fill, uint32_t band)
     const struct span span = band_words(fill, band);
     for (size_t i = span.begin; i < span.end; i += WORDS) {
         vi_words run;
-        white_run(fill->covered + i, fill->words, 4, &run);
+        white_run(fill->closing + i, fill->words, 4, &run);
         *words_at(fill->touched + i) = *words_at(fill->filled + i) & run;
     }
 }
