@@ -26,6 +26,8 @@ WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
 LIGHTING = {"AUTO": 0, "UNLIT": 1, "LIT": 2}
 COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5}
 FREE_SPACE = {"OFF": 0, "SHOW": 1, "USE": 2}
+SOFT = {"OFF": 0, "ALL": 1}
+SOFT_MODEL = {"BASE": 0, "CONCENTRIC": 1, "EXPRESS": 2}
 SHADOW_OFF = {"NO_CAST": 1, "NO_RECEIVE": 2, "NO_SELF": 4}
 ALPHA = {"NONE": 0, "CLIP": 1, "BLEND": 2}
 CLIP_SHAPE = {"BOX": 0, "PLANE": 1}
@@ -137,7 +139,9 @@ class CloudStyle(Descriptor):
                 ("ramp_count", c_uint32), ("ramp_range", c_float * 2), ("exposure", c_float), ("contrast", c_float),
                 ("hidden_classes", c_uint32 * 8), ("clip_off", c_uint32), ("free_space", c_uint32),
                 ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float), ("mask", c_void_p),
-                ("grade", c_void_p), ("exact", c_uint32)]
+                ("grade", c_void_p), ("exact", c_uint32), ("was_padding", c_uint32), ("soft", c_uint32),
+                ("soft_model", c_uint32), ("soft_shells", c_uint32), ("soft_radius", c_float), ("soft_opacity", c_float),
+                ("soft_modulation", c_float)]
 
 
 class MeshStyle(Descriptor):

@@ -158,6 +158,9 @@ void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of ever
 void pt_plan_average(struct pt_builder *builder);
 int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance *instance);
 
+// soft.c: soft points over the picture.
+void pt_plan_soft(struct pt_builder *builder);
+
 // assess.c: certainty and thickness of what the picture shows.
 void pt_plan_assess(struct pt_builder *builder);
 

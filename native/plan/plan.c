@@ -694,11 +694,10 @@ static void plan_points(struct pt_builder *builder)
     if (plan->layers == 1)
         pt_skip(builder, "peel",
                 plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");
-    pt_skip(builder, "gather", "pictures show no soft points yet");
-    pt_skip(builder, "soft", "pictures show no soft points yet");
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
     set_background(&builder->scene->settings, background);
     pt_plan_ink(builder, background);
+    pt_plan_soft(builder);
     pt_plan_paper(builder);
     if (plan->layers == 1)
         put_together(builder);
@@ -711,7 +710,10 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
     builder->plan->light_count = 0;
     builder->plan->line_radius = 0.0f;
     pt_plan_clears(builder, 1);
+    if (builder->plan->soft_count)
+        pt_plan_sift(builder);
     plan_output(builder, PT_PLANE_COLOR_A);
+    pt_plan_soft(builder);
     pt_plan_paper(builder);
     put_together(builder);
     skip_rest(builder, reason, 0);
@@ -758,6 +760,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
         else
             plan_nothing(&builder, scene->mesh_count       ? "nothing is in view"
                                    : !scene->instance_count ? "the scene has no cloud"
+                                   : plan->soft_count       ? "everything in view is soft"
                                    : !plan->chunks          ? "the clouds have no points"
                                                             : "no cloud is in view");
         error = builder.failed;

@@ -14,7 +14,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 // Layers behind the first have keys, from and shading of their own: the passes of the picture show the first. Coarser levels
 // serve one layer after another. What a plane holds says kernels.def. No order here means anything.
 // X(name, format, size, slots, carried)
-//   size: WINDOW: the view's; CROP: the picture that callers read; TILES: of 16 x 16 pixels of the window
+//   size: WINDOW: the view's; CROP: the picture that callers read; TILES: of 16 x 16 pixels of the window; RECORDS: no pixels, but
+//         plan->soft_records of them; BINS: as many as these need
 //   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
 //   carried: from layer to layer
 #define PT_PLANES(X)                                  \
@@ -56,6 +57,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(SOURCE,           f32,   CROP,   ONE,    0)     \
     X(SHADOW,           f32,   CROP,   ONE,    0)     \
     X(LINES,            f32,   CROP,   ONE,    0)     \
+    X(SOFT_POINTS,      record, RECORDS, ONE,  0)     \
+    X(SOFT_BINS,        bins,  BINS,   ONE,    0)     \
     X(CERTAINTY,        f32,   CROP,   ONE,    0)     \
     X(THICKNESS,        f32,   CROP,   ONE,    0)     \
     X(LAYER_COMBINED,   f32x4, CROP,   LAYERS, 0)     \
@@ -69,7 +72,7 @@ enum pt_plane {
         PT_PLANE_COUNT
 };
 
-enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_CROP, PT_SIZE_TILES };
+enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_CROP, PT_SIZE_TILES, PT_SIZE_RECORDS, PT_SIZE_BINS };
 enum pt_plane_slots { PT_SLOTS_ONE, PT_SLOTS_LEVELS, PT_SLOTS_LAYERS };
 
 struct pt_plane_row {
@@ -88,14 +91,17 @@ static inline int pt_of_picture(enum pt_plane plane)
     return pt_plane_rows[plane].size == PT_SIZE_CROP && pt_plane_rows[plane].slots == PT_SLOTS_ONE;
 }
 
+// Of 16 bytes: what is counted, and for each record its keys on the processor, and lists: a tile's always fits.
+enum { PT_SOFT_BINS_HEAD = 4, PT_SOFT_BINS_EACH = 3 };
+
 enum { PT_SLOTS = 16 }; // levels or layers that a plane may have
 _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_SLOTS, "planes have too few slots");
 
 // PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole; PT_MASK to
-// the instance's mask.
+// the instance's mask. PT_FIELD: of points that are all soft, their radii; PT_FIELD_ONE: likewise, radii of 1.
 enum pt_instance_buffer {
     PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES, PT_SHAPES, PT_SIGHTS,
-    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN, PT_MASK
+    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN, PT_MASK, PT_FIELD, PT_FIELD_ONE
 };
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
@@ -159,6 +165,14 @@ struct pt_plan_instance {
     int marked;             // shown with what stations saw through in magenta
 };
 
+// What one pass draws of the soft points: rows of the picture, a slab of depth, and which instances of the plan hold its points.
+struct pt_soft_part {
+    uint32_t rows[2];
+    float z_from, z_to;
+    uint32_t first, count; // of plan->instances
+    uint32_t records;
+};
+
 struct pt_plan_mesh {
     const struct pt_mesh_instance *instance;
     struct mesh_args args;
@@ -200,8 +214,12 @@ struct pt_plan {
     uint32_t crop[4];       // x, y, width, height of the picture in the planes
     uint32_t pixel_offset[2]; // of the crop in the full picture
     uint32_t guard;           // pixels by which the padded picture is wider on each side
-    struct pt_plan_instance *instances;
+    struct pt_plan_instance *instances; // behind those that the count counts: soft ones, whole, and then what parts draw of them
     uint32_t instance_count;
+    uint32_t soft_count, soft_entries; // soft instances in view; those and what parts draw
+    struct pt_soft_part *soft_parts;   // those farther away first, rows beside each other
+    uint32_t soft_part_count;
+    uint32_t soft_records;             // room for the largest part
     uint32_t discs_first, discs_count; // ids whose points are discs
     int sigmas;  // some points know how thick their surface is: d_eff follows it, and the span plane holds
     int reaches; // points know how far they spread: holes are closed no farther
@@ -260,7 +278,7 @@ double pt_thinning(const struct patina_scene *scene);
 // Times an instance's spacing of a class of sigma: a thickness, world units. Strata that are left out make nothing thicker.
 static inline float pt_sigma_scale(const struct patina_scene *scene) { return (float)(1.0 / (16.0 * pt_thinning(scene))); }
 
-// Is there anything in view?
+// Is there anything in view that is no soft point?
 static inline int pt_plan_shows(const struct pt_plan *plan) { return plan->points_scattered || plan->triangles; }
 
 // Every pointer inside belongs to the plan; the clouds must outlive it. Message on the scene when it fails.
@@ -291,6 +309,9 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
 // mesh.c: the image of a mesh, as a picture or a light sees it.
 void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out);
+// soft.c, once the window is known: soft instances in view, and their parts.
+struct pt_eye;
+int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_eye *eye);
 // reopen.c, once the layers are known: plan->reopens.
 uint32_t pt_reopen_rounds(const struct patina_scene *scene, const struct pt_plan *plan);
 int pt_reopen_asked(const struct pt_instance *instance); // whether what its stations saw is needed

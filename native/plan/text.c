@@ -22,6 +22,11 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
         size[1] = plan->crop[3];
         return;
     }
+    if (row->size == PT_SIZE_RECORDS || row->size == PT_SIZE_BINS) {
+        size[0] = row->size == PT_SIZE_RECORDS ? plan->soft_records : PT_SOFT_BINS_HEAD + PT_SOFT_BINS_EACH * plan->soft_records;
+        size[1] = 1;
+        return;
+    }
     struct view_args view = pt_view_at(plan, row->slots == PT_SLOTS_LEVELS || row->size == PT_SIZE_TILES ? level : 0);
     size[0] = view.width;
     size[1] = view.height;

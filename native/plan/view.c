@@ -8,6 +8,7 @@
 #include "plan.h"
 
 #include "expected.h"
+#include "eye.h"
 #include "lines.h"
 #include "scene/clip.h"
 
@@ -23,149 +24,14 @@
 // show what lies behind, in 6 % of a patch of a carved relief whose points lie 2.6 pixels apart.
 #define SPARSE 2.1
 
-struct camera {
-    double axes[9], position[3];
-    double xs, ys;         // window units a pixel
-    double near_clip, far_clip;
-    double left, bottom;   // of the padded picture
-    int orthographic;
-    double width, height;  // padded picture, pixels
-};
-
-// Where a box lies.
-struct extent {
-    double rect[4];            // on screen, pixels
-    double z_middle, z_beyond; // of its part before the eye; nothing lies beyond
-    double share;              // how much of it lies before the eye
-};
-
 // One chunk in view, before it is known which window the planes get.
 struct seen {
     uint32_t chunk;
     uint32_t cull, away; // test each point's normal; every point faces away
-    struct extent extent;  // on screen in pixels of the picture without its padding
+    struct pt_extent extent;  // on screen in pixels of the picture without its padding
     double spacing_px, area_px;
     uint32_t wide; // its points are discs
 };
-
-struct object {
-    double linear[9], translation[3]; // world from object
-    double view[9];                   // camera axes x linear
-    double inverse[9];                // object from world, linear part; valid when !singular
-    double eye[4];                    // in its coordinates: xyz and 1, or the direction towards the viewer and 0
-    double scale;                     // largest stretch
-    int singular;
-};
-
-// As fmin and fmax, which are calls; the second where one is not a number.
-static inline double least(double a, double b) { return a < b ? a : b; }
-static inline double most(double a, double b) { return a > b ? a : b; }
-
-// ---- camera and objects ------------------------------------------------------------------------------------------------
-
-static int set_camera(const struct patina_scene *scene, struct camera *camera)
-{
-    const patina_camera *c = &scene->camera;
-    const patina_settings *s = &scene->settings;
-    if (pt_camera_axes(c, camera->axes, camera->position))
-        return pt_fail_again(&scene->handle, PATINA_ERROR_ARGUMENT);
-    camera->orthographic = c->orthographic != 0;
-    camera->xs = (c->right - c->left) / s->width;
-    camera->ys = (c->top - c->bottom) / s->height;
-    camera->left = c->left;
-    camera->bottom = c->bottom;
-    camera->near_clip = c->near_clip;
-    camera->far_clip = c->far_clip;
-    camera->width = s->width;
-    camera->height = s->height;
-    return PATINA_OK;
-}
-
-static void pad_camera(struct camera *camera, uint32_t guard)
-{
-    camera->left -= guard * camera->xs;
-    camera->bottom -= guard * camera->ys;
-    camera->width += 2.0 * guard;
-    camera->height += 2.0 * guard;
-}
-
-static void set_object(const struct camera *camera, const double world_from_object[16], struct object *object)
-{
-    pt_split_matrix(world_from_object, object->linear, object->translation);
-    pt_multiply(camera->axes, object->linear, object->view);
-    double size = 0.0, determinant = pt_invert(object->linear, object->inverse);
-    object->scale = 0.0;
-    for (int c = 0; c < 3; c++) {
-        double column[3] = { object->linear[c], object->linear[3 + c], object->linear[6 + c] };
-        object->scale = fmax(object->scale, sqrt(pt_dot(column, column)));
-    }
-    size = object->scale * object->scale * object->scale;
-    object->singular = !(fabs(determinant) > 1e-14 * size) || !(size > 0.0);
-    if (object->singular)
-        memset(object->inverse, 0, sizeof object->inverse);
-    double offset[3];
-    for (int k = 0; k < 3; k++)
-        offset[k] = camera->position[k] - object->translation[k];
-    pt_apply(object->inverse, camera->orthographic ? camera->axes + 6 : offset, object->eye);
-    object->eye[3] = camera->orthographic ? 0.0 : 1.0;
-}
-
-// Normals are covectors: the inverse transposed, which also keeps "outward" under mirroring. Scaled to about 1.
-static void normal_matrix(const struct camera *camera, const struct object *object, float out[9])
-{
-    double cofactors[9], product[9], largest = 0.0;
-    pt_cofactors(object->linear, cofactors);
-    double sign = pt_dot(object->linear, cofactors) < 0.0 ? -1.0 : 1.0;
-    pt_multiply(camera->axes, cofactors, product);
-    for (int i = 0; i < 9; i++)
-        largest = fmax(largest, fabs(product[i]));
-    for (int i = 0; i < 9; i++) // a singular object has no normals
-        out[i] = object->singular || !(largest > 0.0) ? 0.0f : (float)(sign * product[i] / largest);
-}
-
-// What makes the normal matrix the inverse transposed, times the largest stretch.
-static float axis_scale(const struct camera *camera, const struct object *object)
-{
-    double cofactors[9], product[9], largest = 0.0;
-    pt_cofactors(object->linear, cofactors);
-    pt_multiply(camera->axes, cofactors, product);
-    for (int i = 0; i < 9; i++)
-        largest = fmax(largest, fabs(product[i]));
-    return object->singular ? 1.0f : (float)(largest * object->scale / fabs(pt_dot(object->linear, cofactors)));
-}
-
-// The product's rows, the same for every chunk of an object: screen X, Y (perspective: times z) and z.
-static void product_rows(const struct camera *camera, const struct object *object, double rows[9])
-{
-    const double sx = 1.0 / camera->xs, sy = 1.0 / camera->ys;
-    const double ox = -camera->left * sx, oy = -camera->bottom * sy; // pixel of the axis
-    const double *v = object->view;
-    for (int c = 0; c < 3; c++) {
-        rows[c] = sx * v[c];
-        rows[3 + c] = sy * v[3 + c];
-        rows[6 + c] = -v[6 + c];
-        if (!camera->orthographic) {
-            rows[c] += ox * rows[6 + c];
-            rows[3 + c] += oy * rows[6 + c];
-        }
-    }
-}
-
-// The product's translation: of the chunk's origin.
-static void chunk_translation(const struct camera *camera, const struct object *object, const struct pt_chunk *chunk,
-                              double translation[3])
-{
-    double world[3], view[3];
-    pt_apply(object->linear, chunk->origin, world);
-    for (int k = 0; k < 3; k++) // subtract first: the difference is exact where 5e6 m cancel
-        world[k] = (world[k] + object->translation[k]) - camera->position[k];
-    pt_apply(camera->axes, world, view);
-    const double sx = 1.0 / camera->xs, sy = 1.0 / camera->ys;
-    const double ox = -camera->left * sx, oy = -camera->bottom * sy;
-    translation[2] = camera->orthographic ? -view[2] - camera->near_clip : -view[2];
-    translation[0] = sx * view[0] + ox * (camera->orthographic ? 1.0 : translation[2]);
-    translation[1] = sy * view[1] + oy * (camera->orthographic ? 1.0 : translation[2]);
-}
 
 // ---- culling -----------------------------------------------------------------------------------------------------------
 
@@ -175,7 +41,7 @@ static double radius_most(const struct pt_instance *instance, double thinned)
     return fmin(0.5 * (double)instance->style.largest_gap * thinned, (double)PT_DISC_MOST);
 }
 
-static double own_reach(const struct pt_instance *instance, const struct object *object, const struct pt_chunk *chunk,
+static double own_reach(const struct pt_instance *instance, const struct pt_object *object, const struct pt_chunk *chunk,
                         double thinned, int most)
 {
     if (instance->style.radius > 0.0f)
@@ -188,7 +54,7 @@ static double own_reach(const struct pt_instance *instance, const struct object 
 }
 
 // Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
-static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct object *object,
+static double disc_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object,
                          const struct pt_chunk *chunk, double thinned, int most)
 {
     if (!pt_knows_discs(scene, instance))
@@ -197,99 +63,7 @@ static double disc_reach(const struct patina_scene *scene, const struct pt_insta
     return limit > 0.0 ? fmin(reach, limit) : reach;
 }
 
-// Whether a box lies beyond one side of the view, its part behind the camera too, where the screen bounds nothing. q: of its
-// corners, screen X and Y times z, and z, each off by `error` at most. A pixel narrower than exact.
-static int lies_beside(const struct camera *camera, double q[3][8], const double error[3], double reach)
-{
-    for (int k = 0; k < 2; k++) {
-        const double size = k ? camera->height : camera->width, scale = 1.0 / (k ? camera->ys : camera->xs);
-        const double wide = error[k] + reach * scale * (1.0 + fabs(k ? camera->bottom : camera->left)), deep = error[2] + reach;
-        int low = 0, high = 0;
-        for (int i = 0; i < 8; i++) {
-            const double pixel = fabs(q[2][i]) + deep;
-            low += q[k][i] + pixel + wide < 0.0;
-            high += q[k][i] - size * (q[2][i] + deep) - pixel - wide > 0.0;
-        }
-        if (low == 8 || high == 8)
-            return 1;
-    }
-    return 0;
-}
-
-// Extent of the chunk's box and what lies within `reach` of it, on screen a pixel wider than exact and not cut off at the
-// picture's; 0 when it is outside the view.
-static int chunk_bounds(const struct camera *camera, const struct pt_chunk *chunk, const double rows[9],
-                        const double translation[3], double reach, struct extent *out)
-{
-    double *const rect = out->rect;
-    const double z_far = camera->orthographic ? camera->far_clip - camera->near_clip : camera->far_clip;
-    const double z_near = camera->orthographic ? 0.0 : camera->near_clip;
-    double z_min = INFINITY, z_max = -INFINITY, q[3][8]; // of the corners
-    double error[3], slop; // what float32 may move a point by: where |R p| is large beside the sum, more than a pixel
-    rect[0] = rect[1] = INFINITY;
-    rect[2] = rect[3] = -INFINITY;
-    for (int k = 0; k < 3; k++) {
-        double part[3][2];
-        error[k] = fabs(translation[k]);
-        for (int c = 0; c < 3; c++) {
-            part[c][0] = rows[3 * k + c] * (double)chunk->box_min[c];
-            part[c][1] = rows[3 * k + c] * (double)chunk->box_max[c];
-            error[k] += most(fabs(part[c][0]), fabs(part[c][1]));
-        }
-        error[k] *= 0x1p-21;
-        for (int i = 0; i < 8; i++)
-            q[k][i] = ((part[0][i & 1] + part[1][i >> 1 & 1]) + part[2][i >> 2]) + translation[k];
-    }
-    for (int i = 0; i < 8; i++) {
-        z_min = least(q[2][i], z_min);
-        z_max = most(q[2][i], z_max);
-        double w = camera->orthographic ? 1.0 : q[2][i];
-        for (int k = 0; k < 2 && w > 0.0; k++) {
-            double at = q[k][i] / w;
-            rect[k] = least(at - 1.0, rect[k]);
-            rect[2 + k] = most(at + 1.0, rect[2 + k]);
-        }
-    }
-    slop = 1e-5 * (fabs(z_min) + fabs(z_max)) + error[2];
-    out->z_middle = 0.5 * (most(z_min, z_near) + most(z_max, z_near));
-    out->z_beyond = z_max + slop + reach;
-    out->share = z_min < z_near ? (z_max - z_near) / (z_max - z_min) : 1.0;
-    const double nearest_z = z_min - reach;
-    if (!(z_max + slop >= z_near) || !(z_min - slop <= z_far))
-        return 0;
-    double nearest = camera->orthographic ? 1.0 : most(nearest_z, z_near) - error[2];
-    for (int k = 0; k < 2; k++) {
-        double far = most(fabs(rect[k]), fabs(rect[2 + k])), wider = INFINITY;
-        if (camera->orthographic)
-            wider = error[k];
-        else if (nearest > 0.0)
-            wider = (error[k] + far * error[2]) / nearest + far * 0x1p-20;
-        // sideways, and along the view at the rim's slope
-        double step = k ? camera->ys : camera->xs, start = k ? camera->bottom : camera->left;
-        double slope = most(fabs(start + step * rect[k]), fabs(start + step * rect[2 + k]));
-        if (reach > 0.0)
-            wider += camera->orthographic ? reach / step : reach * (1.0 + slope) / (step * most(nearest, 0.0));
-        rect[k] -= wider;
-        rect[2 + k] += wider;
-    }
-    if (!camera->orthographic && nearest_z < z_near) { // corners behind the camera bound nothing
-        rect[0] = rect[1] = -INFINITY;
-        rect[2] = rect[3] = INFINITY;
-        return !lies_beside(camera, q, error, reach);
-    }
-    // what is not a number bounds nothing
-    return !(rect[0] >= camera->width || rect[1] >= camera->height || rect[2] <= 0.0 || rect[3] <= 0.0);
-}
-
 enum facing { FACES_AWAY, FACES_BOTH, FACES_US };
-
-// The object's, in the chunk's coordinates.
-static void chunk_eye(const struct object *object, const struct pt_chunk *chunk, double eye[4])
-{
-    eye[3] = object->eye[3];
-    for (int k = 0; k < 3; k++)
-        eye[k] = eye[3] > 0.0 ? object->eye[k] - chunk->origin[k] : object->eye[k];
-}
 
 // How the chunk's normals lie towards the eye, by their cone: the angle between its axis and the direction to the eye, and
 // how far any normal and direction may be from these; a thousandth of a radian of caution. 0 when nothing is known.
@@ -309,8 +83,8 @@ static int chunk_angles(const struct pt_chunk *chunk, const double eye[4], doubl
     radius = eye[3] > 0.0 ? sqrt(radius) : 0.0;
     if (!(distance > radius))
         return 0;
-    *angle = acos(most(least(pt_dot(axis, towards) / distance, 1.0), -1.0));
-    *spread = acos(most((double)chunk->cone_cosine, -1.0)) + asin(radius / distance) + 1e-3;
+    *angle = acos(pt_most(pt_least(pt_dot(axis, towards) / distance, 1.0), -1.0));
+    *spread = acos(pt_most((double)chunk->cone_cosine, -1.0)) + asin(radius / distance) + 1e-3;
     return 1;
 }
 
@@ -330,29 +104,19 @@ static double chunk_cosine(int known, double angle, double spread)
     if (!known)
         return 1.0;
     angle = angle > right_angle ? 2.0 * right_angle - angle : angle;
-    return most(cos(most(angle - spread, 0.0)), (double)PT_COSINE_FLOOR);
+    return pt_most(cos(pt_most(angle - spread, 0.0)), (double)PT_COSINE_FLOOR);
 }
 
 // ---- the chunks in view ------------------------------------------------------------------------------------------------
 
 struct survey {
-    struct camera camera;
+    struct pt_eye camera;
     struct pt_sieve *sieves; // per instance
-    struct object *objects;
+    struct pt_object *objects;
     struct seen **seen; // per instance
     uint32_t *seen_count;
     int points, discs; // some chunk's points are drawn as such
 };
-
-// How many of a chunk's points the settings ask for: whole vectors, for the processor draws no part of one.
-static uint32_t drawn_points(const struct patina_scene *scene, const struct pt_chunk *chunk)
-{
-    uint32_t strata = scene->settings.strata;
-    if (!strata || strata == PT_STRATA)
-        return chunk->count;
-    uint32_t count = (pt_chunk_prefix(chunk, strata) + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
-    return count < chunk->count ? count : chunk->count;
-}
 
 double pt_thinning(const struct patina_scene *scene)
 {
@@ -370,19 +134,19 @@ static int is_transparent(const struct pt_instance *instance)
 
 // How much wider than usual the view draws outward what it sees away from its middle, 1 / cosine of the angle to it, at the place of the
 // box that is farthest out and in the picture; depth: the z there, of a place as far from the eye as the box's middle.
-static double stretch_of(const struct camera *camera, const struct extent *extent, double *depth)
+static double stretch_of(const struct pt_eye *camera, const struct pt_extent *extent, double *depth)
 {
     double middle = 1.0, out = 1.0;
     for (int k = 0; k < 2; k++) {
         const double size = k ? camera->height : camera->width, start = k ? camera->bottom : camera->left, step = k ? camera->ys : camera->xs;
-        const double low = start + step * least(most(extent->rect[k], 0.0), size);
-        const double high = start + step * least(most(extent->rect[2 + k], 0.0), size);
-        const double farther = most(fabs(low), fabs(high));
+        const double low = start + step * pt_least(pt_most(extent->rect[k], 0.0), size);
+        const double high = start + step * pt_least(pt_most(extent->rect[2 + k], 0.0), size);
+        const double farther = pt_most(fabs(low), fabs(high));
         middle += 0.25 * (low + high) * (low + high);
         out += farther * farther;
     }
-    *depth = camera->orthographic ? 1.0 : extent->z_middle * least(USUAL_STRETCH * sqrt(middle / out), 1.0);
-    return camera->orthographic ? 1.0 : most(sqrt(out) / USUAL_STRETCH, 1.0);
+    *depth = camera->orthographic ? 1.0 : extent->z_middle * pt_least(USUAL_STRETCH * sqrt(middle / out), 1.0);
+    return camera->orthographic ? 1.0 : pt_most(sqrt(out) / USUAL_STRETCH, 1.0);
 }
 
 // Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
@@ -392,10 +156,10 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
 {
     const struct pt_instance *instance = &scene->instances[i];
     const struct patina_cloud *cloud = instance->cloud;
-    const struct camera *camera = &survey->camera;
-    struct object *object = &survey->objects[i];
+    const struct pt_eye *camera = &survey->camera;
+    struct pt_object *object = &survey->objects[i];
     int transparent = is_transparent(instance), layered = transparent || scene->settings.layer_passes;
-    set_object(camera, instance->style.world_from_object, object);
+    pt_object_of(camera, instance->style.world_from_object, object);
     int cull = instance->style.cull_back && cloud->info.normals_oriented && !object->singular && !transparent;
     struct seen *list = pt_arena_take(&plan->arena, (cloud->chunk_count + 1) * sizeof *list);
     struct pt_inverse_clip *clips = pt_arena_take(&plan->arena, (scene->clip_count + 1) * sizeof *clips);
@@ -405,8 +169,8 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     survey->sieves[i] = pt_sieve_make(scene, instance, clips);
     const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
-    product_rows(camera, object, rows);
-    for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f; c++) {
+    pt_object_rows(camera, object, rows);
+    for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f && !instance->style.soft; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         struct seen seen = { .chunk = c };
         double translation[3], eye[4], angle = 0.0, spread = 0.0;
@@ -414,13 +178,13 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
             plan->chunks_clipped++;
             continue;
         }
-        chunk_eye(object, chunk, eye);
+        pt_chunk_eye(object, chunk, eye);
         int known = !object->singular && chunk_angles(chunk, eye, &angle, &spread);
         enum facing facing = chunk_facing(known, angle, spread);
         if (cull && facing == FACES_AWAY)
             continue;
-        chunk_translation(camera, object, chunk, translation);
-        if (!chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), &seen.extent))
+        pt_chunk_translation(camera, object, chunk, translation);
+        if (!pt_chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), 0, &seen.extent))
             continue;
         double rim;
         const double stretch = stretch_of(camera, &seen.extent, &rim);
@@ -428,16 +192,16 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
             seen.extent.rect[k] -= AROUND;
         seen.cull = cull && facing == FACES_BOTH;
         seen.away = facing == FACES_AWAY && !layered;
-        const double pixel = most(camera->xs, camera->ys), middle = seen.extent.z_middle;
+        const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
         double footprint = pixel * (camera->orthographic ? 1.0 : middle);
         // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
-        double nearest = plan->map && !camera->orthographic ? pixel * most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle) : footprint;
-        uint32_t count = drawn_points(scene, chunk);
+        double nearest = plan->map && !camera->orthographic ? pixel * pt_most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle) : footprint;
+        uint32_t count = pt_drawn_points(scene, chunk);
         double thinned = sqrt((double)chunk->count / count);
         seen.spacing_px = thinned * (double)chunk->spacing * object->scale / nearest *
                           sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
-        seen.area_px = least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
+        seen.area_px = pt_least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         const double reach = disc_reach(scene, instance, object, chunk, apart, 0) * stretch;
         seen.wide = scene->settings.surface == PATINA_SURFACE_SPLATS || reach > wide * pixel * rim ||
                     (reach > 0.0 && seen.spacing_px > SPARSE * pt_finer(scene));
@@ -499,7 +263,7 @@ static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
     return PATINA_OK;
 }
 
-static void set_view(const struct camera *camera, struct view_args *view)
+static void set_view(const struct pt_eye *camera, struct view_args *view)
 {
     view->perspective = !camera->orthographic;
     view->z_near = camera->orthographic ? 0.0f : (float)camera->near_clip;
@@ -513,90 +277,6 @@ static void set_view(const struct camera *camera, struct view_args *view)
 
 // ---- what kernels get ----------------------------------------------------------------------------------------------------
 
-static void set_product(const double rows[9], const double translation[3], float row[9], float hi[3], float lo[3])
-{
-    for (int k = 0; k < 9; k++)
-        row[k] = (float)rows[k];
-    for (int k = 0; k < 3; k++) {
-        hi[k] = (float)translation[k];
-        lo[k] = (float)(translation[k] - (double)hi[k]);
-    }
-}
-
-static void set_chunk(const struct camera *camera, const struct object *object, const double rows[9],
-                      const struct pt_instance *instance, const struct pt_chunk *chunk, uint32_t count, uint32_t cull,
-                      struct chunk_view *out)
-{
-    double translation[3], eye[4] = { 0 };
-    chunk_translation(camera, object, chunk, translation);
-    set_product(rows, translation, out->row, out->hi, out->lo);
-    if (cull)
-        chunk_eye(object, chunk, eye);
-    for (int k = 0; k < 4; k++)
-        out->eye[k] = (float)eye[k];
-    out->first = chunk->first;
-    out->count = count;
-    out->padded = chunk->padded;
-    out->cull = cull;
-    out->id_base = instance->id_base;
-}
-
-#define LARGEST_LAYER 1e30f
-
-static void set_instance(const struct camera *camera, const struct object *object, const struct pt_instance *instance,
-                         double thinned, struct instance_args *args)
-{
-    const struct patina_cloud *cloud = instance->cloud;
-    const patina_cloud_style *style = &instance->style;
-    args->id_base = instance->id_base;
-    args->id_count = (uint32_t)cloud->slots;
-    args->has_normals = cloud->info.has_normals;
-    args->color_format = cloud->color_format ? cloud->color_format : pt_is_marked(instance) ? PT_COLOR_FLOAT : PT_COLOR_NONE;
-    args->lit = style->lighting == PATINA_LIGHTING_LIT;
-    args->shininess = style->shininess;
-    args->opacity = 1.0f - style->transparency;
-    args->has_opacities = cloud->info.has_opacities;
-    args->ambient = style->ambient;
-    args->diffuse = style->diffuse;
-    args->specular = style->specular;
-    memcpy(args->color, style->color, sizeof args->color);
-    // finite with all that they are multiplied by: within an infinite layer distance empty pixels would be neighbours
-    args->d_min = fminf(style->d_min, LARGEST_LAYER);
-    normal_matrix(camera, object, args->normal_matrix);
-    args->axis_scale = axis_scale(camera, object);
-    for (uint32_t k = 0; k < PT_SPACINGS; k++)
-        args->spacing[k] = (float)fmin(thinned * cloud->spacing_base * pt_spacing_of_class(k) * object->scale,
-                                       LARGEST_LAYER);
-}
-
-static void join_rect(uint32_t rect[4], const uint32_t other[4])
-{
-    if (rect[0] >= rect[2]) {
-        memcpy(rect, other, 4 * sizeof *rect);
-        return;
-    }
-    for (int k = 0; k < 2; k++) {
-        rect[k] = other[k] < rect[k] ? other[k] : rect[k];
-        rect[2 + k] = other[2 + k] > rect[2 + k] ? other[2 + k] : rect[2 + k];
-    }
-}
-
-// The part of bounds, in a picture padded by `pad` less than the planes' one, that the planes hold; 0 when none.
-static int rect_in_window(const struct view_args *view, const double bounds[4], uint32_t pad, uint32_t rect[4])
-{
-    const double origin[2] = { (double)view->origin_x - pad, (double)view->origin_y - pad };
-    const double size[2] = { view->width, view->height };
-    for (int k = 0; k < 2; k++) { // cut first: what is left is whole numbers that fit
-        double first = most(bounds[k] - origin[k], 0.0), last = least(bounds[2 + k] - origin[k], size[k]);
-        if (!(last > 0.0) || !(first < size[k]))
-            return 0;
-        rect[k] = (uint32_t)first;
-        rect[2 + k] = (uint32_t)last;
-        rect[2 + k] += (double)rect[2 + k] < last;
-    }
-    return rect[0] < rect[2] && rect[1] < rect[3];
-}
-
 // Instance i of the scene, its wide chunks or the others. Ids are moved by id_base.
 static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i,
                         uint32_t wide, uint32_t id_base, struct pt_plan_instance *out)
@@ -609,34 +289,34 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     out->radius = (float)fmin((double)instance->style.radius * pt_thinning(scene), (double)PT_DISC_MOST);
     out->radius_most = (float)radius_most(instance, pt_thinning(scene));
     out->radius_scale = (float)fmin(survey->objects[i].scale * pt_thinning(scene), (double)PT_DISC_MOST);
-    set_instance(&survey->camera, &survey->objects[i], instance, pt_thinning(scene), &out->args);
+    pt_set_instance(&survey->camera, &survey->objects[i], instance, pt_thinning(scene), &out->args);
     out->args.id_base += id_base;
     out->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *out->bounds);
     if (!out->chunks || !out->bounds)
         return PATINA_ERROR_MEMORY;
     double rows[9];
-    product_rows(&survey->camera, &survey->objects[i], rows);
+    pt_object_rows(&survey->camera, &survey->objects[i], rows);
     for (uint32_t k = 0; k < survey->seen_count[i]; k++) {
         const struct seen *seen = &survey->seen[i][k];
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
         uint32_t *rect = out->bounds[out->chunk_count].rect;
-        if (seen->wide != wide || !rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
+        if (seen->wide != wide || !pt_rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
             continue;
-        uint32_t count = drawn_points(scene, chunk);
+        uint32_t count = pt_drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
-        set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
+        pt_set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
                   &out->chunks[out->chunk_count]);
         out->chunks[out->chunk_count].id_base += id_base;
         out->chunks[out->chunk_count].row_first = rect[1];
         out->chunks[out->chunk_count].row_end = rect[3];
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
-        join_rect(out->rect, rect);
+        pt_join_rect(out->rect, rect);
         out->points += count;
         plan->points_scattered += count;
     }
-    join_rect(plan->view.rect, out->rect);
+    pt_join_rect(plan->view.rect, out->rect);
     plan->chunks_culled -= out->chunk_count;
     return PATINA_OK;
 }
@@ -657,23 +337,23 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     return error;
 }
 
-static void place_mesh(struct pt_plan *plan, const struct camera *camera, const struct pt_mesh_instance *instance,
+static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const struct pt_mesh_instance *instance,
                        uint32_t id_base, struct pt_plan_mesh *out)
 {
     const struct patina_mesh *mesh = instance->mesh;
-    struct object object;
+    struct pt_object object;
     double rows[9], translation[3];
-    struct extent extent;
+    struct pt_extent extent;
     *out = (struct pt_plan_mesh){ .instance = instance };
-    set_object(camera, instance->style.world_from_object, &object);
-    product_rows(camera, &object, rows);
-    chunk_translation(camera, &object, &mesh->box, translation);
-    if (!pt_mesh_drawn(mesh) || !chunk_bounds(camera, &mesh->box, rows, translation, 0.0, &extent) ||
-        !rect_in_window(&plan->view, extent.rect, 0, out->rect))
+    pt_object_of(camera, instance->style.world_from_object, &object);
+    pt_object_rows(camera, &object, rows);
+    pt_chunk_translation(camera, &object, &mesh->box, translation);
+    if (!pt_mesh_drawn(mesh) || !pt_chunk_bounds(camera, &mesh->box, rows, translation, 0.0, 0, &extent) ||
+        !pt_rect_in_window(&plan->view, extent.rect, 0, out->rect))
         return;
     struct mesh_args *args = &out->args;
-    set_product(rows, translation, args->row, args->hi, args->lo);
-    normal_matrix(camera, &object, args->normal_matrix);
+    pt_set_product(rows, translation, args->row, args->hi, args->lo);
+    pt_normal_matrix(camera, &object, args->normal_matrix);
     args->id_base = id_base;
     args->id_count = (uint32_t)mesh->info.triangle_count;
     args->stride = mesh->stride;
@@ -681,7 +361,7 @@ static void place_mesh(struct pt_plan *plan, const struct camera *camera, const 
     args->has_colors = mesh->has_colors;
     memcpy(args->color, instance->style.color, sizeof args->color);
     pt_plan_texture(plan, instance, &args->texture);
-    join_rect(plan->view.rect, out->rect);
+    pt_join_rect(plan->view.rect, out->rect);
     plan->triangles += mesh->info.triangle_count;
 }
 
@@ -695,9 +375,9 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     survey->sieves = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->sieves);
     if (!survey->sieves || !survey->objects || !survey->seen || !survey->seen_count)
         return PATINA_ERROR_MEMORY;
-    int error = set_camera(scene, &survey->camera);
-    const struct camera bare = survey->camera;
-    pad_camera(&survey->camera, AROUND);
+    int error = pt_eye_of(scene, &survey->camera);
+    const struct pt_eye bare = survey->camera;
+    pt_pad_eye(&survey->camera, AROUND);
     for (uint32_t i = 0; i < scene->instance_count && !error; i++)
         error = look_at_instance(scene, plan, survey, i);
     for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
@@ -739,7 +419,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     uint32_t guard = pt_round_up(8 + 4 * cell + pt_line_reach(plan), cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
-    pad_camera(&survey.camera, guard);
+    pt_pad_eye(&survey.camera, guard);
     set_view(&survey.camera, &plan->view);
     pt_choose_window(scene, plan, guard);
     if ((uint64_t)plan->view.width * plan->view.height >= 1u << 29) // float4 words are gathered by signed indices
@@ -752,24 +432,24 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         place_mesh(plan, &survey.camera, &scene->meshes[i], (uint32_t)id_base, &plan->meshes[i]);
         id_base += scene->meshes[i].mesh->info.triangle_count;
     }
-    return error;
+    return error || plan->map ? error : pt_place_soft(scene, plan, &survey.camera);
 }
 
 int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
                    struct instance_args *args, struct chunk_view **chunks)
 {
-    struct camera camera;
-    struct object object;
-    int error = set_camera(scene, &camera);
+    struct pt_eye camera;
+    struct pt_object object;
+    int error = pt_eye_of(scene, &camera);
     *chunks = pt_arena_take(&plan->arena, (instance->cloud->chunk_count + 1) * sizeof **chunks);
     if (error || !*chunks)
         return error ? error : PATINA_ERROR_MEMORY;
-    pad_camera(&camera, plan->guard);
-    set_object(&camera, instance->style.world_from_object, &object);
-    set_instance(&camera, &object, instance, 1.0, args);
+    pt_pad_eye(&camera, plan->guard);
+    pt_object_of(&camera, instance->style.world_from_object, &object);
+    pt_set_instance(&camera, &object, instance, 1.0, args);
     double rows[9];
-    product_rows(&camera, &object, rows);
+    pt_object_rows(&camera, &object, rows);
     for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-        set_chunk(&camera, &object, rows, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0, &(*chunks)[c]);
+        pt_set_chunk(&camera, &object, rows, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0, &(*chunks)[c]);
     return PATINA_OK;
 }

@@ -9,7 +9,7 @@
 int pt_binder_open(struct pt_binder *binder)
 {
     const struct pt_plan *plan = binder->plan;
-    binder->instances = calloc((size_t)plan->instance_count + 1, sizeof *binder->instances);
+    binder->instances = calloc((size_t)plan->instance_count + plan->soft_entries + 1, sizeof *binder->instances);
     binder->receivers = calloc((size_t)plan->receiver_count + 1, sizeof *binder->receivers);
     binder->meshes = calloc((size_t)plan->mesh_count + 1, sizeof *binder->meshes);
     if (!binder->instances || !binder->receivers || !binder->meshes)
@@ -20,7 +20,7 @@ int pt_binder_open(struct pt_binder *binder)
 void pt_binder_close(struct pt_binder *binder)
 {
     const struct pt_plan *plan = binder->plan;
-    for (uint32_t i = 0; i < plan->instance_count && binder->instances; i++)
+    for (uint32_t i = 0; i < plan->instance_count + plan->soft_entries && binder->instances; i++)
         binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].chunks);
     for (uint32_t i = 0; i < plan->receiver_count && binder->receivers; i++)
         binder->device->ops->buffer_destroy(binder->device, &binder->receivers[i].chunks);
@@ -92,6 +92,11 @@ static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, str
         return error;
     if (ref->which == PT_COLORS)
         return bind_colors(binder, planned, bound, out);
+    if (ref->which == PT_FIELD || ref->which == PT_FIELD_ONE) {
+        const int one = ref->which == PT_FIELD_ONE;
+        *out = &bound->cloud->fields[one];
+        return pt_residency_field(binder->device, planned->instance->cloud, bound->cloud, one);
+    }
     *out = &bound->cloud->buffers[ref->which];
     return ref->which == PT_SIGHTS ? pt_residency_see(binder->device, planned->instance->cloud, bound->cloud) : PATINA_OK;
 }

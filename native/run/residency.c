@@ -2,6 +2,7 @@
 #include "residency.h"
 
 #include "kernel_args.h"
+#include "scene/soft.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,8 @@ static void destroy(struct pt_resident *resident, struct patina_device *device)
     for (int i = 0; i < PT_INSTANCE_BUFFERS; i++)
         device->ops->buffer_destroy(device, &resident->buffers[i]);
     device->ops->buffer_destroy(device, &resident->marked);
+    device->ops->buffer_destroy(device, &resident->fields[0]);
+    device->ops->buffer_destroy(device, &resident->fields[1]);
     pt_alive_release(resident->alive);
     free(resident);
 }
@@ -161,6 +164,27 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
     free(words);
     resident->marked_colors = colors;
     resident->marked_shapes = shapes;
+    return error;
+}
+
+int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident, int one)
+{
+    struct pt_buffer *field = &resident->fields[one];
+    const uint32_t shapes = atomic_load(&cloud->alive->shapes);
+    if (field->size && (one || resident->field_shapes == shapes))
+        return PATINA_OK;
+    device->ops->buffer_destroy(device, field);
+    uint32_t *words = malloc((cloud->slots + 1) * sizeof *words);
+    if (!words)
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "soft points: out of memory");
+    for (uint32_t c = 0; c < cloud->chunk_count; c++) {
+        const struct pt_chunk *chunk = &cloud->chunks[c];
+        for (uint32_t slot = chunk->first; slot < chunk->first + chunk->padded; slot++)
+            words[slot] = pt_soft_word(one ? 1.0f : pt_soft_radius(cloud, chunk, slot));
+    }
+    const int error = device->ops->buffer_create(device, cloud->slots * sizeof *words, words, 0, field);
+    free(words);
+    resident->field_shapes = one ? resident->field_shapes : shapes;
     return error;
 }
 

@@ -18,6 +18,8 @@ struct pt_resident {
     uint32_t colors, shapes; // the states of alive->colors and alive->shapes that the buffers hold
     struct pt_buffer marked; // colours with what stations saw through in magenta; made when first asked for
     uint32_t marked_colors, marked_shapes; // the states that it holds
+    struct pt_buffer fields[2]; // PT_FIELD, PT_FIELD_ONE; made when first asked for
+    uint32_t field_shapes;      // the state of shapes that the first holds
     struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh or texture by pt_mesh_buffer; PT_CHUNKS is unused
 };
 
@@ -28,6 +30,8 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
 int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
 // Makes resident->buffers[PT_SIGHTS] what the cloud's stations saw.
 int pt_residency_see(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident);
+// Makes resident->fields[one] what the cloud's points are as soft ones.
+int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident, int one);
 // Likewise of what a mask or a grade holds: `size` bytes that live as long as `alive` says, in buffers[0].
 int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive, const void *data,
                             size_t size, struct pt_resident **out);

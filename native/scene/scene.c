@@ -148,6 +148,30 @@ static int too_many(const patina_scene *scene, uint64_t slots, uint64_t count)
                    (unsigned long long)most);
 }
 
+static int check_soft(const patina_scene *scene, patina_cloud_style *style)
+{
+    if (style->soft > PATINA_SOFT_ALL || style->soft_model > PATINA_SOFT_EXPRESS)
+        return fail(scene, "cloud style: no such soft or soft_model");
+    if (style->soft_shells > (uint32_t)PT_SOFT_SHELLS)
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %u soft_shells; the most is %u", style->soft_shells,
+                       (uint32_t)PT_SOFT_SHELLS);
+    if (!(style->soft_radius >= 0.0f) || !isfinite(style->soft_radius))
+        return fail(scene, "cloud style: soft_radius must be 0 or more");
+    if (!(style->soft_opacity >= 0.0f && style->soft_opacity <= 1.0f) || !(style->soft_modulation >= 0.0f && style->soft_modulation <= 1.0f))
+        return fail(scene, "cloud style: soft_opacity and soft_modulation must be within 0 and 1");
+    style->soft_opacity = style->soft_opacity == 0.0f ? 0.5f : style->soft_opacity;
+    if (!style->soft)
+        return PATINA_OK;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        const patina_cloud_style *other = &scene->instances[i].style;
+        if (other->soft && (other->soft_model != style->soft_model || other->soft_shells != style->soft_shells))
+            return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT,
+                           "cloud style: soft clouds of a scene are drawn together, and instance %u has another soft_model or soft_shells", i);
+    }
+    style->shadow_off = PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE;
+    return PATINA_OK;
+}
+
 static int check_style(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
 {
     const float *c = style->color;
@@ -180,7 +204,8 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
     if (style->shadow_off > 7)
         return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
-    return check_color(scene, style, cloud);
+    const int error = check_soft(scene, style);
+    return error ? error : check_color(scene, style, cloud);
 }
 
 static int copy_ramp(patina_cloud_style *style)

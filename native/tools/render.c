@@ -96,6 +96,19 @@ static int analyse(struct job *job, patina_cloud *cloud, const struct tool_stati
     return code;
 }
 
+static void set_soft(const struct tool_options *options, int file, patina_cloud_style *style)
+{
+    int soft = options->soft.model && !options->soft.file_count;
+    for (int i = 0; i < options->soft.file_count; i++)
+        soft |= options->soft.files[i] == (uint32_t)file + 1;
+    style->soft = soft ? PATINA_SOFT_ALL : PATINA_SOFT_OFF;
+    style->soft_model = soft ? options->soft.model - 1 : 0;
+    style->soft_shells = options->soft.shells;
+    style->soft_radius = (float)options->soft.radius;
+    style->soft_opacity = (float)options->soft.opacity;
+    style->soft_modulation = (float)options->soft.modulation;
+}
+
 static int load_clouds(struct job *job)
 {
     const struct tool_options *options = &job->options;
@@ -130,6 +143,7 @@ static int load_clouds(struct job *job)
         grow_box(&job->box, info.box_min, info.box_max);
         if (options->opacity_count)
             style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);
+        set_soft(options, i, &style);
         code = tool_set_color(&options->color, job->clouds[i], table, &style);
         if (!code)
             code = patina_scene_add_cloud(job->scene, job->clouds[i], &style);

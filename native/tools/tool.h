@@ -70,6 +70,14 @@ struct tool_options {
     double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
     double radius;                  // of discs, world units; 0: automatic
     double largest_gap;             // that they close, world units; 0: automatic
+    struct {
+        uint32_t model;             // 0: none is soft; 1 + patina_soft_model
+        uint32_t files[TOOL_OPACITIES]; // which of the files are, from 1 on
+        int file_count;             // 0: all
+        uint32_t shells;
+        double radius, opacity, modulation;
+        int shaped;                 // one of the four is given
+    } soft;
     int opacity_count;              // 0: all opaque
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;

@@ -251,8 +251,23 @@ def _meshes(to: _List) -> None:
     to.add("texture, samples, blend", "none", meshes=[{"of": "quad", "texture": "byte repeat", "alpha": "ALPHA.BLEND"}, ball], settings={"pixel_samples": 4})
 
 
+def _soft(to: _List) -> None:
+    soft = {"of": "torus", "soft": "SOFT.ALL", "soft_opacity": 0.4}
+    for model in ("BASE", "CONCENTRIC", "EXPRESS"):
+        to.add(f"soft {model.lower()}", {**soft, "soft_model": f"SOFT_MODEL.{model}"})
+        to.add(f"soft {model.lower()}, around a floor, lit", {**soft, **LIT, "soft_model": f"SOFT_MODEL.{model}", "soft_radius": 0.06}, FLOOR)
+    to.add("soft shells, modulated", {**soft, "soft_model": "SOFT_MODEL.CONCENTRIC", "soft_shells": 4, "soft_modulation": 0.7})
+    to.add("soft, orthographic, own radii", {"of": "attributes", **LIT, "soft": "SOFT.ALL"}, TORUS, camera={"kind": "parallel"})
+    to.add("soft, among the points", soft, camera={"distance": 1.2, "elevation": 10})
+    to.add("soft, ramp, clip, mask", {**soft, "mask": 1, "color_source": "COLOR_SOURCE.HEIGHT", "ramp": RAMP}, clips=[{"shape": "CLIP_SHAPE.PLANE"}])
+    to.add("soft before glass", soft, {**GLASS_TORUS, "world_from_object": _moved(0.8, 0.4, 0.2)})
+    to.add("soft, region", soft, TORUS, settings={"region": [40, 30, 111, 87]})
+    to.add("soft, samples, film, lines", {**soft, "world_from_object": _moved(0.5, -0.5, 0.2)}, TORUS, lines={"width": 3.0},
+           settings={"pixel_samples": 4, "film_transparent": 1})
+
+
 def cases() -> list[Case]:
     to = _List()
-    for fill in (_clouds, _surfaces, _views, _lights, _layers, _colors, _scans, _effects, _samples, _meshes):
+    for fill in (_clouds, _surfaces, _views, _lights, _layers, _colors, _scans, _effects, _samples, _meshes, _soft):
         fill(to)
     return to.cases

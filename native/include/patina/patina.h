@@ -421,6 +421,14 @@ PATINA_API int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3]);
 // and shows what lies behind, which takes such a picture twice the time (light maps, and pictures of several layers, close it all the same).
 enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, PATINA_FREE_SPACE_USE = 2 };
 
+// What points are. ALL: every one is a ball of density, drawn in the order of depth with those of all soft clouds, over what is opaque
+// and behind it, hidden by what is opaque before it. Keys, depth, picks, lines and other passes tell of the rest of the scene; soft
+// points neither cast nor take shadows yet, and what lies behind a transparent surface is hidden by its first layer.
+enum patina_soft { PATINA_SOFT_OFF = 0, PATINA_SOFT_ALL = 1 };
+// BASE: the density along the ray, exactly, through balls that intersect. CONCENTRIC: by shells of even density, which come to BASE as
+// they grow many. EXPRESS: a disc a ball, ten times faster.
+enum patina_soft_model { PATINA_SOFT_BASE = 0, PATINA_SOFT_CONCENTRIC = 1, PATINA_SOFT_EXPRESS = 2 };
+
 // What a cloud leaves out of shadows [D 6].
 enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2, PATINA_SHADOW_NO_SELF = 4 };
 
@@ -460,6 +468,16 @@ typedef struct patina_cloud_style {
                                   // the scene or the next patina_scene_clear, as the cloud must; the grade too
     const patina_grade *grade;    // of this cloud: its colours in place of the cloud's own. NULL = none
     uint32_t exact;               // 1 = black is black, and three Phong factors of 0 are none
+    uint32_t was_padding;         // says nothing
+    // Of soft points [Seemann et al.], SPEC 5; nothing for others:
+    uint32_t soft;                // patina_soft
+    uint32_t soft_model;          // patina_soft_model; the same of all soft clouds of a scene, as soft_shells is
+    uint32_t soft_shells;         // CONCENTRIC: of every ball, 1..64; 0 = as many as its size on screen asks for
+    float soft_radius;            // of every ball, world units; 0 = the point's own radius, else 1.13 times its spacing, as [S Eq. 20]
+                                  // has it of even points: a point without neighbours is not seen then
+    float soft_opacity;           // of a ball through its centre, 0..1, times the cloud's and the point's opacity; 0 = 0.5
+    float soft_modulation;        // 0..1, from the model's own opacity (0) to one that falls evenly from a ball's centre to its rim,
+                                  // so that single points show (1); 1 - W of [S Eq. 22]
 } patina_cloud_style;
 #define PATINA_CLOUD_STYLE_INIT                                                                                                \
     {                                                                                                                          \

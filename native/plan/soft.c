@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Soft points [S]: gathered into records, lit, and drawn over the picture in parts whose records fit. SPEC 5, soft.
+//
+// A part is a slab of depth and rows of the picture. Slabs follow from what the whole picture sees, so that a region is drawn in the
+// same; a ball that reaches into several is in each of them, and each draws what of it lies within. Rows change nothing of a pixel.
+#include "eye.h"
+#include "passes.h"
+
+#include "scene/clip.h"
+#include "scene/soft.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Records of a part, where its balls can be told apart: 64 MB of them, and 96 MB of bins. Software's blocks end at 128 MB.
+enum { PART_RECORDS = 1 << 21 };
+enum { LEAST_ROWS = PT_SOFT_TILE, MOST_SLABS = 256 };
+
+struct depths {
+    float before, beyond; // of a chunk's balls
+    uint32_t records;
+};
+
+struct placing {
+    const struct patina_scene *scene;
+    struct pt_plan *plan;
+    const struct pt_eye *eye;
+    struct pt_plan_instance *whole; // soft instances in view
+    struct depths **depths;         // of their chunks
+    struct depths *seen;            // of all that the whole picture shows
+    uint32_t seen_count;
+    uint32_t entries;               // of plan->instances, behind the whole ones
+    int filling;                    // parts are written, and not only counted
+};
+
+// ---- what is in view -----------------------------------------------------------------------------------------------------
+
+static double thinned_scale(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object)
+{
+    return (instance->style.soft_radius > 0.0f ? (double)instance->style.soft_radius : object->scale) * pt_thinning(scene);
+}
+
+static double ball_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object,
+                         const struct pt_chunk *chunk)
+{
+    const double radius = instance->style.soft_radius > 0.0f ? 1.0 : pt_soft_reach(instance->cloud, chunk);
+    return fmin(radius * thinned_scale(scene, instance, object), (double)PT_SOFT_WIDEST);
+}
+
+static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct depths *depths, const struct pt_sieve *sieve,
+                       const struct pt_object *object, const double rows[9], const struct pt_chunk *chunk)
+{
+    struct pt_plan *plan = p->plan;
+    struct pt_extent extent;
+    double translation[3];
+    // where the eye is close, records are as wide as a pixel at least
+    const double reach = ball_reach(p->scene, out->instance, object, chunk);
+    if (pt_sieve_chunk(sieve, chunk, NULL, NULL) == PT_CUT_AWAY) {
+        plan->chunks_clipped++;
+        return PATINA_OK;
+    }
+    pt_chunk_translation(p->eye, object, chunk, translation);
+    if (!pt_chunk_bounds(p->eye, chunk, rows, translation, reach, 1, &extent))
+        return PATINA_OK;
+    for (int k = 0; k < 4; k++)
+        extent.rect[k] += k < 2 ? -2.0 * (double)PT_SOFT_LEAST : 2.0 * (double)PT_SOFT_LEAST;
+    const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) * (double)PT_SOFT_LEAST;
+    const struct depths own = { nextafterf((float)(extent.z_before - pixel), -INFINITY), nextafterf((float)(extent.z_beyond + pixel), INFINITY),
+                                chunk->padded };
+    p->seen[p->seen_count++] = own;
+    struct pt_bounds *bounds = &out->bounds[out->chunk_count];
+    struct chunk_view *view = &out->chunks[out->chunk_count];
+    if (!pt_rect_in_window(&plan->view, extent.rect, 0, bounds->rect))
+        return PATINA_OK;
+    bounds->z_far = own.beyond;
+    depths[out->chunk_count++] = own;
+    pt_set_chunk(p->eye, object, rows, out->instance, chunk, pt_drawn_points(p->scene, chunk), 0, view);
+    pt_join_rect(out->rect, bounds->rect);
+    out->points += view->count;
+    plan->chunks_culled--;
+    return pt_plan_divide(plan, out, sieve, chunk, view);
+}
+
+static int place_instance(struct placing *p, uint32_t i)
+{
+    const struct pt_instance *instance = &p->scene->instances[i];
+    const struct patina_cloud *cloud = instance->cloud;
+    struct pt_arena **arena = &p->plan->arena;
+    struct pt_plan_instance *out = &p->whole[p->plan->soft_count];
+    struct pt_object object;
+    double rows[9];
+    int error = PATINA_OK;
+    *out = (struct pt_plan_instance){ .instance = instance, .of = i, .marked = pt_is_marked(instance) };
+    out->chunks = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->chunks);
+    out->bounds = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->bounds);
+    struct depths *depths = p->depths[p->plan->soft_count] = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *depths);
+    struct pt_inverse_clip *clips = pt_arena_take(arena, (p->scene->clip_count + 1) * sizeof *clips);
+    if (!out->chunks || !out->bounds || !depths || !clips)
+        return PATINA_ERROR_MEMORY;
+    const struct pt_sieve sieve = pt_sieve_make(p->scene, instance, clips);
+    pt_object_of(p->eye, instance->style.world_from_object, &object);
+    pt_object_rows(p->eye, &object, rows);
+    pt_set_instance(p->eye, &object, instance, pt_thinning(p->scene), &out->args);
+    out->radius_scale = (float)fmin(thinned_scale(p->scene, instance, &object), (double)PT_SOFT_WIDEST);
+    for (uint32_t c = 0; c < cloud->chunk_count && !error && instance->style.transparency < 1.0f; c++)
+        error = place_chunk(p, out, depths, &sieve, &object, rows, &cloud->chunks[c]);
+    p->plan->soft_count += out->chunk_count > 0;
+    return error;
+}
+
+// ---- parts ---------------------------------------------------------------------------------------------------------------
+
+static int by_middle(const void *a, const void *b)
+{
+    const struct depths *x = a, *y = b;
+    const float p = 0.5f * x->before + 0.5f * x->beyond, q = 0.5f * y->before + 0.5f * y->beyond;
+    return (p > q) - (p < q);
+}
+
+// Where slabs end, rising; returns how many ends there are, one less than slabs.
+static uint32_t slab_ends(struct placing *p, float ends[MOST_SLABS])
+{
+    uint64_t total = 0, sum = 0;
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < p->seen_count; i++)
+        total += p->seen[i].records;
+    const uint64_t wanted = total <= PART_RECORDS ? 1 : 2 * total / PART_RECORDS + 1, slabs = wanted < MOST_SLABS ? wanted : MOST_SLABS;
+    qsort(p->seen, p->seen_count, sizeof *p->seen, by_middle);
+    for (uint32_t i = 0; i < p->seen_count && slabs > 1; i++) {
+        const float middle = 0.5f * p->seen[i].before + 0.5f * p->seen[i].beyond;
+        if (sum >= total / slabs * (count + 1) && count + 1 < slabs && (!count || middle > ends[count - 1]))
+            ends[count++] = middle;
+        sum += p->seen[i].records;
+    }
+    return count;
+}
+
+static int takes_part(const struct placing *p, uint32_t instance, uint32_t chunk, const struct pt_soft_part *part)
+{
+    const struct depths *depths = &p->depths[instance][chunk];
+    const uint32_t *rect = p->whole[instance].bounds[chunk].rect, *crop = p->plan->crop;
+    return depths->before < part->z_to && depths->beyond > part->z_from && rect[1] < part->rows[1] && rect[3] > part->rows[0] &&
+           rect[0] < crop[0] + crop[2] && rect[2] > crop[0];
+}
+
+// What of an instance the part draws, as an entry of its own; its records lie behind `records` others.
+static int fill_entry(struct placing *p, uint32_t instance, const struct pt_soft_part *part, uint32_t records)
+{
+    const struct pt_plan_instance *whole = &p->whole[instance];
+    struct pt_plan_instance *out = &p->plan->instances[p->entries];
+    uint32_t count = 0;
+    for (uint32_t c = 0; c < whole->chunk_count; c++)
+        count += (uint32_t)takes_part(p, instance, c, part);
+    *out = *whole;
+    out->chunk_count = 0;
+    out->points = 0;
+    out->chunks = pt_arena_take(&p->plan->arena, (count + 1) * sizeof *out->chunks);
+    if (!out->chunks)
+        return PATINA_ERROR_MEMORY;
+    for (uint32_t c = 0; c < whole->chunk_count; c++) {
+        if (!takes_part(p, instance, c, part))
+            continue;
+        struct chunk_view *view = &out->chunks[out->chunk_count++];
+        *view = whole->chunks[c];
+        view->record = records;
+        records += view->padded;
+        out->points += view->count;
+    }
+    return PATINA_OK;
+}
+
+static int place_part(struct placing *p, struct pt_soft_part part)
+{
+    struct pt_plan *plan = p->plan;
+    uint64_t records = 0;
+    part.first = p->entries;
+    for (uint32_t i = 0; i < plan->soft_count; i++)
+        for (uint32_t c = 0; c < p->whole[i].chunk_count; c++)
+            records += takes_part(p, i, c, &part) ? p->depths[i][c].records : 0;
+    if (records > PART_RECORDS && part.rows[1] - part.rows[0] > LEAST_ROWS) {
+        struct pt_soft_part half[2] = { part, part };
+        half[0].rows[1] = half[1].rows[0] = part.rows[0] + pt_round_up((part.rows[1] - part.rows[0]) / 2, LEAST_ROWS);
+        const int error = place_part(p, half[0]);
+        return error || half[1].rows[0] >= half[1].rows[1] ? error : place_part(p, half[1]);
+    }
+    if (records >= 1u << 26) // bins are counted by 16 bytes, and lists by 32 bits
+        return pt_fail(&p->scene->handle, PATINA_ERROR_MEMORY, "%llu soft points lie behind one another in %u rows: render in regions",
+                       (unsigned long long)records, part.rows[1] - part.rows[0]);
+    uint32_t placed = 0;
+    for (uint32_t i = 0; i < plan->soft_count && records; i++) {
+        uint64_t own = 0;
+        for (uint32_t c = 0; c < p->whole[i].chunk_count; c++)
+            own += takes_part(p, i, c, &part) ? p->depths[i][c].records : 0;
+        if (own && p->filling && fill_entry(p, i, &part, placed))
+            return PATINA_ERROR_MEMORY;
+        placed += (uint32_t)own;
+        p->entries += own > 0;
+    }
+    part.count = p->entries - part.first;
+    part.records = placed;
+    if (placed && p->filling)
+        plan->soft_parts[plan->soft_part_count] = part;
+    plan->soft_part_count += placed > 0;
+    plan->soft_records = placed > plan->soft_records ? placed : plan->soft_records;
+    return PATINA_OK;
+}
+
+static int place_parts(struct placing *p, const float *ends, uint32_t count)
+{
+    const uint32_t *crop = p->plan->crop;
+    int error = PATINA_OK;
+    p->entries = p->plan->instance_count + p->plan->soft_count;
+    p->plan->soft_part_count = 0;
+    for (uint32_t k = count + 1; k-- > 0 && !error;) // the farthest first
+        error = place_part(p, (struct pt_soft_part){ .rows = { crop[1], crop[1] + crop[3] },
+                                                     .z_from = k ? ends[k - 1] : -1.0f,
+                                                     .z_to = k < count ? ends[k] : INFINITY });
+    return error;
+}
+
+int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_eye *eye)
+{
+    struct placing p = { .scene = scene, .plan = plan, .eye = eye };
+    uint32_t instances = 0;
+    uint64_t chunks = 0;
+    float ends[MOST_SLABS];
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        instances += scene->instances[i].style.soft != PATINA_SOFT_OFF;
+        chunks += scene->instances[i].style.soft ? scene->instances[i].cloud->chunk_count : 0;
+    }
+    if (!instances)
+        return PATINA_OK;
+    p.whole = pt_arena_take(&plan->arena, (instances + 1) * sizeof *p.whole);
+    p.depths = pt_arena_take(&plan->arena, (instances + 1) * sizeof *p.depths);
+    p.seen = pt_arena_take(&plan->arena, (chunks + 1) * sizeof *p.seen);
+    if (!p.whole || !p.depths || !p.seen)
+        return PATINA_ERROR_MEMORY;
+    int error = PATINA_OK;
+    for (uint32_t i = 0; i < scene->instance_count && !error; i++)
+        if (scene->instances[i].style.soft)
+            error = place_instance(&p, i);
+    const uint32_t count = error || !plan->soft_count ? 0 : slab_ends(&p, ends);
+    if (error || !plan->soft_count || (error = place_parts(&p, ends, count)))
+        return error;
+    struct pt_plan_instance *grown = pt_arena_take(&plan->arena, (p.entries + 1) * sizeof *grown);
+    plan->soft_parts = pt_arena_take(&plan->arena, (plan->soft_part_count + 1) * sizeof *plan->soft_parts);
+    if (!grown || !plan->soft_parts)
+        return PATINA_ERROR_MEMORY;
+    memcpy(grown, plan->instances, plan->instance_count * sizeof *grown);
+    memcpy(grown + plan->instance_count, p.whole, plan->soft_count * sizeof *grown);
+    plan->instances = grown;
+    p.filling = 1;
+    error = place_parts(&p, ends, count);
+    plan->soft_entries = p.entries - plan->instance_count;
+    return error;
+}
+
+// ---- passes --------------------------------------------------------------------------------------------------------------
+
+static const char *const models[] = { "Base", "Concentric", "Express" };
+
+static void plan_gather(struct pt_builder *builder, uint32_t i)
+{
+    const struct pt_plan *plan = builder->plan;
+    const struct pt_plan_instance *instance = &plan->instances[i];
+    const patina_cloud_style *style = &instance->instance->style;
+    struct gather_args args = { .radius_scale = instance->radius_scale, .opacity = style->soft_opacity, .within = 1,
+                                .sifted = plan->drawn_words > 0 };
+    pt_shade_lights(builder, 0, &args.shade);
+    args.shade.view = plan->view;
+    args.shade.instance = instance->args;
+    args.shade.arrived = 0;
+    args.shade.light_count = instance->args.lit ? args.shade.light_count : 0;
+    pt_plan_recolor(builder, instance, &args.shade);
+    if (style->soft_modulation > 0.0f) // every field is 1
+        args.weight = fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
+    const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
+    PT_REASON(PT_ADD(builder, gather, args,
+                     { pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
+                       pt_buffer_of(PT_SURFACE, i), pt_buffer_of(style->soft_radius > 0.0f ? PT_FIELD_ONE : PT_FIELD, i),
+                       pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i), pt_nothing(),
+                       args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing() }),
+              "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,
+              args.shade.instance.lit ? "lit" : "unlit");
+}
+
+static void plan_part(struct pt_builder *builder, const struct pt_soft_part *part, uint32_t number)
+{
+    const struct pt_plan *plan = builder->plan;
+    const patina_cloud_style *style = &plan->instances[part->first].instance->style;
+    for (uint32_t k = 0; k < part->count; k++)
+        plan_gather(builder, part->first + k);
+    struct soft_args args = { .view = plan->view,
+                              .records = part->records,
+                              .model = style->soft_model == PATINA_SOFT_BASE         ? PT_SOFT_BASE
+                                       : style->soft_model == PATINA_SOFT_CONCENTRIC ? PT_SOFT_CONCENTRIC
+                                                                                     : PT_SOFT_EXPRESS,
+                              .mu = PT_SOFT_EVEN,
+                              .shells = style->soft_shells,
+                              .z_from = part->z_from,
+                              .z_to = part->z_to,
+                              .crop_x = plan->crop[0],
+                              .crop_y = plan->crop[1],
+                              .crop_width = plan->crop[2] };
+    const uint32_t rect[4] = { plan->crop[0], part->rows[0], plan->crop[0] + plan->crop[2], part->rows[1] };
+    memcpy(args.view.rect, rect, sizeof rect);
+    PT_REASON(PT_ADD(builder, soft, args,
+                     { pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_plane_at(PT_PLANE_SOFT_BINS, 0), pt_nothing(),
+                       pt_plane_at(PT_PLANE_COMBINED, 0), pt_nothing() }),
+              "%s, part %u of %u, z %.4g to %.4g, rows %u to %u: %u records", models[style->soft_model], number + 1, plan->soft_part_count,
+              fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1], part->rows[1] - plan->crop[1], part->records);
+}
+
+void pt_plan_soft(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    uint32_t soft = 0;
+    for (uint32_t i = 0; i < builder->scene->instance_count; i++)
+        soft += builder->scene->instances[i].style.soft != PATINA_SOFT_OFF;
+    if (!plan->soft_part_count) {
+        const char *reason = soft ? "no soft cloud is in view" : "no cloud is soft";
+        pt_skip(builder, "gather", reason);
+        pt_skip(builder, "soft", reason);
+    }
+    for (uint32_t k = 0; k < plan->soft_part_count; k++)
+        plan_part(builder, &plan->soft_parts[k], k);
+}
