@@ -25,6 +25,8 @@ static void keep_statistics(struct patina_frame *frame, const struct patina_scen
                                          .pixel_samples = 1,
                                          .ms = ms };
     shown->peak = plan->peak;
+    shown->soft_parts = plan->soft_part_count;
+    shown->soft_records = plan->soft_records;
     shown->stats.plane_bytes = pt_planes_total(&frame->planes);
     shown->stats.spacing_px = (float)plan->spacing_px;
     shown->stats.expected = plan->expected;

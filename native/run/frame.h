@@ -13,6 +13,7 @@ struct pt_mean;
 // What readers are told of the last finished render. The planes of its picture go with it.
 struct pt_shown {
     patina_frame_stats stats;
+    uint32_t soft_parts, soft_records; // of soft points; in the largest part
     uint64_t peak;         // bytes of planes that the plan came to, those of light maps apart
     uint32_t passes;       // bits of what was rendered
     uint32_t assessed;     // passes of certainty and thickness that have planes, bits 1 << PATINA_PASS_*

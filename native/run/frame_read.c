@@ -165,8 +165,11 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         unsigned long long parts = (unsigned long long)((double)light->error * 1e6 + 0.5);
         PUT("%s{\"samples\":%u,\"error\":%llu.%06llu}", i ? "," : "", light->samples, parts / 1000000, parts % 1000000);
     }
-    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u},\"planes\":{\"peak\":%llu,\"held\":%llu}}", frame->sampling[0], frame->sampling[1],
+    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u},\"planes\":{\"peak\":%llu,\"held\":%llu", frame->sampling[0], frame->sampling[1],
         (unsigned long long)frame->shown.peak, (unsigned long long)frame->shown.stats.plane_bytes);
+    if (frame->shown.soft_parts)
+        PUT(",\"soft\":{\"parts\":%u,\"records\":%u}", frame->shown.soft_parts, frame->shown.soft_records);
+    PUT("}}");
 #undef PUT
     return length;
 }

@@ -487,6 +487,30 @@ static size_t count_parts(patina_device *device, const struct mixed *mixed)
 
 enum { POINTS = 2500000, SHOWN = 50 }; // one of so many is not hidden
 
+// The number behind the word in the JSON of a frame's statistics.
+static uint64_t told(const char *json, const char *word)
+{
+    const char *at = strstr(json, word);
+    assert_non_null(at);
+    return strtoull(at + strlen(word), NULL, 10);
+}
+
+// Memory stays what a part takes, and is told.
+static void check_memory(patina_device *device, const struct mixed *many, size_t parts)
+{
+    static char json[65536];
+    patina_frame *frame = NULL;
+    CHECK(patina_frame_create(device, &frame), device);
+    CHECK(patina_frame_render(frame, many->scene), frame);
+    assert_true(patina_frame_stats_json(frame, json, sizeof json) < sizeof json);
+    const uint64_t records = told(json, "\"records\":"), peak = told(json, "\"peak\":");
+    printf("  %llu records in the largest part, %llu bytes of planes\n", (unsigned long long)records, (unsigned long long)peak);
+    assert_int_equal(told(json, "\"parts\":"), parts);
+    assert_true(records >= POINTS / 4 && records <= 1u << 21);
+    assert_true(peak >= 80 * records && peak <= 80 * records + 256 * WIDTH * HEIGHT);
+    patina_frame_destroy(frame);
+}
+
 // More records than a part takes: slabs of depth, which borders share; and what comes through is the product of all.
 static void test_parts(void **state)
 {
@@ -513,6 +537,7 @@ static void test_parts(void **state)
         const size_t parts = count_parts(device, &many);
         printf("  model %u: %zu parts\n", model, parts);
         assert_true(parts > 1);
+        check_memory(device, &many, parts);
         compare_regions(device, &many, 61, 72, "parts");
         struct picture picture = draw(device, &many, 0);
         struct points torus = points_torus(POINTS, 1.0, 0.4, POINTS_ALL, 6);

@@ -805,7 +805,9 @@ PATINA_API int patina_frame_get_stats(const patina_frame *frame, patina_frame_st
 // Milliseconds by pass, why each other pass was left out, and of each layer the points in chunks that were scattered and
 // the pixels that it covers, as JSON: {"passes":{..},"skipped":{..},"layers":[{"points":..,"pixels":..},..]}; one layer
 // that was not peeled has no pixel count. "lights":[{"samples":..,"error":..},..] of the casting lights' shadows;
-// "planes":{"peak":..,"held":..}: bytes that the plan came to before it ran, light maps apart, and those held after it, theirs too.
+// "planes":{"peak":..,"held":..}: bytes that the plan came to before it ran, light maps apart, and those held after it, theirs too; where
+// there are soft points, "soft":{"parts":..,"records":..}: in how many parts they are drawn, and how many the largest has room for, at
+// 80 bytes each: peak counts them.
 // "samples":{"grid":..,"shifts":..}: how pixel_samples were taken, pixels on each side of one, times shifted.
 // Returns the full length; truncates to size.
 PATINA_API size_t patina_frame_stats_json(const patina_frame *frame, char *buffer, size_t size);
