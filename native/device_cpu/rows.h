@@ -47,11 +47,11 @@ static inline int pt_crop_rows(const struct pt_cpu_call *call, const struct view
 static inline uint32_t pt_lanes_left(uint32_t x, uint32_t end) { return end - x < PT_LANES ? end - x : PT_LANES; }
 
 // Asks for the attributes, `size` bytes a point, of the next PT_LANES pixels from x on: with large clouds each is a
-// cache miss of its own.
+// cache miss of its own. attribute NULL: it is read from pictures, not from points.
 static inline void pt_fetch_ahead(const uint64_t *row, uint32_t x, uint32_t end, const struct instance_args *instance,
                                   const void *attribute, size_t size)
 {
-    for (uint32_t i = x; i < x + PT_LANES && i < end; i++) {
+    for (uint32_t i = x; attribute && i < x + PT_LANES && i < end; i++) {
         uint32_t id = (uint32_t)row[i] - instance->id_base;
         if (id < instance->id_count)
             __builtin_prefetch((const char *)attribute + size * id);

@@ -98,7 +98,7 @@ static patina_mesh *mesh(int more, uint64_t triangles)
                               .triangle_count = triangles, .indices = indices };
     if (more) {
         desc.normal = (patina_array){ up, PATINA_FLOAT32, 3, 0 };
-        desc.color = (patina_array){ uv, PATINA_FLOAT32, 3, 0 };
+        desc.color = (patina_array){ up, PATINA_FLOAT32, 3, 0 };
         desc.uv = (patina_array){ uv, PATINA_FLOAT32, 2, 0 };
     }
     patina_mesh *made = NULL;
