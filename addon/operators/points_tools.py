@@ -165,7 +165,7 @@ both intersect"""
         return {'RUNNING_MODAL'}
 
     def _take_tool(self, context: Context) -> None:
-        """H and X mean the selected points with the tools of points alone: whoever begins with a button has such a tool then, too."""
+        """Whoever begins with a button goes on with the tool of that shape. Which points H and X mean hangs on points_keys alone."""
         tool = context.workspace.tools.from_space_view3d_mode(context.mode)
         if tool and tool.idname not in {PatinaSelectBox.bl_idname, PatinaSelectLasso.bl_idname}:
             bpy.ops.wm.tool_set_by_id(name=(PatinaSelectLasso if self.shape == 'LASSO' else PatinaSelectBox).bl_idname)

@@ -11,16 +11,7 @@ struct builder_of_lives {
     struct pt_plan *plan;
     uint32_t (*of)[PT_SLOTS]; // 1 + the life at hand of a plane; NO_LIFE: none yet
     uint32_t clock;           // a pass, or as many as run as one, or a step
-    uint32_t room;
-    int failed;
 };
-
-static size_t bytes_of(const struct pt_plan *plan, enum pt_plane which, uint32_t index)
-{
-    uint32_t size[2];
-    pt_plan_plane_size(plan, which, index, size);
-    return (size_t)size[0] * size[1] * pt_plane_bytes(which);
-}
 
 int pt_plane_is_kept(enum pt_plane which, uint32_t index) { return pt_plane_rows[which].size == PT_SIZE_CROP || (which == PT_PLANE_KEYS && !index); }
 
@@ -30,11 +21,7 @@ static void use(struct builder_of_lives *b, enum pt_plane which, uint32_t index)
     if (pt_plane_is_kept(which, index))
         return;
     if (b->of[which][index] == NO_LIFE) {
-        if (plan->life_count == b->room) {
-            b->failed = 1;
-            return;
-        }
-        plan->lives[plan->life_count++] = (struct pt_life){.plane = which, .index = index, .first = b->clock, .bytes = bytes_of(plan, which, index)};
+        plan->lives[plan->life_count++] = (struct pt_life){.plane = which, .index = index, .first = b->clock, .bytes = pt_plan_plane_bytes(plan, which, index)};
         b->of[which][index] = plan->life_count;
     }
     plan->lives[b->of[which][index] - 1].last = b->clock;
@@ -116,24 +103,25 @@ static uint64_t idle_at(const struct pt_plan *plan, uint32_t when)
 // Kept planes of the picture: each once.
 static uint64_t kept_bytes(const struct pt_plan *plan)
 {
-    uint64_t seen[PT_PLANE_COUNT] = {0}, bytes = bytes_of(plan, PT_PLANE_KEYS, 0);
+    uint64_t seen[PT_PLANE_COUNT] = {0}, bytes = pt_plan_plane_bytes(plan, PT_PLANE_KEYS, 0);
     for (uint32_t i = 0; i < plan->pass_count; i++)
         for (uint32_t k = 0; k < plan->passes[i].ref_count; k++) {
             const struct pt_ref *ref = &plan->passes[i].refs[k];
             if (ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].size != PT_SIZE_CROP || seen[ref->which] >> ref->index & 1u)
                 continue;
             seen[ref->which] |= (uint64_t)1 << ref->index;
-            bytes += bytes_of(plan, ref->which, ref->index);
+            bytes += pt_plan_plane_bytes(plan, ref->which, ref->index);
         }
     return bytes;
 }
 
 int pt_plan_share_planes(struct pt_plan *plan, pt_together *together, const void *device, int apart)
 {
-    struct builder_of_lives b = {.plan = plan, .room = PT_PLANE_COUNT * PT_SLOTS};
+    enum { MOST_LIVES = PT_PLANE_COUNT * PT_SLOTS }; // one of each plane
+    struct builder_of_lives b = {.plan = plan};
     b.of = pt_arena_take(&plan->arena, PT_PLANE_COUNT * sizeof *b.of);
-    plan->lives = pt_arena_take(&plan->arena, b.room * sizeof *plan->lives);
-    plan->slabs = pt_arena_take(&plan->arena, (b.room + 1) * sizeof *plan->slabs);
+    plan->lives = pt_arena_take(&plan->arena, MOST_LIVES * sizeof *plan->lives);
+    plan->slabs = pt_arena_take(&plan->arena, (MOST_LIVES + 1) * sizeof *plan->slabs);
     if (!b.of || !plan->lives || !plan->slabs)
         return PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < plan->step_count; i++)

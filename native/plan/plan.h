@@ -287,6 +287,12 @@ void pt_plan_destroy(struct pt_plan *plan);
 
 // Width and height of a plane at a level (of planes with levels) or of a layer.
 void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane plane, uint32_t level, uint32_t size[2]);
+static inline size_t pt_plan_plane_bytes(const struct pt_plan *plan, enum pt_plane plane, uint32_t level)
+{
+    uint32_t size[2];
+    pt_plan_plane_size(plan, plane, level, size);
+    return (size_t)size[0] * size[1] * pt_plane_bytes(plane);
+}
 
 // Whether the picture that readers see has this plane.
 int pt_plan_writes(const struct pt_plan *plan, enum pt_plane plane);

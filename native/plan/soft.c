@@ -144,6 +144,14 @@ static int takes_part(const struct placing *p, uint32_t instance, uint32_t chunk
            rect[0] < crop[0] + crop[2] && rect[2] > crop[0];
 }
 
+static uint64_t records_of(const struct placing *p, uint32_t instance, const struct pt_soft_part *part)
+{
+    uint64_t records = 0;
+    for (uint32_t c = 0; c < p->whole[instance].chunk_count; c++)
+        records += takes_part(p, instance, c, part) ? p->depths[instance][c].records : 0;
+    return records;
+}
+
 // What of an instance the part draws, as an entry of its own; its records lie behind `records` others.
 static int fill_entry(struct placing *p, uint32_t instance, const struct pt_soft_part *part, uint32_t records)
 {
@@ -176,8 +184,7 @@ static int place_part(struct placing *p, struct pt_soft_part part)
     uint64_t records = 0;
     part.first = p->entries;
     for (uint32_t i = 0; i < plan->soft_count; i++)
-        for (uint32_t c = 0; c < p->whole[i].chunk_count; c++)
-            records += takes_part(p, i, c, &part) ? p->depths[i][c].records : 0;
+        records += records_of(p, i, &part);
     if (records > PART_RECORDS && part.rows[1] - part.rows[0] > LEAST_ROWS) {
         struct pt_soft_part half[2] = { part, part };
         half[0].rows[1] = half[1].rows[0] = part.rows[0] + pt_round_up((part.rows[1] - part.rows[0]) / 2, LEAST_ROWS);
@@ -189,9 +196,7 @@ static int place_part(struct placing *p, struct pt_soft_part part)
                        (unsigned long long)records, part.rows[1] - part.rows[0]);
     uint32_t placed = 0;
     for (uint32_t i = 0; i < plan->soft_count && records; i++) {
-        uint64_t own = 0;
-        for (uint32_t c = 0; c < p->whole[i].chunk_count; c++)
-            own += takes_part(p, i, c, &part) ? p->depths[i][c].records : 0;
+        const uint64_t own = records_of(p, i, &part);
         if (own && p->filling && fill_entry(p, i, &part, placed))
             return PATINA_ERROR_MEMORY;
         placed += (uint32_t)own;

@@ -14,13 +14,6 @@ static uint64_t total_of(const struct pt_planes *planes)
 
 uint64_t pt_planes_total(const struct pt_planes *planes) { return total_of(planes) + (planes->other ? total_of(planes->other) : 0); }
 
-static size_t size_of(const struct pt_plan *plan, enum pt_plane which, uint32_t level)
-{
-    uint32_t size[2];
-    pt_plan_plane_size(plan, which, level, size);
-    return (size_t)size[0] * size[1] * pt_plane_bytes(which);
-}
-
 static int check_cap(const struct patina_device *device, const struct pt_plan *plan, uint64_t total)
 {
     const uint64_t cap = device->memory_cap;
@@ -170,7 +163,7 @@ int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, con
                      uint32_t level)
 {
     struct pt_buffer *plane = &planes->at[which][level];
-    const size_t bytes = size_of(plan, which, level);
+    const size_t bytes = pt_plan_plane_bytes(plan, which, level);
     if (planes->view[which][level]) {
         if (plane->size == bytes)
             return PATINA_OK;
@@ -213,7 +206,7 @@ int pt_planes_ensure_picture(struct patina_device *device, struct pt_planes *pla
     uint64_t total = pt_planes_total(planes);
     int error = PATINA_OK;
     for (int p = 0; p < PT_PLANE_COUNT && !error; p++) {
-        const size_t bytes = size_of(plan, (enum pt_plane)p, 0);
+        const size_t bytes = pt_plan_plane_bytes(plan, (enum pt_plane)p, 0);
         if (!pt_of_picture((enum pt_plane)p) || planes->at[p][0].size == bytes || !pt_plan_writes(plan, (enum pt_plane)p))
             continue;
         total += bytes - planes->at[p][0].size;

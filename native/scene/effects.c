@@ -24,11 +24,6 @@ static int out_of_range(const patina_scene *scene, const char *field, double lea
     return refuse(scene, what);
 }
 
-static int all_zero(const float v[3])
-{
-    return v[0] == 0.0f && v[1] == 0.0f && v[2] == 0.0f;
-}
-
 static int all_within(const float v[3], float least, float most)
 {
     return within(v[0], least, most) && within(v[1], least, most) && within(v[2], least, most);
@@ -50,12 +45,12 @@ static int check(const patina_scene *scene, patina_effects *e)
 #define PATINA_EFFECT_COLOR(field, when, zero, ...)                                                                    \
     if (!all_within(e->field, 0.0f, 65504.0f))                                                                         \
         return out_of_range(scene, #field, 0.0, 65504.0, zero);                                                        \
-    if (!e->exact && all_zero(e->field))                                                                               \
+    if (!e->exact && pt_is_zero(e->field))                                                                             \
         e->field[0] = e->field[1] = e->field[2] = zero;
 #define PATINA_EFFECT_AXIS(field, ...)                                                                                 \
     if (!all_within(e->field, -1e15f, 1e15f))                                                                          \
         return out_of_range(scene, #field, -1e15, 1e15, 0.0);                                                          \
-    if (all_zero(e->field))                                                                                            \
+    if (pt_is_zero(e->field))                                                                                          \
         e->field[2] = 1.0f;
 #define PATINA_EFFECT_SWITCH(field, ...)                                                                               \
     if (e->field > 1)                                                                                                  \

@@ -125,14 +125,9 @@ static int check_matrix(double matrix[16])
     return all_finite(matrix, 16);
 }
 
-static int is_zero(const float color[3])
-{
-    return color[0] == 0.0f && color[1] == 0.0f && color[2] == 0.0f;
-}
-
 static void default_grey(float color[3])
 {
-    if (is_zero(color))
+    if (pt_is_zero(color))
         color[0] = color[1] = color[2] = 0.8f;
 }
 
@@ -296,7 +291,7 @@ static int check_light(const patina_scene *scene, patina_light_desc *light)
     if (!(light->radius >= 0.0f) || !(light->size[0] >= 0.0f) || !(light->size[1] >= 0.0f) ||
         !isfinite(light->radius + light->size[0] + light->size[1]))
         return fail(scene, "light: radius and size must be finite and 0 or more");
-    if (is_zero(light->color))
+    if (pt_is_zero(light->color))
         light->color[0] = light->color[1] = light->color[2] = 1.0f;
     light->cone = light->cone == 0.0f ? (float)(pi / 4.0) : light->cone;
     for (int k = 0; k < 2; k++)
@@ -470,7 +465,7 @@ int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines)
         !isfinite(l.paper[0] + l.paper[1] + l.paper[2] + l.range[0] + l.range[1]))
         return fail(scene, "lines: colours and range must be finite");
     l.width = l.width == 0.0f ? 2.0f : l.width;
-    const int black = !l.exact && is_zero(l.color), no_paper = !l.exact && is_zero(l.paper);
+    const int black = !l.exact && pt_is_zero(l.color), no_paper = !l.exact && pt_is_zero(l.paper);
     for (int k = 0; k < 3; k++) {
         l.color[k] = black && l.source == PATINA_LINE_POINT ? 0.25f : l.color[k];
         l.paper[k] = no_paper ? 1.0f : l.paper[k];

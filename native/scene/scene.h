@@ -7,6 +7,8 @@
 #include "mesh.h"
 #include "texture.h"
 
+static inline int pt_is_zero(const float v[3]) { return v[0] == 0.0f && v[1] == 0.0f && v[2] == 0.0f; }
+
 struct pt_instance {
     const struct patina_cloud *cloud;
     patina_cloud_style style; // defaults made explicit; its ramp is the scene's

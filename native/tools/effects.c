@@ -84,6 +84,8 @@ static const char *next_value(const char *list, int *optional, struct value *out
     return list + strcspn(list, "[,");
 }
 
+static int width_of(const struct field *field) { return field->kind == COLOR || field->kind == AXIS ? 3 : 1; }
+
 static int put(patina_effects *effects, const struct field *field, const double *numbers)
 {
     char *at = (char *)effects + field->offset;
@@ -109,7 +111,7 @@ static int parse(const char *list, const char *text, patina_effects *effects)
     int optional = 0, at = 0;
     const int count = parse_numbers(text, numbers, 1, MOST);
     while (count > 0 && (list = next_value(list, &optional, &value))) {
-        const int wide = value.field->kind == COLOR || value.field->kind == AXIS ? 3 : 1;
+        const int wide = width_of(value.field);
         const double *given = at < count ? numbers + at : wide == 1 ? &value.otherwise : NULL;
         if ((at < count && at + wide > count) || (at >= count && !value.optional))
             return -1;
@@ -140,7 +142,7 @@ static int parse_field(const char *text, patina_effects *effects)
     const struct field *field = find(text, length);
     if (!field || text[length] != '=')
         return -1;
-    const int wide = field->kind == COLOR || field->kind == AXIS ? 3 : 1;
+    const int wide = width_of(field);
     if (field->kind == CHOICE)
         numbers[0] = item_of(field, text + length + 1);
     else if (parse_numbers(text + length + 1, numbers, wide, wide) < 0)
