@@ -423,6 +423,30 @@ static void test_chunks_around_the_camera(void **state)
     patina_cloud_destroy(cloud);
 }
 
+// A product's translation is in two parts: what float32 leaves over of it is there, in X, in Y and in depth (SPEC 1).
+static void test_low_parts(void **state)
+{
+    (void)state;
+    patina_cloud *cloud = square(1);
+    patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
+    look(scene, (const double[]){ 0.1, -0.5, 0.6 }, (const double[]){ 0.1, 0.4, 0.0 });
+    struct pt_plan plan = plan_of(scene);
+    const uint32_t count = plan.instances[0].chunk_count;
+    uint32_t left_over[3] = { 0 };
+    for (uint32_t c = 0; c < count; c++)
+        for (int k = 0; k < 3; k++) {
+            const struct chunk_view *view = &plan.instances[0].chunks[c];
+            assert_true(fabsf(view->lo[k]) <= 0x1p-24f * fabsf(view->hi[k]));
+            left_over[k] += view->lo[k] != 0.0f;
+        }
+    assert_true(count > 5);
+    for (int k = 0; k < 3; k++)
+        assert_true(10 * left_over[k] >= 9 * count);
+    pt_plan_destroy(&plan);
+    patina_scene_destroy(scene);
+    patina_cloud_destroy(cloud);
+}
+
 // The ground below and behind a camera does not show: what is filled is chosen by what does, 12 to 28 pixels apart.
 static void test_spacing_is_of_what_shows(void **state)
 {
@@ -614,7 +638,7 @@ int main(void)
         cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
         cmocka_unit_test(test_steps_hold_the_whole_plan),       cmocka_unit_test(test_maps_are_plans),
         cmocka_unit_test(test_planes_of_the_picture),         cmocka_unit_test(test_ink_stays_within_lines),
-        cmocka_unit_test(test_planes_share_memory),
+        cmocka_unit_test(test_planes_share_memory),             cmocka_unit_test(test_low_parts),
         cmocka_unit_test(test_chunks_around_the_camera),        cmocka_unit_test(test_spacing_is_of_what_shows),
         cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
         cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),
