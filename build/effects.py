@@ -10,6 +10,8 @@ from typing import Any
 
 LIST = Path(__file__).resolve().parent.parent / "native/include/patina/effects.def"
 KINDS = {"NUMBER": 1, "COUNT": 1, "COLOR": 3, "AXIS": 3, "SWITCH": 1, "CHOICE": 1}
+PANELS = ("CUES", "DRAWING", "CAMERA")
+UNITS = ("NONE", "SHARE", "PIXELS", "LENGTH", "HEIGHT", "COLOR")
 
 
 def _split(text: str) -> list[str]:
@@ -46,21 +48,40 @@ def _field(kind: str, values: list[Any]) -> dict[str, Any]:
     return field | ({"items": []} if kind == "CHOICE" else {})
 
 
+def _check(effect: dict[str, Any], option: str, values: str) -> None:
+    """What C's macros take as it comes, and the command line would end by."""
+    fields, where = [field["name"] for field in effect["fields"]], f"effects.def: {effect['name']}"
+    if effect["panel"] not in PANELS:
+        raise ValueError(f"{where}: panel {effect['panel']} is none of {', '.join(PANELS)}")
+    for name in re.findall(r"(?<![\w.])[a-z]\w*", values):
+        if name not in fields:
+            raise ValueError(f"{where}: {option} takes {name}, which is none of its fields {', '.join(fields)}")
+    for field in effect["fields"]:
+        if field.get("unit", "NONE") not in UNITS:
+            raise ValueError(f"{where}: {field['name']}: unit {field['unit']} is none of {', '.join(UNITS)}")
+
+
 def read() -> list[dict[str, Any]]:
+    """The project's table: see parse."""
+    return parse(LIST.read_text(encoding="utf-8"))
+
+
+def parse(text: str) -> list[dict[str, Any]]:
     """Effects as they are listed: name, label, panel, about, fields: name, kind, property, when, label, about, and by their kind
     least, zero, unit, start, low, usual, high; items (name, label, about); automatic (start, about).
 
     Raises:
-        ValueError: what a row is not known for.
+        ValueError: what is wrong with which row.
     """
-    text = LIST.read_text(encoding="utf-8")
     text = re.sub(r"^\s*(#|//).*$", "", text[text.rindex("#endif"):], flags=re.M)
     effects: list[dict[str, Any]] = []
+    options: list[tuple[str, str]] = []
     for kind, row in re.findall(r"^PATINA_EFFECT(_\w+)?\((.*?)\)$", text, re.M | re.S):
         values = [_value(part) for part in _split(row)]
         fields = effects[-1]["fields"] if effects else []
         if not kind:
-            name, label, panel, *_, about = values
+            name, label, panel, option, taken, *_, about = values
+            options.append((option, taken))
             effects.append({"name": name, "label": label, "panel": panel, "about": about, "fields": []})
         elif kind[1:] in KINDS:
             fields.append(_field(kind[1:], values))
@@ -69,5 +90,7 @@ def read() -> list[dict[str, Any]]:
         elif kind == "_AUTOMATIC":
             next(field for field in fields if field["name"] == values[0])["automatic"] = tuple(values[1:])
         elif kind != "_RULE":
-            raise ValueError(f"{LIST}: PATINA_EFFECT{kind} is not known")
+            raise ValueError(f"effects.def: PATINA_EFFECT{kind} is not known")
+    for effect, (option, taken) in zip(effects, options):
+        _check(effect, option, taken)
     return effects

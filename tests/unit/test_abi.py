@@ -14,6 +14,9 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.dont_write_bytecode = True
+sys.path.append(str(ROOT / "build"))
+import effects  # noqa: E402
 
 
 def load():
@@ -77,6 +80,18 @@ class Abi(unittest.TestCase):
             if field["kind"] in ("NUMBER", "COUNT"):
                 self.assertTrue(field["start"] == 0 or field["least"] <= field["start"], field["name"])
                 self.assertLessEqual(field["low"], field["start"], field["name"])
+
+    def test_mistakes_in_the_table_are_told(self) -> None:
+        text = effects.LIST.read_text(encoding="utf-8")
+        for old, new, told in (("[,toon_softness\"", "[,toon_softnes\"", "effects.def: toon: --toon takes toon_softnes, which is none of its fields"),
+                               ("fog_color+fog_fixed", "fog_color+fog_fix", "effects.def: fog: --fog takes fog_fix,"),
+                               ("\"Toon\", DRAWING", "\"Toon\", DRAWINGS", "effects.def: toon: panel DRAWINGS is none of CUES, "),
+                               ("1.4f, PIXELS", "1.4f, PIXEL", "effects.def: edl: edl_radius: unit PIXEL is none of "),
+                               ("PATINA_EFFECT_COUNT(toon", "PATINA_EFFECT_COUNTS(toon", "effects.def: PATINA_EFFECT_COUNTS is not known")):
+            self.assertEqual(text.count(old), 1, old)
+            with self.assertRaises(ValueError) as said:
+                effects.parse(text.replace(old, new))
+            self.assertTrue(str(said.exception).startswith(told), said.exception)
 
     def test_constants(self) -> None:
         self.assertEqual(abi.PASSES["COMBINED"], (0, 4))
