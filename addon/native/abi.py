@@ -181,7 +181,7 @@ class Settings(Descriptor):
 
 
 class Effects(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("edl_strength", c_float), ("edl_radius", c_float),
+    _fields_ = [("struct_size", c_size_t), ("exact", c_uint32), ("edl_strength", c_float), ("edl_radius", c_float),
                 ("obscurance_strength", c_float), ("obscurance_radius", c_float), ("fog_start", c_float),
                 ("fog_end", c_float), ("fog_density", c_float), ("fog_fixed", c_uint32), ("fog_color", c_float * 3),
                 ("toon_bands", c_uint32), ("toon_softness", c_float), ("hatch_levels", c_uint32),
@@ -190,7 +190,7 @@ class Effects(Descriptor):
                 ("contour_start", c_float), ("contour_interval", c_float), ("contour_width", c_float),
                 ("contour_every", c_uint32), ("contour_bold", c_float), ("contour_color", c_float * 3),
                 ("contour_opacity", c_float), ("focus_aperture", c_float), ("focus_distance", c_float),
-                ("paper_color", c_float * 3), ("paper_grain", c_float), ("exact", c_uint32)]
+                ("paper_color", c_float * 3), ("paper_grain", c_float)]
 
 
 class Lines(Descriptor):

@@ -217,6 +217,8 @@ static void set_effects(struct pcg *random, patina_scene *scene)
     effects.toon_softness = between(random, 0.0, 1.0);
     effects.hatch_levels = once_in(random, 3) ? below(random, 4) : 0;
     effects.hatch_ground = between(random, 0.0, 1.0);
+    effects.contour_opacity = once_in(random, 3) ? between(random, 0.2, 1.0) : 0.0f;
+    effects.contour_interval = between(random, 0.01, 1.0);
     effects.fog_density = once_in(random, 3) ? between(random, 0.0, 1.0) : 0.0f;
     effects.fog_start = between(random, 0.0, 3.0);
     effects.fog_end = effects.fog_start + between(random, 0.1, 4.0);

@@ -24,6 +24,7 @@ static const struct {
      {.toon_bands = 3, .toon_softness = 0.4f, .edl_strength = 1.0f},
      0.01f},                                                        // an edge is 1/0.4 as steep as the light
     {"hatching", {.hatch_levels = 3, .hatch_ground = 0.5f}, 0.05f}, // strokes' edges are a pixel wide
+    {"contour lines", {.contour_opacity = 1.0f, .contour_interval = 0.1f}, 0.05f}, // as strokes
     {"fog",
      {.fog_start = 2.0f, .fog_end = 4.0f, .fog_density = 0.9f, .fog_fixed = 1, .fog_color = {0.2f, 0.5f, 1.0f}},
      0.0f},
@@ -35,6 +36,8 @@ static const struct {
       .obscurance_strength = 1.0f,
       .toon_bands = 5,
       .hatch_levels = 1,
+      .contour_opacity = 0.5f,
+      .contour_interval = 0.3f,
       .fog_start = 1.0f,
       .fog_end = 9.0f,
       .fog_density = 0.5f,

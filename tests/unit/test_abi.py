@@ -69,7 +69,7 @@ class Abi(unittest.TestCase):
     def test_effects_are_the_table_s(self) -> None:
         """Every row of effects.def is a field of the structure, in its order; ranges hold what Blender begins with."""
         fields = [field for effect in abi.EFFECTS for field in effect["fields"]]
-        self.assertEqual([field["name"] for field in fields] + ["exact"], [name for name, *_ in abi.Effects._fields_[1:]])
+        self.assertEqual(["exact"] + [field["name"] for field in fields], [name for name, *_ in abi.Effects._fields_[1:]])
         self.assertEqual(len({field["property"] for field in fields}), len(fields))
         for effect in abi.EFFECTS:
             self.assertTrue(any(field["when"] == "STRENGTH" for field in effect["fields"]), effect["name"])

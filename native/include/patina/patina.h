@@ -634,6 +634,7 @@ enum patina_effect_choice {
 // and its unit. Zero leaves an effect out. Lengths in pixels are those of the picture, lengths along the view are those from the camera.
 typedef struct patina_effects {
     size_t struct_size;
+    uint32_t exact; // 1 = black paper is black
 #define PATINA_EFFECT_NUMBER(field, ...) float field;
 #define PATINA_EFFECT_COUNT(field, ...) uint32_t field;
 #define PATINA_EFFECT_COLOR(field, ...) float field[3];
@@ -641,13 +642,12 @@ typedef struct patina_effects {
 #define PATINA_EFFECT_SWITCH(field, ...) uint32_t field;
 #define PATINA_EFFECT_CHOICE(field, ...) uint32_t field;
 #include "effects.def"
-    uint32_t exact; // 1 = black paper is black
 } patina_effects;
 #define PATINA_EFFECTS_INIT                                                                                                    \
     {                                                                                                                          \
-        .struct_size = sizeof(patina_effects), .edl_radius = 1.4f, .hatch_spacing = 6.0f, .hatch_opacity = 1.0f,               \
+        .struct_size = sizeof(patina_effects), .exact = 1, .edl_radius = 1.4f, .hatch_spacing = 6.0f, .hatch_opacity = 1.0f,               \
         .paper_color = {1.0f, 1.0f, 1.0f}, .contour_axis = {0.0f, 0.0f, 1.0f}, .contour_width = 1.0f, .contour_every = 5,      \
-        .contour_bold = 2.0f, .exact = 1                                                                                       \
+        .contour_bold = 2.0f                                                                                                   \
     }
 
 enum patina_line_source { PATINA_LINE_FIXED = 0, PATINA_LINE_POINT = 1, PATINA_LINE_DEPTH = 2 };
