@@ -9,6 +9,7 @@ on another thread (jobs.py says why).
 
 from __future__ import annotations
 
+import math
 import time
 import weakref
 from collections import deque
@@ -31,6 +32,7 @@ from .sync.kept import CHECKS
 TICK = 0.008  # seconds between two looks at the tasks
 STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it started: many are short
 HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that overlays' depth is nearer than the surface: Blender's dots of vertices are hidden, or not
+ROUNDING = 4.0 * 2.0 ** -24  # and by so many steps of Blender's depths of 24 bits: each may be meters, far away in a view that begins near
 REST = 0.12  # seconds without motion after which the whole picture is drawn
 BETTER = 200.0  # milliseconds of further samples between two pictures of a view at rest
 
@@ -262,8 +264,9 @@ class Viewport:
             gpu.state.depth_test_set('LESS_EQUAL')
             gpu.state.depth_mask_set(True)
             cover = SHOWN if _selects_vertices(context) else HIDDEN
-            _fill_rectangle(corners, 'DEPTH', depth, cover=cover * shown.pixel, projection=(
-                projection[2][2], projection[2][3], near, camera.orthographic))
+            _fill_rectangle(corners, 'DEPTH', depth, cover=cover * shown.pixel, rounding=math.copysign(ROUNDING, cover),
+                            away=context.region_data.view_matrix.translation.length, projection=(
+                                projection[2][2], projection[2][3], near, camera.orthographic))
             gpu.state.color_mask_set(True, True, True, True)
             gpu.state.depth_test_set('NONE')
             gpu.state.depth_mask_set(False)
@@ -568,7 +571,8 @@ void main()
     float far = exact().r;
     float z = far - cover * (projection.w > 0.5 ? 1.0 : far);
     float ndc = projection.w > 0.5 ? projection.y - projection.x * (z + projection.z) : projection.y / z - projection.x;
-    gl_FragDepth = far < 1e29 ? clamp(0.5 * ndc + 0.5, 0.0, 1.0) : 1.0;
+    float steps = rounding * (projection.w > 0.5 ? 1.0 : 1.0 + away / max(far, 1e-6));
+    gl_FragDepth = far < 1e29 ? clamp(0.5 * ndc + 0.5 - steps, 0.0, 1.0) : 1.0;
     color = vec4(0.0);
 #elif defined(EXACT)
     color = min(exact(), largest);
@@ -585,7 +589,8 @@ def _fill_rectangle(corners: list[float], kind: str, texture: gpu.types.GPUTextu
     depths of Blender's projection, uniforms of which are its third row, the near plane and whether it is orthographic.
     Overlays hide behind a depth two pixels wider than the surface and `cover` nearer: Blender draws the vertices of our points as dots
     over every engine's picture, and these lie just behind it. Where vertices are selected in Edit Mode it is farther, and hides
-    those of the other side."""
+    those of the other side. `rounding` moves it further, in shares of the whole depth, for Blender's vertices are rounded before they
+    are projected: the more, the farther the eye is from the world's middle, `away`, measured by the distance seen."""
     shader = _shader(kind)
     x0, y0, x1, y1 = corners
     batch = batch_for_shader(shader, 'TRI_STRIP', {"pos": ((x0, y0), (x1, y0), (x0, y1), (x1, y1)),
@@ -605,7 +610,8 @@ def _shader(kind: str) -> gpu.types.GPUShader:
         info.define(kind)
         if kind == 'DEPTH':
             info.push_constant('VEC4', "projection")
-            info.push_constant('FLOAT', "cover")
+            for name in ("cover", "rounding", "away"):
+                info.push_constant('FLOAT', name)
             if hasattr(info, "depth_write"):
                 info.depth_write('ANY')
         info.sampler(0, 'FLOAT_2D', "picture")

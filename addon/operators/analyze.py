@@ -17,6 +17,7 @@ from .steps import Stepped
 WRITTEN = {NORMAL_NAME: ('FLOAT_VECTOR', "vector"), "spacing": ('FLOAT', "value"), "radius": ('FLOAT', "value"),
            "thickness": ('FLOAT', "value"), "kind": ('INT8', "value"), "certainty": ('FLOAT', "value")}
 
+NEAREST = 1e-4  # of how far a 3D view reaches, where it begins
 VIEW_SENSOR = 36.0  # mm, half of what the lens of a 3D view shows the longer side of
 
 
@@ -136,7 +137,8 @@ none are selected, fill their pictures; strays far off do not count"""
 
 
 def _move_views(context: Context, corners: list[Vector]) -> None:
-    """The window's 3D views look at the corners' middle, from so far that they see all and as far as that takes."""
+    """The window's 3D views look at the corners' middle, from so far that they see all and as far as that takes. They begin no nearer than
+    Blender's depths, of 24 bits, can tell overlays from points amid them."""
     middle = sum(corners, Vector()) / len(corners)
     radius = max((corner - middle).length for corner in corners)
     for area in context.screen.areas if context.screen else ():
@@ -148,7 +150,8 @@ def _move_views(context: Context, corners: list[Vector]) -> None:
             continue
         view.view_location = middle
         view.view_distance = radius * max(space.lens / VIEW_SENSOR, 0.5) * 1.7
-        space.clip_end = max(space.clip_end, 2.0 * (view.view_distance + radius))
+        reach = 2.0 * (view.view_distance + radius)
+        space.clip_start, space.clip_end = max(space.clip_start, NEAREST * reach), max(space.clip_end, reach)
 
 
 def _has_points(obj: bpy.types.Object) -> bool:

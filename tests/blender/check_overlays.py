@@ -43,6 +43,14 @@ def dark_pixels():
     return total
 
 
+def view_pixels():
+    """(h, w, 3) int16: the middle of the first 3D view, without tools and texts at its sides."""
+    region = window_region()
+    part = screen.pixels()[region.y:region.y + region.height, region.x:region.x + region.width].astype(np.int16)
+    height, width = part.shape[:2]
+    return part[height // 4:3 * height // 4, width // 4:3 * width // 4]
+
+
 def do(operator, place=None, **options):
     window = bpy.context.window_manager.windows[0]
     place = place or area()
@@ -175,3 +183,78 @@ def test_edit_mode_shows_what_is_selected():
     check(counts[0][0] > 20000 and counts[1][0] < 2000, f"selected and not: {counts} orange and dark pixels")
     check(counts[1][1] < LETTERS, f"nothing is selected: {counts[1][1]} dark pixels")
     check(dark_pixels() < LETTERS, f"{dark_pixels()} dark pixels after Edit Mode")
+
+
+def wide_scene():
+    """Ground of 600 m, bright, as the view comes: it begins a centimeter away and ends where Set Up for Points puts it."""
+    scene, points = bright_scene()
+    bpy.data.objects.remove(points)
+    axis = np.linspace(-300.0, 300.0, 500, dtype=np.float32)
+    x, y = (grid.ravel() for grid in np.meshgrid(axis, axis))
+    positions = np.stack([x, y, 20.0 * np.sin(x / 40.0) * np.cos(y / 55.0)], 1)
+    points = add_points(positions, np.full((len(positions), 4), (220, 180, 140, 255), np.uint8))
+    points.patina.lighting = 'UNLIT'
+    points.select_set(False)
+    space = area().spaces[0]
+    space.clip_start, space.clip_end = 0.01, 2217.0
+    view().view_location, view().view_distance = (0, 0, 0), 900.0
+    view().view_rotation = Quaternion((1, 0, 0), 0.7)
+    return scene, points
+
+
+def test_wide_points_hide_their_dots():
+    """Hundreds of meters away one step of Blender's depths is meters, where the view begins a centimeter before the eye."""
+    _, points = wide_scene()
+    steps = [("a look", lambda: None), ("near", lambda: setattr(view(), "view_distance", 300.0)),
+             ("far", lambda: setattr(view(), "view_distance", 1500.0)),
+             ("an orbit", lambda: setattr(view(), "view_rotation", Quaternion((0.9, 0.35, 0.1, 0.2)).normalized())),
+             ("far from the middle of the world", lambda: [setattr(points, "location", (3000, 2000, 0)),
+                                                           setattr(view(), "view_location", (3000, 2000, 0))]),
+             ("back", lambda: [setattr(points, "location", (0, 0, 0)), setattr(view(), "view_location", (0, 0, 0))]),
+             ("four views", lambda: do(bpy.ops.screen.region_quadview)), ("one view", lambda: do(bpy.ops.screen.region_quadview)),
+             ("maximised", lambda: do(bpy.ops.screen.screen_full_area)), ("restored", lambda: do(bpy.ops.screen.screen_full_area))]
+    counts = {}
+    for name, step in steps:
+        step()
+        area().tag_redraw()
+        yield at_rest()
+        counts[name] = dark_pixels()
+    wrong = {name: dark for name, dark in counts.items() if dark > LETTERS}
+    check(not wrong, f"dark pixels: {wrong} of {counts}")
+    view().view_perspective = 'PERSP'
+
+
+def test_wide_points_leave_what_is_before_them():
+    """An empty over the ground, 100 m before it, is seen whole with the view at 900 m; one below it is not."""
+    _, points = wide_scene()
+    view().view_rotation = Quaternion()
+    empty = bpy.data.objects.new("empty", None)
+    empty.empty_display_type, empty.empty_display_size = 'CUBE', 30.0
+    bpy.context.scene.collection.objects.link(empty)
+    pictures = []
+    for height in (None, 140.0, -140.0):
+        empty.hide_set(height is None)
+        empty.location.z = height or 0.0
+        area().tag_redraw()
+        yield at_rest()
+        pictures.append(view_pixels())
+    without, before, below = pictures
+    changed = [int((np.abs(picture - without).max(axis=2) > 20).sum()) for picture in (before, below)]
+    check(changed[0] > 300 and changed[1] < 30, f"pixels of an empty before and below the ground: {changed}")
+
+
+def test_framing_begins_the_view_farther_away():
+    """Frame Points, and with it Set Up for Points, sets where views end, and where they begin so that depths tell overlays from
+    points: for a landscape, not for a pebble."""
+    _, points = wide_scene()
+    space = area().spaces[0]
+    starts = []
+    for scale in (1e-4, 1.0):
+        points.scale = (scale, scale, scale)
+        space.clip_start = 0.01
+        bpy.context.view_layer.update()
+        do(bpy.ops.object.patina_frame_points)
+        starts.append(round(space.clip_start, 4))
+    yield at_rest()
+    check(starts[0] == 0.01 and 0.1 < starts[1] < 0.5, f"views of 6 cm and 600 m begin at {starts}")
+    check(dark_pixels() < LETTERS, f"{dark_pixels()} dark pixels")
