@@ -335,7 +335,7 @@ def dress(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
 
 
 def _set(owner: bpy.types.ID, names: Iterable[str], values: dict[str, Any], kept: list[str]) -> None:
-    moving, changed = animated(owner), False
+    moving = animated(owner)
     for path, kind in _properties(owner.patina.bl_rna, names):
         if f"patina.{path}" in moving:
             kept.append(f"{owner.name}: {path}")
@@ -344,9 +344,6 @@ def _set(owner: bpy.types.ID, names: Iterable[str], values: dict[str, Any], kept
         value = values.get(path, _default(kind))
         if _get(group, name) != value:
             setattr(group, name, value)
-            changed = True
-    if changed:  # Blender does not notice what Python sets
-        owner.update_tag(refresh={'OBJECT'} if isinstance(owner, bpy.types.Object) else set())
 
 
 def _get(group: bpy.types.PropertyGroup, name: str) -> Any:

@@ -22,10 +22,12 @@ class _OfScans:
     def execute(self, context: Context) -> set[str]:
         obj = context.object
         try:
-            return self.change(obj, points.cloud_of(obj, context))
+            done = self.change(obj, points.cloud_of(obj, context))
         except (native.PatinaError, OSError) as error:
             self.report({'ERROR'}, importers.told(f"Patina: '{obj.name}': {error}"))
             return {'CANCELLED'}
+        obj.update_tag(refresh={'OBJECT'})  # what is unset, or taken from a list, says nothing itself
+        return done
 
 
 class PATINA_OT_scans_list(_OfScans, Operator):

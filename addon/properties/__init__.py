@@ -7,8 +7,6 @@ Enum items are numbered as the library's enumerations, and so keep their meaning
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
-from bpy.props import PointerProperty, StringProperty
 from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume, World
 
 from .. import styles
@@ -17,6 +15,7 @@ from .automatic import switch
 from .clips import PatinaClipProperties
 from .colors import PatinaColorProperties
 from .effects import PatinaEffectsProperties
+from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
 from .lines import PatinaLinesProperties
 from .points import PatinaPointsProperties, PatinaScanProperties
 from .sequence import PatinaSequenceProperties

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bpy.props import BoolProperty
 from bpy.types import PropertyGroup
+
+from .heard import BoolProperty
 
 
 def switch(name: str, start: float | Callable[[PropertyGroup], float], description: str, label: str = "",

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 from bpy.types import PropertyGroup
+
+from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 

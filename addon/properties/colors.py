@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, BoolVectorProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 from bpy.types import PropertyGroup
+
+from .heard import BoolProperty, BoolVectorProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 from bpy.types import PropertyGroup
 
 from ..native.abi import EFFECTS
 from .automatic import switch
+from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 _BOUNDLESS = 1e30

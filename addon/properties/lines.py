@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 from bpy.types import PropertyGroup
 
 from .automatic import switch
+from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 

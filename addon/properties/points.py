@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty
+from bpy.props import CollectionProperty
 from bpy.types import PropertyGroup
+
+from .heard import BoolProperty, FloatProperty, IntProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from bpy.props import EnumProperty, IntProperty
 from bpy.types import PropertyGroup
+
+from .heard import EnumProperty, IntProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 

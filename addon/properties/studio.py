@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from math import radians
 
-from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty
 from bpy.types import PropertyGroup
+
+from .heard import BoolProperty, FloatProperty, FloatVectorProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from bpy.props import EnumProperty, StringProperty
 from bpy.types import Context, PropertyGroup
 
 from .. import styles
+from .heard import EnumProperty, StringProperty
 
 _items: list[tuple[str, str, str, int, int]] = []  # Blender does not keep the strings that a callback gives it
 

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, PointerProperty
 from bpy.types import PropertyGroup
+
+from .heard import BoolProperty, PointerProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 

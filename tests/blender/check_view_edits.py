@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points of linked clouds selected in a 3D view: the modal outline, what is seen of it, undo. See test_window.py for what a yield means."""
 
+import time
+
 import bpy
 import numpy as np
 from check_edits import ROWS, chosen, wall
@@ -129,6 +131,39 @@ def test_lasso_in_the_view():
     found = np.argwhere(orange(screenshot("edit_lasso")))
     off = np.hypot(*(found - center[::-1] + 0.5).T)
     check(off.max() < radius + 6 and len(found) > 0.85 * np.pi * radius ** 2, f"{len(found)} pixels, {off.max():.0f} from the middle")
+
+
+def test_what_operators_and_scripts_set_is_shown():
+    """Color by Scan as a click in the sidebar, properties set from Python, on the object and the scene; nothing else is touched."""
+    obj = begin("view_scans.ply")
+    yield lambda: settled(ROWS * ROWS)
+    pictures = [screenshot("set_before")]
+    steps = (("by scan", lambda: bpy.ops.object.patina_scans_color()),
+             ("a ramp", lambda: setattr(obj.patina.colors, "ramp", 'GREY')),
+             ("opacity", lambda: setattr(obj.patina, "opacity", 0.4)),
+             ("whole again", lambda: setattr(obj.patina, "opacity", 1.0)),
+             ("own colors", lambda: setattr(obj.patina.colors, "source", 'OWN')),
+             ("listed", lambda: bpy.ops.object.patina_scans_list()),
+             ("graded", lambda: setattr(obj.patina.points.scans[0], "gain", 0.3)),
+             ("reset", lambda: bpy.ops.object.patina_scans_reset()),
+             ("its color", lambda: setattr(bpy.context.scene.patina.studio, "background", (0.1, 0.2, 0.6))),
+             ("background", lambda: setattr(bpy.context.scene.patina.studio, "use_background", True)))
+    silent = []
+    for name, step in steps:
+        before = shown().pictures
+        with override():
+            step()
+        start = time.perf_counter()
+        yield lambda: newer(before)() or time.perf_counter() - start > 4.0
+        if not newer(before)():
+            silent.append(name)
+            continue
+        yield lambda: settled(ROWS * ROWS)
+        pictures.append(screenshot(f"set_{name}"))
+    check(not silent, f"nothing is drawn after: {silent}")
+    changes = [int((np.abs(after - old)[..., :3].max(axis=2) > 0.05).sum()) for old, after in zip(pictures, pictures[1:], strict=False)]
+    found = dict(zip([name for name, _ in steps], changes, strict=True))
+    check(all(count > 3000 for name, count in found.items() if name not in {"listed", "its color"}), f"pixels that changed: {found}")
 
 
 def test_tools_and_esc():
