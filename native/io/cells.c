@@ -103,7 +103,9 @@ static inline __attribute__((always_inline)) const uint8_t *read_line(struct pt_
         } else if (!read_number(cells, parting, word, &value)) {
             value = NAN;
             found.strange++;
+            found.strange_columns |= found.count < 32 ? UINT32_C(1) << found.count : 0;
         }
+        found.width++;
         if (found.count < most)
             values[found.count++] = value;
         if (between && (at == end || *at != between))
@@ -171,9 +173,24 @@ static uint32_t count_separators(const uint8_t *at, const uint8_t *end, uint8_t 
     return count;
 }
 
-// Whether the lines are a table of that parting: equally many separators, and below the first line no words within a cell. Tabs
-// also align words: then cells of the first line are empty.
-static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *end)
+// Whether a cell holds several words, all of them numbers: then blanks part numbers too.
+static bool holds_numbers(struct span cell, locale_t c_locale)
+{
+    uint32_t words = 0;
+    for (const uint8_t *at = cell.begin; at < cell.end; words++) {
+        struct span word = take(PT_PARTED_BY_BLANKS, at, cell.end, &at);
+        double value;
+        if (pt_parse_number(word.begin, word.end, c_locale, &value) != word.end)
+            return false;
+        while (at < cell.end && pt_is_blank(*at))
+            at++;
+    }
+    return words > 1;
+}
+
+// Whether the lines are a table of that parting: equally many separators, and below the first line no several numbers within a
+// cell. Tabs also align words: then cells of the first line are empty.
+static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *end, locale_t c_locale)
 {
     uint32_t wanted = 0, lines = 0;
     at = next_line(parting, at, end);
@@ -188,9 +205,8 @@ static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *
             struct span word = take(parting, p, end, &p);
             if (!lines && parting == PT_PARTED_BY_TAB && word.begin == word.end)
                 return false;
-            for (const uint8_t *c = word.begin; lines && c < word.end; c++)
-                if (pt_is_blank(*c))
-                    return false;
+            if (lines && holds_numbers(word, c_locale))
+                return false;
             p += p < end && !pt_is_line_end(*p);
         }
     }
@@ -225,7 +241,7 @@ enum pt_parting pt_cells_look(const uint8_t *at, const uint8_t *end, locale_t c_
 {
     static const enum pt_parting tables[] = { PT_PARTED_BY_SEMICOLON, PT_PARTED_BY_TAB, PT_PARTED_BY_COMMA };
     for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
-        if (is_table(tables[i], at, end))
+        if (is_table(tables[i], at, end, c_locale))
             return tables[i];
     return has_decimal_commas(at, end, c_locale) ? PT_PARTED_BY_BLANKS : PT_PARTED_LOOSELY;
 }

@@ -26,7 +26,9 @@ struct pt_cells {
 // What one line held.
 struct pt_line {
     uint32_t count;   // numbers and others, at most `most`
+    uint32_t width;   // all of them
     uint32_t strange; // words that are no numbers, NaN in the values
+    uint32_t strange_columns; // which of the first 32 they are, a bit each
     uint32_t empty;   // cells without anything, NaN in the values
 };
 

@@ -27,7 +27,10 @@ struct text {
     struct pt_cells cells;
     const uint8_t *at, *end;
     uint64_t line;    // of `at`, from 1
-    uint32_t columns; // words of a row
+    uint32_t columns; // numbers of a row
+    uint32_t width;   // words of a row, those that are left out too
+    uint32_t words;   // columns that hold words and are left out, a bit each
+    uint32_t needed;  // columns that must not: what their names say is no attribute, or all but the first row's words
     uint32_t name_count;
     char names[MOST_COLUMNS][NAME_SIZE];
     bool named, ptx, pts;
@@ -64,6 +67,20 @@ static struct pt_line read_line(struct text *t, double values[MOST_COLUMNS])
 {
     struct pt_line line;
     t->at = pt_cells_read(&t->cells, t->at, t->end, values, MOST_COLUMNS, &line);
+    return line;
+}
+
+// A row without the columns of words; Where it has not as many words as the first, which
+// is which cannot be told: it counts none.
+static struct pt_line read_row(struct text *t, double values[MOST_COLUMNS])
+{
+    struct pt_line line = read_line(t, values);
+    uint32_t kept = 0;
+    for (uint32_t c = 0; t->words && c < line.count; c++)
+        if (!(t->words >> c & 1))
+            values[kept++] = values[c];
+    t->width = t->width ? t->width : line.count;
+    line.count = t->words ? (line.count == t->width ? kept : 0) : line.count;
     return line;
 }
 
@@ -274,6 +291,31 @@ static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
     }
 }
 
+// Columns of the row at `at` that hold words are left out from now on, where they may be.
+static int meet_words(struct text *t, const uint8_t *at, uint32_t columns)
+{
+    char word[NAME_SIZE] = "", called[NAME_SIZE + 16];
+    for (uint32_t c = 0; c < MOST_COLUMNS && (at = pt_cells_name(t->cells.parting, at, t->end, word, sizeof word)); c++) {
+        if (!(columns >> c & 1))
+            continue;
+        if (c < t->name_count && t->names[c][0])
+            snprintf(called, sizeof called, "column '%s'", t->names[c]);
+        else
+            snprintf(called, sizeof called, "column %u", c + 1);
+        if (t->needed >> c & 1) {
+            char what[256];
+            snprintf(what, sizeof what, "%s holds a word, '%.40s', where a number is needed; %s", called, word,
+                     t->named ? "take the line out, or correct it"
+                              : "a first line that names x, y, z and the others lets columns of words be left out");
+            return fail_at(t, what);
+        }
+        pt_log(PT_LOG_WARNING, "%s: %s holds words ('%.40s' in line %llu) and is left out", t->input->name, called, word,
+               (unsigned long long)t->line);
+        t->words |= UINT32_C(1) << c;
+    }
+    return PATINA_OK;
+}
+
 // Goes over all rows; stores them, or only counts them and keeps the first ones.
 static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], uint64_t *count)
 {
@@ -299,17 +341,24 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
                 return PATINA_ERROR_MEMORY;
             continue;
         }
-        struct pt_line line = read_line(t, values);
+        const uint8_t *start = t->at;
+        struct pt_line line = read_row(t, values);
         if (t->pts && line.count == 1 && !line.strange)
             continue; // how many points follow: the lines say it themselves
-        if (line.empty == line.count)
+        if (line.empty && line.empty == line.width)
             continue; // a table's last lines
+        if (line.strange_columns & ~t->words) {
+            int code = meet_words(t, start, line.strange_columns & ~t->words);
+            if (code)
+                return code;
+            continue; // all rows are gone over again
+        }
         if (!t->columns)
             t->columns = line.count;
-        if (line.strange || line.count < t->columns) {
+        if (line.count < t->columns || (t->words && !line.count)) {
             char what[96];
-            snprintf(what, sizeof what, line.strange ? "a word is no number" : "%u numbers; %u were expected", line.count,
-                     t->columns);
+            snprintf(what, sizeof what, t->words ? "%u words; %u were expected" : "%u numbers; %u were expected", line.width,
+                     t->words ? t->width : t->columns);
             return fail_at(t, what);
         }
         if (t->cells.commas && t->cells.points)
@@ -408,6 +457,18 @@ static bool names_points(const struct text *t)
     return has(&named, X);
 }
 
+// A bit for each of those that are no attributes.
+static uint32_t needed_columns(const struct text *t)
+{
+    struct text named = *t;
+    uint32_t found = 0;
+    named.columns = t->name_count;
+    name_roles(&named);
+    for (uint32_t c = 0; c < t->name_count; c++)
+        found |= (uint32_t)(named.roles[c] != ATTRIBUTE) << c;
+    return found;
+}
+
 static int fail_names(const struct text *t)
 {
     char names[128] = "";
@@ -424,6 +485,7 @@ static int look(struct text *t, const uint8_t **body, uint64_t *line)
     double values[MOST_COLUMNS];
     struct scan scan;
     const uint8_t *start = t->at;
+    t->needed = ~UINT32_C(0);
     if (!find_line(t))
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: neither a PLY file nor lines of numbers: there is nothing in it",
                        t->input->name);
@@ -443,12 +505,15 @@ static int look(struct text *t, const uint8_t **body, uint64_t *line)
     t->at = first;
     words = read_line(t, values);
     t->cells.commas = t->cells.points = 0;
-    if (words.strange) {
+    if (words.strange && words.strange < 3 && words.count >= words.strange + 3) {
+        t->needed = ~words.strange_columns; // point names before the numbers, a code behind them
+    } else if (words.strange) {
         if (words.count < 3 || words.strange < 3)
             return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: neither a PLY file nor lines of numbers", t->input->name);
         read_names(t, first);
         if (!names_points(t))
             return fail_names(t);
+        t->needed = needed_columns(t);
         find_line(t);
         *body = t->at;
         *line = t->line;
@@ -488,15 +553,36 @@ static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
     return PATINA_OK;
 }
 
+// Of columns that hold words.
+static void leave_out_names(struct text *t)
+{
+    uint32_t kept = 0;
+    for (uint32_t c = 0; c < MOST_COLUMNS; c++)
+        if (!(t->words >> c & 1))
+            memmove(t->names[kept++], t->names[c], NAME_SIZE);
+    for (; kept < MOST_COLUMNS; kept++)
+        t->names[kept][0] = 0;
+    for (uint32_t c = t->name_count; c-- > 0;)
+        t->name_count -= t->words >> c & 1;
+}
+
 static int read_all(struct text *t)
 {
     double(*sample)[MOST_COLUMNS] = calloc(SAMPLES, sizeof *sample);
     const uint8_t *body = t->at;
     uint64_t line = 1, count;
+    uint32_t known;
     int code = sample ? look(t, &body, &line) : PATINA_ERROR_MEMORY;
     if (!code) {
-        rewind_text(t, body, line);
-        code = walk(t, false, sample, &t->file->count);
+        do {
+            known = t->words;
+            t->columns = t->width = 0;
+            rewind_text(t, body, line);
+            code = walk(t, false, sample, &t->file->count);
+        } while (!code && t->words != known);
+        if (!code && t->words && t->width < t->name_count)
+            code = fail_at(t, "fewer words than names: which column is which cannot be told");
+        leave_out_names(t);
     }
     if (!code && t->file->count > UINT32_MAX - 1)
         code = pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points, more than 2^32 - 2", t->input->name,

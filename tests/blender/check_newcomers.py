@@ -8,9 +8,9 @@ from check_edits import ROWS, chosen, right_half, scene_with_wall, select
 from check_import import columns, import_ply, write_ply
 from check_panorama import stage
 from check_points import mesh_to_points
-from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, render, reports, sphere
+from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, patina, render, reports, sphere
 
-from patina.importers import crs
+from patina.importers import crs, library
 from patina.operators import points_keys
 
 LAMBERT = ('PROJCS["NAD_1983_HARN_Lambert_Conformal_Conic",GEOGCS["GCS_North_American_1983_HARN",UNIT["Degree",0.0174532925199433],'
@@ -117,6 +117,26 @@ def test_other_panoramas_are_named():
         data.panorama_type = kind
         render()
         check(any("equirectangular" in text for _, text in reports) == said, f"{kind}: {reports}")
+
+
+def test_columns_of_words_are_left_out():
+    """Names of points, notes: what a total station or a spreadsheet writes. A line says what was left out."""
+    new_scene()
+    for name, text, column in (("excel.csv", "\ufeffPunkt;X;Y;Z;Note\r\nP 1;1,5;2;3;\r\nP 2;4;5;6;\"a; tree\"\r\n", "'Punkt'"),
+                               ("station.txt", "P1 1.5 2 3\nP2 4 5 6\n", "column 1")):
+        (SCRATCH / name).write_text(text, encoding="utf-8")
+        found = library.read(SCRATCH / name, patina.importers.Filter(), patina.importers.Progress())
+        check_close(found.positions + np.array(found.origin), [(1.5, 2, 3), (4, 5, 6)], 1e-5, name)
+        check(not found.scalars and any(column in warning and "left out" in warning for warning in found.warnings), f"{found.warnings}")
+        obj, = import_ply(SCRATCH / name)
+        check(len(obj.data.vertices) == 2, name)
+    (SCRATCH / "words.csv").write_text("X,Y,Z\n1,2,3\n4,five,6\n")
+    try:
+        import_ply(SCRATCH / "words.csv")
+    except RuntimeError as error:
+        check("line 3: column 'Y' holds a word, 'five'" in str(error) and "correct it" in str(error), str(error))
+    else:
+        raise AssertionError("a word as a coordinate")
 
 
 def test_tables_of_spreadsheets():

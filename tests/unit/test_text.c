@@ -141,6 +141,39 @@ static void test_tables(void **state)
     expect_rows("1\t\t2\t\t3\n4\t\t5\t\t6\n", "XYZ", 2, NULL, aligned);
 }
 
+// All warnings since the last call, a line each.
+static const char *take_log(void)
+{
+    static char log[2048];
+    char text[512];
+    int level;
+    for (log[0] = 0; patina_log_next(text, sizeof text, &level);)
+        if (level == 1)
+            snprintf(log + strlen(log), sizeof log - strlen(log), "%s\n", text);
+    return log;
+}
+
+// Columns of words are left out, and named: where a first line names x, y and z, or the first row has words there itself.
+static void test_words(void **state)
+{
+    (void)state;
+    const double wanted[8] = {1.5, 2, 3, 7, 4, 5, 6, 8}, places[6] = {1.5, 2, 3, 4, 5, 6};
+    take_log();
+    expect_rows("X,Y,Z,Note\n1.5,2,3,tree\n4,5,6,\"a, post\"\n", "CSV", 2, NULL, places);
+    assert_non_null(strstr(take_log(), "column 'Note' holds words ('tree' in line 2) and is left out"));
+    expect_rows("\xEF\xBB\xBF" "Name;X;Y;Z;Code;Wert\r\nP 1;1,5;2;3;;7\r\n12;4;5;6;oak tree;8\r\n;;;;;\r\n", "CSV", 2, "Wert", wanted);
+    const char *said = take_log();
+    assert_non_null(strstr(said, "column 'Name' holds words ('P 1' in line 2)"));
+    assert_non_null(strstr(said, "column 'Code' holds words ('oak tree' in line 3)"));
+    expect_rows("id x y z wert\nP1 1.5 2 3 7\nP2 4 5 6 8\n", "CSV", 2, "wert", wanted);
+    expect_rows("1.5,2,3,7,tree\n4,5,6,8,a post\n", "XYZ", 2, "intensity", wanted);
+    take_log();
+    expect_rows("1.5,P1,2,3,7,a\n4,P2,5,6,8,b\n", "XYZ", 2, "intensity", wanted);
+    assert_non_null(strstr(take_log(), "column 2 holds words ('P1' in line 1) and is left out"));
+    expect("1 2 3 P1 10 20 255\n4 5 6 P2 7 8 9\n", "XYZ", 2, PATINA_UINT8, 0, "");
+    expect("Note,X,Y,Z,nx,ny,nz\ntree,1,2,3,0,0,1\n", "CSV", 1, PATINA_NONE, 1, "");
+}
+
 // A first row without a place is a row like another, and says nothing of what the columns are.
 static void test_first_row_of_nan(void **state)
 {
@@ -281,12 +314,17 @@ static void test_refused(void **state)
 {
     (void)state;
     refuse("1 2 3\n4 5\n", "line 2: 2 numbers; 3 were expected");
-    refuse("1 2 3\n\n4 5 red\n", "line 3: a word is no number");
+    refuse("1 2 3\n\n4 5 red\n", "line 3: column 3 holds a word, 'red', where a number is needed; a first line that names x, y, z");
     refuse("1 2\n3 4\n", "fewer than three numbers");
     refuse("1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 0 0 1\n1 2 3 0.5\n", "within a scan");
     refuse("hello world\n", "not a PLY file");
     refuse("X,Y,Z\n2,051640,0,143959,-0,918971\n", "decimal commas cannot be told apart");
-    refuse("X;Y;Z\n1.234,5;2;3\n", "line 2: a word is no number");
+    refuse("X;Y;Z\n1.234,5;2;3\n", "line 2: column 'X' holds a word, '1.234,5', where a number is needed");
+    refuse("X,Y,Z,Red,Green,Blue\n1,2,3,4,5,6\n1,2,3,4,n/a,6\n", "line 3: column 'Green' holds a word, 'n/a'");
+    refuse("X,Y,Z,Note\n1,2,3,tree\n1,2,tree,4\n", "line 3: column 'Z' holds a word, 'tree'");
+    refuse("X Y Z Note\n1 2 3 tree\n1 2 3 a tree\n", "line 3: 5 words; 4 were expected");
+    refuse("Point Id X Y Z Code\nP1 1 2 3 7\n", "which column is which cannot be told");
+    refuse("1 P1 2 3\n4 P2 five 6\n", "line 2: column 3 holds a word, 'five'");
     refuse("X;Y;Z\n1.5;2;3\n1,5;2;3\n", "line 3: decimals behind a comma");
     refuse_file("patina_text.csv", "id,lon,lat,elev\n1,2,3,4\n", "no columns x, y and z in its line of names: id, lon, lat, elev");
     refuse_file("patina_text.txt", "Dear all, this is a letter\nwithout points\n", "names: Dear, all, this");
@@ -300,6 +338,7 @@ int main(void)
         cmocka_unit_test(test_values),
         cmocka_unit_test(test_decimal_commas),
         cmocka_unit_test(test_tables),
+        cmocka_unit_test(test_words),
         cmocka_unit_test(test_first_row_of_nan),
         cmocka_unit_test(test_ptx),
         cmocka_unit_test(test_ptx_grid),
