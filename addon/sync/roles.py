@@ -43,6 +43,10 @@ class Unknown:
         if _links_light(obj) or _links_light(base):
             self._linking[base.name] = None
 
+    def look_at_light(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        if _links_light(instance.object) or _links_light(_base(instance)):
+            self._linking[_base(instance).name] = None
+
     def notices(self) -> list[str]:
         found = []
         if self._layer.material_override:
@@ -50,7 +54,7 @@ class Unknown:
         if self._indirect:
             found.append(f"Indirect Only is not known to Patina, seen as others are: {_names(self._indirect)}")
         if self._linking:
-            found.append(f"light linking is not known to Patina, every light reaches: {_names(self._linking)}")
+            found.append(f"light linking is not known to Patina, every light reaches everything: {_names(self._linking)}")
         return found
 
 

@@ -181,3 +181,21 @@ def test_unknown_is_told_once():
     for part in ("'part 0', 'part 1', 'part 2' and 2 more", "material override 'clay'",
                  *(["light linking"] if bpy.app.version >= (4, 0, 0) else [])):
         check(len([text for _, text in reports if part in text]) == 1, f"{part}: {reports}")
+
+
+def test_light_linking_of_lamps_is_told():
+    """As artists set it: on the light, with receivers or blockers; an empty collection too."""
+    if bpy.app.version < (4, 0, 0):
+        raise Skip("light linking came with Blender 4.0")
+    scene = flat_scene()
+    square(-4.0, 0.3, "part", 'POINTS')
+    lamp = add_light('SUN', 2.0)
+    lamp = lamp if isinstance(lamp, bpy.types.Object) else next(obj for obj in scene.objects if obj.type == 'LIGHT')
+    render()
+    check(not [text for _, text in reports if "light linking" in text], f"{reports}")
+    for name in ("receiver_collection", "blocker_collection"):
+        setattr(lamp.light_linking, name, bpy.data.collections.new(name))
+        render()
+        said = [text for _, text in reports if "light linking" in text]
+        check(len(said) == 1 and f"'{lamp.name}'" in said[0], f"{name}: {reports}")
+        setattr(lamp.light_linking, name, None)
