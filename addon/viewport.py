@@ -345,7 +345,7 @@ class Viewport:
                         said = edits.notice(item.name, item.edits, cloud)
                         if said and said not in self.notices:
                             self.notices = [*self.notices, said]
-                    elif item.cloud.lost not in self.notices:
+                    if item.cloud.lost and item.cloud.lost not in self.notices:
                         self.notices = [*self.notices, item.cloud.lost]
             finally:
                 self._progress = None

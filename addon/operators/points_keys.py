@@ -27,46 +27,47 @@ def _has(obj: Object | None, which: str) -> bool:
         return False
 
 
-class PATINA_OT_points_key_hide(Operator):
+class _Key:
+    """Beside bpy.types.Operator. which: points that there have to be."""
+
+    bl_options = {'UNDO', 'INTERNAL'}
+    which = "selected"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return _has(context.object, cls.which)
+
+
+class PATINA_OT_points_key_hide(_Key, Operator):
     """Hide the selected points of a linked cloud"""
 
     bl_idname = "object.patina_points_key_hide"
     bl_label = "Hide Selected Points"
-    bl_options = {'UNDO', 'INTERNAL'}
-
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        return _has(context.object, "selected")
 
     def execute(self, _context: Context) -> set[str]:
         return bpy.ops.object.patina_points_hide(unselected=False)
 
 
-class PATINA_OT_points_key_reveal(Operator):
+class PATINA_OT_points_key_reveal(_Key, Operator):
     """Show the hidden points of a linked cloud again, where no object is hidden that the key would bring back"""
 
     bl_idname = "object.patina_points_key_reveal"
     bl_label = "Reveal Hidden Points"
-    bl_options = {'UNDO', 'INTERNAL'}
+    which = "hidden"
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return _has(context.object, "hidden") and not any(obj.hide_get() for obj in context.view_layer.objects)
+        return super().poll(context) and not any(obj.hide_get() for obj in context.view_layer.objects)
 
     def execute(self, _context: Context) -> set[str]:
         return bpy.ops.object.patina_points_reveal()
 
 
-class PATINA_OT_points_key_delete(Operator):
+class PATINA_OT_points_key_delete(_Key, Operator):
     """Delete the selected points of a linked cloud"""
 
     bl_idname = "object.patina_points_key_delete"
     bl_label = "Delete Selected Points"
-    bl_options = {'UNDO', 'INTERNAL'}
-
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        return _has(context.object, "selected")
 
     def execute(self, _context: Context) -> set[str]:
         return bpy.ops.object.patina_points_delete()

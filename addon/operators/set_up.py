@@ -71,7 +71,7 @@ reaches them, turns on the headlight"""
             _look_through_camera(context)
         if unlit(scene, points):
             scene.patina.studio.use_headlight = True
-            self.report({'INFO'}, "No light reaches the points: the headlight shines from the camera")
+            self.report({'INFO'}, "No lamp reaches the points: the headlight shines from the camera, on those without colors of their own")
         return {'FINISHED'}
 
 

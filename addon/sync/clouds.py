@@ -95,7 +95,7 @@ class Pending:
         self.analyzed = arrays is not None and arrays.analyzed  # in time; a linked one is before it is seen
         self.stations = arrays.stations if arrays else None
 
-        self.lost = ""  # why there will be no cloud
+        self.lost = ""  # why there will be no cloud, or that of an earlier file
 
     @property
     def built(self) -> native.Cloud | None:
@@ -119,15 +119,12 @@ class PendingLink(Pending):
     def forget(self, identities: list[tuple]) -> bool:
         """Lets its cloud go, where it is one of these."""
         if self._identity in identities:
-            self._cloud = None
+            self._cloud, self.lost = None, ""
         return self._identity in identities
 
     def resolve(self, progress: native.Progress) -> Steps[native.Cloud | None]:
         if self._cloud is None and not self.lost:
-            try:
-                self._cloud = yield from CACHE.obtain_linked(self._source, Progress(progress))
-            except (native.PatinaError, OSError) as error:
-                self.lost = linked.loss(self.name, self._source, error)
+            self._cloud, self.lost = yield from CACHE.obtain_readable(self.name, self._source, Progress(progress))
         return self._cloud
 
 
@@ -199,6 +196,20 @@ class CloudCache:
         self._keep(source.identity(), (), cloud)
         return cloud
 
+    def obtain_readable(self, name: str, source: linked.Source, progress: Progress) -> Steps[tuple[native.Cloud | None, str]]:
+        """The same; where the file cannot be read that of the last one before it in its sequence that can, or None; and what to say."""
+        failed: Exception | None = None
+        shown: linked.Source | None = source
+        while shown:
+            try:
+                cloud = yield from self.obtain_linked(shown, progress)
+                return cloud, linked.loss(name, source, failed, shown) if failed else ""
+            except (native.PatinaError, OSError) as error:
+                said = linked.loss(name, source, failed or error)  # raises what is not the file's fault
+                failed = failed or error
+                shown = linked.before(shown)
+        return None, said
+
     def drop(self, identities: list[tuple]) -> None:
         """Clouds that are no longer what they were built from."""
         with self._lock:
@@ -250,6 +261,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     scales: list[tuple[str, float, native.Cloud | Pending]] = []
     for instance in depsgraph.object_instances:
         obj = instance.object
+        if obj.type == 'LIGHT' and instance.show_self:
+            unknown.look_at_light(instance)
         if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera or clips.cuts(obj):
             continue
         if not visible(instance):
@@ -356,15 +369,15 @@ class TakingNow:
                 self.settle()
             return soon
 
-        def work() -> native.Cloud:
-            return jobs.finish(CACHE.obtain_linked(link, progress)) if link else _finished(identity, arrays, progress)
+        def work() -> tuple[native.Cloud | None, str]:
+            if link:
+                return jobs.finish(CACHE.obtain_readable(name, link, progress))
+            return _finished(identity, arrays, progress), ""
 
-        try:
-            cloud = jobs.run(work, progress.cancel, stopped)
-        except (native.PatinaError, OSError) as error:
-            if not link:
-                raise
-            self._notices.append(linked.loss(name, link, error))
+        cloud, lost = jobs.run(work, progress.cancel, stopped)
+        if lost:
+            self._notices.append(lost)
+        if cloud is None:
             return None
         self._notice(name, cloud)
         if link and link.scalar and not cloud.has_scalars:

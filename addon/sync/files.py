@@ -102,7 +102,7 @@ def follow(obj: bpy.types.Object) -> None:
 
 @persistent
 def _tell(*_) -> None:
-    """Once a file is loaded, and before it is saved: objects of older versions get their volume, and all say what holds."""
+    """Once a file is loaded, and before and after it is saved, which may rewrite paths: objects of older versions get their volume, and all say what holds."""
     for obj in bpy.data.objects:
         if obj.library is None and (obj.patina.linked_data or obj.patina.linked_file):
             text = text_of(obj)
@@ -117,7 +117,8 @@ def _forget(*_) -> None:
     _unpacked.clear()
 
 
-_HANDLERS = ((bpy.app.handlers.load_pre, _forget), (bpy.app.handlers.load_post, _tell), (bpy.app.handlers.save_pre, _tell))
+_HANDLERS = ((bpy.app.handlers.load_pre, _forget), (bpy.app.handlers.load_post, _tell), (bpy.app.handlers.save_pre, _tell),
+             (bpy.app.handlers.save_post, _tell))
 
 
 def register() -> None:

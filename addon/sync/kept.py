@@ -6,6 +6,7 @@ A kept cloud is mapped at once, and read whole beside by a native task; what is 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import tempfile
@@ -28,9 +29,12 @@ def folder() -> Path:
         chosen = Path(bpy.path.abspath(known.cache_folder))
         chosen.mkdir(parents=True, exist_ok=True)
         return chosen
-    own = bpy.utils.user_resource('DATAFILES', path="patina", create=True)
-    if own and os.access(own, os.W_OK):
-        return Path(own)
+    own = bpy.utils.user_resource('DATAFILES', path="patina")
+    with contextlib.suppress(OSError):  # where Blender is asked to make it, it prints a traceback
+        if own:
+            Path(own).mkdir(parents=True, exist_ok=True)
+            if os.access(own, os.W_OK):
+                return Path(own)
     user = getattr(os, "getuid", lambda: "")()
     beside = Path(tempfile.gettempdir()) / f"patina-{user}"
     beside.mkdir(mode=0o700, exist_ok=True)

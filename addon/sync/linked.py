@@ -38,6 +38,7 @@ class Source:
     scalar: str = ""  # that a ramp is laid over
     analyzed: bool = True
     hide_uncolored: bool = False
+    pattern: Path | None = None  # of the sequence that it is of
 
     def identity(self) -> tuple:
         return ("linked", str(self.path), self.kept.name)
@@ -65,8 +66,9 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
     """Of an object with a linked file, evaluated or not; None where there is nothing to show. The files of a sequence are
     all relative to the object's origin, so that they lie to one another as they were scanned."""
     path = files.path_of(obj)
-    origin = None
+    origin = pattern = None
     if sequence.is_pattern(path):
+        pattern = path
         settings = obj.patina.sequence
         path, notice = sequence.file_at(path, frame, settings.start, settings.step, settings.outside)
         if notice:
@@ -74,14 +76,14 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored)
+    found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored, pattern)
     if found is None:
         notices.append(Loss(f"'{obj.name}': the file {importers.told(path)} is missing"))
     return found
 
 
 def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed: bool = True,
-           hide_uncolored: bool = False) -> Source | None:
+           hide_uncolored: bool = False, pattern: Path | None = None) -> Source | None:
     try:
         status = path.stat()
     except OSError:
@@ -89,18 +91,26 @@ def source(path: Path, origin: Corner | None = None, scalar: str = "", analyzed:
     place = _hash(f"{path.resolve()}{origin or ''}", 12)
     state = _hash(f"{status.st_size} {status.st_mtime_ns}", 6)
     variant = _hash(f"{scalar} {analyzed} {hide_uncolored}", 4)  # several objects may link one file
-    return Source(path, kept.folder() / f"{place}-{state}-{variant}.cloud", origin, scalar, analyzed, hide_uncolored)
+    return Source(path, kept.folder() / f"{place}-{state}-{variant}.cloud", origin, scalar, analyzed, hide_uncolored, pattern)
+
+
+def before(found: Source) -> Source | None:
+    """The file before it in its sequence."""
+    path = sequence.before(found.pattern, found.path) if found.pattern else None
+    return source(path, found.origin, found.scalar, found.analyzed, found.hide_uncolored, found.pattern) if path else None
 
 
 def _hash(text: str, size: int) -> str:
     return hashlib.blake2b(text.encode("utf-8", "surrogateescape"), digest_size=size).hexdigest()
 
 
-def loss(name: str, source: Source, error: Exception) -> Loss:
-    """What to say where an object's file cannot be read. Raises what is not the file's fault: a cancel, memory."""
+def loss(name: str, source: Source, error: Exception, shown: Source | None = None) -> Loss:
+    """What to say where an object's file cannot be read. shown: in its stead. Raises what is not the file's fault: a cancel, memory."""
     if isinstance(error, native.PatinaCancelled) or getattr(error, "code", 0) == native.MEMORY:
         raise error
-    return Loss(importers.told(f"'{name}' is left out: {source.path} cannot be read: {error}"))
+    why = str(error).removeprefix(f"{source.path}: ")
+    what = f"'{name}': {shown.path.name} stays" if shown else f"'{name}' is left out"
+    return Loss(importers.told(f"{what}: {source.path} cannot be read: {why}"))
 
 
 def load(source: Source, progress: importers.Progress | None = None) -> Linked:

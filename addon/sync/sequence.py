@@ -46,6 +46,13 @@ def file_at(pattern: Path, frame: int, start: int, step: int, outside: str) -> t
     return shown, f"{_name(pattern, wanted)} is missing at frame {frame}, {shown.name} stays"
 
 
+def before(pattern: Path, path: Path) -> Path | None:
+    """The file of the next smaller number."""
+    files = files_of(pattern)
+    own = next((number for number, file in files.items() if file == path), 0)
+    return files.get(max((number for number in files if number < own), default=None))
+
+
 def files_of(pattern: Path) -> dict[int, Path]:
     """The files by number. The folder is looked through again when it changed."""
     try:

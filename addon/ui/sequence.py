@@ -34,6 +34,8 @@ class PATINA_PT_sequence(Panel):
         layout.prop(settings, "outside")
         found = sequence.files_of(files.path_of(obj))
         rows.sentence(context, layout, f"{len(found)} files, {min(found)} to {max(found)}" if found else "No file fits", 'INFO')
+        if obj.patina.analysis == 'AUTO':
+            rows.sentence(context, layout, "Drawn without an analysis: Analysis > Always makes sparse points finer, and each frame slower", 'NONE')
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_sequence,))

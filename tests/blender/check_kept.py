@@ -34,10 +34,12 @@ def test_without_a_home():
     path = dense("homeless.ply")
     try:
         locked.chmod(0o500)
-        for answer in ("", *([str(locked)] if not os.access(locked, os.W_OK) else [])):
-            bpy.utils.user_resource = lambda *_, answer=answer, **__: answer
+        for answer in ("", "/proc/nowhere/patina", *([str(locked)] if not os.access(locked, os.W_OK) else [])):
+            asked = []
+            bpy.utils.user_resource = lambda *_, answer=answer, asked=asked, **options: asked.append(options) or answer
             found = linked.load(linked.source(path))
             check(found.cloud.count == 20000, "loaded")
+            check(not any(options.get("create") for options in asked), "Blender prints a traceback where it cannot create a folder")
             check(not list(work.iterdir()), f"the current folder holds {list(work.iterdir())}")
             place = linked.source(path).kept
             check(place.is_absolute() and place.exists() and place.parent.parent == SCRATCH, f"kept as {place}")

@@ -8,7 +8,7 @@ import sys
 import bpy
 from check_import import import_ply
 from check_linked import dense
-from check_sequence import link, scans
+from check_sequence import link, scans, shown
 from harness import REPOSITORY, SCRATCH, Skip, add_points, check, drawn, failing_render, new_scene, render, reports, sphere, written
 
 
@@ -57,6 +57,25 @@ def test_an_animation_goes_on():
     check(all((SCRATCH / f"spoilt_frame_{frame:04}.png").exists() for frame in (1, 2, 3)), "every frame")
     check([text for kind, text in reports if kind == 'ERROR'] == [], f"{reports}")
     check(len([text for _, text in reports if str(spoilt) in text]) == 1, f"{reports}")
+
+
+def test_a_spoilt_file_keeps_the_one_before():
+    """As a missing one does; the warning names it once."""
+    first = link(scans("kept_before", (1, 2, 3, 4)))
+    folder = SCRATCH / "kept_before"
+    for number in (2, 3):
+        path = folder / f"scan_{number:04}.ply"
+        path.write_bytes(path.read_bytes()[:-20])
+        check(shown(number) == 1, f"frame {number}")
+        said = [(kind, text) for kind, text in reports if path.name in text]
+        check(len(said) == 1 and said[0][0] == 'WARNING' and said[0][1].count(path.name) == 1 and
+              "scan_0001.ply stays" in said[0][1] and "cut short" in said[0][1], f"{reports}")
+        with strictly():
+            check(path.name in failing_render(), f"{reports}")
+    check(shown(4) == 4 and not [text for _, text in reports if "cut short" in text], f"{reports}")
+    (folder / "scan_0001.ply").write_bytes(b"ply")
+    check(shown(3) == 0 and [text for _, text in reports if "left out" in text], f"none before it can be read: {reports}")
+    check(first.name == "scan", first.name)
 
 
 def test_nothing_to_draw():
