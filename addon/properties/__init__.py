@@ -235,7 +235,8 @@ class PatinaObjectProperties(PropertyGroup):
         precision=4,
         description="Of the discs that points are drawn as, see Render Properties > Surface")
     use_radius: switch("radius", _known_distance, "One radius for all points; else each point's own where an attribute says so, else what "
-                                                  "its neighbors or 1.75 times the spacing of the points say", "Set Disc Radius")
+                                                  "its neighbors or 1.75 times the spacing of the points say. Where what lies behind shows through gaps, tick it: it "
+                                                  "begins at two spacings", "Set Disc Radius")
     radius_attribute: StringProperty(
         name="Disc Radius Attribute", override=_OVERRIDE, search=_numbers, search_options={'SUGGESTION'},
         description="Point attribute of numbers, or vertex group: the radius of each point's disc; empty: where all points are "

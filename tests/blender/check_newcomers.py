@@ -119,6 +119,27 @@ def test_other_panoramas_are_named():
         check(any("equirectangular" in text for _, text in reports) == said, f"{kind}: {reports}")
 
 
+def test_the_box_of_disc_radius_closes_random_gaps():
+    """A closed ball of points spread at random has gaps wider than its discs; one click closes them, and its outline stays."""
+    random = np.random.default_rng(1)
+    for count, most in ((1000, 1.04), (3000, 1.02)):
+        scene = new_scene(320, 240)
+        scene.patina.fill, scene.patina.surface = 'CLOSED', 'AUTO'
+        bpy.context.view_layer.use_pass_z = True
+        away = random.normal(size=(count, 3))
+        obj = add_points(away / np.linalg.norm(away, axis=1, keepdims=True) + (0, 0, -4))
+        obj.patina.lighting = 'UNLIT'
+        through, drawn = [], []
+        for ticked in (False, True):
+            obj.patina.use_radius = ticked
+            depth = render()["Depth"].reshape(240, 320)
+            middle = np.hypot(*(np.mgrid[:240, :320] - np.array([119.5, 159.5])[:, None, None])) < 95
+            through.append(int((middle & (depth > 4.2)).sum()))
+            drawn.append(int((depth < 1e9).sum()))
+        check(through[0] > 50 and through[1] == 0, f"{count} points: {through} pixels show the far side, or what lies behind")
+        check(drawn[1] < most * drawn[0], f"{count} points: {drawn} pixels")
+
+
 def test_columns_of_words_are_left_out():
     """Names of points, notes: what a total station or a spreadsheet writes. A line says what was left out."""
     new_scene()
