@@ -68,11 +68,41 @@ struct pt_cpu_pass {
     struct pt_cpu_call call;
 };
 typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
-pt_cpu_finish pt_kernel_finish_scalar, pt_kernel_finish_sse42, pt_kernel_finish_avx2, pt_kernel_finish_avx512;
 
-// Every kernel once per level; the levels that a build leaves out are declared and never called.
-#define PT_X(name) pt_cpu_kernel pt_kernel_##name##_scalar, pt_kernel_##name##_sse42, pt_kernel_##name##_avx2, pt_kernel_##name##_avx512;
+// The levels that this build has, the best first: X(name, whether the processor knows it). Kernels are compiled once for each
+// (build/CMakeLists.txt), as PT_ISA.
+#if defined(PT_ONLY_SCALAR)
+#define PT_EACH_LEVEL(X) X(scalar, 1)
+#elif defined(__aarch64__)
+#define PT_EACH_LEVEL(X) X(neon, 1) X(scalar, 1)
+#else
+#define PT_EACH_LEVEL(X)                                                                                                           \
+    X(avx512, __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&    \
+                  __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("bmi2"))                                           \
+    X(avx2, __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2"))                                                     \
+    X(sse42, __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"))                                                \
+    X(scalar, 1)
+#endif
+
+// What a level gives the device: level.c.
+struct pt_cpu_level {
+    const char *name;
+    pt_cpu_kernel *kernels[PT_KERNEL_COUNT];
+    pt_cpu_finish *finish;
+};
+#define PT_X(level, known) extern const struct pt_cpu_level pt_cpu_level_##level;
+PT_EACH_LEVEL(PT_X)
+#undef PT_X
+
+#ifdef PT_ISA // within a level
+#define PT_CONCAT_(a, b) a##b
+#define PT_CONCAT(a, b) PT_CONCAT_(a, b)
+// The name of this level's variant of a kernel's entry: pt_kernel_scatter_avx2.
+#define PT_KERNEL_ENTRY(name) PT_CONCAT(pt_kernel_##name##_, PT_ISA)
+#define PT_X(name) pt_cpu_kernel PT_KERNEL_ENTRY(name);
 PT_EACH_KERNEL(PT_X)
 #undef PT_X
+pt_cpu_finish PT_KERNEL_ENTRY(finish);
+#endif
 
 #endif

@@ -12,48 +12,23 @@
 
 struct cpu_device {
     struct patina_device base;
-    pt_cpu_kernel *const *kernels; // [PT_KERNEL_COUNT]
-    pt_cpu_finish *finish;
+    const struct pt_cpu_level *level;
     struct pt_pool *pool;
     struct pt_cpu_scratch scratch[PT_CPU_SCRATCHES];
 };
 
-#define PT_X(name) pt_kernel_##name##_scalar,
-static pt_cpu_kernel *const kernels_scalar[] = { PT_EACH_KERNEL(PT_X) };
-#undef PT_X
-#if !defined(PT_ONLY_SCALAR)
-#define PT_X(name) pt_kernel_##name##_sse42,
-static pt_cpu_kernel *const kernels_sse42[] = { PT_EACH_KERNEL(PT_X) };
-#undef PT_X
-#define PT_X(name) pt_kernel_##name##_avx2,
-static pt_cpu_kernel *const kernels_avx2[] = { PT_EACH_KERNEL(PT_X) };
-#undef PT_X
-#define PT_X(name) pt_kernel_##name##_avx512,
-static pt_cpu_kernel *const kernels_avx512[] = { PT_EACH_KERNEL(PT_X) };
-#undef PT_X
-#endif
-
-struct level {
-    const char *name;
-    pt_cpu_kernel *const *kernels;
-    pt_cpu_finish *finish;
-};
-
 // The best level first that this processor has; ends with the scalar one.
-static uint32_t available_levels(struct level levels[4])
+static uint32_t available_levels(const struct pt_cpu_level *levels[4])
 {
     uint32_t count = 0;
-#if !defined(PT_ONLY_SCALAR)
+#if defined(__x86_64__)
     __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("bmi2"))
-        levels[count++] = (struct level){ "cpu-avx512", kernels_avx512, pt_kernel_finish_avx512 };
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2"))
-        levels[count++] = (struct level){ "cpu-avx2", kernels_avx2, pt_kernel_finish_avx2 };
-    if (__builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"))
-        levels[count++] = (struct level){ "cpu-sse42", kernels_sse42, pt_kernel_finish_sse42 };
 #endif
-    levels[count++] = (struct level){ "cpu-scalar", kernels_scalar, pt_kernel_finish_scalar };
+#define PT_X(level, known)                                                                                                         \
+    if (known)                                                                                                                     \
+        levels[count++] = &pt_cpu_level_##level;
+    PT_EACH_LEVEL(PT_X)
+#undef PT_X
     return count;
 }
 
@@ -174,7 +149,7 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
                                       .cancel = cancel,
                                       .scratch = cpu->scratch };
     (void)argument_size;
-    int error = cpu->kernels[kernel](&call);
+    int error = cpu->level->kernels[kernel](&call);
     if (error == PATINA_ERROR_MEMORY)
         return pt_fail(&device->handle, error, "%s: out of memory for the scratch of kernel %s", device->info.name,
                        pt_kernels[kernel].name);
@@ -194,7 +169,7 @@ static int cpu_finish_picture(struct patina_device *device, const struct pt_boun
                                            .pool = cpu->pool,
                                            .scratch = cpu->scratch } };
     if (!error)
-        error = cpu->finish(bound, count);
+        error = cpu->level->finish(bound, count);
     free(bound);
     if (error)
         return pt_fail(&device->handle, error, "%s: out of memory for rows of the picture", device->info.name);
@@ -249,10 +224,10 @@ static void describe_processor(char *text, size_t size)
 int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
-    struct level levels[4];
+    const struct pt_cpu_level *levels[4];
     uint32_t count = available_levels(levels), chosen = 0;
     pthread_once(&once, fill_tables);
-    while (chosen < count && strcmp(level, "cpu") != 0 && strcmp(level, levels[chosen].name) != 0)
+    while (chosen < count && strcmp(level, "cpu") != 0 && strcmp(level, levels[chosen]->name) != 0)
         chosen++;
     if (chosen == count)
         return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "device %s: this processor or build has no such level", level);
@@ -266,12 +241,11 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *level, stru
     }
     pt_handle_init(&cpu->base.handle);
     cpu->base.ops = &cpu_ops;
-    cpu->kernels = levels[chosen].kernels;
-    cpu->finish = levels[chosen].finish;
+    cpu->level = levels[chosen];
     cpu->pool = pool;
     cpu->base.memory_cap = desc->memory_cap;
     cpu->base.info = (patina_device_info){ .struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool) };
-    snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", levels[chosen].name);
+    snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", cpu->level->name);
     describe_processor(cpu->base.info.description, sizeof cpu->base.info.description);
     *out = &cpu->base;
     return PATINA_OK;

@@ -8,17 +8,14 @@
 #include "math.h"
 #include "tables.h"
 
-#define PT_CONCAT_(a, b) a##b
-#define PT_CONCAT(a, b) PT_CONCAT_(a, b)
-// The name of this level's variant of a kernel's entry: pt_kernel_scatter_avx2.
-#define PT_KERNEL_ENTRY(name) PT_CONCAT(pt_kernel_##name##_, PT_ISA)
-
 #if defined(PT_ISA_AVX512)
 #include "simd/avx512.h"
 #elif defined(PT_ISA_AVX2)
 #include "simd/avx2.h"
 #elif defined(PT_ISA_SSE42)
 #include "simd/sse42.h"
+#elif defined(PT_ISA_NEON)
+#include "simd/neon.h"
 #else
 #include "simd/scalar.h"
 #endif
@@ -32,7 +29,7 @@ static inline vf vf_zero(void) { return vf_set(0.0f); }
 #if PT_LANES > 1
 #include "simd/pixels.h"
 #endif
-#if defined(PT_ISA_AVX2) || defined(PT_ISA_SSE42)
+#if defined(PT_ISA_AVX2) || defined(PT_ISA_SSE42) || defined(PT_ISA_NEON)
 #include "simd/unmasked.h"
 #endif
 

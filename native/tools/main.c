@@ -79,7 +79,7 @@ static const char usage_behind[] =
     "  --transparent                      background with alpha 0\n"
     "  --pass NAME[,MIN,MAX]              what the picture shows in place of colours: depth, normal, source, shadow, line,\n"
     "                                     certainty or thickness; numbers by --ramp-colors, over a range that is told\n"
-    "  --device auto|cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|gl-egl|gl-osmesa\n"
+    "  --device auto|cpu|cpu-scalar|cpu-sse42|cpu-avx2|cpu-avx512|cpu-neon|gl-egl|gl-osmesa\n"
     "  --threads N, --batch N             of the CPU device (0: automatic)\n"
     "  --repeat N                         then measure N frames, the camera turning one degree a frame\n"
     "  --stats json                       one JSON object on standard output\n"

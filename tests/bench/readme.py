@@ -12,7 +12,7 @@ import plots
 from report import Row, count, joined, name_of, table
 
 PAGES = ("README.md", "tests/bench/README.md")
-NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2",
+NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2", "cpu-neon": "processor, NEON",
          "cpu-scalar": "processor, plain", "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
 QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs",
              "analysed": "analysed", "averaged": "analysed, averages", "final": "analysed, 16 samples"}

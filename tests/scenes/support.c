@@ -6,8 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#if defined(__aarch64__)
+static const char *const all_devices[] = {"cpu", "cpu-scalar", "cpu-neon", "gl-egl", "gl-osmesa"};
+#else
 static const char *const all_devices[] = {"cpu",        "cpu-scalar", "cpu-sse42", "cpu-avx2",
                                           "cpu-avx512", "gl-egl",     "gl-osmesa"};
+#endif
 enum { ALL_DEVICES = sizeof all_devices / sizeof all_devices[0], MAX_DEVICES = 16 };
 
 static const char *chosen[MAX_DEVICES];

@@ -28,7 +28,6 @@ struct pt_pointwise {
 
 // By kernel.
 #define PT_POINTWISE_KERNELS PT_CONCAT(pt_pointwise_, PT_ISA)
-extern const struct pt_pointwise pt_pointwise_scalar[PT_KERNEL_COUNT], pt_pointwise_sse42[PT_KERNEL_COUNT],
-    pt_pointwise_avx2[PT_KERNEL_COUNT], pt_pointwise_avx512[PT_KERNEL_COUNT];
+extern const struct pt_pointwise PT_POINTWISE_KERNELS[PT_KERNEL_COUNT];
 
 #endif

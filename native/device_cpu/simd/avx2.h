@@ -120,7 +120,7 @@ static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
 static inline vi vi_west(vi before, vi own) { return _mm256_alignr_epi8(own, _mm256_permute2x128_si256(before, own, 0x21), 12); }
 static inline vi vi_east(vi own, vi behind) { return _mm256_alignr_epi8(_mm256_permute2x128_si256(own, behind, 0x21), own, 4); }
 #define PT_VECTOR(name) _mm256_##name
-static inline __attribute__((always_inline)) vi sse_words(const char *base, size_t scale, const uint32_t at[PT_LANES])
+static inline __attribute__((always_inline)) vi vi_pick(const char *base, size_t scale, const uint32_t at[PT_LANES])
 {
     return _mm256_setr_epi32(sse_word(base, scale * at[0]), sse_word(base, scale * at[1]), sse_word(base, scale * at[2]),
                              sse_word(base, scale * at[3]), sse_word(base, scale * at[4]), sse_word(base, scale * at[5]),

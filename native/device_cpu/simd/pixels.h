@@ -6,6 +6,7 @@
 static inline vi vi_load_z(const uint64_t *keys) { return vi_odds(vi_load(keys), vi_load(keys + PT_LANES / 2)); }
 static inline vi vi_load_id(const uint64_t *keys) { return vi_evens(vi_load(keys), vi_load(keys + PT_LANES / 2)); }
 
+#ifdef PT_VECTOR
 static inline void vf_transpose(vf r[4]) // 4 x 4 within each quarter
 {
     vf a = PT_VECTOR(unpacklo_ps)(r[0], r[1]), b = PT_VECTOR(unpacklo_ps)(r[2], r[3]);
@@ -15,6 +16,7 @@ static inline void vf_transpose(vf r[4]) // 4 x 4 within each quarter
     r[2] = PT_VECTOR(shuffle_ps)(c, d, 0x44);
     r[3] = PT_VECTOR(shuffle_ps)(c, d, 0xEE);
 }
+#endif
 static inline void vf_load4(const float *pixels, vf out[4])
 {
     vf_load_pixels(pixels, out);

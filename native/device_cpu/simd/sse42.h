@@ -52,15 +52,6 @@ static inline void vi_zip(vi a, vi b, vi out[2])
     out[0] = _mm_unpacklo_epi32(a, b);
     out[1] = _mm_unpackhi_epi32(a, b);
 }
-static inline void vi_store_keys(uint64_t *keys, vi z, vi id, uint32_t lanes)
-{
-    uint64_t words[4];
-    _mm_storeu_si128((__m128i *)words, _mm_unpacklo_epi32(id, z));
-    _mm_storeu_si128((__m128i *)(words + 2), _mm_unpackhi_epi32(id, z));
-    for (int k = 0; k < 4; k++)
-        if (lanes >> k & 1u)
-            keys[k] = words[k];
-}
 static inline vm vm_first(uint32_t n) { return _mm_cmpgt_epi32(_mm_set1_epi32((int)n), vi_lanes()); }
 static inline vm vm_of_bits(uint32_t bits)
 {
@@ -70,56 +61,15 @@ static inline vm vm_of_bits(uint32_t bits)
 static inline vm vm_and(vm a, vm b) { return _mm_and_si128(a, b); }
 static inline vm vm_or(vm a, vm b) { return _mm_or_si128(a, b); }
 static inline vm vm_not(vm a) { return _mm_xor_si128(a, _mm_set1_epi32(-1)); }
-static inline void vi_store_where(void *p, vi a, vm m)
-{
-    uint32_t lanes = vm_bits(m), value[4];
-    if (lanes == 15u) {
-        vi_store(p, a);
-        return;
-    }
-    vi_store(value, a);
-    for (int k = 0; k < 4; k++)
-        if (lanes >> k & 1u)
-            memcpy((char *)p + 4 * k, &value[k], 4);
-}
-static inline void vf_load_pixels(const float *p, vf r[4]) // float4 pixels; vector k: pixel k
-{
-    for (int k = 0; k < 4; k++)
-        r[k] = _mm_loadu_ps(p + 4 * k);
-}
-static inline void vf_pick_pixels(const float *p, const float *fourth, const uint32_t i[4], vf r[4])
-{
-    for (int k = 0; k < 4; k++)
-        r[k] = sse_pixel(p, fourth, i[k]);
-}
-static inline void vf_store_pixels(float *p, vf r[4], uint32_t lanes)
-{
-    for (int k = 0; k < 4; k++)
-        if (lanes >> k & 1u)
-            _mm_storeu_ps(p + 4 * k, r[k]);
-}
-static inline void vf_stream_pixels(float *p, vf r[4])
-{
-    for (int k = 0; k < 4; k++)
-        _mm_stream_ps(p + 4 * k, r[k]);
-}
 static inline vf vf_mul_where(vm m, vf a, vf b) { return _mm_and_ps(a * b, _mm_castsi128_ps(m)); }
 static inline vf vf_add_where(vm m, vf a, vf b) { return a + _mm_and_ps(b, _mm_castsi128_ps(m)); }
-static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
-{
-#define FROM(i, j, k, l) { 0x03020100 + i * 0x04040404, 0x03020100 + j * 0x04040404, 0x03020100 + k * 0x04040404, \
-                           0x03020100 + l * 0x04040404 }
-    static const int32_t from[16][4] = { FROM(0, 0, 0, 0), FROM(0, 0, 0, 0), FROM(1, 0, 0, 0), FROM(0, 1, 0, 0),
-                                         FROM(2, 0, 0, 0), FROM(0, 2, 0, 0), FROM(1, 2, 0, 0), FROM(0, 1, 2, 0),
-                                         FROM(3, 0, 0, 0), FROM(0, 3, 0, 0), FROM(1, 3, 0, 0), FROM(0, 1, 3, 0),
-                                         FROM(2, 3, 0, 0), FROM(0, 2, 3, 0), FROM(1, 2, 3, 0), FROM(0, 1, 2, 3) };
-#undef FROM
-    _mm_storeu_si128((__m128i *)p, _mm_shuffle_epi8(a, _mm_loadu_si128((const __m128i *)from[lanes])));
-}
 static inline vi vi_west(vi before, vi own) { return _mm_alignr_epi8(own, before, 12); }
 static inline vi vi_east(vi own, vi behind) { return _mm_alignr_epi8(behind, own, 4); }
+static inline vi vi_pick_bytes(vi a, const void *from) { return _mm_shuffle_epi8(a, vi_load(from)); }
+static inline void vf_stream(float *p, vf a) { _mm_stream_ps(p, a); }
+static inline vf vf_pixel(const float *p, const float *fourth, uint32_t twice) { return sse_pixel(p, fourth, twice); }
 #define PT_VECTOR(name) _mm_##name
-static inline __attribute__((always_inline)) vi sse_words(const char *base, size_t scale, const uint32_t at[PT_LANES])
+static inline __attribute__((always_inline)) vi vi_pick(const char *base, size_t scale, const uint32_t at[PT_LANES])
 {
     return _mm_setr_epi32(sse_word(base, scale * at[0]), sse_word(base, scale * at[1]), sse_word(base, scale * at[2]),
                           sse_word(base, scale * at[3]));
@@ -130,5 +80,6 @@ static inline void vf_columns(const float *row, const uint32_t at[PT_LANES], vf 
         out[i] = vf_load(row + at[i]);
     _MM_TRANSPOSE4_PS(out[0], out[1], out[2], out[3]);
 }
+#include "four.h"
 
 #endif

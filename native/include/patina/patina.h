@@ -114,7 +114,7 @@ PATINA_API float patina_progress_value(const patina_progress *progress); // 0..1
 typedef struct patina_device_desc {
     size_t struct_size;
     const char *name; // "auto" (default), "cpu", "cpu-scalar", "gl-egl", "gl-osmesa"; CPU levels may be asked for
-                      // by name too: "cpu-sse42", "cpu-avx2", "cpu-avx512"
+                      // by name too: "cpu-sse42", "cpu-avx2", "cpu-avx512", on ARM "cpu-neon"
     uint32_t threads; // CPU worker threads; 0 = one per core available to the process
     uint32_t batch;   // scheduling batch (items a worker takes at once); 0 = automatic. Never changes a picture.
     uint64_t memory_cap; // bytes of planes that a frame may hold (about 100 a pixel, 150 in transparent scenes); 0 = no limit
