@@ -90,8 +90,8 @@ struct patina_device {
     patina_device_info info;
     uint64_t memory_cap; // bytes of planes a frame may hold; 0: no limit
     // Frames of one device take turns, for its scratch is one. `changed` is told when a turn ends, or a frame is cancelled.
-    pthread_mutex_t turns;
-    pthread_cond_t changed;
+    struct pt_mutex turns;
+    struct pt_condition changed;
     int taken;
 };
 

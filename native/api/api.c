@@ -85,8 +85,8 @@ int patina_device_create(const patina_device_desc *desc, patina_device **out)
     int error = pt_take(NULL, "patina_device_create", desc, &checked, sizeof checked);
     error = error ? error : create_named(&checked, checked.name ? checked.name : "auto", out);
     if (!error) {
-        pthread_mutex_init(&(*out)->turns, NULL);
-        pthread_cond_init(&(*out)->changed, NULL);
+        pt_mutex_init(&(*out)->turns);
+        pt_condition_init(&(*out)->changed);
     }
     return error;
 }
@@ -95,8 +95,8 @@ void patina_device_destroy(patina_device *device)
 {
     if (!device)
         return;
-    pthread_cond_destroy(&device->changed);
-    pthread_mutex_destroy(&device->turns);
+    pt_condition_destroy(&device->changed);
+    pt_mutex_destroy(&device->turns);
     device->ops->destroy(device);
 }
 
@@ -136,20 +136,20 @@ static int take_turn(patina_frame *frame)
 {
     struct patina_device *device = frame->device;
     int cancelled = 0;
-    pthread_mutex_lock(&device->turns);
+    pt_mutex_lock(&device->turns);
     while (device->taken && !(cancelled = atomic_exchange(&frame->cancel, 0)))
-        pthread_cond_wait(&device->changed, &device->turns);
+        pt_condition_wait(&device->changed, &device->turns);
     device->taken |= !cancelled;
-    pthread_mutex_unlock(&device->turns);
+    pt_mutex_unlock(&device->turns);
     return cancelled ? pt_fail(&frame->handle, PATINA_ERROR_CANCELLED, "rendering was cancelled") : PATINA_OK;
 }
 
 static int end_turn(patina_frame *frame, int error)
 {
-    pthread_mutex_lock(&frame->device->turns);
+    pt_mutex_lock(&frame->device->turns);
     frame->device->taken = 0;
-    pthread_cond_broadcast(&frame->device->changed);
-    pthread_mutex_unlock(&frame->device->turns);
+    pt_condition_wake_all(&frame->device->changed);
+    pt_mutex_unlock(&frame->device->turns);
     return error;
 }
 
@@ -204,9 +204,9 @@ void patina_frame_cancel(patina_frame *frame)
     if (!frame)
         return;
     atomic_store(&frame->cancel, 1);
-    pthread_mutex_lock(&frame->device->turns); // never held for long
-    pthread_cond_broadcast(&frame->device->changed);
-    pthread_mutex_unlock(&frame->device->turns);
+    pt_mutex_lock(&frame->device->turns); // never held for long
+    pt_condition_wake_all(&frame->device->changed);
+    pt_mutex_unlock(&frame->device->turns);
 }
 
 float patina_frame_progress(const patina_frame *frame) { return frame ? atomic_load(&frame->progress) : 0.0f; }

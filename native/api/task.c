@@ -5,14 +5,13 @@
 #include "scene/analysis.h"
 #include "scene/fingerprint.h"
 
-#include <signal.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct patina_task {
     struct pt_handle handle;
-    pthread_t thread;
+    struct pt_thread thread;
     int joined;
     atomic_int done;
     int error; // of the work, once it is done
@@ -37,20 +36,18 @@ struct patina_task {
     float *normals;
 };
 
-static void *thread_main(void *argument)
+static void thread_main(void *argument)
 {
     struct patina_task *task = argument;
     task->error = task->work(task);
     if (task->error)
         pt_fail_again(&task->handle, task->error);
     atomic_store(&task->done, 1);
-    return NULL;
 }
 
-// Starts a copy of the task. Its thread takes no signals: they belong to the host program.
+// Starts a copy of the task.
 static int start(const struct patina_task *task, patina_task **out)
 {
-    sigset_t all, before;
     if (!out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "a task: out is NULL");
     *out = malloc(sizeof **out);
@@ -59,11 +56,7 @@ static int start(const struct patina_task *task, patina_task **out)
     **out = *task;
     pt_handle_init(&(*out)->handle);
     atomic_init(&(*out)->done, 0);
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    int failed = pthread_create(&(*out)->thread, NULL, thread_main, *out);
-    pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (!failed)
+    if (!pt_thread_start(&(*out)->thread, thread_main, *out, 0))
         return PATINA_OK;
     pt_handle_destroy(&(*out)->handle);
     free(*out);
@@ -233,7 +226,7 @@ int patina_task_wait(patina_task *task)
     if (!task)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_wait: task is NULL");
     if (!task->joined)
-        pthread_join(task->thread, NULL);
+        pt_thread_join(&task->thread);
     task->joined = 1;
     return task->error;
 }

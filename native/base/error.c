@@ -9,14 +9,14 @@ static _Thread_local char thread_message[512];
 void pt_handle_init(struct pt_handle *handle)
 {
     handle->magic = PT_MAGIC;
-    pthread_mutex_init(&handle->lock, NULL);
+    pt_mutex_init(&handle->lock);
     handle->message[0] = 0;
 }
 
 void pt_handle_destroy(struct pt_handle *handle)
 {
     handle->magic = 0;
-    pthread_mutex_destroy(&handle->lock);
+    pt_mutex_destroy(&handle->lock);
 }
 
 static void store(const struct pt_handle *handle)
@@ -24,9 +24,9 @@ static void store(const struct pt_handle *handle)
     if (!handle)
         return;
     struct pt_handle *h = (struct pt_handle *)handle; // the message is not part of a handle's value
-    pthread_mutex_lock(&h->lock);
+    pt_mutex_lock(&h->lock);
     memcpy(h->message, thread_message, sizeof h->message);
-    pthread_mutex_unlock(&h->lock);
+    pt_mutex_unlock(&h->lock);
 }
 
 int pt_fail(const struct pt_handle *handle, int code, const char *format, ...)
@@ -66,9 +66,9 @@ size_t patina_message(const void *handle, char *buffer, size_t size)
         struct pt_handle *h = (struct pt_handle *)handle;
         if (h->magic != PT_MAGIC)
             return 0;
-        pthread_mutex_lock(&h->lock);
+        pt_mutex_lock(&h->lock);
         memcpy(copy, h->message, sizeof copy);
-        pthread_mutex_unlock(&h->lock);
+        pt_mutex_unlock(&h->lock);
     } else {
         memcpy(copy, thread_message, sizeof copy);
     }

@@ -4,14 +4,14 @@
 #define PT_ERROR_H
 
 #include "patina/patina.h"
+#include "platform.h"
 
-#include <pthread.h>
 #include <stdarg.h>
 
 // First member of every handle: patina_message() takes any of them.
 struct pt_handle {
     uint32_t magic; // PT_MAGIC while alive
-    pthread_mutex_t lock;
+    struct pt_mutex lock;
     char message[512];
 };
 

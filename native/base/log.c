@@ -8,17 +8,26 @@
 enum { LINES = 256, LINE_SIZE = 512 };
 
 static struct {
-    pthread_mutex_t lock;
+    struct pt_once made; // the lock
+    struct pt_mutex lock;
     unsigned first, count;
     struct {
         enum pt_level level;
         char text[LINE_SIZE];
     } lines[LINES];
-} ring = { .lock = PTHREAD_MUTEX_INITIALIZER };
+} ring;
+
+static void make_lock(void) { pt_mutex_init(&ring.lock); }
+
+static void lock_ring(void)
+{
+    pt_once(&ring.made, make_lock);
+    pt_mutex_lock(&ring.lock);
+}
 
 void pt_log_write(enum pt_level level, const char *text)
 {
-    pthread_mutex_lock(&ring.lock);
+    lock_ring();
     if (ring.count == LINES) { // the oldest line makes room
         ring.first = (ring.first + 1) % LINES;
         ring.count--;
@@ -26,7 +35,7 @@ void pt_log_write(enum pt_level level, const char *text)
     unsigned at = (ring.first + ring.count++) % LINES;
     ring.lines[at].level = level;
     snprintf(ring.lines[at].text, LINE_SIZE, "%s", text);
-    pthread_mutex_unlock(&ring.lock);
+    pt_mutex_unlock(&ring.lock);
 }
 
 void pt_log(enum pt_level level, const char *format, ...)
@@ -42,7 +51,7 @@ void pt_log(enum pt_level level, const char *format, ...)
 size_t patina_log_next(char *buffer, size_t size, int *level)
 {
     size_t length = 0;
-    pthread_mutex_lock(&ring.lock);
+    lock_ring();
     if (ring.count) {
         if (level)
             *level = (int)ring.lines[ring.first].level;
@@ -52,6 +61,6 @@ size_t patina_log_next(char *buffer, size_t size, int *level)
         ring.first = (ring.first + 1) % LINES;
         ring.count--;
     }
-    pthread_mutex_unlock(&ring.lock);
+    pt_mutex_unlock(&ring.lock);
     return length;
 }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pool.h"
+#include "platform.h"
 
-#include <pthread.h>
-#include <sched.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
@@ -30,9 +29,9 @@ struct job {
 };
 
 struct pt_pool {
-    pthread_mutex_t lock;
-    pthread_mutex_t caller; // one pt_parallel at a time
-    pthread_cond_t wake, done;
+    struct pt_mutex lock;
+    struct pt_mutex caller; // one pt_parallel at a time
+    struct pt_condition wake, done;
     struct job *job;      // that helpers may join; NULL between two
     struct range *ranges; // one a thread
     _Atomic uint64_t generation;
@@ -40,7 +39,7 @@ struct pt_pool {
     uint32_t spins;
     uint32_t threads, batch;
     int quit;
-    pthread_t helpers[MAX_THREADS];
+    struct pt_thread helpers[MAX_THREADS];
     uint32_t started;
 };
 
@@ -101,11 +100,11 @@ static void pause_a_moment(void)
 #if defined(__x86_64__) || defined(__i386__)
     __builtin_ia32_pause();
 #else
-    sched_yield();
+    pt_thread_yield();
 #endif
 }
 
-static void *helper_main(void *argument)
+static void helper_main(void *argument)
 {
     struct helper_start start = *(struct helper_start *)argument;
     free(argument);
@@ -114,33 +113,24 @@ static void *helper_main(void *argument)
     for (;;) {
         for (uint32_t i = 0; i < pool->spins && atomic_load_explicit(&pool->generation, memory_order_acquire) == seen; i++)
             pause_a_moment();
-        pthread_mutex_lock(&pool->lock);
+        pt_mutex_lock(&pool->lock);
         while (!pool->quit && pool->generation == seen)
-            pthread_cond_wait(&pool->wake, &pool->lock);
+            pt_condition_wait(&pool->wake, &pool->lock);
         if (pool->quit)
             break;
         seen = pool->generation;
         struct job *job = pool->job;
         pool->running += job != NULL;
-        pthread_mutex_unlock(&pool->lock);
+        pt_mutex_unlock(&pool->lock);
         if (!job)
             continue;
         take_part(job, start.thread);
-        pthread_mutex_lock(&pool->lock);
+        pt_mutex_lock(&pool->lock);
         if (atomic_fetch_sub(&pool->running, 1) == 1)
-            pthread_cond_signal(&pool->done);
-        pthread_mutex_unlock(&pool->lock);
+            pt_condition_wake_one(&pool->done);
+        pt_mutex_unlock(&pool->lock);
     }
-    pthread_mutex_unlock(&pool->lock);
-    return NULL;
-}
-
-static uint32_t core_count(void)
-{
-    cpu_set_t set;
-    if (sched_getaffinity(0, sizeof set, &set) == 0)
-        return (uint32_t)CPU_COUNT(&set);
-    return 1;
+    pt_mutex_unlock(&pool->lock);
 }
 
 struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
@@ -148,7 +138,7 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
     struct pt_pool *pool = calloc(1, sizeof *pool);
     if (!pool)
         return NULL;
-    pool->threads = threads ? threads : core_count();
+    pool->threads = threads ? threads : pt_core_count();
     if (pool->threads > MAX_THREADS)
         pool->threads = MAX_THREADS;
     pool->batch = batch;
@@ -157,16 +147,16 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
         free(pool);
         return NULL;
     }
-    pool->spins = pool->threads <= core_count() ? SPINS : 0;
-    pthread_mutex_init(&pool->lock, NULL);
-    pthread_mutex_init(&pool->caller, NULL);
-    pthread_cond_init(&pool->wake, NULL);
-    pthread_cond_init(&pool->done, NULL);
+    pool->spins = pool->threads <= pt_core_count() ? SPINS : 0;
+    pt_mutex_init(&pool->lock);
+    pt_mutex_init(&pool->caller);
+    pt_condition_init(&pool->wake);
+    pt_condition_init(&pool->done);
     for (uint32_t i = 1; i < pool->threads; i++) {
         struct helper_start *start = malloc(sizeof *start);
         if (start)
             *start = (struct helper_start){ pool, i };
-        if (!start || pthread_create(&pool->helpers[pool->started], NULL, helper_main, start)) {
+        if (!start || pt_thread_start(&pool->helpers[pool->started], helper_main, start, 0)) {
             free(start);
             pt_pool_destroy(pool);
             return NULL;
@@ -180,16 +170,16 @@ void pt_pool_destroy(struct pt_pool *pool)
 {
     if (!pool)
         return;
-    pthread_mutex_lock(&pool->lock);
+    pt_mutex_lock(&pool->lock);
     pool->quit = 1;
-    pthread_cond_broadcast(&pool->wake);
-    pthread_mutex_unlock(&pool->lock);
+    pt_condition_wake_all(&pool->wake);
+    pt_mutex_unlock(&pool->lock);
     for (uint32_t i = 0; i < pool->started; i++)
-        pthread_join(pool->helpers[i], NULL);
-    pthread_cond_destroy(&pool->wake);
-    pthread_cond_destroy(&pool->done);
-    pthread_mutex_destroy(&pool->caller);
-    pthread_mutex_destroy(&pool->lock);
+        pt_thread_join(&pool->helpers[i]);
+    pt_condition_destroy(&pool->wake);
+    pt_condition_destroy(&pool->done);
+    pt_mutex_destroy(&pool->caller);
+    pt_mutex_destroy(&pool->lock);
     free(pool->ranges);
     free(pool);
 }
@@ -210,28 +200,28 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
         grain = items / (4 * pool->threads);
     grain = grain < 1 ? 1 : grain;
     struct job job = { work, context, grain, pool->threads, pool->ranges };
-    pthread_mutex_lock(&pool->caller);
+    pt_mutex_lock(&pool->caller);
     for (uint32_t t = 0; t < pool->threads; t++)
         atomic_store_explicit(&pool->ranges[t].span,
                               span_of((uint32_t)((uint64_t)items * t / pool->threads),
                                       (uint32_t)((uint64_t)items * (t + 1) / pool->threads)),
                               memory_order_relaxed);
     if (items > grain) {
-        pthread_mutex_lock(&pool->lock);
+        pt_mutex_lock(&pool->lock);
         pool->job = &job;
         pool->generation++;
-        pthread_cond_broadcast(&pool->wake);
-        pthread_mutex_unlock(&pool->lock);
+        pt_condition_wake_all(&pool->wake);
+        pt_mutex_unlock(&pool->lock);
         take_part(&job, 0);
         for (uint32_t i = 0; i < pool->spins && atomic_load_explicit(&pool->running, memory_order_acquire); i++)
             pause_a_moment();
-        pthread_mutex_lock(&pool->lock);
+        pt_mutex_lock(&pool->lock);
         pool->job = NULL; // who still sleeps is not waited for: nothing is left to do
         while (pool->running)
-            pthread_cond_wait(&pool->done, &pool->lock);
-        pthread_mutex_unlock(&pool->lock);
+            pt_condition_wait(&pool->done, &pool->lock);
+        pt_mutex_unlock(&pool->lock);
     } else {
         take_part(&job, 0);
     }
-    pthread_mutex_unlock(&pool->caller);
+    pt_mutex_unlock(&pool->caller);
 }

@@ -2,7 +2,7 @@
 // The CPU device: buffers are memory, kernels are functions of the best level that the processor has.
 #include "base/color.h"
 #include "cpu.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "tables.h"
 
 #include <math.h>
@@ -204,29 +204,12 @@ static const struct pt_device_ops cpu_ops = {
     .finish = cpu_finish,
 };
 
-static void describe_processor(char *text, size_t size)
-{
-    char line[256];
-    FILE *file = fopen("/proc/cpuinfo", "r");
-    snprintf(text, size, "processor");
-    while (file && fgets(line, sizeof line, file))
-        if (!strncmp(line, "model name", 10)) {
-            const char *value = strchr(line, ':');
-            if (value)
-                snprintf(text, size, "%.*s", (int)strcspn(value + 1, "\n"), value + 1 + strspn(value + 1, " "));
-            text[strcspn(text, "\n")] = 0;
-            break;
-        }
-    if (file)
-        fclose(file);
-}
-
 int pt_device_cpu_create(const patina_device_desc *desc, const char *level, struct patina_device **out)
 {
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    static struct pt_once once;
     const struct pt_cpu_level *levels[4];
     uint32_t count = available_levels(levels), chosen = 0;
-    pthread_once(&once, fill_tables);
+    pt_once(&once, fill_tables);
     while (chosen < count && strcmp(level, "cpu") != 0 && strcmp(level, levels[chosen]->name) != 0)
         chosen++;
     if (chosen == count)
@@ -246,7 +229,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *level, stru
     cpu->base.memory_cap = desc->memory_cap;
     cpu->base.info = (patina_device_info){ .struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool) };
     snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", cpu->level->name);
-    describe_processor(cpu->base.info.description, sizeof cpu->base.info.description);
+    pt_processor_name(cpu->base.info.description, sizeof cpu->base.info.description);
     *out = &cpu->base;
     return PATINA_OK;
 }

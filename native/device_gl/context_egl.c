@@ -6,8 +6,8 @@
 // The display of an EGL device is one per process and eglTerminate would end it for every user, our own other devices
 // included: so it is never terminated. What remains of it is bounded: one display per process.
 #include "context.h"
+#include "base/platform.h"
 
-#include <dlfcn.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -66,21 +66,21 @@ static int has(const char *list, const char *word)
 
 static int load(struct egl *c, char *why, size_t why_size)
 {
-    c->library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE); // drivers do not survive being unloaded
+    c->library = pt_library_open("libEGL.so.1");
     if (!c->library) {
         snprintf(why, why_size, "libEGL.so.1 is not installed");
         return -1;
     }
-    *(void **)&c->get_proc = dlsym(c->library, "eglGetProcAddress");
-    *(void **)&c->query_string = dlsym(c->library, "eglQueryString");
-    *(void **)&c->get_platform_display = dlsym(c->library, "eglGetPlatformDisplay"); // EGL 1.5
-    *(void **)&c->initialize = dlsym(c->library, "eglInitialize");
-    *(void **)&c->bind_api = dlsym(c->library, "eglBindAPI");
-    *(void **)&c->choose_config = dlsym(c->library, "eglChooseConfig");
-    *(void **)&c->create_context = dlsym(c->library, "eglCreateContext");
-    *(void **)&c->destroy_context = dlsym(c->library, "eglDestroyContext");
-    *(void **)&c->make_current = dlsym(c->library, "eglMakeCurrent");
-    *(void **)&c->release_thread = dlsym(c->library, "eglReleaseThread");
+    *(void **)&c->get_proc = pt_library_find(c->library, "eglGetProcAddress");
+    *(void **)&c->query_string = pt_library_find(c->library, "eglQueryString");
+    *(void **)&c->get_platform_display = pt_library_find(c->library, "eglGetPlatformDisplay"); // EGL 1.5
+    *(void **)&c->initialize = pt_library_find(c->library, "eglInitialize");
+    *(void **)&c->bind_api = pt_library_find(c->library, "eglBindAPI");
+    *(void **)&c->choose_config = pt_library_find(c->library, "eglChooseConfig");
+    *(void **)&c->create_context = pt_library_find(c->library, "eglCreateContext");
+    *(void **)&c->destroy_context = pt_library_find(c->library, "eglDestroyContext");
+    *(void **)&c->make_current = pt_library_find(c->library, "eglMakeCurrent");
+    *(void **)&c->release_thread = pt_library_find(c->library, "eglReleaseThread");
     if (!c->get_proc || !c->query_string || !c->initialize || !c->bind_api || !c->choose_config || !c->create_context ||
         !c->destroy_context || !c->make_current || !c->release_thread) {
         snprintf(why, why_size, "this libEGL.so.1 lacks functions of EGL 1.4");
@@ -179,8 +179,7 @@ static void destroy(void *context)
         c->destroy_context(c->display, c->context);
         c->release_thread();
     }
-    if (c->library)
-        dlclose(c->library);
+    pt_library_close(c->library);
     free(c);
 }
 

@@ -2,8 +2,8 @@
 // Mesa's off-screen library: llvmpipe without EGL, for machines whose EGL is missing or broken. The interface is small
 // enough to be declared here, so that a build needs no Mesa headers.
 #include "context.h"
+#include "base/platform.h"
 
-#include <dlfcn.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -34,15 +34,15 @@ static int load(struct osmesa *c, char *why, size_t why_size)
 {
     static const char *const names[] = {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"};
     for (unsigned i = 0; i < sizeof names / sizeof *names && !c->library; i++)
-        c->library = dlopen(names[i], RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE); // LLVM does not survive being unloaded
+        c->library = pt_library_open(names[i]);
     if (!c->library) {
         snprintf(why, why_size, "libOSMesa.so.8 is not installed");
         return -1;
     }
-    *(void **)&c->create = dlsym(c->library, "OSMesaCreateContextAttribs");
-    *(void **)&c->destroy = dlsym(c->library, "OSMesaDestroyContext");
-    *(void **)&c->make_current = dlsym(c->library, "OSMesaMakeCurrent");
-    *(void **)&c->get_proc = dlsym(c->library, "OSMesaGetProcAddress");
+    *(void **)&c->create = pt_library_find(c->library, "OSMesaCreateContextAttribs");
+    *(void **)&c->destroy = pt_library_find(c->library, "OSMesaDestroyContext");
+    *(void **)&c->make_current = pt_library_find(c->library, "OSMesaMakeCurrent");
+    *(void **)&c->get_proc = pt_library_find(c->library, "OSMesaGetProcAddress");
     if (!c->create || !c->destroy || !c->make_current || !c->get_proc) {
         snprintf(why, why_size, "this libOSMesa is too old: OSMesaCreateContextAttribs is missing");
         return -1;
@@ -57,8 +57,7 @@ static void destroy(void *context)
         c->make_current(NULL, NULL, 0, 0, 0);
         c->destroy(c->context);
     }
-    if (c->library)
-        dlclose(c->library);
+    pt_library_close(c->library);
     free(c);
 }
 

@@ -3,7 +3,6 @@
 #include "device_gl.h"
 
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,14 +58,14 @@ static int marshal(struct patina_device *device, int (*run)(struct pt_gl_device 
 {
     struct pt_gl_device *d = (struct pt_gl_device *)device;
     struct pt_gl_call c = {.run = run, .context = context, .cleanup = cleanup};
-    pthread_mutex_lock(&d->lock);
+    pt_mutex_lock(&d->lock);
     while (d->call) // another thread's
-        pthread_cond_wait(&d->changed, &d->lock);
+        pt_condition_wait(&d->changed, &d->lock);
     d->call = &c;
-    pthread_cond_broadcast(&d->changed);
+    pt_condition_wake_all(&d->changed);
     while (!c.done)
-        pthread_cond_wait(&d->changed, &d->lock);
-    pthread_mutex_unlock(&d->lock);
+        pt_condition_wait(&d->changed, &d->lock);
+    pt_mutex_unlock(&d->lock);
     if (c.result == PATINA_OK)
         return PATINA_OK;
     return pt_fail(&device->handle, c.result, "%s: %s", device->info.name, c.message);
@@ -100,43 +99,26 @@ static int close_context(struct pt_gl_device *d, void *unused)
     return PATINA_OK;
 }
 
-static void *thread_main(void *argument)
+static void thread_main(void *argument)
 {
     struct pt_gl_device *d = argument;
     for (int quit = 0; !quit;) {
-        pthread_mutex_lock(&d->lock);
+        pt_mutex_lock(&d->lock);
         while (!d->call || d->call->done)
-            pthread_cond_wait(&d->changed, &d->lock);
+            pt_condition_wait(&d->changed, &d->lock);
         struct pt_gl_call *c = d->call;
-        pthread_mutex_unlock(&d->lock);
+        pt_mutex_unlock(&d->lock);
 
         quit = c->run == close_context;
         c->result = d->lost && !c->cleanup ? PATINA_ERROR_DEVICE : c->run(d, c->context);
         memcpy(c->message, d->message, sizeof c->message);
 
-        pthread_mutex_lock(&d->lock);
+        pt_mutex_lock(&d->lock);
         c->done = 1;
         d->call = NULL;
-        pthread_cond_broadcast(&d->changed);
-        pthread_mutex_unlock(&d->lock);
+        pt_condition_wake_all(&d->changed);
+        pt_mutex_unlock(&d->lock);
     }
-    return NULL;
-}
-
-// The thread takes no signals: they belong to the host program.
-static int start_thread(struct pt_gl_device *d)
-{
-    pthread_attr_t attributes;
-    sigset_t all, before;
-    sigfillset(&all);
-    if (pthread_attr_init(&attributes))
-        return -1;
-    pthread_attr_setstacksize(&attributes, STACK_SIZE);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    int failed = pthread_create(&d->thread, &attributes, thread_main, d);
-    pthread_sigmask(SIG_SETMASK, &before, NULL);
-    pthread_attr_destroy(&attributes);
-    return failed ? -1 : 0;
 }
 
 // ---- opening ---------------------------------------------------------------------------------------------------
@@ -426,9 +408,9 @@ static void op_destroy(struct patina_device *device)
 {
     struct pt_gl_device *d = (struct pt_gl_device *)device;
     marshal(device, close_context, NULL, 1);
-    pthread_join(d->thread, NULL);
-    pthread_cond_destroy(&d->changed);
-    pthread_mutex_destroy(&d->lock);
+    pt_thread_join(&d->thread);
+    pt_condition_destroy(&d->changed);
+    pt_mutex_destroy(&d->lock);
     pt_handle_destroy(&device->handle);
     free(d);
 }
@@ -463,16 +445,16 @@ int pt_device_gl_create(const patina_device_desc *desc, const char *context, str
     if (!d)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "out of memory");
     pt_handle_init(&d->base.handle);
-    pthread_mutex_init(&d->lock, NULL);
-    pthread_cond_init(&d->changed, NULL);
+    pt_mutex_init(&d->lock);
+    pt_condition_init(&d->changed);
     d->base.ops = &ops;
     d->context_ops = kind;
     d->base.info.struct_size = sizeof d->base.info;
     d->base.info.threads = 1;
     snprintf(d->base.info.name, sizeof d->base.info.name, "%s", kind->name);
-    if (start_thread(d) < 0) {
-        pthread_cond_destroy(&d->changed);
-        pthread_mutex_destroy(&d->lock);
+    if (pt_thread_start(&d->thread, thread_main, d, STACK_SIZE)) {
+        pt_condition_destroy(&d->changed);
+        pt_mutex_destroy(&d->lock);
         pt_handle_destroy(&d->base.handle);
         free(d);
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "the thread for OpenGL cannot be started");

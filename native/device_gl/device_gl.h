@@ -61,9 +61,9 @@ struct pt_gl_device {
     const struct pt_gl_context_ops *context_ops;
 
     // The hand-over: one call at a time, the caller waits.
-    pthread_t thread;
-    pthread_mutex_t lock;
-    pthread_cond_t changed;
+    struct pt_thread thread;
+    struct pt_mutex lock;
+    struct pt_condition changed;
     struct pt_gl_call *call;
 
     // Of the GL thread alone.

@@ -49,7 +49,7 @@ static char *find_text(const char *name)
     if (folder && *folder) {
         char path[4096];
         int length = snprintf(path, sizeof path, "%s/%s", folder, name);
-        FILE *file = length > 0 && (size_t)length < sizeof path ? fopen(path, "rb") : NULL;
+        FILE *file = length > 0 && (size_t)length < sizeof path ? pt_stream_open(path, "rb") : NULL;
         if (file) {
             char *text = calloc(1, 1 << 20);
             size_t size = text ? fread(text, 1, (1 << 20) - 1, file) : 0;

@@ -57,7 +57,7 @@ static inline struct span take(enum pt_parting parting, const uint8_t *at, const
 }
 
 // A number whose decimals stand behind a comma.
-static bool read_comma(struct span word, locale_t c_locale, double *value)
+static bool read_comma(struct span word, double *value)
 {
     char text[LONGEST_NUMBER];
     size_t length = (size_t)(word.end - word.begin);
@@ -69,17 +69,17 @@ static bool read_comma(struct span word, locale_t c_locale, double *value)
         return false;
     *comma = '.';
     const uint8_t *end = (const uint8_t *)text + length;
-    return pt_parse_number((const uint8_t *)text, end, c_locale, value) == end;
+    return pt_parse_number((const uint8_t *)text, end, value) == end;
 }
 
 static inline bool read_number(struct pt_cells *cells, enum pt_parting parting, struct span word, double *value)
 {
-    if (pt_parse_number(word.begin, word.end, cells->c_locale, value) == word.end) {
+    if (pt_parse_number(word.begin, word.end, value) == word.end) {
         if (parting != PT_PARTED_LOOSELY && !cells->points)
             cells->points = memchr(word.begin, '.', (size_t)(word.end - word.begin)) != NULL;
         return true;
     }
-    bool comma = parting != PT_PARTED_LOOSELY && read_comma(word, cells->c_locale, value);
+    bool comma = parting != PT_PARTED_LOOSELY && read_comma(word, value);
     cells->commas |= comma;
     return comma;
 }
@@ -174,13 +174,13 @@ static uint32_t count_separators(const uint8_t *at, const uint8_t *end, uint8_t 
 }
 
 // Whether a cell holds several words, all of them numbers: then blanks part numbers too.
-static bool holds_numbers(struct span cell, locale_t c_locale)
+static bool holds_numbers(struct span cell)
 {
     uint32_t words = 0;
     for (const uint8_t *at = cell.begin; at < cell.end; words++) {
         struct span word = take(PT_PARTED_BY_BLANKS, at, cell.end, &at);
         double value;
-        if (pt_parse_number(word.begin, word.end, c_locale, &value) != word.end)
+        if (pt_parse_number(word.begin, word.end, &value) != word.end)
             return false;
         while (at < cell.end && pt_is_blank(*at))
             at++;
@@ -190,7 +190,7 @@ static bool holds_numbers(struct span cell, locale_t c_locale)
 
 // Whether the lines are a table of that parting: equally many separators, and below the first line no several numbers within a
 // cell. Tabs also align words: then cells of the first line are empty.
-static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *end, locale_t c_locale)
+static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *end)
 {
     uint32_t wanted = 0, lines = 0;
     at = next_line(parting, at, end);
@@ -205,7 +205,7 @@ static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *
             struct span word = take(parting, p, end, &p);
             if (!lines && parting == PT_PARTED_BY_TAB && word.begin == word.end)
                 return false;
-            if (lines && holds_numbers(word, c_locale))
+            if (lines && holds_numbers(word))
                 return false;
             p += p < end && !pt_is_line_end(*p);
         }
@@ -215,9 +215,9 @@ static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *
 
 // Whether blanks part numbers of which some have decimals behind a comma: equally many in each line, at least three. The first
 // line does not count where it holds names.
-static bool has_decimal_commas(const uint8_t *at, const uint8_t *end, locale_t c_locale)
+static bool has_decimal_commas(const uint8_t *at, const uint8_t *end)
 {
-    struct pt_cells cells = { .parting = PT_PARTED_BY_BLANKS, .c_locale = c_locale };
+    struct pt_cells cells = { .parting = PT_PARTED_BY_BLANKS };
     uint32_t wanted = 0, lines = 0;
     at = next_line(cells.parting, at, end);
     for (; at < end && lines < LOOKED_AT; at = next_line(cells.parting, line_end(at, end), end), lines++) {
@@ -237,11 +237,11 @@ static bool has_decimal_commas(const uint8_t *at, const uint8_t *end, locale_t c
     return cells.commas > 0;
 }
 
-enum pt_parting pt_cells_look(const uint8_t *at, const uint8_t *end, locale_t c_locale)
+enum pt_parting pt_cells_look(const uint8_t *at, const uint8_t *end)
 {
     static const enum pt_parting tables[] = { PT_PARTED_BY_SEMICOLON, PT_PARTED_BY_TAB, PT_PARTED_BY_COMMA };
     for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
-        if (is_table(tables[i], at, end, c_locale))
+        if (is_table(tables[i], at, end))
             return tables[i];
-    return has_decimal_commas(at, end, c_locale) ? PT_PARTED_BY_BLANKS : PT_PARTED_LOOSELY;
+    return has_decimal_commas(at, end) ? PT_PARTED_BY_BLANKS : PT_PARTED_LOOSELY;
 }

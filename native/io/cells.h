@@ -4,7 +4,6 @@
 #ifndef PT_CELLS_H
 #define PT_CELLS_H
 
-#include <locale.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -19,8 +18,7 @@ enum pt_parting {
 
 struct pt_cells {
     enum pt_parting parting;
-    locale_t c_locale;       // from newlocale(LC_ALL_MASK, "C", 0)
-    bool commas, points;      // whether there were decimals of either sign so far; not told where parted loosely
+    bool commas, points; // whether there were decimals of either sign so far; not told where parted loosely
 };
 
 // What one line held.
@@ -34,7 +32,7 @@ struct pt_line {
 
 // Which parting the lines from `at` have, by the first thousand of them: a table has as many separators in each, at least
 // two. The first line may be one of names. Comments (see pt_is_comment) do not count.
-enum pt_parting pt_cells_look(const uint8_t *at, const uint8_t *end, locale_t c_locale);
+enum pt_parting pt_cells_look(const uint8_t *at, const uint8_t *end);
 
 // Reads the line at `at`, returns where it ends (at the line end, not behind it). Values beyond `most` are dropped.
 const uint8_t *pt_cells_read(struct pt_cells *cells, const uint8_t *at, const uint8_t *end, double *values, uint32_t most,

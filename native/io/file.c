@@ -4,16 +4,11 @@
 #include "base/descriptor.h"
 #include "base/progress.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 size_t pt_type_size(uint32_t type)
 {
@@ -107,30 +102,25 @@ static int read_input(const struct pt_input *input, patina_file **out)
 static int fail_to_open(const struct pt_input *input, int error)
 {
     char buffer[128];
-    const char *reason = strerror_r(error, buffer, sizeof buffer); // GNU's, which returns the text
-    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be read: %s", input->name, reason);
+    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be read: %s", input->name, pt_error_text(error, buffer, sizeof buffer));
 }
 
-// Maps the file and reads it. Another process that cuts the file short meanwhile would stop us with SIGBUS: the price
-// of not copying it.
-static int read_descriptor(int descriptor, struct pt_input *input, patina_file **out)
+// Maps the file and reads it.
+static int read_disk(const struct pt_disk *disk, struct pt_input *input, patina_file **out)
 {
-    struct stat status;
-    if (fstat(descriptor, &status))
-        return fail_to_open(input, errno);
-    if (!S_ISREG(status.st_mode))
+    if (disk->kind != PT_DISK_FILE)
         return pt_fail(NULL, PATINA_ERROR_FILE, "%s: is %s, not a file", input->name,
-                       S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe");
-    input->size = (size_t)status.st_size;
+                       disk->kind == PT_DISK_FOLDER ? "a folder" : "a device or pipe");
+    input->size = (size_t)disk->size;
     if (input->size == 0) // cannot be mapped; the reader has the words for it
         return read_input(input, out);
-    void *data = mmap(NULL, input->size, PROT_READ, MAP_PRIVATE, descriptor, 0);
-    if (data == MAP_FAILED)
-        return fail_to_open(input, errno);
-    madvise(data, input->size, MADV_SEQUENTIAL);
+    void *data;
+    int error = pt_disk_map(disk, 0, input->size, PT_DISK_ONCE, &data);
+    if (error)
+        return fail_to_open(input, error);
     input->data = data;
     int code = read_input(input, out);
-    munmap(data, input->size);
+    pt_pages_free(data, input->size);
     return code;
 }
 
@@ -142,13 +132,14 @@ int patina_file_open(const char *path, patina_progress *progress, patina_file **
     if (!path)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open: path is NULL");
     struct pt_input input = { .progress = progress };
+    struct pt_disk disk;
     pt_clip_name(input.name, sizeof input.name, path);
     pt_progress_set(progress, 0);
-    int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a named pipe must not block
-    if (descriptor < 0)
-        return fail_to_open(&input, errno);
-    int code = read_descriptor(descriptor, &input, out);
-    close(descriptor);
+    int error = pt_disk_open(path, &disk);
+    if (error)
+        return fail_to_open(&input, error);
+    int code = read_disk(&disk, &input, out);
+    pt_disk_close(&disk);
     return code;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "number.h"
+#include "base/platform.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -101,8 +102,7 @@ static bool parse_special(const char *token, double *value)
 }
 
 // Cuts the token out and leaves it to the C library, in the C locale.
-static const uint8_t *parse_hard(const uint8_t *start, const uint8_t *end, bool number, locale_t c_locale,
-                                 double *value)
+static const uint8_t *parse_hard(const uint8_t *start, const uint8_t *end, bool number, double *value)
 {
     char token[LONGEST_TOKEN + 1];
     size_t length = 0;
@@ -115,11 +115,11 @@ static const uint8_t *parse_hard(const uint8_t *start, const uint8_t *end, bool 
     token[length] = 0;
     if (!number)
         return parse_special(token, value) ? start + length : NULL;
-    *value = strtod_l(token, NULL, c_locale);
+    *value = pt_decimal(token);
     return start + length;
 }
 
-const uint8_t *pt_parse_number(const uint8_t *start, const uint8_t *end, locale_t c_locale, double *value)
+const uint8_t *pt_parse_number(const uint8_t *start, const uint8_t *end, double *value)
 {
     struct decimal d = { 0 };
     const uint8_t *p = start;
@@ -130,7 +130,7 @@ const uint8_t *pt_parse_number(const uint8_t *start, const uint8_t *end, locale_
         p = take_digits(p + 1, end, -1, &d);
     p = d.any ? take_exponent(p, end, &d) : NULL;
     if (!p || !is_token_end(p, end))
-        return parse_hard(start, end, false, c_locale, value);
+        return parse_hard(start, end, false, value);
 
     double magnitude;
     if (d.mantissa == 0) {
@@ -142,7 +142,7 @@ const uint8_t *pt_parse_number(const uint8_t *start, const uint8_t *end, locale_
     } else if (!d.dropped && d.exponent <= 0 && d.exponent >= -MOST_DIGITS) {
         magnitude = divide(d.mantissa, (int)-d.exponent);
     } else {
-        return parse_hard(start, end, true, c_locale, value);
+        return parse_hard(start, end, true, value);
     }
     *value = d.negative ? -magnitude : magnitude;
     return p;

@@ -3,7 +3,6 @@
 #ifndef PT_NUMBER_H
 #define PT_NUMBER_H
 
-#include <locale.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -19,8 +18,7 @@ static inline bool pt_is_line_end(uint8_t c)
 }
 
 // Parses the token that starts at p: decimal numbers, nan, inf, infinity, and their older spellings nan(ind), 1.#QNAN,
-// 1.#INF. The whole token must be the number. Returns the byte behind it, NULL when it is none. c_locale: from
-// newlocale(LC_ALL_MASK, "C", 0).
-const uint8_t *pt_parse_number(const uint8_t *p, const uint8_t *end, locale_t c_locale, double *value);
+// 1.#INF. The whole token must be the number. Returns the byte behind it, NULL when it is none.
+const uint8_t *pt_parse_number(const uint8_t *p, const uint8_t *end, double *value);
 
 #endif

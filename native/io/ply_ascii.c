@@ -13,7 +13,6 @@ struct text {
     const struct pt_input *input;
     const uint8_t *at, *end;
     uint64_t line; // number of the line that `at` is in
-    locale_t c_locale;
 };
 
 static bool line_ends(const struct text *t)
@@ -76,7 +75,7 @@ static bool fits(uint32_t type, bool byte, double value)
 static int read_value(struct text *t, uint32_t type, bool byte, const char *property, double *value)
 {
     char quoted[44];
-    const uint8_t *behind = pt_parse_number(t->at, t->end, t->c_locale, value);
+    const uint8_t *behind = pt_parse_number(t->at, t->end, value);
     if (!behind)
         return ply_fault(t->cursor, "%s: line %llu: '%s' is not a number (property %s)", t->input->name,
                          (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property);
@@ -177,13 +176,9 @@ int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, con
                       .input = at->input,
                       .at = at->input->data + at->offset,
                       .end = at->input->data + at->input->size,
-                      .line = at->line,
-                      .c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0) };
-    if (!t.c_locale)
-        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", at->input->name);
+                      .line = at->line };
     code = read_element(&t, element, targets, lists);
     at->offset = (uint64_t)(t.at - at->input->data);
     at->line = t.line;
-    freelocale(t.c_locale);
     return code;
 }

@@ -239,17 +239,13 @@ static int read_comment(struct reader *r)
 {
     if (r->word_count != 6 || !is(r->words[1], "patina") || !is(r->words[2], "origin"))
         return PATINA_OK;
-    locale_t c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (!c_locale)
-        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", r->input->name);
     int code = PATINA_OK;
     for (int axis = 0; axis < 3 && !code; axis++) {
         struct word word = r->words[3 + axis];
         double *value = &r->header->origin[axis];
-        if (!pt_parse_number(word.text, word.text + word.length, c_locale, value) || !(fabs(*value) <= 1e15))
+        if (!pt_parse_number(word.text, word.text + word.length, value) || !(fabs(*value) <= 1e15))
             code = fail(r, "an origin must be three numbers of at most 1e15, not", word);
     }
-    freelocale(c_locale);
     return code;
 }
 

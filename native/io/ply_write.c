@@ -4,12 +4,10 @@
 #include "ply.h"
 #include "base/descriptor.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 enum {
     BLOCK = 4096,    // rows a write
@@ -147,8 +145,7 @@ static int fail_to_write(const char *path, int error)
 {
     char name[200], buffer[128];
     pt_clip_name(name, sizeof name, path);
-    const char *reason = strerror_r(error, buffer, sizeof buffer); // GNU's, which returns the text
-    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be written: %s", name, reason);
+    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be written: %s", name, pt_error_text(error, buffer, sizeof buffer));
 }
 
 int patina_write_ply(const char *path, const patina_cloud_desc *given)
@@ -161,41 +158,18 @@ int patina_write_ply(const char *path, const patina_cloud_desc *given)
     code = code ? code : check_desc(desc);
     if (code)
         return code;
-    struct stat status;
-    if (!stat(path, &status) && !S_ISREG(status.st_mode))
-        return fail_to_write(path, S_ISDIR(status.st_mode) ? EISDIR : EINVAL);
     struct writer w = { .desc = desc };
     for (int axis = 0; axis < 3; axis++)
         w.has_origin |= desc->origin[axis] != 0;
     w.position_type = w.has_origin || desc->position.type == PATINA_FLOAT64 ? PATINA_FLOAT64 : PATINA_FLOAT32;
 
-    size_t size = strlen(path) + sizeof ".part";
-    char *part = malloc(size);
-    if (!part)
-        return pt_fail(NULL, PATINA_ERROR_MEMORY, "patina_write_ply: out of memory");
-    snprintf(part, size, "%s.part", path);
-    w.stream = fopen(part, "wbe");
-    if (!w.stream) {
-        code = fail_to_write(path, errno);
-        goto done;
-    }
-    errno = 0;
+    struct pt_whole whole;
+    int error = pt_whole_begin(path, &whole);
+    if (error)
+        return fail_to_write(path, error);
+    w.stream = whole.stream;
     write_header(&w);
     bool good = write_rows(&w) && !ferror(w.stream);
-    int error = good ? 0 : errno;
-    if (fclose(w.stream) && good) {
-        good = false;
-        error = errno;
-    }
-    if (good && rename(part, path)) {
-        good = false;
-        error = errno;
-    }
-    if (!good) {
-        code = fail_to_write(path, error);
-        remove(part);
-    }
-done:
-    free(part);
-    return code;
+    error = pt_whole_end(&whole, good);
+    return error ? fail_to_write(path, error) : PATINA_OK;
 }

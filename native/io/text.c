@@ -501,7 +501,7 @@ static int look(struct text *t, const uint8_t **body, uint64_t *line)
     t->pts = words.count == 1 && !words.strange;
     if (t->pts)
         return PATINA_OK;
-    t->cells.parting = pt_cells_look(first, t->end, t->cells.c_locale);
+    t->cells.parting = pt_cells_look(first, t->end);
     t->at = first;
     words = read_line(t, values);
     t->cells.commas = t->cells.points = 0;
@@ -600,13 +600,9 @@ static int read_all(struct text *t)
 int pt_text_read(struct patina_file *file, const struct pt_input *input)
 {
     struct text t = {.input = input, .file = file, .at = input->data, .end = input->data + input->size, .line = 1};
-    t.cells.c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (!t.cells.c_locale)
-        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
     int code = read_all(&t);
-    freelocale(t.cells.c_locale);
     free(t.attributes);
     if (code || !t.staged) {
         free(t.staged);

@@ -4,6 +4,7 @@
 #ifndef PT_PLAN_H
 #define PT_PLAN_H
 
+#include "base/arena.h"
 #include "device.h"
 #include "expected.h"
 #include "scene/scene.h"
@@ -410,9 +411,5 @@ void pt_area_points(const patina_light_desc *light, double points[3 * PT_AREA_PO
 // Returns the count of numbers; writes at most `room`.
 size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *light, double *numbers, size_t room);
 int pt_same_key(const double *a, const double *b, size_t count);
-
-// Memory that lives as long as the plan; zeroed. NULL when memory lacks.
-void *pt_arena_take(struct pt_arena **arena, size_t size);
-void pt_arena_free(struct pt_arena *arena);
 
 #endif

@@ -188,14 +188,14 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
                 return pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "dumping planes: out of memory");
             int error = frame->device->ops->buffer_read(frame->device, plane, 0, copy, plane->size);
             snprintf(path, sizeof path, "%s/%s_%d.raw", folder, pt_plane_rows[p].name, level);
-            FILE *file = error ? NULL : fopen(path, "wb");
+            FILE *file = error ? NULL : pt_stream_open(path, "wb");
             size_t written = file ? fwrite(copy, 1, plane->size, file) : 0;
             free(copy);
             if (error || !file || fclose(file) || written != plane->size)
                 return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
             uint32_t width = pt_plane_rows[p].size == PT_SIZE_CROP ? frame->shown.crop[2] : (frame->shown.plane_width + (1u << level) - 1) >> level;
             snprintf(path, sizeof path, "%s/%s_%d.txt", folder, pt_plane_rows[p].name, level);
-            file = fopen(path, "w");
+            file = pt_stream_open(path, "w");
             if (!file || fprintf(file, "%s level %d: %u pixels wide, %zu rows, %u bytes a pixel, row 0 at the bottom\n",
                                  pt_plane_rows[p].name, level, width, width ? plane->size / pt_plane_bytes((enum pt_plane)p) / width : 0,
                                  pt_plane_bytes((enum pt_plane)p)) < 0 || fclose(file))

@@ -86,7 +86,7 @@ static int put_textures(const struct patina_frame *frame, uint32_t width, struct
 static int write_file(const struct patina_frame *frame, const char *path, const struct bytes *header,
                       const struct bytes *body)
 {
-    FILE *file = fopen(path, "wb");
+    FILE *file = pt_stream_open(path, "wb");
     int good = file && fwrite(header->data, 1, header->size, file) == header->size &&
                fwrite(body->data, 1, body->size, file) == body->size;
     if (file)
@@ -145,7 +145,7 @@ static int take(struct reader *reader, void *out, size_t size)
 
 static unsigned char *read_file(const char *path, size_t *size)
 {
-    FILE *file = fopen(path, "rb");
+    FILE *file = pt_stream_open(path, "rb");
     unsigned char *data = NULL;
     long length = -1;
     if (file && !fseek(file, 0, SEEK_END) && (length = ftell(file)) >= 0 && !fseek(file, 0, SEEK_SET))

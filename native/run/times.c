@@ -2,14 +2,6 @@
 #include "times.h"
 
 #include <string.h>
-#include <time.h>
-
-double pt_milliseconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
-}
 
 void pt_note_time(struct pt_times *times, const char *name, double ms)
 {

@@ -17,7 +17,6 @@ struct pt_times {
     uint32_t count;
 };
 
-double pt_milliseconds(void); // of a clock that only goes forward
 void pt_note_time(struct pt_times *times, const char *name, double ms);
 
 #endif

@@ -4,7 +4,7 @@
 #include "free_space.h"
 #include "kernel_args.h"
 #include "base/descriptor.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "orient.h"
 #include "base/progress.h"
 

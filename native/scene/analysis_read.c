@@ -3,7 +3,7 @@
 #include "analysis.h"
 #include "kernel_args.h"
 #include "base/descriptor.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "base/progress.h"
 
 #include <math.h>

@@ -4,7 +4,7 @@
 #include "base/color.h"
 #include "base/descriptor.h"
 #include "kernel_args.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "base/progress.h"
 
 #include <math.h>

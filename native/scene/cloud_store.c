@@ -5,18 +5,13 @@
 #include "analysis.h"
 #include "cloud.h"
 #include "fingerprint.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "base/progress.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 enum { SECTION = 1 << 16, VERSION = 8, SECTIONS = 12, PIECE = 1 << 22 };
 static const char magic[8] = "patina\n\x1a";
@@ -91,8 +86,7 @@ static uint64_t file_size(const struct section sections[SECTIONS])
 static int fail_with(const char *path, const char *what, int error)
 {
     char buffer[128];
-    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be %s: %s", path, what,
-                   strerror_r(error, buffer, sizeof buffer));
+    return pt_fail(NULL, PATINA_ERROR_FILE, "%s: cannot be %s: %s", path, what, pt_error_text(error, buffer, sizeof buffer));
 }
 
 // ---- save --------------------------------------------------------------------------------------------------------------
@@ -102,11 +96,11 @@ static int write_sections(FILE *file, const struct header *header, const struct 
     int good = fwrite(header, sizeof *header, 1, file) == 1;
     uint64_t at = SECTION;
     for (int i = 0; i < SECTIONS && good; i++) {
-        good = !fseeko(file, (off_t)at, SEEK_SET) &&
+        good = !pt_stream_seek(file, at) &&
                (!sections[i].size || fwrite(*sections[i].data, sections[i].size, 1, file) == 1);
         at += round_section(sections[i].size);
     }
-    return good && !fflush(file) && !ftruncate(fileno(file), (off_t)header->size);
+    return good && !pt_stream_resize(file, header->size);
 }
 
 int patina_cloud_save(const patina_cloud *cloud, const char *path)
@@ -132,26 +126,12 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
     for (int i = 0; i < SECTIONS; i++)
         header.sums[i] = sum_of(&sections[i]);
     header.check = check_of(&header, cloud->chunks);
-    size_t length = strlen(path);
-    char *beside = malloc(length + 6); // written there first: a file that is mapped must not change, nor be half there
-    if (!beside)
-        return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
-    memcpy(beside, path, length);
-    memcpy(beside + length, ".part", 6);
-    FILE *file = fopen(beside, "wb");
-    int error = file ? 0 : errno;
-    if (file) {
-        errno = 0;
-        int good = write_sections(file, &header, sections);
-        error = good ? 0 : errno ? errno : EIO;
-        if (fclose(file) && !error)
-            error = errno;
-        if (!error && rename(beside, path))
-            error = errno;
-        if (error)
-            unlink(beside);
+    struct pt_whole whole;
+    int error = pt_whole_begin(path, &whole);
+    if (!error) {
+        int good = write_sections(whole.stream, &header, sections);
+        error = pt_whole_end(&whole, good);
     }
-    free(beside);
     return error ? fail_with(path, "written", error) : PATINA_OK;
 }
 
@@ -207,30 +187,26 @@ static int check_header(const char *path, const struct header *header, uint64_t 
     return PATINA_OK;
 }
 
-// Private and writable pages of the file: what is never written stays the file's own.
-static int map_sections(int descriptor, const struct section sections[SECTIONS])
+static int map_sections(const struct pt_disk *disk, const struct section sections[SECTIONS])
 {
     uint64_t at = SECTION;
     for (int i = 0; i < SECTIONS; i++) {
-        if (sections[i].size) {
-            void *data = mmap(NULL, sections[i].size, PROT_READ | PROT_WRITE, MAP_PRIVATE, descriptor, (off_t)at);
-            if (data == MAP_FAILED)
-                return errno;
-            *sections[i].data = data;
-        }
+        int error = sections[i].size ? pt_disk_map(disk, at, sections[i].size, PT_DISK_ANYWHERE, sections[i].data) : 0;
+        if (error)
+            return error;
         at += round_section(sections[i].size);
     }
     return 0;
 }
 
 // The header, and what it says of the sections; cloud: its fields that the header holds are set.
-static int read_header(const char *path, int descriptor, struct patina_cloud *cloud, struct header *header,
+static int read_header(const char *path, const struct pt_disk *disk, struct patina_cloud *cloud, struct header *header,
                        struct section sections[SECTIONS])
 {
-    struct stat status;
-    if (fstat(descriptor, &status) || pread(descriptor, header, sizeof *header, 0) != (ssize_t)sizeof *header)
+    size_t got;
+    if (pt_disk_read(disk, 0, header, sizeof *header, &got) || got != sizeof *header)
         return refuse(path, "not a saved cloud");
-    int code = check_header(path, header, (uint64_t)status.st_size);
+    int code = check_header(path, header, disk->size);
     if (code)
         return code;
     cloud->info = header->info;
@@ -245,14 +221,14 @@ static int read_header(const char *path, int descriptor, struct patina_cloud *cl
     return file_size(sections) == header->size ? PATINA_OK : refuse(path, "its header is damaged");
 }
 
-static int open_descriptor(const char *path, int descriptor, struct patina_cloud *cloud)
+static int open_disk(const char *path, const struct pt_disk *disk, struct patina_cloud *cloud)
 {
     struct header header;
     struct section sections[SECTIONS];
-    int code = read_header(path, descriptor, cloud, &header, sections);
+    int code = read_header(path, disk, cloud, &header, sections);
     if (code)
         return code;
-    int error = map_sections(descriptor, sections);
+    int error = map_sections(disk, sections);
     if (error)
         return fail_with(path, "mapped", error);
     struct pt_chunk *chunks = malloc(sections[0].size + 1); // the one array that is not freed as pages
@@ -272,20 +248,18 @@ static int open_descriptor(const char *path, int descriptor, struct patina_cloud
 // ---- verify ------------------------------------------------------------------------------------------------------------
 
 // Whether a section of the file, from byte `at` on, still has the sum that it was written with.
-static int verify_section(const char *path, int descriptor, uint64_t at, uint64_t size, uint64_t wanted, char *buffer,
+static int verify_section(const char *path, const struct pt_disk *disk, uint64_t at, uint64_t size, uint64_t wanted, char *buffer,
                           patina_progress *progress)
 {
     uint64_t sum = VERSION;
     for (uint64_t done = 0; done < size;) {
         const size_t piece = size - done < PIECE ? size - done : PIECE;
-        for (size_t have = 0; have < piece;) {
-            const ssize_t got = pread(descriptor, buffer + have, piece - have, (off_t)(at + done + have));
-            if (got < 0 && errno == EINTR)
-                continue;
-            if (got <= 0)
-                return got ? fail_with(path, "read", errno) : refuse(path, "a saved cloud that was cut short");
-            have += (size_t)got;
-        }
+        size_t got;
+        int error = pt_disk_read(disk, at + done, buffer, piece, &got);
+        if (error)
+            return fail_with(path, "read", error);
+        if (got != piece)
+            return refuse(path, "a saved cloud that was cut short");
         if (pt_progress_cancelled(progress))
             return pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: cancelled", path);
         sum = add_piece(sum, buffer, piece);
@@ -294,15 +268,15 @@ static int verify_section(const char *path, int descriptor, uint64_t at, uint64_
     return sum == wanted ? PATINA_OK : refuse(path, "a saved cloud whose points are damaged");
 }
 
-static int verify_descriptor(const char *path, int descriptor, char *buffer, patina_progress *progress)
+static int verify_disk(const char *path, const struct pt_disk *disk, char *buffer, patina_progress *progress)
 {
     struct header header;
     struct section sections[SECTIONS];
     struct patina_cloud cloud = {0};
-    int code = read_header(path, descriptor, &cloud, &header, sections);
+    int code = read_header(path, disk, &cloud, &header, sections);
     uint64_t at = SECTION;
     for (int i = 0; i < SECTIONS && !code; i++) {
-        code = verify_section(path, descriptor, at, sections[i].size, header.sums[i], buffer, progress);
+        code = verify_section(path, disk, at, sections[i].size, header.sums[i], buffer, progress);
         at += round_section(sections[i].size);
         pt_progress_set(progress, (double)at / (double)header.size);
     }
@@ -313,14 +287,15 @@ int patina_cloud_verify(const char *path, patina_progress *progress)
 {
     if (!path)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_verify: path is NULL");
-    int descriptor = open(path, O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0)
-        return fail_with(path, "read", errno);
+    struct pt_disk disk;
+    int error = pt_disk_open(path, &disk);
+    if (error)
+        return fail_with(path, "read", error);
     char *buffer = malloc(PIECE);
-    int code = buffer ? verify_descriptor(path, descriptor, buffer, progress)
+    int code = buffer ? verify_disk(path, &disk, buffer, progress)
                       : pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", path);
     free(buffer);
-    close(descriptor);
+    pt_disk_close(&disk);
     return code;
 }
 
@@ -331,9 +306,10 @@ int patina_cloud_open(const char *path, patina_cloud **out)
     if (!path || !out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_open: bad arguments");
     *out = NULL;
-    int descriptor = open(path, O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0)
-        return fail_with(path, "read", errno);
+    struct pt_disk disk;
+    int error = pt_disk_open(path, &disk);
+    if (error)
+        return fail_with(path, "read", error);
     struct patina_cloud *cloud = calloc(1, sizeof *cloud);
     struct pt_alive *alive = calloc(1, sizeof *alive);
     int code = PATINA_ERROR_MEMORY;
@@ -342,14 +318,14 @@ int patina_cloud_open(const char *path, patina_cloud **out)
         atomic_init(&alive->references, 1);
         atomic_init(&alive->alive, 1);
         cloud->alive = alive;
-        code = open_descriptor(path, descriptor, cloud);
+        code = open_disk(path, &disk, cloud);
     } else {
         pt_fail(NULL, code, "%s: out of memory", path);
         free(alive);
         free(cloud);
         cloud = NULL;
     }
-    close(descriptor);
+    pt_disk_close(&disk);
     if (code)
         patina_cloud_destroy(cloud);
     else

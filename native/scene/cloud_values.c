@@ -4,7 +4,7 @@
 #include "cloud.h"
 #include "fingerprint.h"
 #include "io/file.h"
-#include "base/memory.h"
+#include "base/platform.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@
 // of its samples. One grid at a time; every sum and minimum is of integers, so that threads do not show.
 #include "free_space.h"
 #include "kernel_args.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "base/progress.h"
 
 #include <math.h>

@@ -3,7 +3,7 @@
 // follow a slider: 32 ns a point of one core, a second for 30 million shared by all cores.
 #include "mask.h"
 
-#include "base/memory.h"
+#include "base/platform.h"
 
 #include <math.h>
 #include <stdlib.h>

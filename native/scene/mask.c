@@ -3,7 +3,7 @@
 #include "mask.h"
 
 #include "kernel_args.h"
-#include "base/memory.h"
+#include "base/platform.h"
 
 #include <stdlib.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neighbours.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "base/progress.h"
 
 #include <float.h>

@@ -5,7 +5,7 @@
 #include "orient.h"
 #include "analysis.h"
 #include "kernel_args.h"
-#include "base/memory.h"
+#include "base/platform.h"
 #include "base/progress.h"
 
 #include <math.h>

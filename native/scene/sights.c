@@ -4,7 +4,7 @@
 #include "sights.h"
 #include "base/error.h"
 #include "kernel_args.h"
-#include "base/memory.h"
+#include "base/platform.h"
 
 #include <math.h>
 #include <stdatomic.h>

@@ -2,7 +2,6 @@
 // patina analyse FILE -o OUT.ply: what every point knows, as columns of a binary PLY.
 #include "tool.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -71,32 +70,25 @@ static int write_rows(FILE *file, const struct columns *c, const double origin[3
     return good;
 }
 
-// Beside the target first, then in its place: a file that is there is lost only to a whole one.
+// A file that is there is lost only to a whole one. Returns 0, or an error number.
 static int write_ply(const char *path, const struct columns *c, const double origin[3])
 {
     const int wide = origin[0] != 0 || origin[1] != 0 || origin[2] != 0;
     const char *type = wide ? "double" : "float";
-    char *part = malloc(strlen(path) + sizeof ".part");
-    if (!part)
-        return -1;
-    sprintf(part, "%s.part", path);
-    FILE *file = fopen(part, "wb");
-    int good = file != NULL;
-    if (good) {
-        fprintf(file,
-                "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
-                "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
-                "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nproperty "
-                "uchar seen_through\nend_header\n",
-                __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
-                type, type);
-        good = write_rows(file, c, origin, wide) && !ferror(file);
-        good = !fclose(file) && good && !rename(part, path);
-        if (!good)
-            remove(part);
-    }
-    free(part);
-    return good ? 0 : -1;
+    struct pt_whole whole;
+    int error = pt_whole_begin(path, &whole);
+    if (error)
+        return error;
+    FILE *file = whole.stream;
+    fprintf(file,
+            "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
+            "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
+            "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nproperty "
+            "uchar seen_through\nend_header\n",
+            __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
+            type, type);
+    int good = write_rows(file, c, origin, wide) && !ferror(file);
+    return pt_whole_end(&whole, good);
 }
 
 static int analyse(const char *in, const char *out, uint32_t neighbours, patina_progress *progress, struct columns *columns)
@@ -132,8 +124,9 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, patina_
         code = patina_cloud_neighbourhoods(cloud, &wanted, NULL);
     int result = code ? tool_failed(in, NULL, code) : TOOL_OK;
     tool_cancellable(NULL, NULL);
-    if (!code && write_ply(out, columns, info.origin)) {
-        tool_say("%s: cannot be written: %s", out, strerror(errno));
+    const int error = code ? 0 : write_ply(out, columns, info.origin);
+    if (error) {
+        tool_say("%s: cannot be written: %s", out, strerror(error));
         result = TOOL_FAILED;
     } else if (!code) {
         for (int i = 0; i < 6; i++)

@@ -2,13 +2,11 @@
 // patina: looks at, renders and converts point clouds without Blender.
 #include "tool.h"
 
-#include <pthread.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 static const char usage_before[] =
     "patina info FILE                     what a file of points holds\n"
@@ -152,54 +150,35 @@ void tool_drain_log(int least)
 
 // ---- signals -----------------------------------------------------------------------------------------------------
 
-static pthread_mutex_t cancel_lock = PTHREAD_MUTEX_INITIALIZER;
+static struct pt_mutex cancel_lock;
 static patina_progress *cancel_progress;
 static patina_frame *cancel_frame;
 static atomic_int cancelled;
 
-// A thread that waits, rather than a handler: the library's cancel calls need not be async-signal-safe.
-static void *watch(void *context)
+static void interrupted(void)
 {
-    (void)context;
-    sigset_t set;
-    sigemptyset(&set);
-    sigaddset(&set, SIGINT);
-    sigaddset(&set, SIGTERM);
-    for (int caught;;) {
-        if (sigwait(&set, &caught))
-            continue;
-        pthread_mutex_lock(&cancel_lock);
-        if (atomic_exchange(&cancelled, 1) || (!cancel_progress && !cancel_frame))
-            _exit(TOOL_CANCELLED);
-        if (cancel_progress)
-            patina_progress_cancel(cancel_progress);
-        if (cancel_frame)
-            patina_frame_cancel(cancel_frame);
-        pthread_mutex_unlock(&cancel_lock);
-    }
-    return NULL;
+    pt_mutex_lock(&cancel_lock);
+    if (atomic_exchange(&cancelled, 1) || (!cancel_progress && !cancel_frame))
+        _Exit(TOOL_CANCELLED);
+    if (cancel_progress)
+        patina_progress_cancel(cancel_progress);
+    if (cancel_frame)
+        patina_frame_cancel(cancel_frame);
+    pt_mutex_unlock(&cancel_lock);
 }
 
 int tool_watch_signals(void)
 {
-    sigset_t set;
-    sigemptyset(&set);
-    sigaddset(&set, SIGINT);
-    sigaddset(&set, SIGTERM);
-    if (pthread_sigmask(SIG_BLOCK, &set, NULL))
-        return -1;
-    pthread_t thread;
-    if (pthread_create(&thread, NULL, watch, NULL))
-        return -1;
-    return pthread_detach(thread);
+    pt_mutex_init(&cancel_lock);
+    return pt_watch_interrupts(interrupted);
 }
 
 void tool_cancellable(patina_progress *progress, patina_frame *frame)
 {
-    pthread_mutex_lock(&cancel_lock);
+    pt_mutex_lock(&cancel_lock);
     cancel_progress = progress;
     cancel_frame = frame;
-    pthread_mutex_unlock(&cancel_lock);
+    pt_mutex_unlock(&cancel_lock);
 }
 
 int tool_cancelled(void)

@@ -54,7 +54,7 @@ static int take_face(char *text, const struct growing *vertices, struct growing 
 int tool_load_mesh(const char *path, patina_mesh **out)
 {
     struct growing vertices = {0}, triangles = {0};
-    FILE *file = fopen(path, "r");
+    FILE *file = pt_stream_open(path, "r");
     char *line = NULL;
     size_t room = 0, number = 0;
     int code = file ? PATINA_OK : PATINA_ERROR_FILE;

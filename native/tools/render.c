@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 // What one run holds; everything may be NULL.
 struct job {
@@ -23,13 +22,6 @@ struct job {
     patina_frame_stats stats; // of the picture
     double analysis_ms;
 };
-
-static double now_ms(void)
-{
-    struct timespec time;
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec * 1e3 + (double)time.tv_nsec * 1e-6;
-}
 
 static void destroy(struct job *job)
 {
@@ -90,9 +82,9 @@ static int analyse(struct job *job, patina_cloud *cloud, const struct tool_stati
     patina_analysis_desc desc = {.struct_size = sizeof desc, .threads = job->options.threads, .keep_normals = 1};
     tool_describe_stations(stations, &desc);
     desc.free_space = job->options.color.free_space != PATINA_FREE_SPACE_OFF;
-    const double start = now_ms();
+    const double start = pt_milliseconds();
     const int code = job->options.analysis ? PATINA_OK : patina_cloud_analyse(cloud, &desc, job->progress);
-    job->analysis_ms += job->options.analysis ? 0 : now_ms() - start;
+    job->analysis_ms += job->options.analysis ? 0 : pt_milliseconds() - start;
     return code;
 }
 
@@ -216,16 +208,16 @@ static int dump_plan(struct job *job)
 // The picture, with the camera as asked for; also the warm-up of the measurement.
 static int draw(struct job *job, double *ms)
 {
-    const double start = now_ms();
+    const double start = pt_milliseconds();
     if (job->options.panorama[0]) {
         const int bad = tool_draw_panorama(&job->options, &job->panorama, job->scene, job->frame, &job->pixels, &job->stats);
-        *ms = now_ms() - start;
+        *ms = pt_milliseconds() - start;
         return bad ? tool_failed("panorama", job->frame, bad) : TOOL_OK;
     }
     int code = job->options.planes ? patina_frame_keep_planes(job->frame, 1) : PATINA_OK;
     if (!code)
         code = patina_frame_render(job->frame, job->scene);
-    *ms = now_ms() - start;
+    *ms = pt_milliseconds() - start;
     job->stats.struct_size = sizeof job->stats;
     if (!code)
         code = patina_frame_get_stats(job->frame, &job->stats);
@@ -249,10 +241,10 @@ static int measure(struct job *job)
     for (int i = 1; i <= job->options.repeat && !code; i++) {
         patina_camera camera = {.struct_size = sizeof camera};
         code = tool_cancelled() ? PATINA_ERROR_CANCELLED : set_view(job, i, &camera);
-        const double start = now_ms();
+        const double start = pt_milliseconds();
         if (!code)
             code = patina_frame_render(job->frame, job->scene);
-        if (!code && tool_times_add(times, now_ms() - start, job->frame))
+        if (!code && tool_times_add(times, pt_milliseconds() - start, job->frame))
             code = PATINA_ERROR_MEMORY;
     }
     if (!code && job->options.json)

@@ -151,20 +151,6 @@ double tool_times_median(const struct tool_times *times)
     return median(times->ms, times->frames);
 }
 
-static double peak_megabytes(void)
-{
-    FILE *status = fopen("/proc/self/status", "r");
-    if (!status)
-        return 0;
-    char line[256];
-    unsigned long kib = 0;
-    while (fgets(line, sizeof line, status))
-        if (sscanf(line, "VmHWM: %lu", &kib) == 1)
-            break;
-    fclose(status);
-    return (double)kib / 1024.0;
-}
-
 static void print_string(const char *text)
 {
     putchar('"');
@@ -201,7 +187,7 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
         printf(": %.4f", median(times->pass_ms[i], times->frames));
     }
     printf("}, \"layers\": %u, \"skipped\": %s, \"planes\": %s, \"peak_mb\": %.1f", stats->layers,
-           times->skipped ? times->skipped : "{}", times->planes ? times->planes : "{}", peak_megabytes());
+           times->skipped ? times->skipped : "{}", times->planes ? times->planes : "{}", (double)pt_peak_memory() / (1 << 20));
     const patina_expected_error *expected = &stats->expected;
     printf(", \"spacing_px\": %.4f, \"expected_error\": ", (double)stats->spacing_px);
     if (isfinite(expected->color))

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The command line `patina`: what its files share. It sees nothing of the library but patina.h.
+// The command line `patina`: what its files share. It sees nothing of the library but patina.h, and holds a
+// base/platform.h of its own.
 #ifndef TOOL_H
 #define TOOL_H
 
 #include "patina/patina.h"
+#include "base/platform.h"
 
 #include <stdio.h>
 
@@ -27,7 +29,7 @@ void tool_drain_log(int level);
 
 // ---- Ctrl-C ------------------------------------------------------------------------------------------------------
 
-// Call before any other thread exists: from then on SIGINT and SIGTERM cancel what is announced below.
+// Call before any other thread exists: from then on Ctrl-C and SIGTERM cancel what is announced below. 0, or an error number.
 int tool_watch_signals(void);
 // What a signal shall cancel; NULL, NULL: nothing. The second signal always ends the program.
 void tool_cancellable(patina_progress *progress, patina_frame *frame);

@@ -86,7 +86,7 @@ static void test_exact_numbers(void **state)
             *comma = '.';
         double wanted = strtod_l(text, NULL, c_locale);
         const uint8_t *end = (const uint8_t *)text + strlen(text);
-        const uint8_t *behind = pt_parse_number((const uint8_t *)text, end, c_locale, &got);
+        const uint8_t *behind = pt_parse_number((const uint8_t *)text, end, &got);
         if (behind != end || memcmp(&got, &wanted, sizeof got))
             fail_msg("%s was read as %.17g", text, got);
     }

@@ -4,7 +4,9 @@
 #ifndef PATINA_POINTS_H
 #define PATINA_POINTS_H
 
-#include "patina.h"
+#ifndef PATINA_H
+#error "include patina/patina.h"
+#endif
 
 #ifdef __cplusplus
 extern "C" {

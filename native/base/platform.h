@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// All that is asked of the operating system: threads, time, memory, files, libraries, the machine. One implementation a system
+// (platform_posix.c); no other file of native/ includes a system's header (build/check_rooms). Paths are UTF-8. Errors are numbers
+// of <errno.h>, 0 is none. Any function from any thread, unless it says otherwise.
+#ifndef PT_PLATFORM_H
+#define PT_PLATFORM_H
+
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+// ---- threads -----------------------------------------------------------------------------------------------------------
+
+// Room for what the system has; it must not move once made.
+struct pt_mutex {
+    _Alignas(8) unsigned char room[64];
+};
+struct pt_condition {
+    _Alignas(8) unsigned char room[64];
+};
+struct pt_thread {
+    _Alignas(8) unsigned char room[16];
+};
+
+void pt_mutex_init(struct pt_mutex *mutex);
+void pt_mutex_destroy(struct pt_mutex *mutex); // that nobody holds
+void pt_mutex_lock(struct pt_mutex *mutex);    // not twice by one thread
+void pt_mutex_unlock(struct pt_mutex *mutex);  // by the thread that locked it
+
+void pt_condition_init(struct pt_condition *condition);
+void pt_condition_destroy(struct pt_condition *condition);                     // that nobody waits for
+void pt_condition_wait(struct pt_condition *condition, struct pt_mutex *mutex); // may return without a cause: ask again
+void pt_condition_wake_one(struct pt_condition *condition);
+void pt_condition_wake_all(struct pt_condition *condition);
+
+// For what is made at its first use: zero before. The others wait until `make` has returned.
+struct pt_once {
+    atomic_int state;
+};
+void pt_once(struct pt_once *once, void (*make)(void));
+
+// Starts main(context) on a thread that takes no signals: they belong to the host program; those of its own faults it takes.
+// stack: bytes, 0: the system's default. Whoever starts it joins it.
+int pt_thread_start(struct pt_thread *thread, void (*main)(void *context), void *context, size_t stack);
+void pt_thread_join(struct pt_thread *thread);
+void pt_thread_yield(void);
+
+// From now on calls `interrupted` on a thread of its own each time that somebody asks the program to end (Ctrl-C, SIGTERM).
+// Only for programs, before they start any thread.
+int pt_watch_interrupts(void (*interrupted)(void));
+
+// ---- the machine -------------------------------------------------------------------------------------------------------
+
+double pt_milliseconds(void);                      // of a clock that only goes forward
+uint32_t pt_core_count(void);                      // that this process may use, at least 1
+void pt_processor_name(char *text, size_t size);   // as its maker calls it; "processor" where that is not known
+uint64_t pt_peak_memory(void);                     // most bytes that this process ever held; 0: not known
+const char *pt_error_text(int error, char *buffer, size_t size); // buffer: where the text may lie
+
+// ---- memory ------------------------------------------------------------------------------------------------------------
+
+// Large arrays come straight from the system: they go back to it when freed, and huge pages halve a scatter's TLB misses.
+// Zeroed, page-aligned. NULL when memory lacks. size 0 gives a valid pointer.
+void *pt_pages_alloc(size_t size);
+void pt_pages_free(void *pages, size_t size); // of pt_pages_alloc or pt_disk_map, NULL is fine; size as asked for
+
+// ---- files -------------------------------------------------------------------------------------------------------------
+
+enum pt_disk_kind { PT_DISK_FILE, PT_DISK_FOLDER, PT_DISK_OTHER };
+
+// A file that is read where it lies.
+struct pt_disk {
+    intptr_t handle;
+    uint64_t size; // bytes, as it was opened
+    enum pt_disk_kind kind;
+};
+
+int pt_disk_open(const char *path, struct pt_disk *disk); // folders and pipes open too, and never block
+void pt_disk_close(struct pt_disk *disk);                 // what is mapped stays
+// Less than `size` bytes come at the file's end alone.
+int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t size, size_t *got);
+// Pages of the file; they go back by pt_pages_free. Writing changes the process's own copy, never the file. Another process that cuts
+// the file short meanwhile ends this one by a fault: the price of not copying. offset: a multiple of 64 KiB; size: not 0.
+enum pt_disk_use { PT_DISK_ONCE, PT_DISK_ANYWHERE }; // read once from end to end, or here and there
+int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data);
+
+FILE *pt_stream_open(const char *path, const char *mode); // as fopen; programs that are started do not inherit it
+int pt_stream_seek(FILE *stream, uint64_t offset);
+int pt_stream_resize(FILE *stream, uint64_t size); // cuts it, or adds zeros; what was written is with the system then
+
+// A file that is there whole or not at all: written beside `path`, then put in its place. A file that is mapped must not change.
+struct pt_whole {
+    FILE *stream; // what is written goes here
+    char *path, *beside;
+};
+int pt_whole_begin(const char *path, struct pt_whole *whole); // an error: there is nothing to end
+// good: all was written, so the file takes its place. By the thread that wrote. Returns the error that kept it from doing so.
+int pt_whole_end(struct pt_whole *whole, int good);
+
+// ---- libraries ---------------------------------------------------------------------------------------------------------
+
+void *pt_library_open(const char *name); // NULL: there is none. It stays loaded: drivers do not survive being unloaded
+void *pt_library_find(void *library, const char *function);
+void pt_library_close(void *library); // NULL is fine
+
+// ---- numbers -----------------------------------------------------------------------------------------------------------
+
+double pt_decimal(const char *text); // strtod with a decimal point, whatever the process's locale is
+
+#endif

@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// platform.h on Linux, with the GNU C library.
+#include "platform.h"
+
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <locale.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+// ---- threads -----------------------------------------------------------------------------------------------------------
+
+_Static_assert(sizeof(pthread_mutex_t) <= sizeof(struct pt_mutex) && _Alignof(pthread_mutex_t) <= 8, "room of a mutex");
+_Static_assert(sizeof(pthread_cond_t) <= sizeof(struct pt_condition) && _Alignof(pthread_cond_t) <= 8, "room of a condition");
+_Static_assert(sizeof(pthread_t) <= sizeof(struct pt_thread) && _Alignof(pthread_t) <= 8, "room of a thread");
+
+static pthread_mutex_t *mutex_of(struct pt_mutex *mutex) { return (pthread_mutex_t *)(void *)mutex->room; }
+static pthread_cond_t *condition_of(struct pt_condition *condition) { return (pthread_cond_t *)(void *)condition->room; }
+
+void pt_mutex_init(struct pt_mutex *mutex) { pthread_mutex_init(mutex_of(mutex), NULL); }
+void pt_mutex_destroy(struct pt_mutex *mutex) { pthread_mutex_destroy(mutex_of(mutex)); }
+void pt_mutex_lock(struct pt_mutex *mutex) { pthread_mutex_lock(mutex_of(mutex)); }
+void pt_mutex_unlock(struct pt_mutex *mutex) { pthread_mutex_unlock(mutex_of(mutex)); }
+
+void pt_condition_init(struct pt_condition *condition) { pthread_cond_init(condition_of(condition), NULL); }
+void pt_condition_destroy(struct pt_condition *condition) { pthread_cond_destroy(condition_of(condition)); }
+void pt_condition_wait(struct pt_condition *condition, struct pt_mutex *mutex)
+{
+    pthread_cond_wait(condition_of(condition), mutex_of(mutex));
+}
+void pt_condition_wake_one(struct pt_condition *condition) { pthread_cond_signal(condition_of(condition)); }
+void pt_condition_wake_all(struct pt_condition *condition) { pthread_cond_broadcast(condition_of(condition)); }
+
+void pt_once(struct pt_once *once, void (*make)(void))
+{
+    enum { NOT_YET, BEING_MADE, MADE };
+    int seen = NOT_YET;
+    if (atomic_load_explicit(&once->state, memory_order_acquire) == MADE)
+        return;
+    if (atomic_compare_exchange_strong(&once->state, &seen, BEING_MADE)) {
+        make();
+        atomic_store_explicit(&once->state, MADE, memory_order_release);
+    } else {
+        while (atomic_load_explicit(&once->state, memory_order_acquire) != MADE)
+            pt_thread_yield();
+    }
+}
+
+struct start {
+    void (*main)(void *context);
+    void *context;
+};
+
+static void *thread_main(void *argument)
+{
+    struct start start = *(struct start *)argument;
+    free(argument);
+    start.main(start.context);
+    return NULL;
+}
+
+int pt_thread_start(struct pt_thread *thread, void (*main)(void *context), void *context, size_t stack)
+{
+    static const int faults[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGSYS };
+    struct start *start = malloc(sizeof *start);
+    pthread_attr_t attributes;
+    sigset_t signals, before;
+    if (!start || pthread_attr_init(&attributes)) {
+        free(start);
+        return ENOMEM;
+    }
+    *start = (struct start){ main, context };
+    if (stack)
+        pthread_attr_setstacksize(&attributes, stack);
+    sigfillset(&signals);
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
+        sigdelset(&signals, faults[i]);
+    pthread_sigmask(SIG_SETMASK, &signals, &before);
+    int error = pthread_create((pthread_t *)(void *)thread->room, &attributes, thread_main, start);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    pthread_attr_destroy(&attributes);
+    if (error)
+        free(start);
+    return error;
+}
+
+void pt_thread_join(struct pt_thread *thread) { pthread_join(*(pthread_t *)(void *)thread->room, NULL); }
+void pt_thread_yield(void) { sched_yield(); }
+
+static sigset_t interrupts(void)
+{
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    return set;
+}
+
+// A thread that waits, rather than a handler: what it calls need not be async-signal-safe.
+static void *watch(void *context)
+{
+    void (*interrupted)(void);
+    memcpy(&interrupted, context, sizeof interrupted);
+    free(context);
+    const sigset_t set = interrupts();
+    for (int caught;;)
+        if (!sigwait(&set, &caught))
+            interrupted();
+    return NULL;
+}
+
+int pt_watch_interrupts(void (*interrupted)(void))
+{
+    const sigset_t set = interrupts();
+    pthread_t thread;
+    void *context = malloc(sizeof interrupted);
+    if (!context)
+        return ENOMEM;
+    memcpy(context, &interrupted, sizeof interrupted);
+    int error = pthread_sigmask(SIG_BLOCK, &set, NULL); // threads to come inherit it: the one that waits is told
+    error = error ? error : pthread_create(&thread, NULL, watch, context);
+    if (error) {
+        free(context);
+        return error;
+    }
+    return pthread_detach(thread);
+}
+
+// ---- the machine -------------------------------------------------------------------------------------------------------
+
+double pt_milliseconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
+}
+
+uint32_t pt_core_count(void)
+{
+    cpu_set_t set;
+    if (sched_getaffinity(0, sizeof set, &set) == 0)
+        return (uint32_t)CPU_COUNT(&set);
+    return 1;
+}
+
+void pt_processor_name(char *text, size_t size)
+{
+    char line[256];
+    FILE *file = fopen("/proc/cpuinfo", "re");
+    snprintf(text, size, "processor");
+    while (file && fgets(line, sizeof line, file))
+        if (!strncmp(line, "model name", 10)) {
+            const char *value = strchr(line, ':');
+            if (value)
+                snprintf(text, size, "%.*s", (int)strcspn(value + 1, "\n"), value + 1 + strspn(value + 1, " "));
+            text[strcspn(text, "\n")] = 0;
+            break;
+        }
+    if (file)
+        fclose(file);
+}
+
+uint64_t pt_peak_memory(void)
+{
+    char line[256];
+    unsigned long kib = 0;
+    FILE *status = fopen("/proc/self/status", "re");
+    while (status && fgets(line, sizeof line, status))
+        if (sscanf(line, "VmHWM: %lu", &kib) == 1)
+            break;
+    if (status)
+        fclose(status);
+    return (uint64_t)kib << 10;
+}
+
+const char *pt_error_text(int error, char *buffer, size_t size) { return strerror_r(error, buffer, size); } // GNU's, which returns it
+
+// ---- memory ------------------------------------------------------------------------------------------------------------
+
+enum { PAGE = 4096, HUGE_PAGE = 2 << 20 };
+
+static size_t whole_pages(size_t size) { return size ? (size + PAGE - 1) / PAGE * PAGE : PAGE; }
+
+// Whole huge pages inside are asked for as such; what is left over at the end stays small, so that none is wasted.
+void *pt_pages_alloc(size_t size)
+{
+    size_t wanted = whole_pages(size), room = wanted < HUGE_PAGE ? wanted : wanted + HUGE_PAGE;
+    if (size > SIZE_MAX / 2)
+        return NULL;
+    char *memory = mmap(NULL, room, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (memory == MAP_FAILED)
+        return NULL;
+    if (room == wanted)
+        return memory;
+    size_t before = (HUGE_PAGE - (uintptr_t)memory % HUGE_PAGE) % HUGE_PAGE, after = HUGE_PAGE - before;
+    if (before)
+        munmap(memory, before);
+    if (after)
+        munmap(memory + before + wanted, after);
+    madvise(memory + before, wanted / HUGE_PAGE * HUGE_PAGE, MADV_HUGEPAGE); // a wish: ignored where the kernel has none
+    return memory + before;
+}
+
+void pt_pages_free(void *pages, size_t size)
+{
+    if (pages)
+        munmap(pages, whole_pages(size));
+}
+
+// ---- files -------------------------------------------------------------------------------------------------------------
+
+int pt_disk_open(const char *path, struct pt_disk *disk)
+{
+    struct stat status;
+    int descriptor = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a named pipe must not block
+    if (descriptor < 0)
+        return errno;
+    if (fstat(descriptor, &status)) {
+        int error = errno;
+        close(descriptor);
+        return error;
+    }
+    disk->handle = descriptor;
+    disk->size = (uint64_t)status.st_size;
+    disk->kind = S_ISREG(status.st_mode) ? PT_DISK_FILE : S_ISDIR(status.st_mode) ? PT_DISK_FOLDER : PT_DISK_OTHER;
+    return 0;
+}
+
+void pt_disk_close(struct pt_disk *disk) { close((int)disk->handle); }
+
+int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t size, size_t *got)
+{
+    for (*got = 0; *got < size;) {
+        const ssize_t now = pread((int)disk->handle, (char *)data + *got, size - *got, (off_t)(offset + *got));
+        if (now < 0 && errno == EINTR)
+            continue;
+        if (now < 0)
+            return errno;
+        if (!now)
+            break;
+        *got += (size_t)now;
+    }
+    return 0;
+}
+
+int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
+{
+    *data = mmap(NULL, size, PROT_READ | (use == PT_DISK_ANYWHERE ? PROT_WRITE : 0), MAP_PRIVATE, (int)disk->handle, (off_t)offset);
+    if (*data == MAP_FAILED) {
+        *data = NULL;
+        return errno;
+    }
+    if (use == PT_DISK_ONCE)
+        madvise(*data, size, MADV_SEQUENTIAL);
+    return 0;
+}
+
+FILE *pt_stream_open(const char *path, const char *mode)
+{
+    char closed[8]; // with "e": close it where another program is started
+    snprintf(closed, sizeof closed, "%se", mode);
+    return fopen(path, closed);
+}
+
+int pt_stream_seek(FILE *stream, uint64_t offset) { return fseeko(stream, (off_t)offset, SEEK_SET) ? errno : 0; }
+
+int pt_stream_resize(FILE *stream, uint64_t size)
+{
+    return fflush(stream) || ftruncate(fileno(stream), (off_t)size) ? errno : 0;
+}
+
+int pt_whole_begin(const char *path, struct pt_whole *whole)
+{
+    static const char part[] = ".part";
+    const size_t length = strlen(path);
+    struct stat status;
+    *whole = (struct pt_whole){ 0 };
+    if (!stat(path, &status) && !S_ISREG(status.st_mode)) // never in the place of a folder or a device
+        return S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
+    char *names = malloc(2 * length + 1 + sizeof part);
+    if (!names)
+        return ENOMEM;
+    whole->path = memcpy(names, path, length + 1);
+    whole->beside = memcpy(names + length + 1, path, length);
+    memcpy(whole->beside + length, part, sizeof part);
+    whole->stream = pt_stream_open(whole->beside, "wb");
+    if (whole->stream) {
+        errno = 0; // of what is written from now on
+        return 0;
+    }
+    int error = errno;
+    free(names);
+    return error;
+}
+
+int pt_whole_end(struct pt_whole *whole, int good)
+{
+    int error = good ? 0 : errno ? errno : EIO;
+    if (fclose(whole->stream) && !error)
+        error = errno;
+    if (!error && rename(whole->beside, whole->path))
+        error = errno;
+    if (error)
+        unlink(whole->beside);
+    free(whole->path);
+    return error;
+}
+
+// ---- libraries ---------------------------------------------------------------------------------------------------------
+
+void *pt_library_open(const char *name) { return dlopen(name, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE); }
+void *pt_library_find(void *library, const char *function) { return dlsym(library, function); }
+void pt_library_close(void *library)
+{
+    if (library)
+        dlclose(library);
+}
+
+// ---- numbers -----------------------------------------------------------------------------------------------------------
+
+static struct pt_once c_locale_made;
+static locale_t c_locale;
+
+static void make_c_locale(void) { c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0); } // glibc's own: it cannot fail
+
+double pt_decimal(const char *text)
+{
+    pt_once(&c_locale_made, make_c_locale);
+    return strtod_l(text, NULL, c_locale);
+}
