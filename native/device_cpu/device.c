@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The CPU device: buffers are memory, kernels are functions of the best level that the processor has.
-#include "base/color.h"
 #include "cpu.h"
 #include "base/platform.h"
 #include "tables.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,21 +28,6 @@ static uint32_t available_levels(const struct pt_cpu_level *levels[4])
     PT_EACH_LEVEL(PT_X)
 #undef PT_X
     return count;
-}
-
-// ---- tables ----------------------------------------------------------------------------------------------------------
-
-float pt_srgb_table[256];
-uint64_t pt_pack_table[256];
-
-static void fill_tables(void)
-{
-    for (int i = 0; i < 256; i++) {
-        pt_srgb_table[i] = (float)pt_linear_of_srgb(i / 255.0);
-        for (uint64_t lane = 0, count = 0; lane < 8; lane++)
-            if (i >> lane & 1)
-                pt_pack_table[i] |= lane << 8 * count++;
-    }
 }
 
 // ---- buffers ---------------------------------------------------------------------------------------------------------
@@ -125,19 +108,6 @@ static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffe
 
 // ---- kernels ---------------------------------------------------------------------------------------------------------
 
-void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size)
-{
-    struct pt_cpu_scratch *scratch = &call->scratch[index];
-    size += PT_SLACK;
-    if (scratch->size >= size)
-        return scratch->memory;
-    size += scratch->size ? size / 8 : 0; // a moving camera asks for a little more every time
-    pt_pages_free(scratch->memory, scratch->size);
-    scratch->memory = pt_pages_alloc(size);
-    scratch->size = scratch->memory ? size : 0;
-    return scratch->memory;
-}
-
 static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const void *arguments, size_t argument_size,
                    struct pt_buffer *const *buffers, uint32_t buffer_count, const atomic_int *cancel)
 {
@@ -209,7 +179,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *level, stru
     static struct pt_once once;
     const struct pt_cpu_level *levels[4];
     uint32_t count = available_levels(levels), chosen = 0;
-    pt_once(&once, fill_tables);
+    pt_once(&once, pt_cpu_tables_fill);
     while (chosen < count && strcmp(level, "cpu") != 0 && strcmp(level, levels[chosen]->name) != 0)
         chosen++;
     if (chosen == count)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What kernels look up, filled at start.
+// What kernels look up, filled before the first of them runs.
 #ifndef PT_TABLES_H
 #define PT_TABLES_H
 
@@ -9,5 +9,7 @@
 extern float pt_srgb_table[256];
 // Of each set of eight lanes, their numbers, a byte each, one behind another.
 extern uint64_t pt_pack_table[256];
+
+void pt_cpu_tables_fill(void);
 
 #endif

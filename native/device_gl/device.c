@@ -18,39 +18,6 @@ struct pt_gl_call {
 
 enum { STACK_SIZE = 16 << 20 }; // drivers compile shaders on our stack
 
-// ---- errors ----------------------------------------------------------------------------------------------------
-
-int pt_gl_fail(struct pt_gl_device *d, int code, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    vsnprintf(d->message, sizeof d->message, format, args);
-    va_end(args);
-    return code;
-}
-
-int pt_gl_check(struct pt_gl_device *d, const char *doing)
-{
-    const GladGLContext *gl = &d->gl;
-    GLenum reset = GL_NO_ERROR;
-    if (gl->KHR_robustness && gl->GetGraphicsResetStatus)
-        reset = gl->GetGraphicsResetStatus();
-    else if (gl->ARB_robustness && gl->GetGraphicsResetStatusARB)
-        reset = gl->GetGraphicsResetStatusARB();
-    GLenum first = gl->GetError(), error = first;
-    for (int i = 0; i < 16 && error != GL_NO_ERROR && error != GL_CONTEXT_LOST; i++)
-        error = gl->GetError();
-    if (reset != GL_NO_ERROR || first == GL_CONTEXT_LOST || error == GL_CONTEXT_LOST) {
-        d->lost = 1;
-        return pt_gl_fail(d, PATINA_ERROR_DEVICE, "the OpenGL context was lost while %s", doing);
-    }
-    if (first == GL_NO_ERROR)
-        return PATINA_OK;
-    if (first == GL_OUT_OF_MEMORY)
-        return pt_gl_fail(d, PATINA_ERROR_MEMORY, "OpenGL ran out of memory while %s", doing);
-    return pt_gl_fail(d, PATINA_ERROR_DEVICE, "OpenGL error 0x%04X while %s", first, doing);
-}
-
 // ---- the thread ------------------------------------------------------------------------------------------------
 
 // Runs in the GL thread and returns its result and message. The caller's thread has no part in it but waiting.
@@ -258,40 +225,6 @@ static int read_buffer(struct pt_gl_device *d, void *context)
     d->gl.BindBuffer(GL_COPY_READ_BUFFER, b->buffer->name);
     d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, (GLintptr)b->offset, (GLsizeiptr)b->size, b->target);
     return pt_gl_check(d, "reading a buffer back");
-}
-
-// In software the memory is at hand, and the driver clears by a call every 8 bytes: 2.0 ms for the keys of 1024² in place of 0.3.
-static int clear_mapped(struct pt_gl_device *d, size_t offset, size_t size, uint64_t first, uint64_t second)
-{
-    const size_t count = (size + 7) / 8; // buffers are padded
-    uint64_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)(8 * count),
-                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT);
-    if (!to)
-        return pt_gl_check(d, "clearing a buffer");
-    for (size_t i = 0; i < count / 2; i++) {
-        to[2 * i] = first;
-        to[2 * i + 1] = second;
-    }
-    if (count & 1)
-        to[count - 1] = first;
-    d->gl.UnmapBuffer(GL_COPY_WRITE_BUFFER);
-    return pt_gl_check(d, "clearing a buffer");
-}
-
-int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
-                uint32_t bytes)
-{
-    static const GLenum formats[] = {GL_R32UI, GL_RG32UI, GL_NONE, GL_RGBA32UI};
-    static const GLenum parts[] = {GL_RED_INTEGER, GL_RG_INTEGER, GL_NONE, GL_RGBA_INTEGER};
-    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, buffer->name);
-    if (!size)
-        return PATINA_OK;
-    if (!d->base.info.hardware)
-        return clear_mapped(d, offset, size, (uint64_t)words[1] << 32 | words[0], (uint64_t)words[3] << 32 | words[2]);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, formats[bytes / 4 - 1], (GLintptr)offset,
-                             (GLsizeiptr)(size - size % bytes), parts[bytes / 4 - 1], GL_UNSIGNED_INT, words);
-    return pt_gl_check(d, "clearing a buffer");
 }
 
 static int fill_buffer(struct pt_gl_device *d, void *context)

@@ -87,15 +87,11 @@ struct pt_gl_device {
     struct pt_gl_scratch scratch[PT_GL_SCRATCH_COUNT];
 };
 
-// device.c
+// fail.c
 // Keeps the sentence for the handle of the device; returns code.
 int pt_gl_fail(struct pt_gl_device *d, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 // Turns whatever GL has to complain about into a code and a sentence: "OpenGL ran out of memory while ...".
 int pt_gl_check(struct pt_gl_device *d, const char *doing);
-
-// words: 16 bytes; a pattern of 4 or 8 `bytes` repeats in them. Offset and size are multiples of 8, or size reaches the end.
-int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
-                uint32_t bytes);
 
 struct pt_gl_unit {
     GLenum format;
@@ -109,7 +105,6 @@ int pt_gl_program(struct pt_gl_device *d, const char *name, const char *definiti
 // The same with the file that `#include "BODY"` stands for.
 int pt_gl_program_of_body(struct pt_gl_device *d, const char *name, const char *definitions, const char *body, GLuint *program);
 
-// kernels.c
 // A kernel with what it runs on.
 struct pt_gl_work {
     enum pt_kernel kernel;
@@ -118,8 +113,8 @@ struct pt_gl_work {
     struct pt_buffer *const *buffers; // as kernels.def lists them
     const atomic_int *cancel;
 };
-int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work);
-// Steps that a kernel's own runner shares with the default one.
+
+// bind.c: what runners share
 void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size); // bound at 0
 int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions);
 int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what);
@@ -133,8 +128,14 @@ size_t pt_gl_part(const struct pt_buffer_row *row);
 int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct pt_buffer *plane);
 int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, size_t offset, size_t size); // a part of a buffer
 int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y);
+// Workgroups for every pixel, of programs whose invocations take several of a row each (lib/planes.glsl).
+int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height);
 // At least `size` bytes; keeps the first `keep` bytes when it has to grow.
 int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep);
+
+// words: 16 bytes; a pattern of 4 or 8 `bytes` repeats in them. Offset and size are multiples of 8, or size reaches the end.
+int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
+                uint32_t bytes);
 
 // tiles.c
 // Lists the tiles of a key plane, unless the lists at hand are still good.
@@ -143,8 +144,6 @@ void pt_gl_tiles_forget(struct pt_gl_device *d); // keys changed
 int pt_gl_dispatch_tiles(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, enum pt_gl_tile_list list);
 // Workgroups for `count` tiles of the list bound at PT_BIND_tile_list.
 int pt_gl_dispatch_list(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t count);
-// Workgroups for every pixel, of programs whose invocations take several of a row each (lib/planes.glsl).
-int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height);
 // A grid of at least `count` workgroups, within every driver's limits.
 void pt_gl_grid(uint32_t count, uint32_t *x, uint32_t *y);
 
@@ -159,10 +158,15 @@ pt_gl_runner pt_gl_pointwise;
 pt_gl_runner pt_gl_raster, pt_gl_scatter, pt_gl_splat, pt_gl_blend, pt_gl_average, pt_gl_points, pt_gl_fill, pt_gl_shade,
     pt_gl_antialias, pt_gl_push, pt_gl_lines, pt_gl_gather, pt_gl_soft;
 int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant);
-// shade, of any number of instances, smooth, antialias and compose, without the planes between them.
-int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count);
+// The picture from what is shaded: smooth, antialias and compose at once, whose passes these are.
+int pt_gl_finish(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded);
 // The coarse cells over the rectangle of a push.
 struct view_args pt_gl_coarse_view(const struct push_args *args);
+
+// kernels.c
+int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work);
+// shade, of any number of instances, smooth, antialias and compose, without the planes between them.
+int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count);
 
 // selftest.c
 // Whether 64-bit atomics of this driver give what the CPU says; 0 too where the driver has none.

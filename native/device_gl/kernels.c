@@ -1,121 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Running a kernel: bind its arguments and buffers as kernels.def lists them, one dispatch over its domain. Some have runners of
+// Running a kernel: its arguments and buffers are bound (bind.c), and it is dispatched once over its domain. Some have runners of
 // their own.
 #include "device_gl.h"
 
 #include <stdio.h>
-
-int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions)
-{
-    if (d->programs[kernel][variant])
-        return PATINA_OK;
-    char name[64];
-    snprintf(name, sizeof name, "kernels/%s.comp", pt_kernels[kernel].name);
-    return pt_gl_program(d, name, definitions, &d->programs[kernel][variant]);
-}
-
-int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what)
-{
-    if (size > d->block_size)
-        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
-                          "%s: a buffer of %zu bytes; this OpenGL driver's shaders reach %zu at most", what, size,
-                          d->block_size);
-    size_t padded = size ? (size + 15) & ~(size_t)15 : 16; // as buffers are made
-    d->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, name, (GLintptr)offset, (GLsizeiptr)padded);
-    return PATINA_OK;
-}
-
-int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y)
-{
-    if (x && y) {
-        d->gl.UseProgram(d->programs[kernel][variant]);
-        d->gl.DispatchCompute(x, y, 1);
-        d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
-                            GL_TEXTURE_FETCH_BARRIER_BIT);
-    }
-    char doing[64];
-    snprintf(doing, sizeof doing, "running %s", pt_kernels[kernel].name);
-    return pt_gl_check(d, doing);
-}
-
-int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep)
-{
-    const GladGLContext *gl = &d->gl;
-    struct pt_gl_scratch *scratch = &d->scratch[use];
-    if (size <= scratch->size)
-        return PATINA_OK;
-    size = (size + size / 4 + 4095) & ~(size_t)4095;
-    GLuint name = 0;
-    gl->GenBuffers(1, &name);
-    gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
-    gl->BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)size, NULL, GL_DYNAMIC_COPY);
-    if (keep) {
-        gl->BindBuffer(GL_COPY_READ_BUFFER, scratch->name);
-        gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, (GLsizeiptr)keep);
-    }
-    int result = pt_gl_check(d, "making room for a kernel");
-    if (result != PATINA_OK) {
-        gl->DeleteBuffers(1, &name);
-        return result;
-    }
-    gl->DeleteBuffers(1, &scratch->name);
-    *scratch = (struct pt_gl_scratch){name, size};
-    return PATINA_OK;
-}
-
-int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct pt_buffer *plane)
-{
-    return pt_gl_bind_texels(d, unit, plane->name, 0, plane->size);
-}
-
-int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, size_t offset, size_t size)
-{
-    const size_t texels = size / pt_gl_units[unit].bytes;
-    if (texels > d->texels)
-        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
-                          "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels,
-                          d->texels);
-    d->gl.ActiveTexture(GL_TEXTURE0 + unit);
-    d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
-    d->gl.TexBufferRange(GL_TEXTURE_BUFFER, pt_gl_units[unit].format, name, (GLintptr)offset,
-                         (GLsizeiptr)(size ? size : 16)); // as buffers are made
-    return PATINA_OK;
-}
-
-size_t pt_gl_part(const struct pt_buffer_row *row)
-{
-    if (row->formats & 1u << PT_FORMAT_position)
-        return 12;
-    return row->formats & 1u << PT_FORMAT_word && !row->binding ? 4 : 0;
-}
-
-// In place of a block that is missing any other stands: the kernel does not touch it.
-static int bind_row(struct pt_gl_device *d, const struct pt_gl_work *work, const struct pt_buffer_row *row,
-                    const struct pt_buffer *buffer)
-{
-    const int missing = !buffer || !buffer->name, texture = row->unit && !(row->soft && d->base.info.hardware);
-    int result = PATINA_OK;
-    if (row->binding && !(texture && row->soft))
-        result = pt_gl_bind(d, row->binding, missing ? d->arguments : buffer->name, 0, missing ? work->argument_size : buffer->size,
-                            pt_kernels[work->kernel].name);
-    return result == PATINA_OK && texture && !missing ? pt_gl_bind_texture(d, row->unit - 1u, buffer) : result;
-}
-
-int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t count,
-                    struct pt_buffer *const *buffers)
-{
-    const struct pt_buffer_row *rows = pt_kernels[work->kernel].buffers + first;
-    int result = PATINA_OK;
-    for (uint32_t i = 0; i < count && result == PATINA_OK; i++)
-        if (!pt_gl_part(&rows[i]))
-            result = bind_row(d, work, &rows[i], buffers[i]);
-    return result;
-}
-
-int pt_gl_bind_buffers(struct pt_gl_device *d, const struct pt_gl_work *work)
-{
-    return pt_gl_bind_rows(d, work, 0, pt_kernels[work->kernel].fixed, work->buffers);
-}
 
 static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
                     uint32_t width, uint32_t height)
@@ -127,13 +15,6 @@ static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t vari
     d->gl.GetProgramiv(d->programs[kernel][variant], GL_COMPUTE_WORK_GROUP_SIZE, group);
     return pt_gl_dispatch(d, kernel, variant, (width + (uint32_t)group[0] - 1) / (uint32_t)group[0],
                           (height + (uint32_t)group[1] - 1) / (uint32_t)group[1]);
-}
-
-// llvmpipe spends as much on an invocation as on a pixel.
-int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height)
-{
-    enum { COLUMNS = 64, ROWS = 4 }; // of a workgroup, as in lib/planes.glsl
-    return pt_gl_dispatch(d, kernel, variant, (width + COLUMNS - 1) / COLUMNS, (height + ROWS - 1) / ROWS);
 }
 
 static int run_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t width, uint32_t height)
@@ -244,14 +125,6 @@ static void forget_tiles(struct pt_gl_device *d, const struct pt_gl_work *work)
             pt_gl_tiles_forget(d);
 }
 
-void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size)
-{
-    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->arguments);
-    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)((size + 15) & ~(size_t)15), NULL, GL_STREAM_DRAW);
-    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)size, arguments);
-    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
-}
-
 // The keys that tell which tiles a kernel visits: those that it reads as a texture.
 static const struct pt_buffer *keys_of(const struct pt_gl_work *work)
 {
@@ -283,4 +156,22 @@ int pt_gl_run(struct pt_gl_device *d, const struct pt_gl_work *work)
     if (result != PATINA_OK)
         return result;
     return runners[work->kernel] ? runners[work->kernel](d, work) : run_once(d, work);
+}
+
+int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count)
+{
+    const struct pt_bound_pass *tail = passes + count - 3;
+    const struct view_args *view = tail->arguments;
+    const size_t size = (size_t)view->width * view->height * 16;
+    int result = pt_gl_scratch(d, PT_GL_SCRATCH_SHADED, size, 0);
+    struct pt_buffer shaded = {.size = size, .name = d->scratch[PT_GL_SCRATCH_SHADED].name};
+    for (const struct pt_bound_pass *shade = passes; shade < tail && result == PATINA_OK; shade++) {
+        shade->buffers[PT_BUF_shade_shading] = NULL;
+        shade->buffers[PT_BUF_shade_color] = &shaded;
+        result = pt_gl_run(d, &(struct pt_gl_work){.kernel = PT_KERNEL_shade,
+                                                   .arguments = shade->arguments,
+                                                   .argument_size = sizeof(struct shade_args),
+                                                   .buffers = shade->buffers});
+    }
+    return result == PATINA_OK ? pt_gl_finish(d, tail, &shaded) : result;
 }

@@ -214,50 +214,32 @@ static int bind_finish(struct pt_gl_device *d, const struct finish_args *args, c
 }
 
 // What shows no point is background; the rest is smoothed into the picture, and then its edges.
-static int finish(struct pt_gl_device *d, const struct finish_args *args, const struct pt_bound_pass *passes,
-                  const struct pt_buffer *shaded)
+int pt_gl_finish(struct pt_gl_device *d, const struct pt_bound_pass *passes, const struct pt_buffer *shaded)
 {
+    const struct finish_args args = {*(const struct smooth_args *)passes[0].arguments,
+                                     *(const struct antialias_args *)passes[1].arguments,
+                                     *(const struct compose_args *)passes[2].arguments};
     static const char *const definitions[] = {"#define STEP 0\n#define INKED 0\n", "#define STEP 1\n#define INKED 0\n",
                                               "#define STEP 0\n#define INKED 1\n", "#define STEP 1\n#define INKED 1\n"};
     const struct pt_buffer *combined = passes[2].buffers[PT_BUF_compose_combined];
-    const uint32_t find = 2 * (args->antialias.inked != 0);
+    const uint32_t find = 2 * (args.antialias.inked != 0);
     uint32_t words[4];
-    memcpy(words, args->compose.background, sizeof words);
+    memcpy(words, args.compose.background, sizeof words);
     int result = pt_gl_clear(d, combined, 0, combined->size, words, sizeof words);
     if (result == PATINA_OK)
-        result = pt_gl_tiles(d, passes[0].buffers[PT_BUF_smooth_keys], &args->smooth.view);
+        result = pt_gl_tiles(d, passes[0].buffers[PT_BUF_smooth_keys], &args.smooth.view);
     if (result != PATINA_OK || !d->tiles.count[PT_GL_TILES_POINTS])
         return result;
     for (uint32_t i = find; i < find + 2 && result == PATINA_OK; i++)
         if (!d->programs[PT_KERNEL_compose][FINISH + i])
             result = pt_gl_program(d, "lib/finish.glsl", definitions[i], &d->programs[PT_KERNEL_compose][FINISH + i]);
     if (result == PATINA_OK)
-        result = bind_finish(d, args, passes, shaded);
+        result = bind_finish(d, &args, passes, shaded);
     if (result == PATINA_OK)
         result = prepare_list(d, PT_BIND_finish_counters, PT_BIND_finish_edges, TILE_PIXELS);
     if (result == PATINA_OK)
         result = pt_gl_dispatch_tiles(d, PT_KERNEL_compose, FINISH + find, PT_GL_TILES_POINTS);
     return result == PATINA_OK ? dispatch_list(d, PT_KERNEL_compose, FINISH + find + 1, list_length(d), GROUP) : result;
-}
-
-int pt_gl_finish_picture(struct pt_gl_device *d, const struct pt_bound_pass *passes, uint32_t count)
-{
-    const struct pt_bound_pass *tail = passes + count - 3;
-    const struct finish_args args = {*(const struct smooth_args *)tail[0].arguments,
-                                     *(const struct antialias_args *)tail[1].arguments,
-                                     *(const struct compose_args *)tail[2].arguments};
-    const size_t size = (size_t)args.smooth.view.width * args.smooth.view.height * 16;
-    int result = pt_gl_scratch(d, PT_GL_SCRATCH_SHADED, size, 0);
-    struct pt_buffer shaded = {.size = size, .name = d->scratch[PT_GL_SCRATCH_SHADED].name};
-    for (const struct pt_bound_pass *shade = passes; shade < tail && result == PATINA_OK; shade++) {
-        shade->buffers[PT_BUF_shade_shading] = NULL;
-        shade->buffers[PT_BUF_shade_color] = &shaded;
-        result = pt_gl_run(d, &(struct pt_gl_work){.kernel = PT_KERNEL_shade,
-                                                   .arguments = shade->arguments,
-                                                   .argument_size = sizeof(struct shade_args),
-                                                   .buffers = shade->buffers});
-    }
-    return result == PATINA_OK ? finish(d, &args, tail, &shaded) : result;
 }
 
 // ---- push ------------------------------------------------------------------------------------------------------

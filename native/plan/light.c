@@ -4,7 +4,7 @@
 //
 // Suns look in parallel. Other lights look in perspective at the box of the casters while it spans less than 120 degrees
 // (beyond that the texels in the middle shrink to a quarter of those at the edge), else through the six faces of a cube.
-#include "plan.h"
+#include "light_points.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
 
@@ -186,28 +186,6 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
 
 // ---- light frames ----------------------------------------------------------------------------------------------------------
 
-// Rows x, y, z with z against `direction` (unit) and x along `side` as far as it goes.
-static void frame_of(const double direction[3], const double side[3], double axes[9])
-{
-    double *x = axes, *y = axes + 3, *z = axes + 6, along, length;
-    const double poles[3][3] = { { side[0], side[1], side[2] }, { 0, 0, 1 }, { 1, 0, 0 } };
-    for (int k = 0; k < 3; k++)
-        z[k] = -direction[k];
-    for (int pole = 0; pole < 3; pole++) {
-        const double *p = poles[pole];
-        along = pt_dot(p, z);
-        for (int k = 0; k < 3; k++) // of the poles: across, so that y goes up
-            x[k] = pole ? p[(k + 1) % 3] * z[(k + 2) % 3] - p[(k + 2) % 3] * z[(k + 1) % 3] : p[k] - along * z[k];
-        length = sqrt(pt_dot(x, x));
-        if (length > 1e-3 * sqrt(pt_dot(p, p)) && isfinite(length))
-            break;
-    }
-    for (int k = 0; k < 3; k++)
-        x[k] /= length;
-    for (int k = 0; k < 3; k++)
-        y[k] = z[(k + 1) % 3] * x[(k + 2) % 3] - z[(k + 2) % 3] * x[(k + 1) % 3];
-}
-
 // The six faces of a cube: exact permutations, so that all agree about z to the bit.
 static void face_axes(uint32_t face, double axes[9])
 {
@@ -219,63 +197,20 @@ static void face_axes(uint32_t face, double axes[9])
     axes[(k + 1) % 3] = sign;              // x = y cross z
 }
 
-// Two numbers in [0, 1): the additive recurrence of the plastic number, even in every prefix; the first is the middle.
-static void point_of_sample(uint32_t sample, double p[2])
-{
-    static const double steps[2] = { 0.75487766624669276, 0.56984029099805327 };
-    for (int k = 0; k < 2; k++) {
-        double x = 0.5 + sample * steps[k];
-        p[k] = x - floor(x);
-    }
-}
-
-// The square onto the disc, areas kept, the middle onto the middle.
-static void disc_of_square(double p[2])
-{
-    double a = 2.0 * p[0] - 1.0, b = 2.0 * p[1] - 1.0;
-    double r = fabs(a) > fabs(b) ? a : b;
-    double turn = fabs(a) > fabs(b) ? PI / 4.0 * (b / a) : b != 0.0 ? PI / 2.0 - PI / 4.0 * (a / b) : 0.0;
-    p[0] = r * cos(turn);
-    p[1] = r * sin(turn);
-}
-
-static void area_point(const patina_light_desc *light, double p[2])
-{
-    if (light->shape == PATINA_AREA_ELLIPSE)
-        disc_of_square(p);
-    else
-        for (int k = 0; k < 2; k++)
-            p[k] = 2.0 * p[k] - 1.0;
-    for (int k = 0; k < 2; k++)
-        p[k] *= 0.5 * (double)light->size[k];
-}
-
-void pt_area_points(const patina_light_desc *light, double points[3 * PT_AREA_POINTS])
-{
-    double axes[9];
-    frame_of(light->direction, light->side, axes);
-    for (int i = 0; i < PT_AREA_POINTS; i++) { // the middles of 4 x 4 fields
-        double p[2] = { (i % 4 + 0.5) / 4.0, (i / 4 + 0.5) / 4.0 };
-        area_point(light, p);
-        for (int k = 0; k < 3; k++)
-            points[3 * i + k] = light->position[k] + p[0] * axes[k] + p[1] * axes[3 + k];
-    }
-}
-
 // Where the light is and looks in a sample. axes: of the light's maps, in and out: a sun turns them.
 static void place_sample(const struct pt_plan_light *planned, uint32_t sample, double axes[9], double position[3])
 {
     const patina_light_desc *light = planned->light;
     double p[2], frame[9], across[2];
-    point_of_sample(sample, p);
+    pt_light_sample(sample, p);
     memcpy(axes, planned->axes, 9 * sizeof *axes);
     memcpy(position, light->position, 3 * sizeof *position);
     if (light->type == PATINA_LIGHT_AREA) {
-        area_point(light, p);
-        frame_of(light->direction, light->side, frame);
+        pt_area_point(light, p);
+        pt_light_frame(light->direction, light->side, frame);
         memcpy(across, p, sizeof across);
     } else {
-        disc_of_square(p);
+        pt_light_disc(p);
         memcpy(frame, planned->axes, sizeof frame);
         double radius = light->type == PATINA_LIGHT_SUN ? tan(0.5 * fmin((double)light->angle, 0.99 * PI)) : (double)light->radius;
         across[0] = radius * p[0];
@@ -294,7 +229,7 @@ static void place_sample(const struct pt_plan_light *planned, uint32_t sample, d
     length = sqrt(pt_dot(direction, direction));
     for (int k = 0; k < 3; k++)
         direction[k] /= length;
-    frame_of(direction, frame, axes);
+    pt_light_frame(direction, frame, axes);
 }
 
 static int has_area(const patina_light_desc *light)
@@ -404,7 +339,7 @@ static void aim(const struct patina_scene *scene, struct pt_plan_light *planned)
     static const double world[9] = { 1, 0, 0, 0, 1, 0, 0, 0, 1 }, none[3];
     const patina_light_desc *light = planned->light;
     if (light->type == PATINA_LIGHT_SUN) {
-        frame_of(light->direction, none, planned->axes);
+        pt_light_frame(light->direction, none, planned->axes);
         return;
     }
     struct extent around = look(scene, NULL, world, light->position);
@@ -414,7 +349,7 @@ static void aim(const struct patina_scene *scene, struct pt_plan_light *planned)
     length = sqrt(pt_dot(middle, middle));
     for (int k = 0; k < 3; k++)
         middle[k] = length > 0.0 ? middle[k] / length : light->direction[k];
-    frame_of(middle, none, planned->axes);
+    pt_light_frame(middle, none, planned->axes);
     planned->cube = 0;
     for (uint32_t sample = 0; sample < (has_area(light) ? 16u : 1u); sample++) { // from all over its area
         double axes[9], position[3];
@@ -587,7 +522,7 @@ static void put_matrix(struct key *key, const struct patina_scene *scene, const 
                                                 : scene->meshes[0].style.world_from_object;
     const double *from = planned->light->position;
     double linear[9], translation[3], turned[9], moved[3], frame[9];
-    frame_of(planned->light->direction, planned->light->side, frame);
+    pt_light_frame(planned->light->direction, planned->light->side, frame);
     pt_split_matrix(matrix, linear, translation);
     for (int k = 0; k < 3; k++)
         translation[k] -= planned->light->type == PATINA_LIGHT_SUN ? first[4 * k + 3] : from[k];

@@ -5,24 +5,6 @@
 
 #include <string.h>
 
-static const float spent = 1.0f / 512.0f; // less opacity does not show
-
-void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out)
-{
-    const struct patina_texture *texture = instance->style.texture;
-    const uint32_t alpha = instance->style.alpha;
-    if (!texture)
-        return;
-    out->levels = texture->levels;
-    out->uv = instance->mesh->stride - 2;
-    out->format = texture->format;
-    out->nearest = texture->nearest;
-    out->wrap = texture->wrap;
-    out->blend = alpha == PATINA_ALPHA_BLEND;
-    out->cut = alpha == PATINA_ALPHA_CLIP ? instance->style.alpha_least : !out->blend ? 0.0f : plan->map ? 0.5f : spent;
-    memcpy(out->sizes, texture->sizes, sizeof out->sizes);
-}
-
 static uint32_t pixels_of(const struct pt_plan *plan) { return plan->view.width * plan->view.height; }
 
 static int in_view(const struct pt_plan_mesh *mesh) { return mesh->rect[0] < mesh->rect[2]; }

@@ -97,3 +97,9 @@ struct view_args pt_view_filled(const struct pt_plan *plan, const struct pt_plan
     }
     return view;
 }
+
+void pt_plan_destroy(struct pt_plan *plan)
+{
+    pt_arena_free(plan->arena);
+    *plan = (struct pt_plan){0};
+}

@@ -774,8 +774,3 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
     return error;
 }
 
-void pt_plan_destroy(struct pt_plan *plan)
-{
-    pt_arena_free(plan->arena);
-    *plan = (struct pt_plan){0};
-}

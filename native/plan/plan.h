@@ -10,6 +10,8 @@
 #include "scene/scene.h"
 #include "steps.h"
 
+#include <math.h>
+
 enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 
 // Layers behind the first have keys, from and shading of their own: the passes of the picture show the first. Coarser levels
@@ -273,8 +275,12 @@ static inline uint32_t pt_disc_ids(const struct patina_scene *scene)
     return first + scene->points < 0xFFFFFFFFu ? (uint32_t)first : 0;
 }
 
-// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2. (view.c)
-double pt_thinning(const struct patina_scene *scene);
+// How much farther apart points lie when only some strata are drawn: with half of them, by the root of 2.
+static inline double pt_thinning(const struct patina_scene *scene)
+{
+    const uint32_t strata = scene->settings.strata;
+    return strata ? sqrt((double)(1u << (PT_STRATA - strata))) : 1.0;
+}
 
 // Times an instance's spacing of a class of sigma: a thickness, world units. Strata that are left out make nothing thicker.
 static inline float pt_sigma_scale(const struct patina_scene *scene) { return (float)(1.0 / (16.0 * pt_thinning(scene))); }
@@ -314,8 +320,6 @@ size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan);
 // No more than the spacings on screen.
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan);
-// mesh.c: the image of a mesh, as a picture or a light sees it.
-void pt_plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out);
 // soft.c, once the window is known: soft instances in view, and their parts.
 struct pt_eye;
 int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_eye *eye);
@@ -403,9 +407,6 @@ int pt_group_receives(const struct patina_scene *scene, const struct pt_shadow_g
 int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light *light, const struct pt_shadow_group *group,
                    uint32_t sample, uint32_t face, struct pt_instance *instances, struct pt_mesh_instance *meshes,
                    struct patina_scene *out, double window[4]);
-
-// Where shading gathers an area light's light: PT_AREA_POINTS positions, world.
-void pt_area_points(const patina_light_desc *light, double points[3 * PT_AREA_POINTS]);
 
 // What a light's texture depends on, in a fixed order: integers as such, lengths and angles relative to the light.
 // Returns the count of numbers; writes at most `room`.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What shading is told of the world and its lights, as the camera sees them.
+#include "light_points.h"
 #include "passes.h"
 
 #include <math.h>

@@ -118,12 +118,6 @@ struct survey {
     int points, discs; // some chunk's points are drawn as such
 };
 
-double pt_thinning(const struct patina_scene *scene)
-{
-    uint32_t strata = scene->settings.strata;
-    return strata ? sqrt((double)(1u << (PT_STRATA - strata))) : 1.0;
-}
-
 static int is_transparent(const struct pt_instance *instance)
 {
     return instance->style.transparency > 0.0f || instance->cloud->info.has_opacities;
@@ -337,6 +331,24 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     return error;
 }
 
+static const float spent = 1.0f / 512.0f; // less opacity does not show
+
+static void plan_texture(const struct pt_plan *plan, const struct pt_mesh_instance *instance, struct texture_args *out)
+{
+    const struct patina_texture *texture = instance->style.texture;
+    const uint32_t alpha = instance->style.alpha;
+    if (!texture)
+        return;
+    out->levels = texture->levels;
+    out->uv = instance->mesh->stride - 2;
+    out->format = texture->format;
+    out->nearest = texture->nearest;
+    out->wrap = texture->wrap;
+    out->blend = alpha == PATINA_ALPHA_BLEND;
+    out->cut = alpha == PATINA_ALPHA_CLIP ? instance->style.alpha_least : !out->blend ? 0.0f : plan->map ? 0.5f : spent;
+    memcpy(out->sizes, texture->sizes, sizeof out->sizes);
+}
+
 static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const struct pt_mesh_instance *instance,
                        uint32_t id_base, struct pt_plan_mesh *out)
 {
@@ -360,7 +372,7 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     args->has_normals = mesh->has_normals;
     args->has_colors = mesh->has_colors;
     memcpy(args->color, instance->style.color, sizeof args->color);
-    pt_plan_texture(plan, instance, &args->texture);
+    plan_texture(plan, instance, &args->texture);
     pt_join_rect(plan->view.rect, out->rect);
     plan->triangles += mesh->info.triangle_count;
 }

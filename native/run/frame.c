@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A frame plans a scene, has the plan executed on its planes, and keeps what there is to be told of it.
+// What a frame is asked for: a picture, of samples or not, or shadow textures alone.
 #include "frame.h"
 
 #include "execute.h"
@@ -7,132 +7,6 @@
 
 #include <math.h>
 #include <string.h>
-
-static void keep_statistics(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan,
-                            double ms)
-{
-    struct pt_shown *shown = &frame->shown;
-    shown->stats = (patina_frame_stats){ .struct_size = sizeof shown->stats,
-                                         .width = plan->crop[2],
-                                         .height = plan->crop[3],
-                                         .points = plan->points,
-                                         .points_scattered = plan->points_scattered,
-                                         .triangles = plan->triangles,
-                                         .chunks = plan->chunks,
-                                         .chunks_culled = plan->chunks_culled,
-                                         .chunks_clipped = plan->chunks_clipped,
-                                         .chunks_cut = plan->chunks_cut,
-                                         .pixel_samples = 1,
-                                         .ms = ms };
-    shown->peak = plan->peak;
-    shown->soft_parts = plan->soft_part_count;
-    shown->soft_records = plan->soft_records;
-    shown->stats.plane_bytes = pt_planes_total(&frame->planes);
-    shown->stats.spacing_px = (float)plan->spacing_px;
-    shown->stats.expected = plan->expected;
-    shown->stats.layers = frame->layer_count && plan->layers == 1;
-    for (uint32_t i = 0; i < frame->layer_count; i++)
-        shown->stats.layers += frame->layers[i].pixels > 0;
-    shown->layer_most = plan->layers;
-    shown->layer_passes = scene->settings.layer_passes;
-    shown->stats.shadow_maps = frame->shadow_maps;
-    shown->stats.shadow_width = frame->shadow_size[0];
-    shown->stats.shadow_height = frame->shadow_size[1];
-    for (uint32_t i = 0; i < frame->shadows.instance_count; i++)
-        shown->stats.shadow_bytes += frame->shadows.words[i].size;
-    frame->light_count = plan->light_count;
-    for (uint32_t i = 0; i < plan->light_count; i++) {
-        const struct pt_shadow_light *light = &frame->shadows.lights[i];
-        const int refined = plan->mesh_shadows && frame->shadows.pixels.pending; // at once with the points
-        shown->stats.shadow_pending += (light->samples < plan->lights[i].samples && !light->settled) || refined;
-        const uint32_t of_pixels = plan->mesh_shadows ? frame->shadows.pixels.samples[i] : 0;
-        const uint32_t samples = light->samples > of_pixels ? light->samples : of_pixels;
-        shown->stats.shadow_samples = samples > shown->stats.shadow_samples ? samples : shown->stats.shadow_samples;
-        shown->stats.shadow_error = fmaxf(shown->stats.shadow_error, light->error);
-    }
-    memcpy(frame->skipped, plan->skipped, sizeof frame->skipped);
-    frame->skipped_count = plan->skipped_count;
-    shown->passes = scene->settings.passes | 1u << PATINA_PASS_COMBINED;
-    shown->all_lit = !plan->light_count;
-    shown->has_lines = plan->line_radius > 0.0f;
-    shown->assessed = plan->assessed;
-    memcpy(shown->crop, plan->crop, sizeof shown->crop);
-    shown->plane_width = plan->view.width;
-    frame->keys_valid = 1;
-    shown->picture_valid = 1;
-}
-
-// ---- rendering -----------------------------------------------------------------------------------------------------------
-
-static void link_planes(struct patina_frame *frame)
-{
-    frame->planes.other = &frame->shadows.planes;
-    frame->shadows.planes.other = &frame->planes;
-    frame->shadows.planes.varies = 1;
-}
-
-// The plan of a picture, or of textures alone, on the frame's planes.
-static int execute(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan)
-{
-    struct pt_execution execution = { .device = frame->device,
-                                      .scene = scene,
-                                      .plan = plan,
-                                      .times = &frame->times,
-                                      .cancel = &frame->cancel,
-                                      .progress = &frame->progress,
-                                      .progress_done = frame->progress_done,
-                                      .progress_share = frame->progress_share,
-                                      .layers = frame->layers,
-                                      .layer_count = pt_plan_shows(plan),
-                                      .binder = { .device = frame->device,
-                                                  .plan = plan,
-                                                  .residency = &frame->residency,
-                                                  .planes = &frame->planes,
-                                                  .picture = &frame->planes,
-                                                  .clips = &frame->clips,
-                                                  .shadows = &frame->shadows } };
-    frame->keys_valid = 0;
-    link_planes(frame);
-    frame->layers[0] = (struct pt_layer){ .points = plan->points_scattered };
-    int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
-    if (!error)
-        error = pt_execute(&execution);
-    pt_execution_close(&execution);
-    if (error)
-        frame->shown.picture_valid &= !execution.writing; // half a picture is none: the device failed
-    frame->layer_count = execution.layer_count;
-    frame->shadow_maps += execution.maps;
-    for (int k = 0; k < 2; k++)
-        frame->shadow_size[k] = execution.map_size[k] > frame->shadow_size[k] ? execution.map_size[k] : frame->shadow_size[k];
-    return error;
-}
-
-int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene)
-{
-    struct pt_plan plan;
-    const double start = pt_milliseconds();
-    int error = pt_plan_create(scene, &plan);
-    if (!error && (error = pt_frame_number(frame, scene)))
-        pt_plan_destroy(&plan);
-    if (error)
-        return pt_fail_again(&frame->handle, error);
-    pt_note_time(&frame->times, "plan", pt_milliseconds() - start);
-    frame->keys_valid = 0;
-    link_planes(frame);
-    error = pt_plan_share_planes(&plan, pt_passes_together, frame->device, frame->planes.apart);
-    if (error)
-        pt_fail(&frame->device->handle, error, "planning the frame: out of memory");
-    if (!error)
-        error = pt_planes_open(frame->device, &frame->planes, &plan);
-    if (!error)
-        error = execute(frame, scene, &plan);
-    if (!error)
-        keep_statistics(frame, scene, &plan, pt_milliseconds() - start);
-    pt_plan_destroy(&plan);
-    if (error == PATINA_ERROR_CANCELLED)
-        return pt_fail(&frame->handle, error, "rendering was cancelled");
-    return error ? pt_fail_again(&frame->handle, error) : PATINA_OK;
-}
 
 int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
 {
@@ -151,7 +25,7 @@ int pt_frame_bake(struct patina_frame *frame, const struct patina_scene *scene)
         error = pt_frame_number(frame, scene);
     if (!error) {
         const struct pt_layer first = frame->layers[0];
-        error = execute(frame, &whole, &plan);
+        error = pt_frame_execute(frame, &whole, &plan);
         frame->keys_valid = known; // of the last picture, which stays
         frame->layer_count = (uint32_t)layers;
         frame->layers[0] = first;
@@ -178,13 +52,6 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
         frame->shown.stats.ms = pt_milliseconds() - start;
     atomic_store(&frame->cancel, 0);
     return error;
-}
-
-int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene)
-{
-    return pt_numbering_take(&frame->numbering, scene)
-               ? pt_fail(NULL, PATINA_ERROR_MEMORY, "numbering %u instances: out of memory", scene->instance_count)
-               : PATINA_OK;
 }
 
 void pt_frame_release(struct patina_frame *frame)

@@ -51,7 +51,9 @@ struct patina_frame {
 
 int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene);
 // One picture, whatever the scene says of samples: what rendering does over and over.
-int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene);
+int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene); // frame_draw.c
+struct pt_plan;
+int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan); // on the frame's planes
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cpu.h"
+#include "base/platform.h"
+
+void *pt_cpu_scratch(const struct pt_cpu_call *call, uint32_t index, size_t size)
+{
+    struct pt_cpu_scratch *scratch = &call->scratch[index];
+    size += PT_SLACK;
+    if (scratch->size >= size)
+        return scratch->memory;
+    size += scratch->size ? size / 8 : 0; // a moving camera asks for a little more every time
+    pt_pages_free(scratch->memory, scratch->size);
+    scratch->memory = pt_pages_alloc(size);
+    scratch->size = scratch->memory ? size : 0;
+    return scratch->memory;
+}

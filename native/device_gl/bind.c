@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What runners of kernels share: programs, buffers bound as kernels.def lists them, memory of the device's own, dispatches.
+#include "device_gl.h"
+
+#include <stdio.h>
+
+int pt_gl_kernel_program(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions)
+{
+    if (d->programs[kernel][variant])
+        return PATINA_OK;
+    char name[64];
+    snprintf(name, sizeof name, "kernels/%s.comp", pt_kernels[kernel].name);
+    return pt_gl_program(d, name, definitions, &d->programs[kernel][variant]);
+}
+
+int pt_gl_bind(struct pt_gl_device *d, uint32_t binding, GLuint name, size_t offset, size_t size, const char *what)
+{
+    if (size > d->block_size)
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
+                          "%s: a buffer of %zu bytes; this OpenGL driver's shaders reach %zu at most", what, size,
+                          d->block_size);
+    size_t padded = size ? (size + 15) & ~(size_t)15 : 16; // as buffers are made
+    d->gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, name, (GLintptr)offset, (GLsizeiptr)padded);
+    return PATINA_OK;
+}
+
+int pt_gl_bind_texture(struct pt_gl_device *d, enum pt_unit unit, const struct pt_buffer *plane)
+{
+    return pt_gl_bind_texels(d, unit, plane->name, 0, plane->size);
+}
+
+int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, size_t offset, size_t size)
+{
+    const size_t texels = size / pt_gl_units[unit].bytes;
+    if (texels > d->texels)
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
+                          "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels,
+                          d->texels);
+    d->gl.ActiveTexture(GL_TEXTURE0 + unit);
+    d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
+    d->gl.TexBufferRange(GL_TEXTURE_BUFFER, pt_gl_units[unit].format, name, (GLintptr)offset,
+                         (GLsizeiptr)(size ? size : 16)); // as buffers are made
+    return PATINA_OK;
+}
+
+size_t pt_gl_part(const struct pt_buffer_row *row)
+{
+    if (row->formats & 1u << PT_FORMAT_position)
+        return 12;
+    return row->formats & 1u << PT_FORMAT_word && !row->binding ? 4 : 0;
+}
+
+// In place of a block that is missing any other stands: the kernel does not touch it.
+static int bind_row(struct pt_gl_device *d, const struct pt_gl_work *work, const struct pt_buffer_row *row,
+                    const struct pt_buffer *buffer)
+{
+    const int missing = !buffer || !buffer->name, texture = row->unit && !(row->soft && d->base.info.hardware);
+    int result = PATINA_OK;
+    if (row->binding && !(texture && row->soft))
+        result = pt_gl_bind(d, row->binding, missing ? d->arguments : buffer->name, 0, missing ? work->argument_size : buffer->size,
+                            pt_kernels[work->kernel].name);
+    return result == PATINA_OK && texture && !missing ? pt_gl_bind_texture(d, row->unit - 1u, buffer) : result;
+}
+
+int pt_gl_bind_rows(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t count,
+                    struct pt_buffer *const *buffers)
+{
+    const struct pt_buffer_row *rows = pt_kernels[work->kernel].buffers + first;
+    int result = PATINA_OK;
+    for (uint32_t i = 0; i < count && result == PATINA_OK; i++)
+        if (!pt_gl_part(&rows[i]))
+            result = bind_row(d, work, &rows[i], buffers[i]);
+    return result;
+}
+
+int pt_gl_bind_buffers(struct pt_gl_device *d, const struct pt_gl_work *work)
+{
+    return pt_gl_bind_rows(d, work, 0, pt_kernels[work->kernel].fixed, work->buffers);
+}
+
+void pt_gl_arguments(struct pt_gl_device *d, const void *arguments, size_t size)
+{
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, d->arguments);
+    d->gl.BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)((size + 15) & ~(size_t)15), NULL, GL_STREAM_DRAW);
+    d->gl.BufferSubData(GL_COPY_WRITE_BUFFER, 0, (GLsizeiptr)size, arguments);
+    d->gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, d->arguments);
+}
+
+int pt_gl_scratch(struct pt_gl_device *d, enum pt_gl_scratch_use use, size_t size, size_t keep)
+{
+    const GladGLContext *gl = &d->gl;
+    struct pt_gl_scratch *scratch = &d->scratch[use];
+    if (size <= scratch->size)
+        return PATINA_OK;
+    size = (size + size / 4 + 4095) & ~(size_t)4095;
+    GLuint name = 0;
+    gl->GenBuffers(1, &name);
+    gl->BindBuffer(GL_COPY_WRITE_BUFFER, name);
+    gl->BufferData(GL_COPY_WRITE_BUFFER, (GLsizeiptr)size, NULL, GL_DYNAMIC_COPY);
+    if (keep) {
+        gl->BindBuffer(GL_COPY_READ_BUFFER, scratch->name);
+        gl->CopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, (GLsizeiptr)keep);
+    }
+    int result = pt_gl_check(d, "making room for a kernel");
+    if (result != PATINA_OK) {
+        gl->DeleteBuffers(1, &name);
+        return result;
+    }
+    gl->DeleteBuffers(1, &scratch->name);
+    *scratch = (struct pt_gl_scratch){name, size};
+    return PATINA_OK;
+}
+
+int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t x, uint32_t y)
+{
+    if (x && y) {
+        d->gl.UseProgram(d->programs[kernel][variant]);
+        d->gl.DispatchCompute(x, y, 1);
+        d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
+                            GL_TEXTURE_FETCH_BARRIER_BIT);
+    }
+    char doing[64];
+    snprintf(doing, sizeof doing, "running %s", pt_kernels[kernel].name);
+    return pt_gl_check(d, doing);
+}
+
+// llvmpipe spends as much on an invocation as on a pixel.
+int pt_gl_dispatch_rows(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, uint32_t width, uint32_t height)
+{
+    enum { COLUMNS = 64, ROWS = 4 }; // of a workgroup, as in lib/planes.glsl
+    return pt_gl_dispatch(d, kernel, variant, (width + COLUMNS - 1) / COLUMNS, (height + ROWS - 1) / ROWS);
+}
+
+// In software the memory is at hand, and the driver clears by a call every 8 bytes: 2.0 ms for the keys of 1024² in place of 0.3.
+static int clear_mapped(struct pt_gl_device *d, size_t offset, size_t size, uint64_t first, uint64_t second)
+{
+    const size_t count = (size + 7) / 8; // buffers are padded
+    uint64_t *to = d->gl.MapBufferRange(GL_COPY_WRITE_BUFFER, (GLintptr)offset, (GLsizeiptr)(8 * count),
+                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_RANGE_BIT);
+    if (!to)
+        return pt_gl_check(d, "clearing a buffer");
+    for (size_t i = 0; i < count / 2; i++) {
+        to[2 * i] = first;
+        to[2 * i + 1] = second;
+    }
+    if (count & 1)
+        to[count - 1] = first;
+    d->gl.UnmapBuffer(GL_COPY_WRITE_BUFFER);
+    return pt_gl_check(d, "clearing a buffer");
+}
+
+int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t offset, size_t size, const uint32_t words[4],
+                uint32_t bytes)
+{
+    static const GLenum formats[] = {GL_R32UI, GL_RG32UI, GL_NONE, GL_RGBA32UI};
+    static const GLenum parts[] = {GL_RED_INTEGER, GL_RG_INTEGER, GL_NONE, GL_RGBA_INTEGER};
+    d->gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    d->gl.BindBuffer(GL_COPY_WRITE_BUFFER, buffer->name);
+    if (!size)
+        return PATINA_OK;
+    if (!d->base.info.hardware)
+        return clear_mapped(d, offset, size, (uint64_t)words[1] << 32 | words[0], (uint64_t)words[3] << 32 | words[2]);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, formats[bytes / 4 - 1], (GLintptr)offset,
+                             (GLsizeiptr)(size - size % bytes), parts[bytes / 4 - 1], GL_UNSIGNED_INT, words);
+    return pt_gl_check(d, "clearing a buffer");
+}
