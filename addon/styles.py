@@ -29,7 +29,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import degrees, isfinite, radians
+from math import degrees, isfinite
 from pathlib import Path
 from typing import Any
 

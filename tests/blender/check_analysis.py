@@ -340,7 +340,7 @@ def test_frame_points():
 
 def test_hidden_points():
     """Stray, doubtful, uncolored and unclassified points are left out, each by its own switch, without another analysis."""
-    scene = fresh_scene(160, 120)
+    fresh_scene(160, 120)
     ball = sphere(4000)[0]
     stray = np.array([[-1.4, 0.9, -4], [1.4, 0.9, -4], [-1.4, -0.9, -4]])
     points = np.concatenate([ball, stray])

@@ -6,7 +6,7 @@ import math
 import bpy
 import numpy as np
 from check_points import pixel
-from harness import add_light, add_points, check, check_close, drawn, linear, new_scene, patina, render
+from harness import add_light, add_points, check, check_close, drawn, linear, new_scene, render
 from mathutils import Matrix
 
 GREEN = (30, 180, 90, 255)

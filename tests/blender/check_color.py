@@ -7,7 +7,7 @@ import struct
 import bpy
 import numpy as np
 from check_points import grid, pixel
-from harness import SCRATCH, add_points, check, check_close, drawn, linear, new_scene, patina, render, reports
+from harness import SCRATCH, add_points, check, check_close, drawn, linear, new_scene, render, reports
 from mathutils import Matrix, Vector
 
 from patina import native

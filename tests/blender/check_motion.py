@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion blur of final pictures: what moves smears by as many pixels as it moves while the shutter is open."""
 
-import bpy
 import numpy as np
 from harness import add_points, check, check_close, new_scene, render, reports
 
@@ -101,7 +100,7 @@ def test_the_same_again():
 
 def test_premultiplied():
     """What crosses a coloured background mixes with it by how long it covers."""
-    scene = stage()
+    stage()
     picture = render()["Combined"]
     check_close(picture[..., 0], picture[..., 3], 1e-6, "white points: colour is alpha")
 

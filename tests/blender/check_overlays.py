@@ -10,7 +10,7 @@ import numpy as np
 import screen
 from harness import add_points, check, sphere
 from mathutils import Quaternion
-from window import area, setup, view, window_region
+from window import area, setup, view
 
 from patina import viewport
 

@@ -3,13 +3,11 @@
 
 import re
 
-import bpy
 import numpy as np
 from check_motion import stage
-from check_passes import dense_scene
-from harness import add_points, check, new_scene, render, reports, sphere, stats, written
+from harness import add_points, check, new_scene, render, reports, sphere, stats
 
-from patina import engine, native
+from patina import engine
 from patina import render as drawing
 
 _described: list[tuple] = []
@@ -134,7 +132,7 @@ def test_noise_threshold():
 
 def test_holdouts_sample_by_sample():
     """A picture that is made of several betters as a whole: a hole stays a hole, with soft borders."""
-    scene = scene_of(200)
+    scene_of(200)
     hole = add_points(*sphere(6000, 0.4, (0.3, 0, -2.5)))
     hole.is_holdout = True
     found, last = shown_steps()

@@ -148,7 +148,7 @@ def test_analyze_is_undone():
 
 def test_what_changes_is_read():
     """The camera, a transform and painting read no more than what changed."""
-    scene = setup()
+    setup()
     positions, colors, normals = sphere(20000, 1.0, (0, 0, 0))
     obj = add_points(positions, np.full_like(colors, (0, 255, 0, 255)), normals)
     other = add_points(positions + (3, 0, 0), colors, normals, "other")

@@ -330,7 +330,7 @@ def test_sun_of_a_picture_casts_shadows():
 
 def test_what_is_not_known_is_named():
     """Once, by the artist's names; pictures that are missing are pink, as in Cycles."""
-    scene = backdrop_scene()
+    backdrop_scene()
     world = world_with('ShaderNodeTexBrick')
     world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.1, 0.2, 0.3, 1)
     picture = render()["Combined"]
