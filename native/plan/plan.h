@@ -157,7 +157,7 @@ struct pt_plan_instance {
     uint32_t of;    // its place in the scene: shadows are kept by it
     uint32_t discs; // 1: its points are discs
     struct instance_args args;
-    float radius, radius_scale, radius_most; // of discs, as disc_args has them
+    float radius, radius_scale, radius_most, surface_scale; // of discs, as disc_args has them
     struct chunk_view *chunks; // those in view
     struct pt_bounds *bounds;  // of each of them
     uint32_t chunk_count;

@@ -41,7 +41,8 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
                                                                                    : PT_RADII_NONE,
                                                 .radius = instance->radius,
                                                 .radius_scale = instance->radius_scale,
-                                                .radius_most = instance->radius_most};
+                                                .radius_most = instance->radius_most,
+                                                .surface_scale = instance->surface_scale};
         chunks += instance->chunk_count;
         points += instance->points;
         count += bind_instance(refs + count, i, blend);

@@ -24,6 +24,11 @@
 // show what lies behind, in 6 % of a patch of a carved relief whose points lie 2.6 pixels apart.
 #define SPARSE 2.1
 
+// Of footprints, where discs alone make the surface: a footprint ends about where its neighbours' begin, and filling closes what lies
+// between. Of a sphere of random points 1.2 % stays open at 1, 0.03 at 1.4, 0.01 at 1.55; at 1.6 sharp edges and slits lose half a
+// decibel. Borders, lines and foliage end where they end.
+#define SURFACE_SCALE 1.55f
+
 // One chunk in view, before it is known which window the planes get.
 struct seen {
     uint32_t chunk;
@@ -41,15 +46,20 @@ static double radius_most(const struct pt_instance *instance, double thinned)
     return fmin(0.5 * (double)instance->style.largest_gap * thinned, (double)PT_DISC_MOST);
 }
 
-static double own_reach(const struct pt_instance *instance, const struct pt_object *object, const struct pt_chunk *chunk,
-                        double thinned, int most)
+static float surface_scale(const struct patina_scene *scene)
+{
+    return scene->settings.surface == PATINA_SURFACE_SPLATS ? SURFACE_SCALE : 1.0f;
+}
+
+static double own_reach(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object,
+                        const struct pt_chunk *chunk, double thinned, int most)
 {
     if (instance->style.radius > 0.0f)
         return (double)instance->style.radius * thinned;
     if (instance->cloud->info.has_radii)
         return (double)instance->cloud->info.radius_most * object->scale * thinned;
     if (instance->cloud->shapes)
-        return (double)(most ? chunk->reach : chunk->footprint) * object->scale * thinned;
+        return (double)(surface_scale(scene) * (most ? chunk->reach : chunk->footprint)) * object->scale * thinned;
     return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
 }
 
@@ -59,7 +69,7 @@ static double disc_reach(const struct patina_scene *scene, const struct pt_insta
 {
     if (!pt_knows_discs(scene, instance))
         return 0.0;
-    const double reach = own_reach(instance, object, chunk, thinned, most), limit = radius_most(instance, thinned);
+    const double reach = own_reach(scene, instance, object, chunk, thinned, most), limit = radius_most(instance, thinned);
     return limit > 0.0 ? fmin(reach, limit) : reach;
 }
 
@@ -282,6 +292,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     out->marked = pt_is_marked(instance);
     out->radius = (float)fmin((double)instance->style.radius * pt_thinning(scene), (double)PT_DISC_MOST);
     out->radius_most = (float)radius_most(instance, pt_thinning(scene));
+    out->surface_scale = surface_scale(scene);
     out->radius_scale = (float)fmin(survey->objects[i].scale * pt_thinning(scene), (double)PT_DISC_MOST);
     pt_set_instance(&survey->camera, &survey->objects[i], instance, pt_thinning(scene), &out->args);
     out->args.id_base += id_base;

@@ -16,7 +16,8 @@ void discs_describe(struct harness *h, struct rng *rng, struct disc_scene *scene
                                              .opacity = 1.0f},
                                 .has_radii = radius == 0.0f,
                                 .radius = radius,
-                                .radius_scale = 1.0f};
+                                .radius_scale = 1.0f,
+                                .surface_scale = 1.0f};
     for (int k = 0; k < 9; k++)
         discs->instance.normal_matrix[k] = (float)camera->rotation[k];
     for (int k = 0; k < PT_SPACINGS; k++)

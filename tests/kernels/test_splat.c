@@ -98,6 +98,7 @@ static void ellipses(struct harness *h)
                 discs_describe(h, &rng, &scene, i, &camera, 0.0f, seed == 2 ? 3.0 : 0.5, 1);
                 discs_shape(h, &rng, &scene, i, &camera, i == 2 ? stretch : NULL);
                 scene.discs[i].radius_most = i == 1 ? 0.15f : 0.0f;
+                scene.discs[i].surface_scale = i == 2 ? 1.0f : 1.45f;
             }
             check_scene(h, &scene);
         }

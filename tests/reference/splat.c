@@ -24,8 +24,11 @@ static double radius_of(const struct disc_args *args, const void *radii, uint32_
 {
     if (args->radius > 0.0f)
         return args->radius;
-    if (is_shaped(args))
-        return args->instance.spacing[((const uint32_t *)radii)[id] & PT_SHAPE_CLASS_BITS];
+    if (is_shaped(args)) {
+        const uint32_t shape = ((const uint32_t *)radii)[id];
+        const double scale = (shape >> PT_SHAPE_KIND_SHIFT & 7u) == PT_KIND_SURFACE ? (double)args->surface_scale : 1.0;
+        return scale * (double)args->instance.spacing[shape & PT_SHAPE_CLASS_BITS];
+    }
     if (args->has_radii)
         return fmin((double)((const float *)radii)[id] * args->radius_scale, PT_DISC_MOST);
     return args->instance.spacing[word >> PT_SPACING_SHIFT] * (double)PT_DISC_SPACINGS;

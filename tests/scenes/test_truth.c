@@ -24,10 +24,10 @@ struct scenario {
     double density; // points a pixel where the surface faces the camera; on the plane, everywhere
     int orthographic;
     unsigned columns;
-    uint32_t quality; // DISCS: no filling, points are discs
+    uint32_t quality; // DISCS: no filling, points are discs; ANALYSED: as wide as an analysis says
     struct bounds bounds;
 };
-enum { DISCS = 2 };
+enum { DISCS = 2, ANALYSED = 4 };
 
 // Limits are what was measured when the test was written and a fifth or so: a picture that gets worse fails.
 // Read with care: at 4 points a pixel the nearest of several points wins, which is half a pixel's slope before the
@@ -64,6 +64,10 @@ static const struct scenario scenarios[] = {
     {"torus, discs",           TORUS,  1.0, 0, POINTS_NORMALS, DISCS, {0.986, 0.01, 0.02, 0.242, 3.57, 0.32, 0.0046}},
     {"torus, discs",           TORUS,  4.0, 0, POINTS_NORMALS, DISCS, {0.985, 0.01, 0.02, 1.147, 8.56, 0.16, 0.0036}},
     {"plane, discs",           PLANE,  1.0, 0, POINTS_NORMALS, DISCS, {0.949, 0.01, 1.42, 0.001, 0.002, 0.01, 0.0005}},
+    {"sphere, analysed discs", SPHERE, 0.3, 0, POINTS_NORMALS, ANALYSED, {0.989, 0.01, 0.02, 0.94, 0.56, 0.41, 0.0138}},
+    {"sphere, analysed discs", SPHERE, 1.0, 0, POINTS_NORMALS, ANALYSED, {0.988, 0.01, 0.02, 2.30, 3.23, 0.22, 0.0081}},
+    {"sphere, analysed discs", SPHERE, 4.0, 0, POINTS_NORMALS, ANALYSED, {0.987, 0.01, 0.02, 1.33, 7.08, 0.10, 0.0026}},
+    {"torus, analysed discs",  TORUS,  1.0, 0, POINTS_NORMALS, ANALYSED, {0.986, 0.01, 0.02, 1.00, 3.62, 0.40, 0.0066}},
 };
 // clang-format on
 
@@ -115,6 +119,8 @@ static struct analytic_error measure(patina_device *device, const struct scenari
     struct setting set = prepare(scenario);
     patina_cloud *cloud = points_upload(&set.points);
     points_free(&set.points);
+    if (scenario->quality == ANALYSED)
+        CHECK(patina_cloud_analyse(cloud, NULL, NULL), cloud);
     patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT};
     patina_scene *scene = scene_of(cloud, &style);
     patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = (float)M_PI};
@@ -124,7 +130,7 @@ static struct analytic_error measure(patina_device *device, const struct scenari
     patina_settings settings = settings_default(SIZE, SIZE);
     settings.film_transparent = 1;
     settings.quality = scenario->quality % DISCS;
-    settings.surface = scenario->quality == DISCS ? PATINA_SURFACE_SPLATS : PATINA_SURFACE_FILL;
+    settings.surface = scenario->quality >= DISCS ? PATINA_SURFACE_SPLATS : PATINA_SURFACE_FILL;
     struct picture picture = picture_render(device, scene, &set.camera, &settings);
     struct analytic_hit *truth = analytic_picture(&set.shape, &set.camera, SIZE, SIZE);
     // A sun of pi W/m2 shows a Lambert surface that faces it in its own colour, 0.8.
