@@ -42,6 +42,7 @@ class Kernel:
     reach: str = "0"
     buffers: list[Buffer] = field(default_factory=list)
     scratch: dict[str, int] = field(default_factory=dict)
+    shares: dict[str, str] = field(default_factory=dict)  # of scratch: whose binding it has
     blocks_of: Kernel | None = None
 
     @property
@@ -94,7 +95,8 @@ def _buffer(words: list[str], listing: Listing) -> Buffer:
 
 def _add(kernel: Kernel, words: list[str], listing: Listing) -> None:
     if words[0] == "+":
-        kernel.scratch.update(dict.fromkeys(words[1:], 0))
+        kernel.scratch.update(dict.fromkeys((word.partition("@")[0] for word in words[1:]), 0))
+        kernel.shares.update(word.split("@") for word in words[1:] if "@" in word)
         return
     if not kernel.domain or len(words) < 5:
         raise ValueError("a buffer has a name, a format, access, a place, and what GLSL sees")
@@ -115,7 +117,9 @@ def _number(kernel: Kernel) -> None:
         if buffer.block:
             buffer.binding, binding = binding, binding + 1
     for name in kernel.scratch:
-        if name != TILE_LIST:
+        if name in kernel.shares:
+            kernel.scratch[name] = next(b.binding for b in kernel.buffers if b.name == kernel.shares[name])
+        elif name != TILE_LIST:
             kernel.scratch[name], binding = binding, binding + 1
     if TILE_LIST in kernel.scratch:
         kernel.scratch[TILE_LIST] = BINDINGS - 1

@@ -230,7 +230,7 @@ int pt_gl_splat(struct pt_gl_device *d, const struct pt_gl_work *work)
     return result;
 }
 
-enum { ADD = 0, MEAN = 1, BAND_BYTES = 1 << 26, SUM_BYTES = 64 };
+enum { ADD = 0, MEAN = 1, BAND_BYTES = 1 << 26, SUM_BYTES = 80 }; // blend sums ten, two words each
 
 // Room for the sums of as many rows as fit, at most `height`; bound.
 static int make_sums(struct pt_gl_device *d, uint32_t width, uint32_t height, uint32_t binding, const char *what, uint32_t *rows)
@@ -265,6 +265,8 @@ static int blend_band(struct pt_gl_device *d, const struct pt_gl_work *work, uin
     }
     for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
         result = run_discs(d, work, PT_BUF_blend_chunks, ADD, i, width, end - first);
+    if (result == PATINA_OK) // large discs were bound there
+        result = pt_gl_bind_rows(d, work, PT_BUF_blend_offset, 1, work->buffers + PT_BUF_blend_offset);
     return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_blend, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
 }
 
@@ -275,7 +277,7 @@ int pt_gl_blend(struct pt_gl_device *d, const struct pt_gl_work *work)
     uint32_t rows = height;
     int result = disc_programs(d, PT_KERNEL_blend, ADD, "#define STEP 0\n");
     if (result == PATINA_OK)
-        result = pt_gl_kernel_program(d, PT_KERNEL_blend, MEAN, "#define STEP 1\n#define LARGE 1\n");
+        result = pt_gl_kernel_program(d, PT_KERNEL_blend, MEAN, "#define STEP 1\n");
     if (result == PATINA_OK)
         result = make_sums(d, args->view.width, height, PT_BIND_blend_sums, "blend", &rows);
     for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)

@@ -152,6 +152,8 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
 enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words); // `words`, where some light's are read
 // splats.c: discs in place of points and filling. Says of the passes of filling why they are left out.
 void pt_plan_splat(struct pt_builder *builder);
+int pt_tells_surfaces(const struct pt_builder *builder); // the depth asked for is that of the surface
+int pt_tells_depths(const struct pt_builder *builder);   // and discs, in the mean, tell how far off it is
 void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of every instance
 
 // average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.

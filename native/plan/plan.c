@@ -373,10 +373,11 @@ static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
 }
 
 // Where the depth pass tells of surfaces, and not of points.
-static int tells_surfaces(const struct pt_builder *builder)
+int pt_tells_surfaces(const struct pt_builder *builder)
 {
     const patina_settings *settings = &builder->scene->settings;
-    return settings->depth == PATINA_DEPTH_SURFACE && (settings->passes >> PATINA_PASS_DEPTH & 1u) && builder->plan->filled;
+    return settings->depth == PATINA_DEPTH_SURFACE && (settings->passes >> PATINA_PASS_DEPTH & 1u) &&
+           (builder->plan->filled || settings->surface == PATINA_SURFACE_SPLATS);
 }
 
 // ---- the picture -------------------------------------------------------------------------------------------------------
@@ -401,7 +402,7 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
                         : settings->own_background ? "over its own background" : "over the world colour");
 
     struct extract_args extract = extract_args(builder, settings->passes);
-    extract.centered = tells_surfaces(builder) ? (uint32_t)builder->scene->points : 0;
+    extract.centered = pt_tells_surfaces(builder) ? (uint32_t)builder->scene->points : 0;
     if (!extract.depth && !extract.normal && !extract.source && !extract.shadow) {
         pt_skip(builder, "extract", "no pass beside the combined one is asked for");
         return;
@@ -522,11 +523,11 @@ static void plan_measured(struct pt_builder *builder)
     for (uint32_t i = 0; i < plan->instance_count; i++)
         if (plan->instances[i].chunk_count) {
             pt_plan_surface(builder, i);
-            if (builder->layer == 1 && tells_surfaces(builder) && !plan->instances[i].discs)
+            if (builder->layer == 1 && pt_tells_surfaces(builder) && !plan->instances[i].discs)
                 plan_center(builder, i);
             estimate |= !plan->instances[i].args.has_normals;
         }
-    if (!tells_surfaces(builder))
+    if (!pt_tells_surfaces(builder) || !plan->filled)
         pt_skip(builder, "center", !plan->filled ? "discs have the depth of their surface" : "the depth asked for is the points'");
     if (!estimate)
         pt_skip(builder, "normals", "every cloud in view has normals");

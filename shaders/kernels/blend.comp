@@ -12,7 +12,8 @@ layout(local_size_x = 64) in;
 layout(local_size_x = 32, local_size_y = 8) in;
 #endif
 
-#define SUMS 8u // colour 3, opacity, normal 3, weight: two words each, the low one first
+// Colour 3, opacity, normal 3, weight: two words each, the low one first; with depths, weight and share of the reach.
+#define SUMS (args.depths != 0u ? 10u : 8u)
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { blend_args args; disc_args discs[]; };
 layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
@@ -22,11 +23,26 @@ layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
 layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albedo[]; };
 layout(std430, binding = BIND_away) writeonly buffer away_block { float away_from[]; }; // how many pixels the key's point fell away
 
+#if STEP == 1
+layout(std430, binding = BIND_offset) writeonly buffer offset_block { float offset_of[]; };
+#endif
+
 layout(location = 3) uniform int band_first;
 layout(location = 4) uniform int band_end;
 
+#include "lib/math.glsl"
+#include "lib/planes.glsl"
+#if STEP == 0
 #include "lib/disc.glsl"
 #include "lib/srgb.glsl"
+#endif
+
+// How far behind the nearest disc depths are averaged.
+float reach_of(uint pixel)
+{
+    precise float reach = read_deff(pixel) * PT_DISC_DEPTHS;
+    return pt_max(pt_min(reach, PT_DISC_MOST), PT_DISC_LEAST);
+}
 
 #if STEP == 0
 
@@ -65,6 +81,19 @@ void add(uint at, float weight, float term)
         atomicAdd(sums[at + 1u], high);
 }
 
+void add_depth(view_args view, disc d, uint pixel, int x, int y, float nearest, float z, float square, bool beside)
+{
+    float reach = reach_of(pixel);
+    precise float farthest = nearest + reach;
+    if (!(nearest <= z && z <= farthest))
+        return;
+    float weight = disc_weight(view, d, x, y, square, beside);
+    uint at = 2u * SUMS * (pixel - uint(band_first) * view.width) + 16u;
+    precise float share = ((z - nearest) * pt_rcp(reach)) * weight;
+    add(at, weight, PT_SUM_SCALE);
+    add(at + 2u, share, PT_SUM_SCALE);
+}
+
 void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color, precise vec3 n)
 {
     float z, square;
@@ -74,7 +103,11 @@ void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color
     if (!disc_pixel(view, d, x, y, z, square, beside))
         return;
     precise float farthest = pt_float(key.y) + read_deff(pixel);
-    if (key.y == PT_KEY_EMPTY_Z || !(pt_float(key.y) <= z && z <= farthest))
+    if (key.y == PT_KEY_EMPTY_Z)
+        return;
+    if (args.depths != 0u)
+        add_depth(view, d, pixel, x, y, pt_float(key.y), z, square, beside);
+    if (!(pt_float(key.y) <= z && z <= farthest))
         return;
     if (key.x == id) {
         precise float dx = float(x - d.own.x), dy = float(y - d.own.y);
@@ -204,6 +237,11 @@ void main()
     uint of = instance_of(key.x);
     if (key.y == PT_KEY_EMPTY_Z || of == args.instances)
         return;
+    if (args.depths != 0u) {
+        float weights = sum_of(at + 16u);
+        precise float mean = (sum_of(at + 18u) * pt_rcp(pt_max(weights, 1.0))) * reach_of(pixel);
+        offset_of[pixel] = weights < 1.0 ? 0.0 : mean;
+    }
     float opacity = sum_of(at + 6u), weight = pt_max(sum_of(at + 14u), 1.0);
     vec3 color = vec3(0.0);
     if (1.0 <= opacity) {

@@ -119,6 +119,7 @@
 #define PT_DISC_GENTLE 0.015625f // slopes up to 2^-6: 1 / (1 + s) = (1 - s) (1 + s^2), within 2^-24 of it
 #define PT_DISC_FAR 4194304.0f // pixels: centres beyond are not drawn, boxes end there
 #define PT_SUM_SCALE 262144.0f // 2^18: weights, and what they weigh, are summed as integers
+#define PT_DISC_DEPTHS 2.0f // layer distances behind the nearest disc: whose depths are averaged. Four spacings hold noise of one
 #define PT_SUM_BRIGHTEST 4096.0f // colours above blend as this, so that a term fits 31 bits
 #define PT_COLOR_OF_SCALAR 4u // color_format: a float a point, for a ramp
 #define PT_COLOR_OF_PLANE 3u  // color_format: the colours buffer is a plane, four floats a pixel, opacity last
@@ -330,10 +331,12 @@ struct splat_args {
 // PT_SUM_SCALE a unit, so that no order shows.
 //   normal.xyz: unit mean; of instances without normals as it was. away: how many pixels off the point of the key fell.
 //   albedo: mean colour, each disc weighted by its opacity too, and the mean opacity.
+//   offset: with `depths`, how far behind the nearest surface the discs within PT_DISC_DEPTHS d_eff lie in the mean, by the same weights.
 struct blend_args {
     struct view_args view;
     uint32_t instances;
     uint32_t sifted; // as in scatter_args
+    uint32_t depths; // 1: the offset plane is written
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Its radius is d /

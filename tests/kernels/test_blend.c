@@ -10,7 +10,7 @@ enum { SIZES = sizeof sizes / sizeof sizes[0] };
 
 struct planes {
     uint64_t *keys;
-    float *deff, *normal, *albedo, *away;
+    float *deff, *normal, *albedo, *away, *offset;
 };
 
 // What blend reads of the points beside their discs.
@@ -63,12 +63,12 @@ static struct ref_look look_of(const struct disc_scene *scene, const struct pain
     return look;
 }
 
-// open: share of the pixels that float32 may leave open.
-static struct planes run_hard(struct harness *h, struct disc_scene *scene, const struct paint *paint, double open)
+// open: share of the pixels that float32 may leave open. depths: means of depth too.
+static struct planes run_hard(struct harness *h, struct disc_scene *scene, const struct paint *paint, double open, uint32_t depths)
 {
     const struct scene *points = &scene->points;
     const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct blend_args);
-    struct pt_buffer *buffers[6 + 6 * MOST_INSTANCES];
+    struct pt_buffer *buffers[7 + 6 * MOST_INSTANCES];
     char args[sizeof(struct blend_args) + sizeof scene->discs];
     struct planes out;
     struct pt_buffer *keys = discs_splat(h, scene);
@@ -77,12 +77,14 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     struct pt_buffer *away = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     struct pt_buffer *deff = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
     struct pt_buffer *from = harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4);
+    struct pt_buffer *offset = depths ? harness_buffer(h, harness_alloc(h, pixels * 4), pixels * 4) : NULL;
     uint32_t n = 0;
     buffers[n++] = keys;
     buffers[n++] = deff;
     buffers[n++] = zero;
     buffers[n++] = albedo;
     buffers[n++] = away;
+    buffers[n++] = offset;
     buffers[n++] = NULL; // drawn
     for (uint32_t i = 0; i < points->count; i++) {
         const struct cloud *cloud = &points->clouds[i];
@@ -96,7 +98,7 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
         buffers[n++] = harness_buffer(h, paint->colors[i], paint->color_bytes[i]);
         buffers[n++] = harness_buffer(h, paint->opacities[i], cloud->slots + 4);
     }
-    const struct blend_args blend = {.view = points->view, .instances = points->count};
+    const struct blend_args blend = {.view = points->view, .instances = points->count, .depths = depths};
     memcpy(args, &blend, head);
     memcpy(args + head, scene->discs, points->count * sizeof *scene->discs);
     out.keys = harness_read(h, keys);
@@ -111,13 +113,16 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     harness_same(h, "normal", out.normal, pixels * 4, 4, 4, points->view.width);
     harness_same(h, "albedo", out.albedo, pixels * 4, 4, 4, points->view.width);
     harness_same(h, "away", out.away, pixels, 4, 1, points->view.width);
+    out.offset = depths ? harness_read(h, offset) : NULL;
+    if (depths)
+        harness_same(h, "offset", out.offset, pixels, 4, 1, points->view.width);
     // the reference needs the normals as they were
     uint32_t count;
     const struct ref_disc *discs = discs_reference(h, scene, &count);
     struct ref_look *looks = harness_alloc(h, (count + 1) * sizeof *looks);
     for (uint32_t i = 0; i < count; i++)
         looks[i] = look_of(scene, paint, discs[i].id);
-    size_t unsure = 0, shown = 0;
+    size_t unsure = 0, unsure_depth = 0, shown = 0;
     for (size_t p = 0; p < pixels; p++) {
         const int x = (int)(p % points->view.width), y = (int)(p / points->view.width);
         if (out.keys[p] == REF_EMPTY_KEY)
@@ -145,6 +150,9 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
         const float *mean = out.normal + 4 * p;
         if (!(sqrt((double)mean[0] * mean[0] + (double)mean[1] * mean[1] + (double)mean[2] * mean[2]) < 1.0 + 1e-5))
             harness_fail(h, "normal", x, y, "got %.9g %.9g %.9g", mean[0], mean[1], mean[2]);
+        if (depths && !expected.unsure_offset && !harness_near(out.offset[p], expected.offset, expected.offset_error))
+            harness_fail(h, "offset", x, y, "got %.9g, expected %.9g +- %.2g", out.offset[p], expected.offset, expected.offset_error);
+        unsure_depth += expected.unsure_offset != 0;
         unsure += expected.unsure != 0;
         if (expected.unsure)
             continue;
@@ -163,12 +171,13 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
             harness_fail(h, "normal", x, y, "1 / cosine: got %.9g, it was %.9g", out.normal[4 * p + 3], before[4 * p + 3]);
     }
     harness_unsure(h, unsure, shown, open);
+    harness_unsure(h, unsure_depth, shown, open);
     return out;
 }
 
 static struct planes run(struct harness *h, struct disc_scene *scene, const struct paint *paint)
 {
-    return run_hard(h, scene, paint, TOL_UNSURE_SHARE);
+    return run_hard(h, scene, paint, TOL_UNSURE_SHARE, 1);
 }
 
 static void random_discs(struct harness *h, int perspective, uint32_t seed, double largest, int with_normals)
@@ -232,7 +241,7 @@ static void camera_plane(struct harness *h)
         discs_beside(h, &rng, &scene, 60.0, 0.25f);
     const struct paint colors = paint(h, &rng, &scene);
     scene.discs[0].instance.opacity = 0.5f;
-    run_hard(h, &scene, &colors, TOL_UNSURE_HARD);
+    run_hard(h, &scene, &colors, TOL_UNSURE_HARD, 0);
 }
 
 static void under_a_pixel(struct harness *h)

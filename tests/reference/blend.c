@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+static double middle_of(struct ref_range r) { return 0.5 * (r.lo + r.hi); }
+
 // Weight of a disc at a pixel and how far float32 may be off; its own pixel counts it as a pixel wide at least.
 static double weight_of(const struct view_args *view, const struct ref_disc *disc, const struct ref_met *cover, int x, int y,
                         double *error)
@@ -21,6 +23,33 @@ static double weight_of(const struct view_args *view, const struct ref_disc *dis
     const double least = exp(-2.0 * hi), most = exp(-2.0 * lo);
     *error = 0.5 * (most - least) + TOL_GAUSSIAN;
     return 0.5 * (most + least);
+}
+
+// The mean of how far the discs within PT_DISC_DEPTHS d_eff lie behind z.
+static void mean_depth(const struct view_args *view, const struct ref_disc *discs, uint32_t count, uint32_t nearest, double z, double deff,
+                       int x, int y, struct ref_blend *out)
+{
+    const double reach = fmax(fmin((double)PT_DISC_DEPTHS * deff, (double)PT_DISC_MOST), (double)PT_DISC_LEAST);
+    const double farthest = z + reach, slack = 2.0 * TOL_UNIT * farthest;
+    double weights = 0.0, weights_error = 0.0, sum = 0.0, sum_error = 0.0;
+    for (uint32_t i = 0; i < count; i++) {
+        const struct ref_met cover = ref_disc_at(view, &discs[i], x, y);
+        double error;
+        if (!discs[i].possible || cover.covered == REF_NO || (i != nearest && cover.z.lo > farthest + slack))
+            continue;
+        if (i != nearest && (cover.covered == REF_UNSURE || cover.z.hi > farthest - slack || !discs[i].definite))
+            out->unsure_offset = 1;
+        out->unsure_offset |= discs[i].edge_on && discs[i].radius > 0.0;
+        const double w = weight_of(view, &discs[i], &cover, x, y, &error), behind = i == nearest ? 0.0 : middle_of(cover.z) - z;
+        error += 2.0 / (double)PT_SUM_SCALE;
+        weights += w;
+        weights_error += error;
+        sum += w * behind;
+        sum_error += error * fabs(behind) + w * (0.5 * (cover.z.hi - cover.z.lo) + 8.0 * TOL_UNIT * (fabs(z) + fabs(behind))) +
+                     2.0 * reach / (double)PT_SUM_SCALE;
+    }
+    out->offset = sum / weights;
+    out->offset_error = (sum_error + fabs(out->offset) * weights_error) / fmax(weights - weights_error, 1e-12);
 }
 
 struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *discs, const struct ref_look *looks,
@@ -63,6 +92,7 @@ struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *
     }
     out.color[3] = opaque / weights;
     out.color_error[3] = (opaque_error + out.color[3] * weights_error) / fmax(weights - weights_error, 1e-12) + 1e-6;
+    mean_depth(view, discs, count, nearest, z, deff, x, y, &out);
     // on the side of the nearest disc's
     struct ref_ray at = ref_ray(view, x, y);
     double facing = view->perspective ? n[0] * at.u + n[1] * at.v - n[2] : -(double)n[2];

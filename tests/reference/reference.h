@@ -156,7 +156,8 @@ struct ref_blend {
     struct ref_vec n;
     double normal_error;
     double away;
-    int unsure;
+    double offset, offset_error; // of the depths' mean behind z
+    int unsure, unsure_offset;
 };
 // nearest: the key's disc, by its place in the list; z, deff: of the pixel; n: its normal before, w aside.
 struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *discs, const struct ref_look *looks,

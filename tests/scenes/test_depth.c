@@ -70,6 +70,54 @@ static void test_bias(void **state)
     patina_device_destroy(device);
 }
 
+// A sphere of discs whose points lie off it by `noise` spacings: what the depth of surfaces is off by.
+static double noisy_discs(patina_device *device, double density, double noise, uint32_t depth, double *bias)
+{
+    const double pixel = 3.0 / SIZE, area = area_sphere(1.0), eye[3] = {0, -5, 0}, target[3] = {0, 0, 0};
+    const uint64_t count = (uint64_t)(density * area / (pixel * pixel));
+    const double spacing = sqrt(area / (double)count);
+    struct points points = points_sphere(count, 1.0, POINTS_NORMALS, 11);
+    uint64_t state = 7;
+    for (uint64_t i = 0; i < count; i++) {
+        double sum = -6.0; // of twelve uniform numbers: nearly normal
+        for (int k = 0; k < 12; k++) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            sum += (double)(state >> 40) / 16777216.0;
+        }
+        for (int k = 0; k < 3; k++)
+            points.position[3 * i + (uint64_t)k] *= (float)(1.0 + noise * spacing * sum);
+    }
+    patina_cloud_style style = {.struct_size = sizeof style, .cull_back = 1};
+    struct stage stage = {.cloud = points_upload(&points), .settings = settings_default(SIZE, SIZE)};
+    stage.scene = scene_of(stage.cloud, &style);
+    stage.camera = camera_orthographic(eye, target, 3.0, SIZE, SIZE, 0.1, 100.0);
+    stage.settings.surface = PATINA_SURFACE_SPLATS;
+    stage.settings.depth = depth;
+    struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+    const double rms = depth_error(&picture, spacing, bias);
+    points_free(&points);
+    picture_free(&picture);
+    stage_free(&stage);
+    return rms;
+}
+
+static void test_discs(void **state)
+{
+    (void)state;
+    static const double densities[] = {1.0, 4.0, 16.0}, noises[] = {0.0, 0.5, 1.0};
+    patina_device *device = support_device_first();
+    for (int i = 0; i < 9; i++) {
+        double bias[2], rms[2];
+        for (uint32_t depth = 0; depth < 2; depth++)
+            rms[depth] = noisy_discs(device, densities[i / 3], noises[i % 3], depth, &bias[depth]);
+        print_message("  discs, %4.1f points a pixel, noise of %.1f spacings: nearest %+.3f, rms %.3f; mean %+.4f, rms %.3f spacings\n",
+                      densities[i / 3], noises[i % 3], bias[0], rms[0], bias[1], rms[1]);
+        assert_true(fabs(bias[1]) <= (noises[i % 3] > 0.0 ? 0.08 : 0.03));
+        assert_true(rms[1] < 0.7);
+    }
+    patina_device_destroy(device);
+}
+
 static void test_parity_and_regions(void **state)
 {
     (void)state;
@@ -156,7 +204,7 @@ static void test_within_the_cloud(void **state)
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bias), cmocka_unit_test(test_parity_and_regions),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bias), cmocka_unit_test(test_discs), cmocka_unit_test(test_parity_and_regions),
                                        cmocka_unit_test(test_within_the_cloud)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

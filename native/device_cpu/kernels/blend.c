@@ -32,6 +32,11 @@ struct tile {
     int emptied;
     _Alignas(64) int32_t sums[TILE_PIXELS + PT_PATCH_COLUMNS][SUMS];
     int64_t wide[TILE_PIXELS][SUMS];
+    // with depths: how far behind as differences of bits, world units, and 1 over them; sums of weights, and of shares of `reach`
+    int deep;
+    float deepest[TILE_PIXELS + PT_PATCH_BEYOND], reach[TILE_PIXELS + PT_PATCH_BEYOND], inverse[TILE_PIXELS + PT_PATCH_BEYOND];
+    int32_t depth_sums[TILE_PIXELS][2];
+    int64_t depth_wide[TILE_PIXELS][2];
     // of the discs at hand
     struct pt_patches patches;
     struct pt_farthest farthest;
@@ -72,6 +77,11 @@ static void empty_sums(struct tile *tile)
             tile->wide[i][k] = (tile->emptied ? tile->wide[i][k] : 0) + tile->sums[i][k];
             tile->sums[i][k] = 0;
         }
+    for (int i = 0; i < TILE_PIXELS && tile->deep; i++)
+        for (int k = 0; k < 2; k++) {
+            tile->depth_wide[i][k] = (tile->emptied ? tile->depth_wide[i][k] : 0) + tile->depth_sums[i][k];
+            tile->depth_sums[i][k] = 0;
+        }
     tile->emptied = 1;
     tile->left = SUM_ROOM;
 }
@@ -93,6 +103,28 @@ static inline void count_pixels(struct counted *out, const struct pt_patches *li
 
 static inline uint32_t counted_pixel(uint32_t one) { return one & 0xFFFFu; }
 static inline uint32_t counted_disc(uint32_t one) { return one >> 16 & 15u; }
+
+// Adds discs to the means of depth.
+static void add_depths(struct tile *tile, const struct pt_patches *list)
+{
+    struct counted taken;
+    _Alignas(64) float weights[PT_PATCHES * PT_LANES], shares[PT_PATCHES * PT_LANES];
+    taken.count = 0;
+    for (uint32_t i = 0; i < list->count; i++) {
+        const struct pt_shown shown = pt_patch_show(list, i);
+        const uint32_t at = pt_patch_pixel(list, i);
+        const vf nearest = pt_patch_load(tile->nearest + at), weight = pt_shown_weight(&shown);
+        const vm beyond = vi_lt_unsigned(vf_bits(pt_patch_load(tile->deepest + at)), vi_sub(vf_bits(shown.z), vf_bits(nearest)));
+        vf_store(weights + i * PT_LANES, weight);
+        vf_store(shares + i * PT_LANES, ((shown.z - nearest) * pt_patch_load(tile->inverse + at)) * weight);
+        count_pixels(&taken, list, i, vm_and(shown.covered, vm_not(beyond)));
+    }
+    for (uint32_t i = 0; i < taken.count; i++) {
+        int32_t *sums = tile->depth_sums[counted_pixel(taken.each[i])];
+        sums[0] += (int32_t)(weights[taken.each[i] >> 20] * PT_SUM_SCALE);
+        sums[1] += (int32_t)(shares[taken.each[i] >> 20] * PT_SUM_SCALE);
+    }
+}
 
 // Adds a disc to the sums of its pixels; where nothing lies before it, it may be the one that the key names.
 static void add_up(void *context, struct pt_patches *list)
@@ -122,6 +154,8 @@ static void add_up(void *context, struct pt_patches *list)
         if (tile->id[pixel] == tile->ids[disc])
             tile->own[pixel] = tile->places[disc];
     }
+    if (tile->deep)
+        add_depths(tile, list);
 }
 
 // Sees to it that the sums have room for `size` more.
@@ -153,6 +187,16 @@ static inline void draw(void *context, uint32_t instance, const struct pt_discs 
 
 // ---- tiles ---------------------------------------------------------------------------------------------------------------
 
+// How far behind z depths are averaged.
+static inline vf set_reach(struct tile *tile, uint32_t at, vf z, vf deff)
+{
+    const vf reach = vf_max(vf_min(deff * vf_set(PT_DISC_DEPTHS), vf_set(PT_DISC_MOST)), vf_set(PT_DISC_LEAST));
+    vi_store(tile->deepest + at, vi_sub(vf_bits(z + reach), vf_bits(z)));
+    vf_store(tile->reach + at, reach);
+    vf_store(tile->inverse + at, vf_rcp(reach));
+    return reach;
+}
+
 static int load(struct tile *tile, const uint64_t *keys, const float *deff)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
@@ -166,7 +210,10 @@ static int load(struct tile *tile, const uint64_t *keys, const float *deff)
             vm some = vm_and(vf_lt(z, empty), vm_first(pt_lanes_left(x, (uint32_t)tile->patches.tile.width)));
             float *farthest = tile->farthest.column[y >> PT_CELL_SHIFT] + x;
             any |= vm_bits(some) != 0;
-            vf_store(farthest, vf_select(some, vf_max(z + vf_load(deff + from + x), vf_load(farthest)), vf_load(farthest)));
+            vf limit = z + vf_load(deff + from + x);
+            if (tile->deep)
+                limit = vf_max(limit, z + set_reach(tile, to + x, z, vf_load(deff + from + x)));
+            vf_store(farthest, vf_select(some, vf_max(limit, vf_load(farthest)), vf_load(farthest)));
             vf_store(tile->nearest + to + x, z);
             vi_store(tile->behind + to + x, vi_sub(vf_bits(z + vf_load(deff + from + x)), vf_bits(z)));
             vi_store(tile->id + to + x, vi_load_id(keys + from + x));
@@ -241,6 +288,20 @@ static void save(const struct tile *tile, const uint64_t *keys, float *normals, 
         }
 }
 
+static void save_depths(const struct tile *tile, float *offsets)
+{
+    for (int32_t y = 0; y < tile->patches.tile.height; y++)
+        for (int32_t x = 0; x < tile->patches.tile.width; x++) {
+            const int32_t pixel = y * PT_DISC_TILE + x;
+            float sums[2];
+            for (int k = 0; k < 2; k++)
+                sums[k] = pt_wide_sum((tile->emptied ? tile->depth_wide[pixel][k] : 0) + tile->depth_sums[pixel][k]);
+            const float share = sums[1] * pt_rcp(sums[0] < 1.0f ? 1.0f : sums[0]);
+            offsets[(size_t)(tile->patches.tile.y + y) * tile->bins->view->width + (size_t)(tile->patches.tile.x + x)] =
+                sums[0] < 1.0f ? 0.0f : share * tile->reach[pixel];
+        }
+}
+
 static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct pt_bins *bins = context;
@@ -249,15 +310,20 @@ static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t th
     tile->bins = bins;
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
         pt_patches_turn(&tile->patches, bins->view, pt_bin_tile(bins, t));
+        tile->deep = ((const struct blend_args *)bins->call->arguments)->depths != 0;
         if (!load(tile, PT_DATA(bins->call, blend, keys), PT_DATA(bins->call, blend, deff)))
             continue;
         memset(tile->sums, 0, sizeof tile->sums);
+        if (tile->deep)
+            memset(tile->depth_sums, 0, sizeof tile->depth_sums);
         tile->left = SUM_ROOM;
         tile->emptied = 0;
         pt_bin_walk(bins, thread, t, &tile->patches.tile, &tile->farthest, 1, draw, tile);
         pt_bin_walk(bins, thread, large, &tile->patches.tile, &tile->farthest, 1, draw, tile);
         save(tile, PT_DATA(bins->call, blend, keys), PT_DATA(bins->call, blend, normal), PT_DATA(bins->call, blend, albedo),
              PT_DATA(bins->call, blend, away));
+        if (tile->deep)
+            save_depths(tile, PT_DATA(bins->call, blend, offset));
     }
 }
 

@@ -560,7 +560,8 @@ enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OF
 // iterations and error_target say nothing then. Light maps of shadows are filled either way.
 enum patina_surface { PATINA_SURFACE_AUTO = 0, PATINA_SURFACE_SPLATS = 1, PATINA_SURFACE_FILL = 2 };
 // What the depth pass tells of a pixel with points. POINT: z of the nearest point in it, wherever in the pixel that lies: as the
-// keys. SURFACE: z of that point's surface in the middle of the pixel. Discs and meshes are exact either way.
+// keys. SURFACE: z of that point's surface in the middle of the pixel; where surface is SPLATS, the mean of the discs there: of noisy
+// points the nearest lies in front. Meshes are exact either way.
 enum patina_depth { PATINA_DEPTH_POINT = 0, PATINA_DEPTH_SURFACE = 1 };
 enum patina_smooth { PATINA_SMOOTH_ALLEVIATED = 0, PATINA_SMOOTH_GAUSSIAN = 1, PATINA_SMOOTH_BOX = 2, PATINA_SMOOTH_OFF = 3 };
 enum patina_antialias { PATINA_ANTIALIAS_LAYERS = 0, PATINA_ANTIALIAS_BACKGROUND = 1, PATINA_ANTIALIAS_OFF = 2 };
