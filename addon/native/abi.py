@@ -26,7 +26,7 @@ WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
 LIGHTING = {"AUTO": 0, "UNLIT": 1, "LIT": 2}
 COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5}
 FREE_SPACE = {"OFF": 0, "SHOW": 1, "USE": 2}
-SOFT = {"OFF": 0, "ALL": 1}
+SOFT = {"OFF": 0, "ALL": 1, "FIELD": 2}
 SOFT_MODEL = {"BASE": 0, "CONCENTRIC": 1, "EXPRESS": 2}
 SHADOW_OFF = {"NO_CAST": 1, "NO_RECEIVE": 2, "NO_SELF": 4}
 ALPHA = {"NONE": 0, "CLIP": 1, "BLEND": 2}
@@ -141,7 +141,7 @@ class CloudStyle(Descriptor):
                 ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float), ("mask", c_void_p),
                 ("grade", c_void_p), ("exact", c_uint32), ("was_padding", c_uint32), ("soft", c_uint32),
                 ("soft_model", c_uint32), ("soft_shells", c_uint32), ("soft_radius", c_float), ("soft_opacity", c_float),
-                ("soft_modulation", c_float)]
+                ("soft_modulation", c_float), ("field", c_void_p), ("soft_threshold", c_float), ("soft_unused", c_float)]
 
 
 class MeshStyle(Descriptor):
@@ -333,6 +333,8 @@ CALLS = {
     "patina_mask_destroy": (c_void_p,),
     "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),
     "patina_grade_destroy": (c_void_p,),
+    "patina_field_create": (c_void_p, c_void_p, c_uint64, POINTER(c_void_p)),
+    "patina_field_destroy": (c_void_p,),
     "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
     "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),
 }
@@ -342,7 +344,8 @@ RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_me
            "patina_mesh_destroy": None, "patina_texture_destroy": None, "patina_file_destroy": None,
            "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
            "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
-           "patina_task_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None}
+           "patina_task_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None,
+           "patina_field_destroy": None}
 
 # effects.def: what Blender shows of each effect, and how
 EFFECTS = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Single points of clouds: masks, grades of scans, picking. Bits are (count + 7) // 8 bytes, point i is bit i % 8 of byte i // 8."""
+"""Single points of clouds: masks, grades of scans, fields, picking. Bits are (count + 7) // 8 bytes, point i is bit i % 8 of byte i // 8."""
 
 from __future__ import annotations
 
@@ -35,6 +35,16 @@ class Grade(_Handle):
         values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade) for grade in grades))
         super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, len(grades),
                          blame=(cloud._handle,))
+
+
+class Field(_Handle):
+    """A number of 0 to 1 for each point of a cloud, (count,) float32: points with more than a style's soft_threshold are soft."""
+
+    _kind = "field"
+
+    def __init__(self, cloud: Cloud, values: np.ndarray) -> None:
+        numbers = np.ascontiguousarray(values, np.float32)
+        super().__init__(cloud._handle, numbers.ctypes.data, len(numbers))
 
 
 def pick(scene: Scene, instance: int, polygon: np.ndarray | None, frame: Frame | None = None, classes: Sequence[int] = (0,) * 8,

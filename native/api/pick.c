@@ -329,7 +329,7 @@ static int run(struct pick *pick, const struct patina_frame *frame, struct pt_in
     if (!error)
         error = pool ? make_outline(pick->desc, pick->scene->settings.height, &pick->outline) : PATINA_ERROR_MEMORY;
     if (!error) {
-        pick->sieve = pt_sieve_make(pick->scene, pick->instance, room);
+        pick->sieve = pt_sieve_make(pick->scene, pick->instance, PT_EVERY_POINT, room);
         pt_parallel(pool, cloud->chunk_count, 4, pick_chunks, pick);
         error = pt_progress_cancelled(pick->progress) ? PATINA_ERROR_CANCELLED
                 : pick->done > cloud->chunk_count     ? PATINA_ERROR_MEMORY

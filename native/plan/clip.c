@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Clips, hidden classes, hidden shapes and masks. Chunks that they take whole are culled, chunks that they leave whole cost nothing; the points of
+// Clips, hidden classes, hidden shapes, masks and fields. Chunks that they take whole are culled, chunks that they leave whole cost nothing; the points of
 // divided ones are sifted before scatter, into a word of bits for every PT_SLOTS_A_WORD of them. The cut may be tinted.
 #include "passes.h"
 #include "scene/clip.h"
+#include "scene/mask.h"
 
 #include <string.h>
 
@@ -44,6 +45,7 @@ int pt_plan_divide(struct pt_plan *plan, struct pt_plan_instance *instance, cons
     instance->by_class |= division.by_class;
     instance->by_shape |= division.by_shape;
     instance->by_mask |= division.by_mask;
+    instance->by_field |= division.by_field;
     return PATINA_OK;
 }
 
@@ -51,8 +53,8 @@ void pt_plan_sift(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     if (!plan->drawn_words) {
-        pt_skip(builder, "sift", plan->chunks_clipped ? "clips, classes, shapes and masks take chunks whole"
-                                                      : "no clip, hidden class, hidden shape or mask in view");
+        pt_skip(builder, "sift", plan->chunks_clipped ? "clips, classes, shapes, masks and fields take chunks whole"
+                                                      : "no clip, hidden class, hidden shape, mask or field in view");
         return;
     }
     for (uint32_t i = 0; i < plan->instance_count + plan->soft_count && builder->layer <= 1; i++) { // the words serve every layer
@@ -61,15 +63,18 @@ void pt_plan_sift(struct pt_builder *builder)
             continue;
         struct sift_args args = { .by_class = instance->by_class != 0,
                                   .by_shape = instance->by_shape != 0,
-                                  .by_mask = instance->by_mask != 0 };
+                                  .by_mask = instance->by_mask != 0,
+                                  .by_field = instance->by_field != 0,
+                                  .threshold = pt_field_steps(instance->instance->style.soft_threshold) };
         memcpy(args.hidden, instance->instance->style.hidden_classes, sizeof args.hidden);
         pt_hidden_shapes(instance->instance, args.hidden_shapes);
         PT_REASON(PT_ADD(builder, sift, args,
                          { pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), args.by_class ? pt_buffer_of(PT_CLASSES, i) : pt_nothing(),
                            pt_buffer_of(PT_CLIPS, i), pt_buffer_of(PT_DRAWN, i),
                            args.by_shape ? pt_shapes_of(instance, i) : pt_nothing(),
-                           args.by_mask ? pt_buffer_of(PT_MASK, i) : pt_nothing() }),
-                  "clips, classes, shapes or a mask divide %u chunks of instance %u", instance->chunks_cut, i);
+                           args.by_mask ? pt_buffer_of(PT_MASK, i) : pt_nothing(),
+                           args.by_field ? pt_field_of(instance, i) : pt_nothing() }),
+                  "clips, classes, shapes, a mask or a field divide %u chunks of instance %u", instance->chunks_cut, i);
     }
 }
 
@@ -94,7 +99,7 @@ static uint32_t clips_in_view(struct pt_builder *builder, const struct pt_instan
         builder->failed = PATINA_ERROR_MEMORY;
         return 0;
     }
-    struct pt_sieve sieve = pt_sieve_make(builder->scene, instance, room);
+    struct pt_sieve sieve = pt_sieve_make(builder->scene, instance, PT_EVERY_POINT, room);
     pt_camera_axes(&builder->scene->camera, axes, position);
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)

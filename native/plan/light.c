@@ -172,7 +172,7 @@ static struct extent look(const struct patina_scene *scene, const struct pt_shad
         const struct pt_instance *instance = &scene->instances[i];
         if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
             continue;
-        const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, room) : (struct pt_sieve){ .instance = instance };
+        const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, PT_SOLID_POINTS, room) : (struct pt_sieve){ .instance = instance };
         for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
             if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
                 pt_chunk_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, &extent);
@@ -476,7 +476,7 @@ static void put_word(struct key *key, uint64_t word)
     put(key, (double)(word & 0xFFFFFFFFu));
 }
 
-// What is cut out of the instance: clips in its own frame, hidden classes, hidden shapes and masked points.
+// What is cut out of the instance: clips in its own frame, hidden classes, hidden shapes, masked and soft points.
 static void put_cuts(struct key *key, const struct patina_scene *scene, const struct pt_instance *instance)
 {
     const uint32_t clips = instance->style.clip_off || scene->settings.shadow_uncut ? 0 : scene->clip_count;
@@ -494,6 +494,10 @@ static void put_cuts(struct key *key, const struct patina_scene *scene, const st
         put(key, (double)shapes[k]);
     if (pt_mask_of(instance))
         put_word(key, pt_mask_of(instance)->hash);
+    if (instance->style.soft == PATINA_SOFT_FIELD) {
+        put_word(key, instance->style.field->hash);
+        put(key, (double)pt_field_steps(instance->style.soft_threshold));
+    }
     for (uint32_t i = 0; i < clips; i++) {
         const patina_clip *clip = &scene->clips[i];
         double turned[9], across[9], from[3], product[9];

@@ -160,6 +160,11 @@ void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of ever
 void pt_plan_average(struct pt_builder *builder);
 int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance *instance);
 
+// The instance's field, as all its passes bind it: with one radius where the style has one.
+static inline struct pt_ref pt_field_of(const struct pt_plan_instance *instance, uint32_t i)
+{
+    return pt_buffer_of(instance->instance->style.soft_radius > 0.0f ? PT_FIELD_ONE : PT_FIELD, i);
+}
 // soft.c: soft points over the picture.
 void pt_plan_soft(struct pt_builder *builder);
 

@@ -101,7 +101,7 @@ enum { PT_SLOTS = 16 }; // levels or layers that a plane may have
 _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_SLOTS, "planes have too few slots");
 
 // PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole; PT_MASK to
-// the instance's mask. PT_FIELD: of points that are all soft, their radii; PT_FIELD_ONE: likewise, radii of 1.
+// the instance's mask. PT_FIELD: its field, or 1 where all points are soft, with the points' radii; PT_FIELD_ONE: with radii of 1.
 enum pt_instance_buffer {
     PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES, PT_SHAPES, PT_SIGHTS,
     PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN, PT_MASK, PT_FIELD, PT_FIELD_ONE
@@ -164,7 +164,7 @@ struct pt_plan_instance {
     uint64_t points;        // of these chunks, drawn ones
     uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
     uint32_t chunks_cut; // of its chunks, those that are sifted
-    int by_class, by_shape, by_mask; // some of them by class, by shape, by mask
+    int by_class, by_shape, by_mask, by_field; // some of them by class, by shape, by mask, by field
     int marked;             // shown with what stations saw through in magenta
 };
 

@@ -7,6 +7,7 @@
 #include "passes.h"
 
 #include "scene/clip.h"
+#include "scene/mask.h"
 #include "scene/soft.h"
 
 #include <math.h>
@@ -57,7 +58,7 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
     // where the eye is close, records are as wide as a pixel at least
     const double reach = ball_reach(p->scene, out->instance, object, chunk);
     if (pt_sieve_chunk(sieve, chunk, NULL, NULL) == PT_CUT_AWAY) {
-        plan->chunks_clipped++;
+        plan->chunks_clipped += (uint64_t)pt_all_soft(out->instance);
         return PATINA_OK;
     }
     pt_chunk_translation(p->eye, object, chunk, translation);
@@ -78,7 +79,7 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
     pt_set_chunk(p->eye, object, rows, out->instance, chunk, pt_drawn_points(p->scene, chunk), 0, view);
     pt_join_rect(out->rect, bounds->rect);
     out->points += view->count;
-    plan->chunks_culled--;
+    plan->chunks_culled -= (uint64_t)pt_all_soft(out->instance); // others may count as solid ones
     return pt_plan_divide(plan, out, sieve, chunk, view);
 }
 
@@ -98,7 +99,7 @@ static int place_instance(struct placing *p, uint32_t i)
     struct pt_inverse_clip *clips = pt_arena_take(arena, (p->scene->clip_count + 1) * sizeof *clips);
     if (!out->chunks || !out->bounds || !depths || !clips)
         return PATINA_ERROR_MEMORY;
-    const struct pt_sieve sieve = pt_sieve_make(p->scene, instance, clips);
+    const struct pt_sieve sieve = pt_sieve_make(p->scene, instance, PT_SOFT_POINTS, clips);
     pt_object_of(p->eye, instance->style.world_from_object, &object);
     pt_object_rows(p->eye, &object, rows);
     pt_set_instance(p->eye, &object, instance, pt_thinning(p->scene), &out->args);
@@ -278,12 +279,14 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
     args.shade.arrived = 0;
     args.shade.light_count = instance->args.lit ? args.shade.light_count : 0;
     pt_plan_recolor(builder, instance, &args.shade);
-    if (style->soft_modulation > 0.0f) // every field is 1
-        args.weight = fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
+    args.threshold = style->soft == PATINA_SOFT_FIELD ? pt_field_steps(style->soft_threshold) : 0;
+    if (style->soft_modulation > 0.0f) // without a field all is 1
+        args.weight = style->soft == PATINA_SOFT_FIELD ? fminf(1.0f / (style->soft_modulation * PT_FIELD_MOST), 1.0f)
+                                                       : fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
     const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     PT_REASON(PT_ADD(builder, gather, args,
                      { pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
-                       pt_buffer_of(PT_SURFACE, i), pt_buffer_of(style->soft_radius > 0.0f ? PT_FIELD_ONE : PT_FIELD, i),
+                       pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i),
                        pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i), pt_nothing(),
                        args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing() }),
               "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,

@@ -170,11 +170,11 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     if (!list || !clips)
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
-    survey->sieves[i] = pt_sieve_make(scene, instance, clips);
+    survey->sieves[i] = pt_sieve_make(scene, instance, PT_SOLID_POINTS, clips);
     const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
     pt_object_rows(camera, object, rows);
-    for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f && !instance->style.soft; c++) {
+    for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f && !pt_all_soft(instance); c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         struct seen seen = { .chunk = c };
         double translation[3], eye[4], angle = 0.0, spread = 0.0;

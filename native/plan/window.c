@@ -33,7 +33,7 @@ int pt_knows_reach(const struct patina_scene *scene)
 {
     int known = scene->settings.surface == PATINA_SURFACE_AUTO;
     for (uint32_t i = 0; i < scene->instance_count; i++)
-        known = known && (scene->instances[i].style.soft || pt_knows_discs(scene, &scene->instances[i]));
+        known = known && (pt_all_soft(&scene->instances[i]) || pt_knows_discs(scene, &scene->instances[i]));
     return known;
 }
 
@@ -41,7 +41,7 @@ int pt_knows_sigmas(const struct patina_scene *scene)
 {
     int known = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++)
-        known |= !scene->instances[i].style.soft && scene->instances[i].cloud->shapes && scene->instances[i].cloud->beside;
+        known |= !pt_all_soft(&scene->instances[i]) && scene->instances[i].cloud->shapes && scene->instances[i].cloud->beside;
     return known && (scene->settings.surface == PATINA_SURFACE_SPLATS || closes_by_analysis(&scene->settings));
 }
 

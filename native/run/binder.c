@@ -56,6 +56,21 @@ static int take_grade(struct pt_binder *binder, struct pt_bound_instance *bound,
                                                   &bound->grade);
 }
 
+// Where all points are soft, the words are the cloud's.
+static int bind_field(struct pt_binder *binder, const struct pt_instance *instance, struct pt_bound_instance *bound, int one,
+                      struct pt_buffer **out)
+{
+    const struct patina_field *field = instance->style.soft == PATINA_SOFT_FIELD ? instance->style.field : NULL;
+    int error = PATINA_OK;
+    if (field && !bound->field)
+        error = pt_residency_take_bytes(binder->residency, binder->device, field->alive, NULL, 0, &bound->field);
+    if (error)
+        return error;
+    struct pt_resident *holder = field ? bound->field : bound->cloud;
+    *out = &holder->fields[one];
+    return pt_residency_field(binder->device, instance->cloud, field ? field->steps : NULL, holder, one);
+}
+
 // Colours: the cloud's own, with what stations saw through in magenta, or graded.
 static int bind_colors(struct pt_binder *binder, const struct pt_plan_instance *planned, struct pt_bound_instance *bound,
                        struct pt_buffer **out)
@@ -92,11 +107,8 @@ static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, str
         return error;
     if (ref->which == PT_COLORS)
         return bind_colors(binder, planned, bound, out);
-    if (ref->which == PT_FIELD || ref->which == PT_FIELD_ONE) {
-        const int one = ref->which == PT_FIELD_ONE;
-        *out = &bound->cloud->fields[one];
-        return pt_residency_field(binder->device, planned->instance->cloud, bound->cloud, one);
-    }
+    if (ref->which == PT_FIELD || ref->which == PT_FIELD_ONE)
+        return bind_field(binder, planned->instance, bound, ref->which == PT_FIELD_ONE, out);
     *out = &bound->cloud->buffers[ref->which];
     return ref->which == PT_SIGHTS ? pt_residency_see(binder->device, planned->instance->cloud, bound->cloud) : PATINA_OK;
 }

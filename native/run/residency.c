@@ -167,7 +167,8 @@ int pt_residency_mark(struct patina_device *device, const struct patina_cloud *c
     return error;
 }
 
-int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident, int one)
+int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, const uint16_t *steps,
+                       struct pt_resident *resident, int one)
 {
     struct pt_buffer *field = &resident->fields[one];
     const uint32_t shapes = atomic_load(&cloud->alive->shapes);
@@ -180,7 +181,7 @@ int pt_residency_field(struct patina_device *device, const struct patina_cloud *
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t slot = chunk->first; slot < chunk->first + chunk->padded; slot++)
-            words[slot] = pt_soft_word(one ? 1.0f : pt_soft_radius(cloud, chunk, slot));
+            words[slot] = pt_soft_word(steps ? steps[slot] : (uint32_t)PT_FIELD_MOST, one ? 1.0f : pt_soft_radius(cloud, chunk, slot));
     }
     const int error = device->ops->buffer_create(device, cloud->slots * sizeof *words, words, 0, field);
     free(words);
@@ -218,7 +219,8 @@ int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device
         return PATINA_OK;
     if (!(resident = begin(device, alive)))
         return PATINA_ERROR_MEMORY;
-    return end(residency, device, resident, device->ops->buffer_create(device, size, data, 1, &resident->buffers[0]), out);
+    const int error = size ? device->ops->buffer_create(device, size, data, 1, &resident->buffers[0]) : PATINA_OK;
+    return end(residency, device, resident, error, out);
 }
 
 int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device, const struct patina_texture *texture,

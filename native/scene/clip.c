@@ -70,13 +70,18 @@ int pt_is_marked(const struct pt_instance *instance)
 
 // ---- the sieve -----------------------------------------------------------------------------------------------------------
 
-struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance,
+struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance, enum pt_points points,
                               struct pt_inverse_clip *room)
 {
     const patina_cloud_info *info = &instance->cloud->info;
     struct pt_sieve sieve = { .instance = instance, .clips = room };
     sieve.hiding_shapes = pt_hidden_shapes(instance, sieve.hidden_shapes);
     sieve.mask = pt_mask_of(instance);
+    if (points != PT_EVERY_POINT && instance->style.soft == PATINA_SOFT_FIELD) {
+        sieve.field = instance->style.field;
+        sieve.threshold = pt_field_steps(instance->style.soft_threshold);
+        sieve.soft = points == PT_SOFT_POINTS;
+    }
     for (int k = 0; k < 8; k++)
         sieve.hiding |= info->has_classes && (instance->style.hidden_classes[k] & info->class_bits[k]);
     for (int keeps = 1; keeps >= 0 && !instance->style.clip_off; keeps--) {
@@ -140,6 +145,17 @@ static int hides(const uint32_t hidden[8], const uint32_t has[8])
     return !out ? 0 : in ? -1 : 1;
 }
 
+// Which points of a chunk the field leaves to the other side.
+static enum pt_masked leaves(const struct pt_sieve *sieve, size_t chunk)
+{
+    if (!sieve->field)
+        return PT_MASKED_NONE;
+    const int some_soft = sieve->field->chunks[chunk][1] > sieve->threshold, all_soft = sieve->field->chunks[chunk][0] > sieve->threshold;
+    if (sieve->soft)
+        return all_soft ? PT_MASKED_NONE : some_soft ? PT_MASKED_SOME : PT_MASKED_ALL;
+    return all_soft ? PT_MASKED_ALL : some_soft ? PT_MASKED_SOME : PT_MASKED_NONE;
+}
+
 // Where the chunk lies to clip i; what is divided becomes an entry.
 static int meet(const struct pt_sieve *sieve, uint32_t i, const struct pt_chunk *chunk, const double linear[9],
                 const double origin[3], struct clip_view *entries, struct pt_division *division)
@@ -158,16 +174,18 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
 {
     struct pt_division found = { 0 };
     double linear[9], object[3], origin[3];
-    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes && !sieve->mask)
+    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes && !sieve->mask && !sieve->field)
         return PT_WHOLE; // of most scenes all are
     int by_class = sieve->hiding ? hides(sieve->instance->style.hidden_classes, chunk->classes) : 0;
     int by_shape = sieve->hiding_shapes ? hides(sieve->hidden_shapes, chunk->shapes) : 0, kept = !sieve->keeping;
-    const enum pt_masked masked = sieve->mask ? sieve->mask->chunks[chunk - sieve->instance->cloud->chunks] : PT_MASKED_NONE;
-    if (by_class == 1 || by_shape == 1 || masked == PT_MASKED_ALL)
+    const size_t place = (size_t)(chunk - sieve->instance->cloud->chunks);
+    const enum pt_masked masked = sieve->mask ? sieve->mask->chunks[place] : PT_MASKED_NONE, left = leaves(sieve, place);
+    if (by_class == 1 || by_shape == 1 || masked == PT_MASKED_ALL || left == PT_MASKED_ALL)
         return PT_CUT_AWAY;
     found.by_class = by_class != 0;
     found.by_shape = by_shape != 0;
     found.by_mask = masked == PT_MASKED_SOME;
+    found.by_field = left == PT_MASKED_SOME && !sieve->soft;
     pt_split_matrix(sieve->instance->style.world_from_object, linear, object);
     pt_apply(linear, chunk->origin, origin);
     for (int k = 0; k < 3; k++)
@@ -182,7 +200,7 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
             return PT_CUT_AWAY;
     if (division)
         *division = found;
-    return found.count || found.by_class || found.by_shape || found.by_mask ? PT_DIVIDED : PT_WHOLE;
+    return found.count || found.by_class || found.by_shape || found.by_mask || found.by_field ? PT_DIVIDED : PT_WHOLE;
 }
 
 void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3],

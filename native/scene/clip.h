@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What clips, hidden classes, hidden shapes and masks leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
+// What clips, hidden classes, hidden shapes, masks and fields leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
 #ifndef PT_CLIP_H
 #define PT_CLIP_H
 
@@ -22,14 +22,20 @@ struct pt_sieve {
     uint32_t hidden_shapes[8]; // what pt_hidden_shapes says
     int hiding_shapes;
     const struct patina_mask *mask; // that hides some of its points, or NULL
+    const struct patina_field *field; // that leaves points to the other of both, or NULL
+    uint32_t threshold;
+    int soft; // what is above it stays
 };
+
+// Which points of an instance: all, or by their fields those that are drawn as points and discs, or those that are soft.
+enum pt_points { PT_EVERY_POINT, PT_SOLID_POINTS, PT_SOFT_POINTS };
 
 enum pt_side { PT_CUT_AWAY, PT_DIVIDED, PT_WHOLE };
 
-// How a divided chunk is divided: by which of the sieve's clips, and whether by class, shape or mask.
+// How a divided chunk is divided: by which of the sieve's clips, and whether by class, shape, mask or field.
 struct pt_division {
     uint32_t count, keeps;
-    int by_class, by_shape, by_mask;
+    int by_class, by_shape, by_mask, by_field;
 };
 
 // Which of the bytes from PT_SHAPE_SIGHT_SHIFT on of a shape the style hides, as sift_args has them. 0: none, or the cloud
@@ -38,8 +44,9 @@ int pt_hidden_shapes(const struct pt_instance *instance, uint32_t hidden[8]);
 // Whether what stations saw through is to be shown in it.
 int pt_is_marked(const struct pt_instance *instance);
 
-// The sieve of an instance. room: for the scene's clips, kept by the sieve.
-struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance,
+// The sieve of an instance. room: for the scene's clips, kept by the sieve. Which of the soft points of a chunk are, kernel gather
+// sees for itself: chunks are not divided by that.
+struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_instance *instance, enum pt_points points,
                               struct pt_inverse_clip *room);
 // chunk: one of the cloud's. entries: room for the sieve's clips; may be NULL, as may division. Written where the chunk is divided.
 enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,

@@ -44,7 +44,7 @@ static int keep_instance(const patina_scene *scene, const struct pt_instance *in
     struct pt_dense *boxes = malloc((cloud->chunk_count + 1) * sizeof *boxes);
     f->error = !room || !boxes ? PATINA_ERROR_MEMORY : pt_dense_chunks(cloud, boxes);
     if (!f->error) {
-        const struct pt_sieve sieve = pt_sieve_make(scene, instance, room);
+        const struct pt_sieve sieve = pt_sieve_make(scene, instance, PT_EVERY_POINT, room);
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
             if (boxes[c].lower[0] <= boxes[c].upper[0] && pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
                 pt_box_corners(boxes[c].lower, boxes[c].upper, instance->style.world_from_object, keep_corner, f);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What somebody did with single points of a cloud: which are hidden and which selected (mask.c), and other colours by scan (grade.c).
-// Both belong to instances, not to the cloud: several may show one cloud.
+// What somebody did with single points of a cloud: which are hidden and which selected (mask.c), other colours by scan (grade.c), and which are soft (field.c).
+// All belong to instances, not to the cloud: several may show one cloud.
 #ifndef PT_MASK_H
 #define PT_MASK_H
 
+#include "kernel_args.h"
 #include "scene.h"
 
 enum pt_masked { PT_MASKED_NONE, PT_MASKED_SOME, PT_MASKED_ALL }; // of a chunk's points: hidden
@@ -25,6 +26,18 @@ struct patina_grade {
     size_t size;
     void *colors; // in chunk order, in the cloud's own format
 };
+
+struct patina_field {
+    struct pt_handle handle;
+    struct pt_alive *alive, *of; // as a mask's
+    uint64_t slots;
+    uint16_t *steps;             // in chunk order, of PT_FIELD_MOST; padding as what it repeats
+    uint16_t (*chunks)[2];       // least and greatest of each
+    uint64_t hash;               // of the steps
+};
+
+// t of points that are solid up to it, in steps of a field.
+static inline uint32_t pt_field_steps(float value) { return (uint32_t)((double)value * (double)PT_FIELD_MOST + 0.5); }
 
 // The instance's mask where it hides something, else NULL.
 static inline const struct patina_mask *pt_mask_of(const struct pt_instance *instance)

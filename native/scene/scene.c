@@ -143,9 +143,9 @@ static int too_many(const patina_scene *scene, uint64_t slots, uint64_t count)
                    (unsigned long long)most);
 }
 
-static int check_soft(const patina_scene *scene, patina_cloud_style *style)
+static int check_soft(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
 {
-    if (style->soft > PATINA_SOFT_ALL || style->soft_model > PATINA_SOFT_EXPRESS)
+    if (style->soft > PATINA_SOFT_FIELD || style->soft_model > PATINA_SOFT_EXPRESS)
         return fail(scene, "cloud style: no such soft or soft_model");
     if (style->soft_shells > (uint32_t)PT_SOFT_SHELLS)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %u soft_shells; the most is %u", style->soft_shells,
@@ -154,6 +154,10 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style)
         return fail(scene, "cloud style: soft_radius must be 0 or more");
     if (!(style->soft_opacity >= 0.0f && style->soft_opacity <= 1.0f) || !(style->soft_modulation >= 0.0f && style->soft_modulation <= 1.0f))
         return fail(scene, "cloud style: soft_opacity and soft_modulation must be within 0 and 1");
+    if (!(style->soft_threshold >= 0.0f && style->soft_threshold <= 1.0f))
+        return fail(scene, "cloud style: soft_threshold must be within 0 and 1");
+    if (style->field ? style->field->handle.magic != PT_MAGIC || style->field->of != cloud->alive : style->soft == PATINA_SOFT_FIELD)
+        return fail(scene, "cloud style: the field is missing, destroyed, or of another cloud");
     style->soft_opacity = style->soft_opacity == 0.0f ? 0.5f : style->soft_opacity;
     if (!style->soft)
         return PATINA_OK;
@@ -163,7 +167,8 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style)
             return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT,
                            "cloud style: soft clouds of a scene are drawn together, and instance %u has another soft_model or soft_shells", i);
     }
-    style->shadow_off = PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE;
+    if (style->soft == PATINA_SOFT_ALL)
+        style->shadow_off = PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE;
     return PATINA_OK;
 }
 
@@ -199,7 +204,7 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
     if (style->shadow_off > 7)
         return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
-    const int error = check_soft(scene, style);
+    const int error = check_soft(scene, style, cloud);
     return error ? error : check_color(scene, style, cloud);
 }
 
@@ -509,7 +514,7 @@ int pt_each_corner(const patina_scene *scene, pt_corner_work *work, void *contex
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "framing the scene: out of memory");
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const patina_cloud *cloud = scene->instances[i].cloud;
-        struct pt_sieve sieve = pt_sieve_make(scene, &scene->instances[i], room);
+        struct pt_sieve sieve = pt_sieve_make(scene, &scene->instances[i], PT_EVERY_POINT, room);
         for (uint32_t c = 0; c < cloud->chunk_count; c++)
             if (pt_sieve_chunk(&sieve, &cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
                 pt_chunk_corners(&cloud->chunks[c], scene->instances[i].style.world_from_object, work, context);

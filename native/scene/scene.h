@@ -73,4 +73,7 @@ void pt_box_corners(const double lower[3], const double upper[3], const double m
 void pt_chunk_corners(const struct pt_chunk *chunk, const double matrix[16], pt_corner_work *work, void *context);
 int pt_each_corner(const struct patina_scene *scene, pt_corner_work *work, void *context);
 
+// None of its points is drawn as a point or disc.
+static inline int pt_all_soft(const struct pt_instance *instance) { return instance->style.soft == PATINA_SOFT_ALL; }
+
 #endif

@@ -29,10 +29,10 @@ double pt_soft_reach(const struct patina_cloud *cloud, const struct pt_chunk *ch
     return ROUNDED * (cloud->radii ? (double)cloud->info.radius_most : widest(cloud) * RADIUS_SPACINGS * (double)chunk->spacing);
 }
 
-uint32_t pt_soft_word(float radius)
+uint32_t pt_soft_word(uint32_t step, float radius)
 {
     uint32_t bits;
     memcpy(&bits, &radius, sizeof bits);
     bits = bits < 0x7F7FC000u ? bits + 0x4000u : 0x7F7F8000u;
-    return (uint32_t)PT_FIELD_MOST << PT_FIELD_SHIFT | (bits >> 15 & PT_FIELD_RADIUS);
+    return step << PT_FIELD_SHIFT | (bits >> 15 & PT_FIELD_RADIUS);
 }

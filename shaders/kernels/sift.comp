@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: which points of divided chunks are drawn: those that clips, hidden classes, hidden shapes and masks leave; twin of
+// sift: which points of divided chunks are drawn: those that clips, hidden classes, hidden shapes, masks and fields leave; twin of
 // native/device_cpu/kernels/sift.c
 //
 // A workgroup takes a chunk, an invocation PT_SLOTS_A_WORD of its points at a time.
@@ -16,6 +16,7 @@ layout(std430, binding = BIND_clips) readonly buffer clips_block { clip_view cli
 layout(std430, binding = BIND_drawn) writeonly buffer drawn_block { uint drawn[]; };
 layout(std430, binding = BIND_shapes) readonly buffer shapes_block { uint shapes[]; };
 layout(std430, binding = BIND_mask) readonly buffer mask_block { uint mask[]; };
+layout(std430, binding = BIND_field) readonly buffer field_block { uint field[]; };
 
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
@@ -57,6 +58,7 @@ void main()
             vec3 p = vec3(positions[at], positions[at + chunk.padded], positions[at + 2u * chunk.padded]);
             bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden_class(chunk.first + slot);
             cut = cut || (args.by_shape != 0u && hidden_shape(chunk.first + slot));
+            cut = cut || (args.by_field != 0u && args.threshold < field[chunk.first + slot] >> PT_FIELD_SHIFT);
             for (uint k = chunk.clip_first; k < keeps; k++)
                 keep = keep || inside(k, p);
             for (uint k = keeps; k < cuts; k++)

@@ -213,6 +213,8 @@ struct sift_args {
     uint32_t by_shape;  // 1: shapes are there, and some are hidden
     uint32_t hidden_shapes[8]; // likewise, of the byte from PT_SHAPE_SIGHT_SHIFT on
     uint32_t by_mask;   // 1: the mask is there: a word of each PT_SLOTS_A_WORD slots of the cloud, bit i: slot i is hidden
+    uint32_t by_field;  // 1: the field is there, and points above ...
+    uint32_t threshold; // ... are soft: in steps, as in gather_args
 };
 
 // scatter: points -> least key a pixel. [D 3.1]; behind a layer only points with z > limit at their pixel count. [D 5]

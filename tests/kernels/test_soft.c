@@ -12,7 +12,7 @@ struct place {
     double center[3], r, a, color[3];
 };
 
-enum { STEPS = 400000 };
+enum { STEPS = 40000 };
 
 // Marches along the ray from the origin: no closed form, no pieces.
 static struct ref_soft march(const struct place *balls, uint32_t count, const double ray[3], double from, double to)
@@ -288,8 +288,8 @@ static void many(struct harness *h)
         const uint32_t count = k == 3 ? 2000 : 10000;
         struct setup s = look_at(h, &rng, 2, 1, 1, models[k], count);
         for (uint32_t i = 0; i < count; i++) {
-            const double color[3] = {rng_unit(&rng), rng_unit(&rng), 1.0}, z = rng_range(&rng, 2.0, 8.0);
-            put(&s, i, s.args.view.origin_x + 1.0, s.args.view.origin_y + 0.5, z, 4.0 * ref_footprint(&s.args.view, z), 2e-4, 1.0, color);
+            const double color[3] = {rng_unit(&rng), rng_unit(&rng), 1.0}, z = exp(rng_range(&rng, 0.7, 6.0));
+            put(&s, i, s.args.view.origin_x + 1.0, s.args.view.origin_y + 0.5, z, 1.2 * ref_footprint(&s.args.view, z), 2e-4, 1.0, color);
         }
         s.keys[0] = s.keys[1] = REF_EMPTY_KEY;
         s.args.shells = 3;

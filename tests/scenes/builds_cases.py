@@ -261,6 +261,9 @@ def _soft(to: _List) -> None:
     to.add("soft, among the points", soft, camera={"distance": 1.2, "elevation": 10})
     to.add("soft, ramp, clip, mask", {**soft, "mask": 1, "color_source": "COLOR_SOURCE.HEIGHT", "ramp": RAMP}, clips=[{"shape": "CLIP_SHAPE.PLANE"}])
     to.add("soft before glass", soft, {**GLASS_TORUS, "world_from_object": _moved(0.8, 0.4, 0.2)})
+    by = {**soft, **LIT, "soft": "SOFT.FIELD", "field": 100, "soft_threshold": 0.6}
+    to.add("soft by field, modulated, shadows", {**by, "soft_modulation": 0.2}, FLOOR, light={**SUN, "shadows": 1})
+    to.add("soft by field, mask, one radius, glass", {**by, "mask": 1, "soft_radius": 0.05, "soft_model": "SOFT_MODEL.EXPRESS"}, {**GLASS_TORUS, "world_from_object": _moved(0.8, 0.4, 0.2)})
     to.add("soft, region", soft, TORUS, settings={"region": [40, 30, 111, 87]})
     to.add("soft, samples, film, lines", {**soft, "world_from_object": _moved(0.5, -0.5, 0.2)}, TORUS, lines={"width": 3.0},
            settings={"pixel_samples": 4, "film_transparent": 1})

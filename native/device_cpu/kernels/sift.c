@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: which points of divided chunks are drawn: those that clips, hidden classes, hidden shapes and masks leave; twin of
+// sift: which points of divided chunks are drawn: those that clips, hidden classes, hidden shapes, masks and fields leave; twin of
 // shaders/kernels/sift.comp
 //
 // Distances to a clip are sums of products in one written order, as scatter's: what is cut is cut on every device.
@@ -46,6 +46,10 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
         const uint32_t *shapes = (const uint32_t *)PT_DATA(sift->call, sift, shapes) + chunk->first + i;
         vi sight = vi_and(vi_shr(vi_load(shapes), PT_SHAPE_SIGHT_SHIFT), vi_set(255));
         cut = vm_or(cut, vi_lt_unsigned(vi_set(0), vi_gather(sift->hides_shape, sight, vm_first(PT_LANES))));
+    }
+    if (args->by_field) {
+        const uint32_t *field = (const uint32_t *)PT_DATA(sift->call, sift, field) + chunk->first + i;
+        cut = vm_or(cut, vi_lt_unsigned(vi_set(args->threshold), vi_shr(vi_load(field), PT_FIELD_SHIFT)));
     }
     return vm_bits(vm_and(keep, vm_not(cut))) & PT_ALL;
 }

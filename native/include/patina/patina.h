@@ -83,6 +83,7 @@ typedef struct patina_mesh patina_mesh;
 typedef struct patina_texture patina_texture;
 typedef struct patina_mask patina_mask;
 typedef struct patina_grade patina_grade;
+typedef struct patina_field patina_field;
 typedef struct patina_scene patina_scene;
 typedef struct patina_frame patina_frame;
 typedef struct patina_file patina_file;
@@ -423,8 +424,9 @@ enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, 
 
 // What points are. ALL: every one is a ball of density, drawn in the order of depth with those of all soft clouds, over what is opaque
 // and behind it, hidden by what is opaque before it. Keys, depth, picks, lines and other passes tell of the rest of the scene; soft
-// points neither cast nor take shadows yet, and what lies behind a transparent surface is hidden by its first layer.
-enum patina_soft { PATINA_SOFT_OFF = 0, PATINA_SOFT_ALL = 1 };
+// points neither cast nor take shadows yet, and what lies behind a transparent surface is hidden by its first layer. FIELD: so are
+// points whose field is above soft_threshold; the others are as with OFF.
+enum patina_soft { PATINA_SOFT_OFF = 0, PATINA_SOFT_ALL = 1, PATINA_SOFT_FIELD = 2 };
 // BASE: the density along the ray, exactly, through balls that intersect. CONCENTRIC: by shells of even density, which come to BASE as
 // they grow many. EXPRESS: a disc a ball, ten times faster.
 enum patina_soft_model { PATINA_SOFT_BASE = 0, PATINA_SOFT_CONCENTRIC = 1, PATINA_SOFT_EXPRESS = 2 };
@@ -477,7 +479,12 @@ typedef struct patina_cloud_style {
                                   // has it of even points: a point without neighbours is not seen then
     float soft_opacity;           // of a ball through its centre, 0..1, times the cloud's and the point's opacity; 0 = 0.5
     float soft_modulation;        // 0..1, from the model's own opacity (0) to one that falls evenly from a ball's centre to its rim,
-                                  // so that single points show (1); 1 - W of [S Eq. 22]
+                                  // so that single points show (1); 1 - W of [S Eq. 22].
+                                  // FIELD: l_m - t of it: such a share of the field's range above the threshold leads from that
+                                  // opacity to the model's own; 0 = none of it
+    const patina_field *field;    // of this cloud, for FIELD. It must outlive what the mask must
+    float soft_threshold;         // FIELD: 0..1; points with more are soft
+    float soft_unused;            // says nothing
 } patina_cloud_style;
 #define PATINA_CLOUD_STYLE_INIT                                                                                                \
     {                                                                                                                          \

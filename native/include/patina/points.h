@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single points of clouds, a part of patina.h, which includes it: hidden, selected, graded by scan, and picked on the picture. Its
+// Single points of clouds, a part of patina.h, which includes it: hidden, selected, graded by scan, soft by a field, and picked on the picture. Its
 // conventions and thread rules hold here too.
 #ifndef PATINA_POINTS_H
 #define PATINA_POINTS_H
@@ -36,6 +36,14 @@ typedef struct patina_scan_grade {
 PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades, uint32_t count,
                                    patina_grade **out);
 PATINA_API void patina_grade_destroy(patina_grade *grade);
+
+// ---- fields: which points are soft ---------------------------------------------------------------------------------
+
+// A number of 0 to 1 for each point of a cloud, in the given order, `count` of them as patina_cloud_info has it; kept in 65536 steps,
+// what lies beyond as the nearer end, NaN as 0. Copied; 2 bytes a point, and 4 on a device. Given to scenes by style.field, which has
+// the threshold: one field serves any. It never changes: after an edit make another. Any number of fields of one cloud.
+PATINA_API int patina_field_create(const patina_cloud *cloud, const float *values, uint64_t count, patina_field **out);
+PATINA_API void patina_field_destroy(patina_field *field);
 
 // ---- picking: which points lie in an outline on the picture ---------------------------------------------------------
 
