@@ -169,6 +169,7 @@ class Cloud(_Handle):
 
     # Of a linked one of several scans: where a uint16 for each point says which it is of, the attribute that named them, and as what.
     scan_file: Path | None = None
+    numbers: np.ndarray | None = None  # (count,) that points may be soft by, in the given order; whoever reads the points sets them
     scan_name: str = ""
     scan_numbers: tuple[int, ...] = ()
 
@@ -223,6 +224,7 @@ class Cloud(_Handle):
         self.has_colors = bool(info.has_colors)
         self.class_bits = tuple(info.class_bits)  # classes that drawn points have
         self.has_scalars = bool(info.has_scalars)
+        self.has_classes = bool(info.has_classes)
         self.has_opacities = bool(info.has_opacities)
         self.has_shapes = bool(info.has_shapes)  # analysed
         self.normals_oriented = bool(info.normals_oriented)

@@ -42,6 +42,8 @@ ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
 EFFECT_CHOICE = {"NO_CHOICE": 0, "CONTOUR_HEIGHT": 0, "CONTOUR_PLANE": 1}
 LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
 LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
+FIELD_SOURCE = {"VALUES": 0, "SCALAR": 1, "LUMINANCE": 2, "CLASSES": 3, "DISTANCE": 4, "UNCERTAINTY": 5, "DENSITY": 6}
+FIELD_SHAPE = {"FROM_POINT": 0, "FROM_PLANE": 1, "FROM_AXIS": 2}
 
 
 class Descriptor(Structure):
@@ -229,6 +231,12 @@ class ScanGrade(Structure):
     _fields_ = [("gain", c_float), ("gamma", c_float), ("saturation", c_float), ("temperature", c_float)]
 
 
+class FieldDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("source", c_uint32), ("shape", c_uint32), ("count", c_uint64),
+                ("values", c_void_p), ("range", c_double * 2), ("classes", c_uint32 * 8), ("invert", c_uint32),
+                ("unused", c_uint32), ("world_from_object", c_double * 16), ("world_from_shape", c_double * 16)]
+
+
 class Pick(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("instance", c_uint32), ("polygon", c_void_p), ("corners", c_uint32),
                 ("classes", c_uint32 * 8), ("threads", c_uint32)]
@@ -333,7 +341,7 @@ CALLS = {
     "patina_mask_destroy": (c_void_p,),
     "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),
     "patina_grade_destroy": (c_void_p,),
-    "patina_field_create": (c_void_p, c_void_p, c_uint64, POINTER(c_void_p)),
+    "patina_field_create": (c_void_p, POINTER(FieldDesc), c_void_p, POINTER(c_void_p)),
     "patina_field_destroy": (c_void_p,),
     "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
     "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),

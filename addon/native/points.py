@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from ctypes import byref, c_float
+from typing import Any
 
 import numpy as np
 
@@ -42,9 +43,12 @@ class Field(_Handle):
 
     _kind = "field"
 
-    def __init__(self, cloud: Cloud, values: np.ndarray) -> None:
-        numbers = np.ascontiguousarray(values, np.float32)
-        super().__init__(cloud._handle, numbers.ctypes.data, len(numbers))
+    def __init__(self, cloud: Cloud, values: np.ndarray | None = None, progress: Progress | None = None, **desc: Any) -> None:
+        """values: any (count,) numbers, or None: desc's source, as patina_field_desc has it."""
+        if values is not None:
+            numbers = np.ascontiguousarray(values, np.float32).reshape(-1)
+            desc |= {"values": numbers.ctypes.data, "count": len(numbers)}
+        super().__init__(cloud._handle, byref(abi.FieldDesc(**desc)), _handle_of(progress))
 
 
 def pick(scene: Scene, instance: int, polygon: np.ndarray | None, frame: Frame | None = None, classes: Sequence[int] = (0,) * 8,

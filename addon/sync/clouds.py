@@ -18,7 +18,7 @@ from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, roles
+from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, roles, soft
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -44,6 +44,7 @@ class PointArrays:
     radii: np.ndarray | None = None  # (n, 1) float32
     analyzed: bool = False
     stations: analysis.Stations | None = None  # where the scanners stood
+    numbers: np.ndarray | None = None  # (n, 1) float32, that points are soft by
 
     def fingerprint(self) -> Steps[tuple[int, int]]:
         """Of the places, normals, opacities, radii and classes, and of the colours and scalars: what Blender's update tags miss
@@ -137,6 +138,7 @@ class CloudItem:
     name: str = ""  # of the object
     asset: str = ""  # of its topmost parent
     edits: edits.State = edits.State()
+    soft: soft.Soft | None = None
 
 
 class CloudCache:
@@ -170,6 +172,7 @@ class CloudCache:
             known, cloud = self._entries.pop(identity, ((), None))
             if fingerprint == known:
                 self._entries[identity] = (known, cloud)
+                _set_numbers(cloud, arrays)
                 return cloud
             recolor = recolor and not self._finals and known[:1] == fingerprint[:1] and cloud not in ANALYSES
         if recolor:  # out of the cache: nobody takes it meanwhile
@@ -182,6 +185,7 @@ class CloudCache:
         cloud = task.result() or cloud
         if recolor:
             cloud.set_scalars(arrays.scalars)
+        _set_numbers(cloud, arrays)
         self._keep(identity, fingerprint, cloud)
         return cloud
 
@@ -236,6 +240,12 @@ class CloudCache:
 
     def __len__(self) -> int:
         return len(self._entries)
+
+
+def _set_numbers(cloud: native.Cloud, arrays: PointArrays) -> None:
+    """The same array stays where nothing changed: fields are kept by it."""
+    if arrays.numbers is None or cloud.numbers is None or not np.array_equal(arrays.numbers, cloud.numbers, equal_nan=True):
+        cloud.numbers = arrays.numbers
 
 
 CACHE = CloudCache()
@@ -301,7 +311,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
             edited = edits.state_of(obj) if link else edits.State()
-            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited))
+            softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
@@ -311,6 +322,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     images.CACHE.trim()
     notices += filter(None, [edits.notice(item.name, item.edits, item.cloud) for item in items
                              if isinstance(item, CloudItem) and item.edits and isinstance(item.cloud, native.Cloud)])
+    notices += [f"'{item.name}' has no {missing} to be soft by" for item in items if isinstance(item, CloudItem) and item.soft and
+                isinstance(item.cloud, native.Cloud) and (missing := item.soft.missing(item.cloud))]
     estimates.keep({name: built.layer_distance * scale for name, scale, cloud in scales
                     if (built := cloud.built if isinstance(cloud, Pending) else cloud)})
     notices += unknown.notices()
@@ -513,7 +526,7 @@ def _identity(obj: bpy.types.Object, used: set[tuple], radius: str, faces_as: in
 
 def _attribute_names(obj: bpy.types.Object) -> tuple[str | bool, ...]:
     return (obj.patina.color_attribute, obj.patina.normal_attribute, obj.patina.opacity_attribute, colors.scalar_name(obj),
-            obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored)
+            obj.patina.colors.class_attribute, obj.patina.radius_attribute, obj.patina.hide_uncolored, soft.attribute_name(obj))
 
 
 def _radius_name(obj: bpy.types.Object, surface: str) -> str:
@@ -568,11 +581,15 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
                               ("scalar", scalar, scalars), ("class", class_name, classes)):
         if name and found is None:
             notices.append(f"'{obj.name}' has no point attribute '{name}' to take as {kind}")
+    softened = soft.attribute_name(obj)
+    by = numbers(softened)
+    if softened and by is None:
+        notices.append(f"'{obj.name}' has no point attribute '{softened}' to be soft by")
     if obj.patina.hide_uncolored:
         opacities = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
     stations = analysis.stations(obj, data, count) if analyzed else None
-    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations)
+    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations, by)
 
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
@@ -62,10 +63,15 @@ def _hidden_classes(obj: bpy.types.Object) -> tuple[int, ...]:
 
 
 def hidden_classes(group: bpy.types.PropertyGroup) -> tuple[int, ...]:
-    """256 bits in eight words. What is no class in the list of others is left out."""
-    numbers = {number for number in range(CLASSES) if group.hidden[number]}
-    for part in group.hidden_more.split(","):
+    """256 bits in eight words."""
+    return class_bits(group.hidden_more, {number for number in range(CLASSES) if group.hidden[number]})
+
+
+def class_bits(listed: str, beside: Iterable[int] = ()) -> tuple[int, ...]:
+    """256 bits in eight words, of a list as 3-5, 64 and others beside it. What is no class in the list is left out."""
+    numbers = set(beside)
+    for part in listed.split(","):
         first, _, last = (text.strip() for text in part.partition("-"))
         if first.isdigit() and (last.isdigit() or not last):
-            numbers.update(range(int(first), int(last or first) + 1))
+            numbers.update(range(int(first), min(int(last or first), 255) + 1))
     return tuple(sum(1 << number % 32 for number in numbers if number // 32 == word) for word in range(8))

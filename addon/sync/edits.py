@@ -17,18 +17,21 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import bpy
 import numpy as np
 
 from .. import native
-from ..native.points import Grade, Mask
+from ..native.points import Field, Grade, Mask
 
 PROPERTY = "patina_points"  # of an object
 PLANES = ("selected", "hidden", "deleted")
 _MAGIC = b"PTP1"
 _HEADER = struct.Struct("<4sQ16s")  # magic, points, digest of what follows
 _LEVEL = 1  # of zlib: 30 million points in a tenth of a second, and runs are all there is
+Handle = TypeVar("Handle", Mask, Grade, Field)
+
 _KEPT = 4  # masks and grades of a cloud, and unpacked edits: those of the last undo steps come back at once
 
 Bits = np.ndarray  # (count + 7) // 8 uint8, point i is bit i % 8 of byte i // 8
@@ -182,7 +185,7 @@ def notice(name: str, state: State, cloud: native.Cloud) -> str:
 
 _lock = threading.Lock()
 _unpacked: OrderedDict[str, Edits] = OrderedDict()
-_handles: weakref.WeakKeyDictionary[native.Cloud, dict[tuple, Mask | Grade]] = weakref.WeakKeyDictionary()
+_handles: weakref.WeakKeyDictionary[native.Cloud, dict[tuple, Mask | Grade | Field]] = weakref.WeakKeyDictionary()
 _scans: weakref.WeakKeyDictionary[native.Cloud, np.ndarray | None] = weakref.WeakKeyDictionary()
 
 
@@ -192,7 +195,7 @@ def mask_of(cloud: native.Cloud, state: State) -> Mask | None:
         found = for_cloud(state.packed, cloud.count)
     except Damaged:
         return None
-    return _kept(cloud, ("mask", state.packed), lambda: Mask(cloud, found.gone, found.selected)) if found else None
+    return keep(cloud, ("mask", state.packed), lambda: Mask(cloud, found.gone, found.selected)) if found else None
 
 
 def has_selection(cloud: native.Cloud, state: State) -> bool:
@@ -210,7 +213,7 @@ def grade_of(cloud: native.Cloud, state: State) -> Grade | None:
     scans = scans_of(cloud)
     if cloud.scan_file and scans is None:
         return None
-    return _kept(cloud, ("grade", state.grades), lambda: Grade(cloud, scans, state.grades))
+    return keep(cloud, ("grade", state.grades), lambda: Grade(cloud, scans, state.grades))
 
 
 def scans_of(cloud: native.Cloud) -> np.ndarray | None:
@@ -229,7 +232,7 @@ def scans_of(cloud: native.Cloud) -> np.ndarray | None:
     return found
 
 
-def _kept(cloud: native.Cloud, key: tuple, make: Callable[[], Mask | Grade]) -> Mask | Grade:
+def keep(cloud: native.Cloud, key: tuple, make: Callable[[], Handle]) -> Handle:
     """The one that is there, or a new one in place of the oldest of its kind."""
     with _lock:
         known = _handles.setdefault(cloud, {})

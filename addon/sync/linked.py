@@ -20,6 +20,7 @@ from ..importers.origin import PROPERTY
 from . import analysis, analyzing, attributes, files, kept, sequence
 from .colors import scalar_name
 from .losses import Loss
+from .soft import attribute_name
 
 Corner = tuple[float, float, float]
 
@@ -76,7 +77,7 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    found = source(path, origin, scalar_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored, pattern)
+    found = source(path, origin, scalar_name(obj) or attribute_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored, pattern)
     if found is None:
         notices.append(Loss(f"'{obj.name}': the file {importers.told(path)} is missing"))
     return found

@@ -12,7 +12,9 @@ from .panels import PatinaPanel
 _POINTS = {'MESH', 'POINTCLOUD'}
 
 
-class _ColorPanel(PatinaPanel):
+class ColorPanel(PatinaPanel):
+    """Below the points of an object's data."""
+
     bl_context = "data"
     bl_parent_id = "PATINA_PT_points"
 
@@ -21,7 +23,7 @@ class _ColorPanel(PatinaPanel):
         return super().poll(context) and context.object and context.object.type in _POINTS
 
 
-class PATINA_PT_color(_ColorPanel, Panel):
+class PATINA_PT_color(ColorPanel, Panel):
     bl_label = "Color"
 
     def draw(self, context: Context) -> None:
@@ -65,7 +67,7 @@ class PATINA_PT_color(_ColorPanel, Panel):
             column.prop(group, "range_max")
 
 
-class PATINA_PT_classes(_ColorPanel, Panel):
+class PATINA_PT_classes(ColorPanel, Panel):
     bl_label = "Hidden Classes"
     bl_options = {'DEFAULT_CLOSED'}
     bl_order = 1
@@ -83,7 +85,7 @@ class PATINA_PT_classes(_ColorPanel, Panel):
             layout.prop_search(group, "class_attribute", obj.data, "attributes")
 
 
-class PATINA_PT_cuts(_ColorPanel, Panel):
+class PATINA_PT_cuts(ColorPanel, Panel):
     bl_label = "Clip"
     bl_order = 1
 

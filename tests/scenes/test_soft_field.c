@@ -20,6 +20,12 @@ struct room {
     patina_settings settings;
 };
 
+static int field_of(const patina_cloud *cloud, const float *values, uint64_t count, patina_field **out)
+{
+    const patina_field_desc desc = {.struct_size = sizeof desc, .values = values, .count = count, .range = {0.0, 1.0}};
+    return patina_field_create(cloud, &desc, NULL, out);
+}
+
 // F rises along x, with noise: some chunks lie on one side, others on both.
 static struct room room_make(float threshold)
 {
@@ -40,7 +46,7 @@ static struct room room_make(float threshold)
     points_transform(&floor, same, below);
     room.torus = points_upload(&torus);
     room.floor = points_upload(&floor);
-    CHECK(patina_field_create(room.torus, values, POINTS, &room.field), NULL);
+    CHECK(field_of(room.torus, values, POINTS, &room.field), NULL);
     CHECK(patina_mask_create(room.torus, bits[1], NULL, POINTS / 8, &room.solid), NULL);
     CHECK(patina_mask_create(room.torus, bits[0], NULL, POINTS / 8, &room.soft), NULL);
     const double eye[3] = {0.2, -4.0, 2.0}, target[3] = {0};
@@ -201,7 +207,7 @@ static void modulate(patina_device *device, const char *name)
     for (uint32_t i = 0; i < POINTS; i++)
         values[i] = 0.45f;
     patina_field *even = NULL;
-    CHECK(patina_field_create(room.torus, values, POINTS, &even), NULL);
+    CHECK(field_of(room.torus, values, POINTS, &even), NULL);
     for (int k = 0; k < 2; k++) {
         patina_cloud_style style = field_style(&room, PATINA_SOFT_EXPRESS), all = style_of(PATINA_SOFT_ALL, PATINA_SOFT_EXPRESS);
         style.field = even;
@@ -233,6 +239,91 @@ static void test_modulation(void **state)
     each_device(modulate);
 }
 
+// Numbers that the library finds are those that a caller would.
+static void test_sources(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"from a point", "from a plane", "from an axis", "luminance", "uncertainty", "any range"};
+    patina_device *device = support_device_first();
+    struct room room = room_make(0.5f);
+    struct points torus = points_torus(POINTS, 1.0, 0.4, POINTS_ALL, 6);
+    float *values = calloc(POINTS, sizeof *values);
+    assert_non_null(values);
+    for (uint32_t k = 0; k < 6; k++) {
+        patina_field_desc desc = {.struct_size = sizeof desc, .range = {0.3, 1.7}};
+        const double at[3] = {0.4, -0.3, 0.2}, twice[16] = {2, 0, 0, 0.1, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1};
+        const double tilted[16] = {3, 0, 0, at[0], 0, 1.2, -1.6, at[1], 0, 1.6, 1.2, at[2], 0, 0, 0, 1}; // z of 2 along (0, -0.8, 0.6)
+        patina_field *found = NULL, *given = NULL;
+        desc.source = k < 3 ? PATINA_FIELD_DISTANCE : k == 3 ? PATINA_FIELD_LUMINANCE : k == 4 ? PATINA_FIELD_UNCERTAINTY : PATINA_FIELD_VALUES;
+        desc.shape = k < 3 ? k : 0;
+        memcpy(desc.world_from_object, twice, sizeof twice);
+        memcpy(desc.world_from_shape, tilted, sizeof tilted);
+        desc.invert = k == 1;
+        if (k > 2)
+            desc.range[0] = desc.range[1] = 0.0;
+        const patina_neighbourhoods walk = {.struct_size = sizeof walk, .neighbours = 16, .uncertainty = values};
+        if (k == 4)
+            CHECK(patina_cloud_neighbourhoods(room.torus, &walk, NULL), NULL);
+        for (uint32_t i = 0; i < POINTS; i++) {
+            double off[3], square = 0.0;
+            for (int c = 0; c < 3; c++) {
+                off[c] = 2.0 * (double)torus.position[3 * i + c] + (c == 0 ? 0.1 : 0.0) - at[c];
+                square += off[c] * off[c];
+            }
+            const double along = -0.8 * off[1] + 0.6 * off[2];
+            const double number = k == 0 ? sqrt(square) : k == 1 ? along : sqrt(fmax(square - along * along, 0.0));
+            const uint8_t *color = torus.color + 3 * i;
+            values[i] = k == 1   ? (float)(1.0 - (number - 0.3) / 1.4)
+                        : k < 3  ? (float)((number - 0.3) / 1.4)
+                        : k == 3 ? (float)((0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]) / 255.0)
+                        : k == 4 ? values[i]
+                                 : (float)i / POINTS;
+        }
+        float *wide = malloc(POINTS * sizeof *wide);
+        assert_non_null(wide);
+        for (uint32_t i = 0; i < POINTS; i++) // 1 of a hundred lies beyond either end
+            wide[i] = k == 5 ? 500.0f - 1000.0f * (values[i] * 0.98f + 0.01f) : 0.0f;
+        if (k == 5) {
+            desc.values = wide;
+            desc.count = POINTS;
+            for (uint32_t i = 0; i < POINTS; i++)
+                values[i] = 1.0f - values[i];
+        }
+        CHECK(patina_field_create(room.torus, &desc, NULL, &found), NULL);
+        CHECK(field_of(room.torus, values, POINTS, &given), NULL);
+        patina_cloud_style style = field_style(&room, PATINA_SOFT_EXPRESS);
+        style.soft_threshold = k == 4 ? 0.5f : 0.437f;
+        style.field = found;
+        struct picture got = draw(device, &room, &style, NULL);
+        style.field = given;
+        struct picture expected = draw(device, &room, &style, NULL);
+        style.soft_threshold = k == 4 ? 0.9f : 0.55f;
+        struct picture other = draw(device, &room, &style, NULL);
+        const uint32_t wrong = differing(&got, &expected), moved = differing(&got, &other);
+        printf("  %s: %u pixels differ from the caller's field, %u from another threshold's\n", names[k], wrong, moved);
+        assert_true(moved > 40 && wrong <= (k == 5 ? moved / 4 : 0)); // the range's ends are a sample's
+        picture_free(&got);
+        picture_free(&expected);
+        picture_free(&other);
+        patina_field_destroy(found);
+        patina_field_destroy(given);
+        free(wide);
+    }
+    patina_field_desc desc = {.struct_size = sizeof desc, .source = PATINA_FIELD_SCALAR};
+    patina_field *none = NULL;
+    assert_int_equal(patina_field_create(room.torus, &desc, NULL, &none), PATINA_ERROR_EMPTY);
+    desc.source = PATINA_FIELD_CLASSES;
+    assert_int_equal(patina_field_create(room.torus, &desc, NULL, &none), PATINA_ERROR_EMPTY);
+    desc.source = PATINA_FIELD_DISTANCE;
+    desc.world_from_shape[15] = 1.0;
+    desc.shape = PATINA_FIELD_FROM_PLANE;
+    assert_int_equal(patina_field_create(room.torus, &desc, NULL, &none), PATINA_ERROR_ARGUMENT);
+    free(values);
+    points_free(&torus);
+    room_free(&room);
+    patina_device_destroy(device);
+}
+
 static void refuse(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style, const char *word)
 {
     assert_int_equal(patina_scene_add_cloud(scene, cloud, style), PATINA_ERROR_ARGUMENT);
@@ -255,8 +346,8 @@ static void test_refusals(void **state)
     }
     patina_field *field = NULL;
     float value = 0.5f;
-    assert_int_equal(patina_field_create(room.torus, &value, 1, &field), PATINA_ERROR_ARGUMENT);
-    assert_int_equal(patina_field_create(room.torus, NULL, POINTS, &field), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(field_of(room.torus, &value, 1, &field), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(field_of(room.torus, NULL, POINTS, &field), PATINA_ERROR_ARGUMENT);
     assert_null(field);
     patina_scene_destroy(scene);
     room_free(&room);
@@ -266,7 +357,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_divide), cmocka_unit_test(test_threshold), cmocka_unit_test(test_modulation), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_divide), cmocka_unit_test(test_threshold), cmocka_unit_test(test_modulation), cmocka_unit_test(test_sources),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

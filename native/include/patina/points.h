@@ -39,10 +39,40 @@ PATINA_API void patina_grade_destroy(patina_grade *grade);
 
 // ---- fields: which points are soft ---------------------------------------------------------------------------------
 
-// A number of 0 to 1 for each point of a cloud, in the given order, `count` of them as patina_cloud_info has it; kept in 65536 steps,
-// what lies beyond as the nearer end, NaN as 0. Copied; 2 bytes a point, and 4 on a device. Given to scenes by style.field, which has
-// the threshold: one field serves any. It never changes: after an edit make another. Any number of fields of one cloud.
-PATINA_API int patina_field_create(const patina_cloud *cloud, const float *values, uint64_t count, patina_field **out);
+enum patina_field_source { // of a point's number
+    PATINA_FIELD_VALUES = 0,      // desc.values
+    PATINA_FIELD_SCALAR = 1,      // the cloud's scalar
+    PATINA_FIELD_LUMINANCE = 2,   // of its colour, 0..1 as a screen shows it
+    PATINA_FIELD_CLASSES = 3,     // 1 of classes that desc.classes names, else 0
+    PATINA_FIELD_DISTANCE = 4,    // from desc.shape, world units
+    PATINA_FIELD_UNCERTAINTY = 5, // [S Eq. 21] of its 16 nearest, 0..1; takes as long as an analysis
+    PATINA_FIELD_DENSITY = 6,     // points per area of the object, where the point lies
+};
+enum patina_field_shape { // of world_from_shape
+    PATINA_FIELD_FROM_POINT = 0, // its origin
+    PATINA_FIELD_FROM_PLANE = 1, // x and y through its origin; below it negative
+    PATINA_FIELD_FROM_AXIS = 2,  // z through its origin
+};
+
+typedef struct patina_field_desc {
+    size_t struct_size;
+    uint32_t source;         // patina_field_source
+    uint32_t shape;          // patina_field_shape, for DISTANCE
+    uint64_t count;          // of values: patina_cloud_info.count
+    const float *values;     // in the given order
+    double range[2];         // numbers that become 0 and 1, straight between; the first may be the greater. Equal: 0 and 1 where all
+                             // lie within, else what one point of a hundred lies below, and above
+    uint32_t classes[8];     // bits as in patina_cloud_info.class_bits
+    uint32_t invert;         // 1 = 1 becomes 0, and the reverse; NaN stays 0
+    uint32_t unused;         // says nothing
+    double world_from_object[16], world_from_shape[16]; // row-major; all zero = identity
+} patina_field_desc;
+
+// A number of 0 to 1 for each point of a cloud, in 65536 steps; what lies beyond the range is its nearer end, NaN 0. 2 bytes a point,
+// and 4 on a device. Given to scenes by style.field, which has the threshold: one field serves any. It never changes: after an edit
+// make another. Any number of fields of one cloud. PATINA_ERROR_EMPTY where the cloud has no such numbers. progress: may be NULL, ends
+// UNCERTAINTY early.
+PATINA_API int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc, patina_progress *progress, patina_field **out);
 PATINA_API void patina_field_destroy(patina_field *field);
 
 // ---- picking: which points lie in an outline on the picture ---------------------------------------------------------

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an object says of soft points → fields of patina_cloud_style, and the field that divides its points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from .. import native
+from ..native.points import Field
+from ..properties import enum_number
+from .camera import row_major
+from .colors import class_bits
+from .edits import keep
+
+OFF, ALL, FIELD = 0, 1, 2  # patina_soft
+_EMPTY = 'EMPTY'
+_MISSING = {'ATTRIBUTE': "attribute '{name}'", 'LUMINANCE': "colors", 'CLASSES': "classes"}
+Desc = tuple[tuple[str, Any], ...]  # of patina_field_desc
+
+
+@dataclass(frozen=True)
+class Soft:
+    """What a picture needs to know of one object's soft points; cheap to compare."""
+
+    by: str
+    name: str  # of the attribute
+    style: tuple[tuple[str, Any], ...]  # of patina_cloud_style
+    desc: Desc = ()
+
+    def missing(self, cloud: native.Cloud) -> str:
+        """What the cloud lacks for it, for the artist; "": nothing."""
+        lacks = {'ATTRIBUTE': cloud.numbers is None and not cloud.has_scalars, 'LUMINANCE': not cloud.has_colors,
+                 'CLASSES': not cloud.has_classes}
+        return _MISSING[self.by].format(name=self.name) if lacks.get(self.by) else ""
+
+
+def attribute_name(obj: bpy.types.Object) -> str:
+    """Whose numbers points are soft by; empty: of none."""
+    group = obj.patina.soft
+    return group.attribute if group.use and group.by == 'ATTRIBUTE' else ""
+
+
+def soft_of(obj: bpy.types.Object, matrix: Matrix, scene: bpy.types.Scene) -> Soft | None:
+    """Of an evaluated object, which lies at matrix in an evaluated scene; None: its points are surface."""
+    group = obj.patina.soft
+    if not group.use:
+        return None
+    style = {
+        "soft": ALL if group.by == 'ALL' else FIELD,
+        "soft_model": enum_number(scene.patina, "soft_model"),
+        "soft_radius": group.radius if group.use_radius else 0.0,
+        "soft_opacity": group.opacity,
+        "soft_modulation": group.transition,
+    }
+    if group.by == 'ALL':
+        return Soft(group.by, "", tuple(style.items()))
+    style["soft_threshold"] = group.threshold
+    desc: dict[str, Any] = {"source": enum_number(group, "by")}
+    if group.by == 'CLASSES':
+        desc["classes"] = class_bits(group.classes)
+    if group.by == 'DISTANCE':
+        target = group.target or scene.camera
+        desc["shape"] = enum_number(group, "shape")
+        desc["world_from_object"] = row_major(matrix)
+        desc["world_from_shape"] = row_major(target.matrix_world if target else Matrix())
+    if group.use_range:
+        desc["range"] = (group.range_min, group.range_max)
+    return Soft(group.by, group.attribute, tuple(style.items()), (*desc.items(), ("invert", group.invert)))
+
+
+def field_of(cloud: native.Cloud, soft: Soft) -> Field | None:
+    """Any thread. None where all points are soft."""
+    if soft.by == 'ALL':
+        return None
+    desc = dict(soft.desc)
+    values = cloud.numbers if soft.by == 'ATTRIBUTE' else None
+    return keep(cloud, ("field", soft.desc, id(values)), lambda: _make(cloud, values, **desc))
+
+
+def _make(cloud: native.Cloud, values: np.ndarray | None, **desc: Any) -> Field:
+    return Field(cloud, values, **desc | ({"source": 0} if values is not None else {}))

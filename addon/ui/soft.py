@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel of an object's soft points."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.types import Context, Panel
+
+from .colors import ColorPanel
+
+
+class PATINA_PT_soft(ColorPanel, Panel):
+    bl_label = "Soft Points"
+    bl_options = {'DEFAULT_CLOSED'}
+    bl_order = 1
+
+    def draw_header(self, context: Context) -> None:
+        self.layout.prop(context.object.patina.soft, "use", text="")
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        obj = context.object
+        group = obj.patina.soft
+        layout.active = group.use
+        layout.prop(group, "by")
+        if group.by == 'ATTRIBUTE':
+            layout.prop(group, "attribute")
+            clash = obj.patina.linked_file and obj.patina.colors.source == 'SCALAR' and obj.patina.colors.scalar != group.attribute
+            if clash:
+                layout.label(text="A linked file gives one column: the color ramp's", icon='INFO')
+        if group.by == 'CLASSES':
+            layout.prop(group, "classes")
+        if group.by == 'DISTANCE':
+            layout.prop(group, "target")
+            layout.prop(group, "shape")
+        if group.by != 'ALL':
+            self._draw_threshold(group)
+        layout.prop(group, "transition")
+        layout.prop(group, "opacity")
+        row = layout.row(heading="Radius")
+        row.prop(group, "use_radius", text="")
+        row = row.row()
+        row.active = group.use_radius
+        row.prop(group, "radius", text="")
+        layout.prop(context.scene.patina, "soft_model")
+
+    def _draw_threshold(self, group: bpy.types.PropertyGroup) -> None:
+        layout = self.layout
+        if group.by not in {'CLASSES', 'LUMINANCE'}:
+            column = layout.column(align=True)
+            column.prop(group, "use_range")
+            if group.use_range:
+                column.prop(group, "range_min")
+                column.prop(group, "range_max")
+        layout.prop(group, "invert")
+        layout.prop(group, "threshold")
+
+
+register, unregister = bpy.utils.register_classes_factory((PATINA_PT_soft,))

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Soft points: by every source, what is soft lets the background through and the rest does not; own objects, linked files, viewport."""
+
+import bpy
+import numpy as np
+from check_points import pixel
+from harness import SCRATCH, add_points, check, new_scene, patina, render, reports
+
+COUNT = 9
+
+
+def row(colors=None):
+    """(scene, object, points): a row of points at z = -3, from left to right."""
+    scene = new_scene()
+    points = np.array([((k - 4) * 0.2, 0.0, -3.0) for k in range(COUNT)])
+    if colors is None:
+        colors = np.tile(np.array((200, 60, 60, 255), np.uint8), (COUNT, 1))
+    obj = add_points(points, colors)
+    obj.patina.soft.use = True
+    obj.patina.soft.use_radius = True
+    obj.patina.soft.radius = 0.08
+    return scene, obj, points
+
+
+def soft(scene, points):
+    """Which of the points are soft: half of the background comes through them."""
+    alpha = render()["Combined"][..., 3]
+    at = [float(alpha[pixel(scene, point)]) for point in points]
+    check(all(value > 0.999 or 0.2 < value < 0.8 for value in at), f"neither surface nor soft: {at}")
+    return [k for k, value in enumerate(at) if value < 0.9]
+
+
+def by(obj, source, **values):
+    obj.patina.soft.by = source
+    for name, value in values.items():
+        setattr(obj.patina.soft, name, value)
+    obj.update_tag()
+
+
+def test_all():
+    scene, obj, points = row()
+    check(soft(scene, points) == list(range(COUNT)), "every point is soft")
+    opacity = {}
+    for model in ('BASE', 'CONCENTRIC', 'EXPRESS'):
+        scene.patina.soft_model = model
+        opacity[model] = render()["Combined"][..., 3].sum()
+    check(len({round(float(value), 3) for value in opacity.values()}) == 3, f"three models: {opacity}")
+    faint = opacity['EXPRESS']
+    obj.patina.soft.opacity = 0.9
+    check(render()["Combined"][..., 3].sum() > 1.5 * faint, "opacity")
+    obj.patina.soft.use = False
+    alpha = render()["Combined"][..., 3]
+    check(set(np.unique(alpha)) <= {0.0, 1.0}, "off: surface")
+
+
+def test_attribute():
+    scene, obj, points = row()
+    values = np.linspace(10.0, 90.0, COUNT).astype(np.float32)
+    obj.data.attributes.new("score", 'FLOAT', 'POINT').data.foreach_set("value", values)
+    by(obj, 'ATTRIBUTE', attribute="score", threshold=0.6)
+    check(soft(scene, points) == [5, 6, 7, 8], "from the least to the greatest")
+    by(obj, 'ATTRIBUTE', invert=True)
+    check(soft(scene, points) == [0, 1, 2, 3], "inverted")  # 1 - F > 0.6
+    by(obj, 'ATTRIBUTE', invert=False, use_range=True, range_min=0.0, range_max=100.0, threshold=0.75)
+    check(soft(scene, points) == [7, 8], "by a range")
+    obj.data.attributes["score"].data.foreach_set("value", values[::-1])
+    obj.data.update()
+    check(soft(scene, points) == [0, 1], "numbers that changed")
+    by(obj, 'ATTRIBUTE', attribute="nowhere")
+    reports.clear()
+    check(soft(scene, points) == [], "an attribute that is missing: surface")
+    check(any("'nowhere' to be soft by" in text for _, text in reports), f"said so: {reports}")
+
+
+def test_weights():
+    scene, obj, points = row()
+    group = obj.vertex_groups.new(name="faint")
+    group.add([2, 3], 0.9, 'REPLACE')
+    group.add([4], 0.3, 'REPLACE')
+    by(obj, 'ATTRIBUTE', attribute="faint")
+    check(soft(scene, points) == [2, 3], "painted weights")
+    group.add([4], 1.0, 'REPLACE')
+    obj.data.update()
+    check(soft(scene, points) == [2, 3, 4], "painted on")
+
+
+def test_colors_and_classes():
+    grey = np.array([[20 + 28 * k] * 3 + [255] for k in range(COUNT)], np.uint8)
+    scene, obj, points = row(grey)
+    by(obj, 'LUMINANCE', threshold=0.5)
+    check(soft(scene, points) == [4, 5, 6, 7, 8], "bright points")
+    obj.data.attributes.new("classification", 'INT', 'POINT').data.foreach_set("value", np.array([2, 3, 4, 5, 6, 2, 3, 64, 9], np.int32))
+    obj.data.update()
+    by(obj, 'CLASSES', classes="3-4, 64")
+    check(soft(scene, points) == [1, 2, 6, 7], "classes")
+    obj.data.attributes.remove(obj.data.attributes["classification"])
+    obj.data.update()
+    reports.clear()
+    check(soft(scene, points) == [], "no classes: surface")
+    check(any("has no classes to be soft by" in text for _, text in reports), f"said so: {reports}")
+
+
+def test_distance():
+    scene, obj, points = row()
+    target = bpy.data.objects.new("target", None)
+    target.location = (-0.8, 0.0, -3.0)
+    scene.collection.objects.link(target)
+    by(obj, 'DISTANCE', target=target, use_range=True, range_min=0.0, range_max=1.0, threshold=0.5)
+    check(soft(scene, points) == [3, 4, 5, 6, 7, 8], "far from an object")
+    target.location.x = 0.8
+    check(soft(scene, points) == [0, 1, 2, 3, 4, 5], "that moved")
+    target.rotation_euler = (0.0, 1.5707963, 0.0)  # its z along x
+    by(obj, 'DISTANCE', shape='PLANE', range_min=-1.5, range_max=0.5)
+    check(soft(scene, points) == [6, 7, 8], "beyond a plane")  # x - 0.8 > -0.5
+    by(obj, 'DISTANCE', shape='AXIS', range_min=0.0, range_max=1.0)
+    check(soft(scene, points) == [], "on an axis")
+
+
+def test_found():
+    """By what the library finds of the points: density halves the row; uncertainty takes any cloud with normals."""
+    scene = new_scene()
+    rng = np.random.default_rng(3)
+    dense, wide = rng.uniform((-1, -0.6), (0, 0.6), (6000, 2)), rng.uniform((0, -0.6), (1, 0.6), (1500, 2))
+    points = np.c_[np.r_[dense, wide], np.full(7500, -3.0)]
+    obj = add_points(points, normals=np.tile((0.0, 0.0, 1.0), (7500, 1)))
+    obj.patina.soft.use = True
+    by(obj, 'DENSITY', opacity=0.1)
+    scene.patina.fill = 'CLOSED'
+    alpha = render()["Combined"][..., 3]
+    left, right = alpha[16:32, 14:28].mean(), alpha[16:32, 36:50].mean()
+    check(left < 0.9 < 0.99 < right, f"what lies dense is soft: {left}, {right}")
+    by(obj, 'UNCERTAINTY', threshold=1.0)
+    check(render()["Combined"][20:28, 16:48, 3].mean() > 0.99, "no more than wholly uncertain")
+
+
+def test_linked():
+    scene, obj, points = row()
+    path = SCRATCH / "soft.xyz"
+    path.write_text("//X Y Z Intensity\n" + "".join(f"{x:.6g} {y:.6g} {z:.6g} {k * 10}\n" for k, (x, y, z) in enumerate(points)))
+    bpy.data.objects.remove(obj)
+    box = bpy.data.objects.new("linked", bpy.data.meshes.new("box"))
+    scene.collection.objects.link(box)
+    box.patina.linked_file = str(path)
+    group = box.patina.soft
+    group.use = group.use_radius = True
+    group.radius = 0.08
+    origin = np.array(box.get("patina_origin", (0.0, 0.0, 0.0)), float) if "patina_origin" in box else np.zeros(3)
+    file = patina.native.File(str(path))
+    place = np.array(file.positions(), float) + np.array(file.origin) - origin
+    name = file.attributes[0]
+    check(soft(scene, place) == list(range(COUNT)), "a linked cloud, all of it")
+    by(box, 'ATTRIBUTE', attribute=name, use_range=True, range_min=0.0, range_max=80.0, threshold=0.55)
+    check(soft(scene, place) == [5, 6, 7, 8], "by a column of its file")
+    by(box, 'DISTANCE', range_min=2.9, range_max=3.1, threshold=0.5)  # from the camera
+    check(soft(scene, place) == [0, 1, 2, 6, 7, 8] or soft(scene, place) == [0, 8, 1, 7], f"by distance: {soft(scene, place)}")
+
+
+def test_panel_draws():
+    scene, obj, points = row()
+    bpy.context.view_layer.objects.active = obj
+    check(hasattr(bpy.types, "PATINA_PT_soft") and bpy.types.PATINA_PT_soft.poll(bpy.context), "the panel is there")
