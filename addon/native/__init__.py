@@ -169,7 +169,8 @@ class Cloud(_Handle):
 
     # Of a linked one of several scans: where a uint16 for each point says which it is of, the attribute that named them, and as what.
     scan_file: Path | None = None
-    numbers: np.ndarray | None = None  # (count,) that points may be soft by, in the given order; whoever reads the points sets them
+    numbers: np.ndarray | None = None  # (count,) that points may be soft by, in the given order; whoever reads the points sets them, and
+    numbers_stamp = 0  # counts how often they changed
     scan_name: str = ""
     scan_numbers: tuple[int, ...] = ()
 

@@ -243,9 +243,10 @@ class CloudCache:
 
 
 def _set_numbers(cloud: native.Cloud, arrays: PointArrays) -> None:
-    """The same array stays where nothing changed: fields are kept by it."""
-    if arrays.numbers is None or cloud.numbers is None or not np.array_equal(arrays.numbers, cloud.numbers, equal_nan=True):
+    """Where they changed: fields are kept by their stamp."""
+    if (arrays.numbers is None) != (cloud.numbers is None) or arrays.numbers is not None and not np.array_equal(arrays.numbers, cloud.numbers, equal_nan=True):
         cloud.numbers = arrays.numbers
+        cloud.numbers_stamp += 1
 
 
 CACHE = CloudCache()

@@ -18,7 +18,6 @@ from .colors import class_bits
 from .edits import keep
 
 OFF, ALL, FIELD = 0, 1, 2  # patina_soft
-_EMPTY = 'EMPTY'
 _MISSING = {'ATTRIBUTE': "attribute '{name}'", 'LUMINANCE': "colors", 'CLASSES': "classes"}
 Desc = tuple[tuple[str, Any], ...]  # of patina_field_desc
 
@@ -79,7 +78,7 @@ def field_of(cloud: native.Cloud, soft: Soft) -> Field | None:
         return None
     desc = dict(soft.desc)
     values = cloud.numbers if soft.by == 'ATTRIBUTE' else None
-    return keep(cloud, ("field", soft.desc, id(values)), lambda: _make(cloud, values, **desc))
+    return keep(cloud, ("field", soft.desc, cloud.numbers_stamp), lambda: _make(cloud, values, **desc))
 
 
 def _make(cloud: native.Cloud, values: np.ndarray | None, **desc: Any) -> Field:
