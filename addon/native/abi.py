@@ -22,14 +22,12 @@ ERROR = {"OK": 0, "ERROR_ARGUMENT": -1, "ERROR_MEMORY": -2, "ERROR_FILE": -3, "E
          "ERROR_DEVICE": -6, "ERROR_CANCELLED": -7, "ERROR_TOO_MANY_POINTS": -8, "ERROR_EMPTY": -9, "ERROR_INTERNAL": -10}
 TYPE = {"NONE": 0, "FLOAT32": 1, "FLOAT64": 2, "UINT8": 3, "UINT16": 4, "UINT32": 5, "INT8": 6, "INT16": 7, "INT32": 8}
 KIND = {"UNKNOWN": 0, "SURFACE": 1, "BORDER": 2, "LINE": 3, "VOLUME": 4, "STRAY": 5}
-WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
 LIGHTING = {"AUTO": 0, "UNLIT": 1, "LIT": 2}
 COLOR_SOURCE = {"OWN": 0, "FIXED": 1, "SCALAR": 2, "HEIGHT": 3, "OBJECT_HEIGHT": 4, "DISTANCE": 5}
 FREE_SPACE = {"OFF": 0, "SHOW": 1, "USE": 2}
 SOFT = {"OFF": 0, "ALL": 1, "FIELD": 2}
 SOFT_MODEL = {"BASE": 0, "CONCENTRIC": 1, "EXPRESS": 2}
 SHADOW_OFF = {"NO_CAST": 1, "NO_RECEIVE": 2, "NO_SELF": 4}
-ALPHA = {"NONE": 0, "CLIP": 1, "BLEND": 2}
 CLIP_SHAPE = {"BOX": 0, "PLANE": 1}
 LIGHT_TYPE = {"SUN": 1, "POINT": 2, "SPOT": 3, "AREA": 4}
 AREA_SHAPE = {"RECTANGLE": 0, "ELLIPSE": 1}
@@ -42,6 +40,8 @@ ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
 EFFECT_CHOICE = {"NO_CHOICE": 0, "CONTOUR_HEIGHT": 0, "CONTOUR_PLANE": 1}
 LINE_SOURCE = {"FIXED": 0, "POINT": 1, "DEPTH": 2}
 LINE_SURFACE = {"SHOWN": 0, "PAPER": 1, "NONE": 2}
+WRAP = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2}
+ALPHA = {"NONE": 0, "CLIP": 1, "BLEND": 2}
 FIELD_SOURCE = {"VALUES": 0, "SCALAR": 1, "LUMINANCE": 2, "CLASSES": 3, "DISTANCE": 4, "UNCERTAINTY": 5, "DENSITY": 6}
 FIELD_SHAPE = {"FROM_POINT": 0, "FROM_PLANE": 1, "FROM_AXIS": 2}
 
@@ -102,21 +102,6 @@ class Neighbourhoods(Descriptor):
                 ("distances", c_void_p), ("soft_radius", c_void_p), ("uncertainty", c_void_p)]
 
 
-class MeshDesc(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", Array), ("normal", Array),
-                ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p), ("uv", Array)]
-
-
-class MeshInfo(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("triangle_count", c_uint64), ("bytes", c_uint64),
-                ("box_min", c_double * 3), ("box_max", c_double * 3)]
-
-
-class TextureDesc(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("pixels", Array), ("raw", c_uint32),
-                ("nearest", c_uint32), ("wrap", c_uint32)]
-
-
 class FileInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
@@ -144,12 +129,6 @@ class CloudStyle(Descriptor):
                 ("grade", c_void_p), ("exact", c_uint32), ("was_padding", c_uint32), ("soft", c_uint32),
                 ("soft_model", c_uint32), ("soft_shells", c_uint32), ("soft_radius", c_float), ("soft_opacity", c_float),
                 ("soft_modulation", c_float), ("field", c_void_p), ("soft_threshold", c_float), ("soft_unused", c_float)]
-
-
-class MeshStyle(Descriptor):
-    _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("color", c_float * 3),
-                ("shadow_off", c_uint32), ("unlit", c_uint32), ("texture", c_void_p), ("alpha", c_uint32),
-                ("alpha_least", c_float), ("exact", c_uint32)]
 
 
 class Clip(Descriptor):
@@ -223,8 +202,25 @@ class Panorama(Descriptor):
                 ("near_clip", c_double), ("far_clip", c_double)]
 
 
-class Read(Structure):
-    _fields_ = [("pass_", c_uint32), ("pixels", c_void_p), ("size", c_size_t)]
+class MeshDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("position", Array), ("normal", Array),
+                ("color", Array), ("triangle_count", c_uint64), ("indices", c_void_p), ("uv", Array)]
+
+
+class MeshInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("vertex_count", c_uint64), ("triangle_count", c_uint64), ("bytes", c_uint64),
+                ("box_min", c_double * 3), ("box_max", c_double * 3)]
+
+
+class TextureDesc(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("width", c_uint32), ("height", c_uint32), ("pixels", Array), ("raw", c_uint32),
+                ("nearest", c_uint32), ("wrap", c_uint32)]
+
+
+class MeshStyle(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("world_from_object", c_double * 16), ("color", c_float * 3),
+                ("shadow_off", c_uint32), ("unlit", c_uint32), ("texture", c_void_p), ("alpha", c_uint32),
+                ("alpha_least", c_float), ("exact", c_uint32)]
 
 
 class ScanGrade(Structure):
@@ -240,6 +236,10 @@ class FieldDesc(Descriptor):
 class Pick(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("instance", c_uint32), ("polygon", c_void_p), ("corners", c_uint32),
                 ("classes", c_uint32 * 8), ("threads", c_uint32)]
+
+
+class Read(Structure):
+    _fields_ = [("pass_", c_uint32), ("pixels", c_void_p), ("size", c_size_t)]
 
 
 # name → types of arguments; what returns anything but int stands in RESULTS
@@ -267,11 +267,6 @@ CALLS = {
     "patina_cloud_open": (c_char_p, POINTER(c_void_p)),
     "patina_cloud_verify": (c_char_p, c_void_p),
     "patina_cloud_get_info": (c_void_p, POINTER(CloudInfo)),
-    "patina_mesh_create": (POINTER(MeshDesc), POINTER(c_void_p)),
-    "patina_mesh_destroy": (c_void_p,),
-    "patina_mesh_get_info": (c_void_p, POINTER(MeshInfo)),
-    "patina_texture_create": (POINTER(TextureDesc), POINTER(c_void_p)),
-    "patina_texture_destroy": (c_void_p,),
     "patina_file_open": (c_char_p, c_void_p, POINTER(c_void_p)),
     "patina_file_open_memory": (c_void_p, c_size_t, POINTER(c_void_p)),
     "patina_file_destroy": (c_void_p,),
@@ -292,7 +287,6 @@ CALLS = {
     "patina_scene_destroy": (c_void_p,),
     "patina_scene_clear": (c_void_p,),
     "patina_scene_add_cloud": (c_void_p, c_void_p, POINTER(CloudStyle)),
-    "patina_scene_add_mesh": (c_void_p, c_void_p, POINTER(MeshStyle)),
     "patina_scene_add_clip": (c_void_p, POINTER(Clip)),
     "patina_scene_add_light": (c_void_p, POINTER(LightDesc)),
     "patina_scene_set_camera": (c_void_p, POINTER(Camera)),
@@ -321,6 +315,20 @@ CALLS = {
     "patina_panorama_camera": (POINTER(Panorama), c_uint32, POINTER(Camera), c_void_p),
     "patina_panorama_join": (POINTER(Panorama), c_uint32, c_void_p * 6, c_void_p, c_size_t),
     "patina_panorama_join_keys": (POINTER(Panorama), c_void_p * 6, c_void_p, c_size_t),
+    "patina_mesh_create": (POINTER(MeshDesc), POINTER(c_void_p)),
+    "patina_mesh_destroy": (c_void_p,),
+    "patina_mesh_get_info": (c_void_p, POINTER(MeshInfo)),
+    "patina_texture_create": (POINTER(TextureDesc), POINTER(c_void_p)),
+    "patina_texture_destroy": (c_void_p,),
+    "patina_scene_add_mesh": (c_void_p, c_void_p, POINTER(MeshStyle)),
+    "patina_mask_create": (c_void_p, c_void_p, c_void_p, c_size_t, POINTER(c_void_p)),
+    "patina_mask_destroy": (c_void_p,),
+    "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),
+    "patina_grade_destroy": (c_void_p,),
+    "patina_field_create": (c_void_p, POINTER(FieldDesc), c_void_p, POINTER(c_void_p)),
+    "patina_field_destroy": (c_void_p,),
+    "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
+    "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, POINTER(Read), c_uint32, POINTER(c_void_p)),
     "patina_task_refine": (c_void_p, c_void_p, c_double, POINTER(Read), c_uint32, POINTER(c_void_p)),
     "patina_task_build": (POINTER(CloudDesc), c_void_p, POINTER(c_void_p)),
@@ -337,23 +345,15 @@ CALLS = {
     "patina_task_take_cloud": (c_void_p, POINTER(c_void_p)),
     "patina_task_take_file": (c_void_p, POINTER(c_void_p)),
     "patina_task_destroy": (c_void_p,),
-    "patina_mask_create": (c_void_p, c_void_p, c_void_p, c_size_t, POINTER(c_void_p)),
-    "patina_mask_destroy": (c_void_p,),
-    "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),
-    "patina_grade_destroy": (c_void_p,),
-    "patina_field_create": (c_void_p, POINTER(FieldDesc), c_void_p, POINTER(c_void_p)),
-    "patina_field_destroy": (c_void_p,),
-    "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
-    "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),
 }
 RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_message": c_size_t,
            "patina_log_next": c_size_t, "patina_progress_destroy": None, "patina_progress_cancel": None,
            "patina_progress_value": c_float, "patina_device_destroy": None, "patina_cloud_destroy": None,
-           "patina_mesh_destroy": None, "patina_texture_destroy": None, "patina_file_destroy": None,
-           "patina_scene_destroy": None, "patina_frame_destroy": None, "patina_frame_cancel": None,
-           "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t, "patina_frame_plan_text": c_size_t,
-           "patina_task_destroy": None, "patina_mask_destroy": None, "patina_grade_destroy": None,
-           "patina_field_destroy": None}
+           "patina_file_destroy": None, "patina_scene_destroy": None, "patina_frame_destroy": None,
+           "patina_frame_cancel": None, "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t,
+           "patina_frame_plan_text": c_size_t, "patina_mesh_destroy": None, "patina_texture_destroy": None,
+           "patina_mask_destroy": None, "patina_grade_destroy": None, "patina_field_destroy": None,
+           "patina_task_destroy": None}
 
 # effects.def: what Blender shows of each effect, and how
 EFFECTS = (

@@ -287,59 +287,6 @@ PATINA_API int patina_cloud_open(const char *path, patina_cloud **out);
 PATINA_API int patina_cloud_verify(const char *path, patina_progress *progress);
 PATINA_API int patina_cloud_get_info(const patina_cloud *cloud, patina_cloud_info *info);
 
-// ---- mesh: triangles that stand among the points ----------------------------------------------------------------
-
-typedef struct patina_mesh_desc {
-    size_t struct_size;
-    uint64_t vertex_count;
-    patina_array position;   // 3 x FLOAT32 or FLOAT64, object units. A triangle with a NaN/Inf corner is not drawn
-    patina_array normal;     // 3 x FLOAT32/FLOAT64, any length, of every vertex, shared out over the triangle. Optional: without
-                             // it, and where it comes to zero, triangles are lit flat
-    patina_array color;      // 3 or 4 x FLOAT32, linear, of every vertex, shared out likewise. Optional; else the style's
-    uint64_t triangle_count;
-    const uint32_t *indices; // three a triangle, below vertex_count; NULL: vertices 0 1 2, 3 4 5, ...
-    patina_array uv;         // 2 x FLOAT32 or FLOAT64, of every vertex: where on an image it lies, 0..1 from its lower left corner;
-                             // what is not finite is 0. Optional; for the style's texture
-} patina_mesh_desc;
-
-typedef struct patina_mesh_info {
-    size_t struct_size;
-    uint64_t vertex_count, triangle_count;
-    uint64_t bytes;                // of memory held
-    double box_min[3], box_max[3]; // over the vertices that are finite; none: min > max
-} patina_mesh_info;
-
-// A mesh of at most 2^27 vertices and 2^29 triangles. Immutable; used in scenes as a cloud is. Vertices are kept as float32
-// around the middle of their box.
-PATINA_API int patina_mesh_create(const patina_mesh_desc *desc, patina_mesh **out);
-PATINA_API void patina_mesh_destroy(patina_mesh *mesh);
-PATINA_API int patina_mesh_get_info(const patina_mesh *mesh, patina_mesh_info *info);
-
-// ---- texture: an image on a mesh ----------------------------------------------------------------------------------
-
-enum patina_wrap { // beyond the image
-    PATINA_WRAP_REPEAT = 0,
-    PATINA_WRAP_EXTEND = 1, // its border texels
-    PATINA_WRAP_CLIP = 2,   // nothing: black, opacity 0, from half a texel on
-};
-
-typedef struct patina_texture_desc {
-    size_t struct_size;
-    uint32_t width, height; // texels, 1..16384
-    patina_array pixels;    // width * height elements of 3 or 4 x UINT8, UINT16 (0..max) or FLOAT32 (linear, within +-65504), row
-                            // by row from the bottom left. Colour, not multiplied by the 4th component, its opacity (0..1; none: 1).
-                            // Not finite: 0, of opacity 1. UINT8 takes 5.4 bytes a texel, the others 21.4
-    uint32_t raw;           // 1 = integers are linear; 0 = sRGB. Opacity is linear
-    uint32_t nearest;       // 1 = each texel is a square where it is larger than a pixel; 0 = shared out between four
-    uint32_t wrap;          // patina_wrap
-} patina_texture_desc;
-
-// An image of any size, not only powers of two, with box means of it for where it is small on screen: up to eight probes of two of
-// them a pixel, along its longer side, so that oblique faces neither shimmer nor blur. Copied; immutable, so that it may be used
-// by many scenes and threads at once. Any thread may make one.
-PATINA_API int patina_texture_create(const patina_texture_desc *desc, patina_texture **out);
-PATINA_API void patina_texture_destroy(patina_texture *texture); // NULL is fine
-
 // ---- files -----------------------------------------------------------------------------------------------------
 
 typedef struct patina_file_info {
@@ -490,30 +437,6 @@ typedef struct patina_cloud_style {
     {                                                                                                                          \
         .struct_size = sizeof(patina_cloud_style), .color = {0.8f, 0.8f, 0.8f}, .ambient = 1.0f, .diffuse = 1.0f,              \
         .shininess = 32, .contrast = 1.0f, .exact = 1                                                                          \
-    }
-
-enum patina_alpha {
-    PATINA_ALPHA_NONE = 0,  // nothing: all is opaque, its colours times the opacity
-    PATINA_ALPHA_CLIP = 1,  // cuts holes, for light too
-    PATINA_ALPHA_BLEND = 2, // lets through what lies behind: layers are peeled, settings.layers at most. Light is stopped where
-                            // opacity is at least 0.5
-};
-
-typedef struct patina_mesh_style {
-    size_t struct_size;
-    double world_from_object[16]; // row-major; all zero = identity
-    float color[3];               // linear, of meshes without colours; all zero = 0.8 grey, unless exact
-    uint32_t shadow_off;          // bits of patina_shadow_off: NO_CAST, NO_RECEIVE
-    uint32_t unlit;               // 1 = the colour as it is, as if it shone by itself; lights and shadows change nothing
-    const patina_texture *texture; // in place of color and the mesh's colours; the mesh has uv. Outlives the scene or the next
-                                   // patina_scene_clear. NULL = none
-    uint32_t alpha;               // patina_alpha: what the texture's opacity does
-    float alpha_least;            // CLIP: what is less opaque is not there, 0..1; 0 = 0.5
-    uint32_t exact;               // 1 = black is black
-} patina_mesh_style;
-#define PATINA_MESH_STYLE_INIT                                                                                   \
-    {                                                                                                            \
-        .struct_size = sizeof(patina_mesh_style), .color = {0.8f, 0.8f, 0.8f}, .alpha_least = 0.5f, .exact = 1   \
     }
 
 enum patina_clip_shape { PATINA_CLIP_BOX = 0, PATINA_CLIP_PLANE = 1 };
@@ -692,11 +615,6 @@ PATINA_API int patina_scene_clear(patina_scene *scene);    // removes clouds, me
 // The cloud must outlive the scene or the next patina_scene_clear. Instances get ids in order of adding: the base
 // of instance i is the sum of the counts before it.
 PATINA_API int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style);
-// A mesh is opaque but for its texture, seen from both sides, lit by all lights (ambient and diffuse), takes part in every pass,
-// and hides and shadows points and meshes, as points hide and shadow it. Shadows on it are tested for each pixel, anew for every
-// picture; with shadow_error it takes 1 / shadow_error samples, 256 at most. It is drawn exactly: neither filled nor grown. In keys, ids of triangles follow
-// those of all clouds' points, meshes in order of adding. The mesh must outlive the scene or the next patina_scene_clear.
-PATINA_API int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const patina_mesh_style *style);
 // Any number of clips.
 PATINA_API int patina_scene_add_clip(patina_scene *scene, const patina_clip *clip);
 // At most 32 lights.
@@ -858,55 +776,12 @@ PATINA_API int patina_panorama_join(const patina_panorama *panorama, uint32_t pa
 PATINA_API int patina_panorama_join_keys(const patina_panorama *panorama, const uint64_t *const faces[6], uint64_t *keys,
                                          size_t size);
 
-// ---- tasks: long calls that return at once and run on a thread of their own ------------------------------------------
-
-// Each starts one call. Handles and arrays that it is given must stay until the task is done; descriptors are copied. Stop
-// it with patina_frame_cancel or patina_progress_cancel.
-
-// A pass that a task reads once its picture is done: the arguments of patina_frame_read.
-typedef struct patina_read {
-    uint32_t pass;
-    float *pixels;
-    size_t size;
-} patina_read;
-
-// patina_frame_render, then patina_frame_read of each of `count` reads, which must stay like other arrays; 0: none.
-PATINA_API int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
-                                  patina_task **out);
-// The same of patina_frame_refine.
-PATINA_API int patina_task_refine(patina_frame *frame, const patina_scene *scene, double ms, const patina_read *reads, uint32_t count,
-                                  patina_task **out);
-PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress,
-                                 patina_task **out); // patina_cloud_create
-PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
-                                      patina_task **out); // patina_cloud_set_colors
-// patina_cloud_analyse beside frames: the cloud stays as it is, and may be drawn, until patina_task_apply takes what was found;
-// no frame may be rendering it then. stations and station must live until the task is done.
-PATINA_API int patina_task_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress,
-                                   patina_task **out);
-PATINA_API int patina_task_apply(patina_task *task); // waits; PATINA_ERROR_EMPTY the second time or for other tasks
-// Two numbers that tell whether points changed: of count, positions, normals, opacities, radii and classes; of count, colours
-// and scalars. Not
-// against forgery. Arrays must be tightly packed (stride 0), else the task fails with PATINA_ERROR_ARGUMENT. `values` are
-// written once the task is done. About as fast as memory is read.
-PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);
-PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals,
-                                        patina_task **out); // patina_grid_normals
-PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
-PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
-PATINA_API int patina_task_verify(const char *path, patina_progress *progress, patina_task **out);    // patina_cloud_verify
-PATINA_API int patina_task_done(const patina_task *task); // 1 when the call has ended; does not block
-// Waits for the end and returns what the call returned; its message is at the task.
-PATINA_API int patina_task_wait(patina_task *task);
-// Waits, and gives ownership of the cloud that patina_task_build made; PATINA_ERROR_EMPTY the second time or without one.
-PATINA_API int patina_task_take_cloud(patina_task *task, patina_cloud **out);
-// The same for the file that patina_task_open_file opened.
-PATINA_API int patina_task_take_file(patina_task *task, patina_file **out);
-PATINA_API void patina_task_destroy(patina_task *task); // waits; a cloud or file that was not taken goes too
-
 #ifdef __cplusplus
 }
 #endif
 
+// The rest of the manual, which this header includes.
+#include "meshes.h"
 #include "points.h"
+#include "tasks.h"
 #endif
