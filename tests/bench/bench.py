@@ -137,19 +137,20 @@ def chosen(options: argparse.Namespace) -> list[dict[str, Any]]:
 
 
 def independent(device: str, quick: bool) -> list[dict[str, Any]]:
-    """The shapes that no rule was made on, by density: analysed, averaged, with 16 samples, and as discs; on two of them noise,
-    strays and scan rows of 1 : 10. The sphere turns. Ten minutes, half of them for the exact pictures where these are not kept."""
+    """The shapes that no rule was made on, by density: analysed, averaged, with 16 samples, and as discs, not analysed and
+    analysed; on two of them noise, strays and scan rows of 1 : 10. The sphere turns. Ten minutes, half of them for the exact
+    pictures where these are not kept."""
     cases = []
     shapes = ["sphere", *stage.scenes.SHAPES][: 2 if quick else None]
     for surface in shapes:
         for density in [1.0] if quick else [0.2, 1.0, 4.0] + [16.0] * (surface == "sphere"):
             cases += [case_of("independent", surface, device, 256, density=density, quality=quality, frames=3,
                               steady=int(surface == "sphere"))
-                      for quality in ("analysed", "averaged", "final", "splats")]
+                      for quality in ("analysed", "averaged", "final", "splats", "known discs")]
     for more in ({"noise": 1.0}, {"strays": 0.001}, {"pattern": "rows"}):
         for surface in ("knot",) if quick else ("sphere", "knot"):
             cases += [case_of("independent", surface, device, 256, density=density, quality=quality, frames=3, **more)
-                      for density in (1.0, 4.0) for quality in ("analysed", "splats")]
+                      for density in (1.0, 4.0) for quality in ("analysed", "splats", "known discs")]
     return cases
 
 

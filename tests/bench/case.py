@@ -29,6 +29,7 @@ QUALITIES = {"refined": {"quality": 0, "fill": 0}, "paper": {"quality": 1, "fill
              "unfilled": {"quality": 1, "fill": 2}, "splats": {"surface": 1},
              "analysed": {},  # the default once the library knows what every point is
              "averaged": {"average": 1},  # the same, means of the points about a surface
+             "known discs": {"surface": 1, "depth": 1},  # the same as discs, their depth of the surface
              "final": {"pixel_samples": 16, "depth": 1}}  # the same, for final pictures
 LAYERS = 8  # rays through the nested tori meet up to eight surfaces
 COLOR_AND_DEPTH, ALL_PASSES = 3, 0  # patina_settings.passes
@@ -169,7 +170,7 @@ def measure(case: dict[str, Any]) -> dict[str, Any]:
         cloud = native.Cloud(shown.position, shown.normal, shown.color, opacities=shown.opacity)
         upload_ms.append(1e3 * (time.perf_counter() - start))
     start = time.perf_counter()
-    if case["quality"] in ("analysed", "averaged", "final"):
+    if case["quality"] in ("analysed", "averaged", "known discs", "final"):
         cloud.analyse()
     analysis_ms = 1e3 * (time.perf_counter() - start)
     spacing, count, scene_known = shown.spacing, len(shown.position), shown.scene is not None

@@ -15,7 +15,8 @@ PAGES = ("README.md", "tests/bench/README.md")
 NAMES = {"cpu-avx512": "processor, AVX-512", "cpu-avx2": "processor, AVX2", "cpu-sse42": "processor, SSE4.2", "cpu-neon": "processor, NEON",
          "cpu-scalar": "processor, plain", "gl-egl": "OpenGL, EGL", "gl-osmesa": "OpenGL, OSMesa"}
 QUALITIES = {"refined": "refined", "paper": "as in the paper", "unfilled": "points alone", "splats": "discs",
-             "analysed": "analysed", "averaged": "analysed, averages", "final": "analysed, 16 samples"}
+             "analysed": "analysed", "averaged": "analysed, averages", "final": "analysed, 16 samples",
+             "known discs": "analysed, discs"}
 
 
 def _line(row: Row) -> list[str]:
