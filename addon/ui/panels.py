@@ -80,6 +80,7 @@ class PATINA_PT_transparency(PatinaPanel, Panel):
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
         self.layout.prop(context.scene.patina, "layers")
+        self.layout.prop(context.scene.patina, "soft_model", text="Soft Points")
 
 
 class PATINA_PT_shadows(PatinaPanel, Panel):

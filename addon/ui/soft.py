@@ -43,7 +43,6 @@ class PATINA_PT_soft(ColorPanel, Panel):
         row = row.row()
         row.active = group.use_radius
         row.prop(group, "radius", text="")
-        layout.prop(context.scene.patina, "soft_model")
 
     def _draw_threshold(self, group: bpy.types.PropertyGroup) -> None:
         layout = self.layout

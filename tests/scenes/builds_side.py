@@ -104,6 +104,8 @@ class Side:
             if style.pop("mask", 0):
                 number = np.arange(cloud.count)
                 more["mask"] = points.Mask(cloud, np.packbits(number % 5 == 0, bitorder="little"), np.packbits(number % 3 == 0, bitorder="little"))
+            if "field" in style and not hasattr(points, "Field"):
+                raise Unknown("points.Field")
             if "field" in style:
                 more["field"] = points.Field(cloud, (np.arange(cloud.count) % style.pop("field") / 100.0).astype(np.float32))
             if "grade" in style:
