@@ -34,8 +34,8 @@ class _Effects:
 
 
 # patina_effects; what is switched off has no strength.
-Effects = make_dataclass("Effects", [(field["name"], _TYPES.get(field["kind"], int)) for field in _FIELDS]
-                         + [("exact", int, 1)], bases=(_Effects,), frozen=True)
+Effects = make_dataclass("Effects", [("exact", int, 1)] + [(field["name"], _TYPES.get(field["kind"], int)) for field in _FIELDS],
+                         bases=(_Effects,), frozen=True, kw_only=True)
 
 
 def read(scene: bpy.types.Scene, focus: Focus | None, notices: list[str]) -> Effects:
