@@ -10,9 +10,8 @@ import numpy as np
 import screen
 from harness import add_points, check, sphere
 from mathutils import Quaternion
-from window import area, setup, view
-
 from patina import viewport
+from window import area, setup, view, window_region
 
 DARK = 40  # of 255: no channel of points and background is below 140
 LETTERS = 9000  # more than the dark pixels of texts, cursor and tools in four views, 2,000 to 7,000; the points' dots are 14,000 and more
