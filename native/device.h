@@ -28,8 +28,8 @@ struct pt_kernel_row {
     const char *name;
     enum pt_domain domain;
     enum pt_stage stage;
-    int reach;            // pixels; -1: its arguments say
-    uint32_t fixed, each; // buffers: those once, and behind them those once an instance
+    int reach;                           // pixels; -1: its arguments say
+    uint32_t fixed, each;                // buffers: those once, and behind them those once an instance
     const struct pt_buffer_row *buffers; // fixed + each
 };
 
@@ -59,13 +59,10 @@ struct pt_device_ops {
     void (*destroy)(struct patina_device *device);
     // Uninitialised memory, or a copy of source when not NULL. A CPU device may keep the pointer instead of a copy when
     // `borrow` is set: source must then stay alive and unchanged as long as the buffer.
-    int (*buffer_create)(struct patina_device *device, size_t size, const void *source, int borrow,
-                         struct pt_buffer *out);
+    int (*buffer_create)(struct patina_device *device, size_t size, const void *source, int borrow, struct pt_buffer *out);
     void (*buffer_destroy)(struct patina_device *device, struct pt_buffer *buffer);
-    int (*buffer_write)(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source,
-                        size_t size);
-    int (*buffer_read)(struct patina_device *device, const struct pt_buffer *buffer, size_t offset, void *target,
-                       size_t size);
+    int (*buffer_write)(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source, size_t size);
+    int (*buffer_read)(struct patina_device *device, const struct pt_buffer *buffer, size_t offset, void *target, size_t size);
     // Repeats a pattern of 4 or 8 bytes (low word first) from offset on, `size` bytes; both are multiples of 8, or size reaches
     // the buffer's end.
     int (*buffer_fill)(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size, uint64_t pattern,

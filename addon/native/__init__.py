@@ -23,8 +23,22 @@ from . import abi, devices
 from .abi import MAX_LAYERS as MOST_LAYERS
 from .abi import MAX_RAMP as MOST_RAMP
 from .abi import PASSES as PLANES
-from .loader import (CANCELLED, FORMAT, INTERNAL, MEMORY, NEIGHBOURHOODS, TYPES, PatinaCancelled, PatinaError, check,
-                      forget_library, library, library_path, log_lines, split_plane)
+from .loader import (
+    CANCELLED,
+    FORMAT,
+    INTERNAL,
+    MEMORY,
+    NEIGHBOURHOODS,
+    TYPES,
+    PatinaCancelled,
+    PatinaError,
+    check,
+    forget_library,
+    library,
+    library_path,
+    log_lines,
+    split_plane,
+)
 
 __all__ = ["CANCELLED", "FORMAT", "INTERNAL", "KINDS", "MEMORY", "MOST_LAYERS", "MOST_RAMP", "NEIGHBOURHOODS", "PLANES", "Cloud", "Device", "File",
            "Frame", "Mesh", "Panorama", "PatinaCancelled", "PatinaError", "Progress", "Scene", "Task", "Texture", "WRAPS", "forget_library",

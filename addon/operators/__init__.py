@@ -3,8 +3,27 @@
 
 from __future__ import annotations
 
-from . import (analyze, clips, colors, combine, export_points, import_points, linked_points, plan, points, points_keys, points_tools, preferences,
-               scanner, scans, set_up, shadows, styles, view_transform, world)
+from . import (
+    analyze,
+    clips,
+    colors,
+    combine,
+    export_points,
+    import_points,
+    linked_points,
+    plan,
+    points,
+    points_keys,
+    points_tools,
+    preferences,
+    scanner,
+    scans,
+    set_up,
+    shadows,
+    styles,
+    view_transform,
+    world,
+)
 
 _MODULES = (analyze, clips, colors, import_points, export_points, combine, linked_points, plan, points, points_keys, points_tools, preferences,
             scanner, scans, set_up, shadows, styles, view_transform, world)

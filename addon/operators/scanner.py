@@ -14,7 +14,6 @@ from mathutils import Matrix, Vector
 from ..sync.analysis import SCANNERS
 
 
-
 def positions(obj: bpy.types.Object | None) -> np.ndarray:
     """(n, 3) in the object's coordinates, one a scan, NaN for one that does not say; n is 0 where nothing is known."""
     known = obj.data.get(SCANNERS) if obj and obj.data else None

@@ -15,7 +15,8 @@ import bpy
 from .. import migrate
 from . import clipping, clips, clouds, effects, lights, lines, settings, world
 from .camera import Camera, CameraError, Focus, Panorama, View, final_view, viewport_view
-from .clips import Clip, of_view as view_clips
+from .clips import Clip
+from .clips import of_view as view_clips
 from .clouds import CloudItem, CloudStyle, Pending, PendingLink, Trusted, changed_owners, style_of
 from .effects import Effects
 from .lights import Headlight, Light

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from .. import native, options
 
+
 class Loss(str):
     """A notice of what a picture was to show and does not."""
 

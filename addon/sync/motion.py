@@ -9,7 +9,6 @@ import bpy
 
 from . import settings
 
-
 _GOLDEN = 0.6180339887498949
 
 

@@ -3,8 +3,27 @@
 
 from __future__ import annotations
 
-from . import (colors, combine, cryptomatte, effects, lines, materials, motion, panels, panorama, points, presets, sampling, scan_points,
-               sequence, soft, standard, statistics, styles, world)
+from . import (
+    colors,
+    combine,
+    cryptomatte,
+    effects,
+    lines,
+    materials,
+    motion,
+    panels,
+    panorama,
+    points,
+    presets,
+    sampling,
+    scan_points,
+    sequence,
+    soft,
+    standard,
+    statistics,
+    styles,
+    world,
+)
 
 # What makes the look comes first, then how it is drawn.
 _MODULES = (presets, styles, lines, effects, panels, sampling, cryptomatte, points, colors, soft, scan_points, motion, combine, panorama,

@@ -72,8 +72,9 @@ static int create_named(const patina_device_desc *desc, const char *name, patina
         return pt_device_cpu_create(desc, name, out);
     if (!strcmp(name, "gl-egl") || !strcmp(name, "gl-osmesa"))
         return pt_device_gl_create(desc, name, out);
-    return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
-                   "device \"%s\": known are auto, cpu, cpu-scalar, cpu-sse42, cpu-avx2, cpu-avx512, cpu-neon, gl-egl, gl-osmesa", name);
+    return pt_fail(
+        NULL, PATINA_ERROR_ARGUMENT,
+        "device \"%s\": known are auto, cpu, cpu-scalar, cpu-sse42, cpu-avx2, cpu-avx512, cpu-neon, gl-egl, gl-osmesa", name);
 }
 
 int patina_device_create(const patina_device_desc *desc, patina_device **out)

@@ -14,8 +14,8 @@
 
 // Right, up and back of each face in the camera's space: ahead, right, behind, left, above, below.
 static const double AXES[6][3][3] = {
-    {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},   {{0, 0, 1}, {0, 1, 0}, {-1, 0, 0}}, {{-1, 0, 0}, {0, 1, 0}, {0, 0, -1}},
-    {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}},  {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}, {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}},
+    {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},  {{0, 0, 1}, {0, 1, 0}, {-1, 0, 0}}, {{-1, 0, 0}, {0, 1, 0}, {0, 0, -1}},
+    {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}}, {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}, {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}},
 };
 
 struct wave { // of one of the two angles
@@ -67,10 +67,7 @@ static double share(const double place[2])
     return product;
 }
 
-static double texel(const struct join *join, double place)
-{
-    return (place / (1 + GUARD) * 0.5 + 0.5) * join->side;
-}
+static double texel(const struct join *join, double place) { return (place / (1 + GUARD) * 0.5 + 0.5) * join->side; }
 
 // Adds a face's colour between four pixels.
 static void add_color(const struct join *join, uint32_t face, const double place[2], double weight, double sum[4])
@@ -262,7 +259,8 @@ static int run(const patina_panorama *panorama, const char *call, struct join *j
     return PATINA_OK;
 }
 
-int patina_panorama_join(const patina_panorama *panorama, uint32_t pass, const float *const faces[6], float *pixels, size_t size)
+int patina_panorama_join(const patina_panorama *panorama, uint32_t pass, const float *const faces[6], float *pixels,
+                         size_t size)
 {
     static const uint32_t channels[] = {
 #define PATINA_X(name, count, text) count,

@@ -30,11 +30,11 @@ struct pick {
     const patina_pick *desc;
     struct pt_sieve sieve;
     struct outline outline;
-    double linear[9], translation[3]; // world from object
+    double linear[9], translation[3];    // world from object
     double axes[9], eye[3], rotation[9]; // view from world; view from object
-    double scale;    // longest of the object's axes in the world
-    double pixel;    // width of one, at distance 1 in perspective
-    const uint64_t *keys; // of the frame, or NULL
+    double scale;                        // longest of the object's axes in the world
+    double pixel;                        // width of one, at distance 1 in perspective
+    const uint64_t *keys;                // of the frame, or NULL
     uint32_t region[4];
     int by_class;
     uint8_t *bits;
@@ -78,8 +78,11 @@ static int list_edges(struct outline *outline)
 
 static int make_outline(const patina_pick *desc, uint32_t rows, struct outline *outline)
 {
-    *outline = (struct outline){ .corners = desc->polygon, .count = desc->corners, .rows = rows,
-                                 .lower = { INFINITY, INFINITY }, .upper = { -INFINITY, -INFINITY } };
+    *outline = (struct outline){.corners = desc->polygon,
+                                .count = desc->corners,
+                                .rows = rows,
+                                .lower = {INFINITY, INFINITY},
+                                .upper = {-INFINITY, -INFINITY}};
     for (uint32_t i = 0; i < 2 * outline->count; i++) {
         outline->lower[i % 2] = fmin(outline->lower[i % 2], outline->corners[i]);
         outline->upper[i % 2] = fmax(outline->upper[i % 2], outline->corners[i]);
@@ -192,7 +195,7 @@ static void chunk_offset(const struct pick *pick, const struct pt_chunk *chunk, 
 static int may_have(const struct pick *pick, const struct pt_chunk *chunk, const double offset[3])
 {
     const patina_camera *camera = &pick->scene->camera;
-    double lower[2] = { INFINITY, INFINITY }, upper[2] = { -INFINITY, -INFINITY }, near = INFINITY, far = -INFINITY;
+    double lower[2] = {INFINITY, INFINITY}, upper[2] = {-INFINITY, -INFINITY}, near = INFINITY, far = -INFINITY;
     for (int corner = 0; corner < 8; corner++) {
         double p[3], v[3];
         for (int k = 0; k < 3; k++)
@@ -201,8 +204,10 @@ static int may_have(const struct pick *pick, const struct pt_chunk *chunk, const
         const double depth = -(v[2] + offset[2]), over = camera->orthographic ? 1.0 : depth;
         near = fmin(near, depth);
         far = fmax(far, depth);
-        const double x = ((v[0] + offset[0]) / over - camera->left) / (camera->right - camera->left) * pick->scene->settings.width;
-        const double y = ((v[1] + offset[1]) / over - camera->bottom) / (camera->top - camera->bottom) * pick->scene->settings.height;
+        const double x = ((v[0] + offset[0]) / over - camera->left) / (camera->right - camera->left) *
+                         pick->scene->settings.width;
+        const double y = ((v[1] + offset[1]) / over - camera->bottom) / (camera->top - camera->bottom) *
+                         pick->scene->settings.height;
         lower[0] = fmin(lower[0], x);
         lower[1] = fmin(lower[1], y);
         upper[0] = fmax(upper[0], x);
@@ -233,8 +238,8 @@ static void pick_chunk(const struct pick *pick, const struct pt_chunk *chunk, co
     if (pick->outline.count && !may_have(pick, chunk, offset))
         return;
     for (uint32_t i = 0; i < chunk->count; i++) {
-        const double p[3] = { (double)positions[i], (double)positions[chunk->padded + i],
-                              (double)positions[2 * (size_t)chunk->padded + i] };
+        const double p[3] = {(double)positions[i], (double)positions[chunk->padded + i],
+                             (double)positions[2 * (size_t)chunk->padded + i]};
         const uint64_t slot = (uint64_t)chunk->first + i;
         double v[3], place[3];
         if (pick->by_class && !of_class(pick, slot))
@@ -287,7 +292,8 @@ static int check(const patina_scene *scene, const patina_pick *desc, const uint8
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: %zu bytes for %llu points", size,
                        (unsigned long long)count);
     if (desc->corners > MOST_CORNERS || (desc->corners && (desc->corners < 3 || !desc->polygon)))
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: %u corners; 3 to %d", desc->corners, MOST_CORNERS);
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: %u corners; 3 to %d", desc->corners,
+                       MOST_CORNERS);
     for (uint32_t i = 0; i < 2 * desc->corners; i++)
         if (!isfinite(desc->polygon[i]))
             return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "patina_scene_pick: a corner is not finite");
@@ -348,13 +354,14 @@ int patina_scene_pick(const patina_scene *scene, const patina_frame *frame, cons
     patina_pick taken;
     const patina_pick *const desc = &taken;
     if (!scene || !given)
-        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_scene_pick: scene or what to pick is NULL");
+        return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT,
+                       "patina_scene_pick: scene or what to pick is NULL");
     int error = pt_take(&scene->handle, "patina_scene_pick", given, &taken, sizeof taken);
     error = error ? error : check(scene, desc, bits, size);
     if (error)
         return error;
-    struct pick pick = { .scene = scene, .instance = &scene->instances[desc->instance], .desc = desc, .bits = bits,
-                         .progress = progress };
+    struct pick pick = {
+        .scene = scene, .instance = &scene->instances[desc->instance], .desc = desc, .bits = bits, .progress = progress};
     for (int k = 0; k < 8; k++)
         pick.by_class |= desc->classes[k] != 0;
     memset(bits, 0, size);
@@ -381,11 +388,12 @@ static int is_selected(const struct patina_scene *scene, uint32_t id, uint32_t *
     }
     const uint32_t slot = id - instance->id_base;
     const struct patina_mask *mask = instance->style.mask;
-    return mask && slot < instance->cloud->slots && (mask->words[slot / PT_SLOTS_A_WORD] >> (PT_SLOTS_A_WORD + slot % PT_SLOTS_A_WORD) & 1u);
+    return mask && slot < instance->cloud->slots &&
+           (mask->words[slot / PT_SLOTS_A_WORD] >> (PT_SLOTS_A_WORD + slot % PT_SLOTS_A_WORD) & 1u);
 }
 
-int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene, const float color[3], float strength, float *pixels,
-                           size_t size)
+int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene, const float color[3], float strength,
+                           float *pixels, size_t size)
 {
     if (!frame || !scene || !color || !pixels || !(strength >= 0.0f && strength <= 1.0f))
         return pt_fail(frame ? &frame->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_frame_highlight: bad arguments");
@@ -396,7 +404,8 @@ int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene,
     int error = pt_frame_read_slots(frame, scene, keys, count * sizeof *keys);
     uint32_t last = 0;
     for (size_t i = 0; i < count && !error && scene->instance_count; i++) {
-        if (keys[i] >> 32 == PT_KEY_EMPTY_Z || (uint32_t)keys[i] >= scene->points || !is_selected(scene, (uint32_t)keys[i], &last))
+        if (keys[i] >> 32 == PT_KEY_EMPTY_Z || (uint32_t)keys[i] >= scene->points ||
+            !is_selected(scene, (uint32_t)keys[i], &last))
             continue;
         for (int k = 0; k < 3; k++)
             pixels[4 * i + k] += strength * (color[k] * pixels[4 * i + 3] - pixels[4 * i + k]);

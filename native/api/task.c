@@ -108,7 +108,7 @@ int patina_task_render(patina_frame *frame, const patina_scene *scene, const pat
 {
     if (count && !reads)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_render: reads is NULL");
-    const struct patina_task task = { .work = render, .frame = frame, .scene = scene, .reads = reads, .read_count = count };
+    const struct patina_task task = {.work = render, .frame = frame, .scene = scene, .reads = reads, .read_count = count};
     return start(&task, out);
 }
 
@@ -118,14 +118,13 @@ int patina_task_refine(patina_frame *frame, const patina_scene *scene, double ms
     if (count && !reads)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_refine: reads is NULL");
     const struct patina_task task = {
-        .work = refine, .frame = frame, .scene = scene, .refine_ms = ms, .reads = reads, .read_count = count
-    };
+        .work = refine, .frame = frame, .scene = scene, .refine_ms = ms, .reads = reads, .read_count = count};
     return start(&task, out);
 }
 
 int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress, patina_task **out)
 {
-    struct patina_task task = { .work = build, .progress = progress };
+    struct patina_task task = {.work = build, .progress = progress};
     if (!desc)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_build: desc is NULL");
     const int error = pt_take(NULL, "patina_task_build", desc, &task.desc, sizeof task.desc);
@@ -136,12 +135,12 @@ int patina_task_set_colors(patina_cloud *cloud, const patina_array *color, patin
 {
     if (!color)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_set_colors: color is NULL");
-    return start(&(struct patina_task){ .work = paint, .painted = cloud, .color = *color }, out);
+    return start(&(struct patina_task){.work = paint, .painted = cloud, .color = *color}, out);
 }
 
 int patina_task_analyse(patina_cloud *cloud, const patina_analysis_desc *desc, patina_progress *progress, patina_task **out)
 {
-    struct patina_task task = { .work = analyse, .painted = cloud, .progress = progress };
+    struct patina_task task = {.work = analyse, .painted = cloud, .progress = progress};
     int error = pt_take(NULL, "patina_task_analyse", desc, &task.analyse, sizeof task.analyse);
     error = error ? error : pt_analysis_check(cloud, &task.analyse);
     return error ? error : start(&task, out);
@@ -162,7 +161,7 @@ int patina_task_apply(patina_task *task)
 
 int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out)
 {
-    struct patina_task task = { .work = fingerprint, .fingerprint = values };
+    struct patina_task task = {.work = fingerprint, .fingerprint = values};
     if (!desc || !values)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: desc or values is NULL");
     const int error = pt_take(NULL, "patina_task_fingerprint", desc, &task.desc, sizeof task.desc);
@@ -171,7 +170,7 @@ int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], p
 
 int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals, patina_task **out)
 {
-    struct patina_task task = { .work = grid_normals, .progress = progress, .normals = normals };
+    struct patina_task task = {.work = grid_normals, .progress = progress, .normals = normals};
     if (!grid)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_grid_normals: grid is NULL");
     const int error = pt_take(NULL, "patina_task_grid_normals", grid, &task.grid, sizeof task.grid);
@@ -194,17 +193,17 @@ static int start_at(struct patina_task *task, const char *path, patina_task **ou
 
 int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out)
 {
-    return start_at(&(struct patina_task){ .work = open_file, .progress = progress }, path, out);
+    return start_at(&(struct patina_task){.work = open_file, .progress = progress}, path, out);
 }
 
 int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out)
 {
-    return start_at(&(struct patina_task){ .work = save, .saved = cloud }, path, out);
+    return start_at(&(struct patina_task){.work = save, .saved = cloud}, path, out);
 }
 
 int patina_task_verify(const char *path, patina_progress *progress, patina_task **out)
 {
-    return start_at(&(struct patina_task){ .work = verify, .progress = progress }, path, out);
+    return start_at(&(struct patina_task){.work = verify, .progress = progress}, path, out);
 }
 
 int patina_task_take_file(patina_task *task, patina_file **out)

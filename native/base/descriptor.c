@@ -9,7 +9,8 @@ static int check_size(const struct pt_handle *handle, const char *call, size_t s
 {
     if (size > sizeof size && size <= MOST)
         return PATINA_OK;
-    return pt_fail(handle, PATINA_ERROR_ARGUMENT, "%s: a descriptor's struct_size is %zu, it was not set to its size", call, size);
+    return pt_fail(handle, PATINA_ERROR_ARGUMENT, "%s: a descriptor's struct_size is %zu, it was not set to its size", call,
+                   size);
 }
 
 int pt_take(const struct pt_handle *handle, const char *call, const void *given, void *ours, size_t size)
@@ -24,8 +25,10 @@ int pt_take(const struct pt_handle *handle, const char *call, const void *given,
         memcpy(ours, given, has < size ? has : size);
         for (size_t i = size; i < has; i++)
             if (((const unsigned char *)given)[i])
-                return pt_fail(handle, PATINA_ERROR_UNSUPPORTED,
-                               "%s: the descriptor of %zu bytes asks for something that this library does not know; it knows %zu", call, has, size);
+                return pt_fail(
+                    handle, PATINA_ERROR_UNSUPPORTED,
+                    "%s: the descriptor of %zu bytes asks for something that this library does not know; it knows %zu", call,
+                    has, size);
     }
     memcpy(ours, &size, sizeof size);
     return PATINA_OK;

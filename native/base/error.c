@@ -51,7 +51,7 @@ const char *patina_error_text(int code)
 {
     switch (code) {
     case PATINA_OK: return "no error";
-#define PATINA_X(name, number, text) \
+#define PATINA_X(name, number, text)                                                                                           \
     case PATINA_##name: return text;
         PATINA_ERRORS(PATINA_X)
 #undef PATINA_X

@@ -29,7 +29,7 @@ void pt_mutex_lock(struct pt_mutex *mutex);    // not twice by one thread
 void pt_mutex_unlock(struct pt_mutex *mutex);  // by the thread that locked it
 
 void pt_condition_init(struct pt_condition *condition);
-void pt_condition_destroy(struct pt_condition *condition);                     // that nobody waits for
+void pt_condition_destroy(struct pt_condition *condition);                      // that nobody waits for
 void pt_condition_wait(struct pt_condition *condition, struct pt_mutex *mutex); // may return without a cause: ask again
 void pt_condition_wake_one(struct pt_condition *condition);
 void pt_condition_wake_all(struct pt_condition *condition);
@@ -52,10 +52,10 @@ int pt_watch_interrupts(void (*interrupted)(void));
 
 // ---- the machine -------------------------------------------------------------------------------------------------------
 
-double pt_milliseconds(void);                      // of a clock that only goes forward
-uint32_t pt_core_count(void);                      // that this process may use, at least 1
-void pt_processor_name(char *text, size_t size);   // as its maker calls it; "processor" where that is not known
-uint64_t pt_peak_memory(void);                     // most bytes that this process ever held; 0: not known
+double pt_milliseconds(void);                                    // of a clock that only goes forward
+uint32_t pt_core_count(void);                                    // that this process may use, at least 1
+void pt_processor_name(char *text, size_t size);                 // as its maker calls it; "processor" where that is not known
+uint64_t pt_peak_memory(void);                                   // most bytes that this process ever held; 0: not known
 const char *pt_error_text(int error, char *buffer, size_t size); // buffer: where the text may lie
 
 // ---- memory ------------------------------------------------------------------------------------------------------------

@@ -69,7 +69,7 @@ static void *thread_main(void *argument)
 
 int pt_thread_start(struct pt_thread *thread, void (*main)(void *context), void *context, size_t stack)
 {
-    static const int faults[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGSYS };
+    static const int faults[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGSYS};
     struct start *start = malloc(sizeof *start);
     pthread_attr_t attributes;
     sigset_t signals, before;
@@ -77,7 +77,7 @@ int pt_thread_start(struct pt_thread *thread, void (*main)(void *context), void 
         free(start);
         return ENOMEM;
     }
-    *start = (struct start){ main, context };
+    *start = (struct start){main, context};
     if (stack)
         pthread_attr_setstacksize(&attributes, stack);
     sigfillset(&signals);
@@ -181,7 +181,10 @@ uint64_t pt_peak_memory(void)
     return (uint64_t)kib << 10;
 }
 
-const char *pt_error_text(int error, char *buffer, size_t size) { return strerror_r(error, buffer, size); } // GNU's, which returns it
+const char *pt_error_text(int error, char *buffer, size_t size)
+{
+    return strerror_r(error, buffer, size);
+} // GNU's, which returns it
 
 // ---- memory ------------------------------------------------------------------------------------------------------------
 
@@ -253,7 +256,8 @@ int pt_disk_read(const struct pt_disk *disk, uint64_t offset, void *data, size_t
 
 int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum pt_disk_use use, void **data)
 {
-    *data = mmap(NULL, size, PROT_READ | (use == PT_DISK_ANYWHERE ? PROT_WRITE : 0), MAP_PRIVATE, (int)disk->handle, (off_t)offset);
+    *data = mmap(NULL, size, PROT_READ | (use == PT_DISK_ANYWHERE ? PROT_WRITE : 0), MAP_PRIVATE, (int)disk->handle,
+                 (off_t)offset);
     if (*data == MAP_FAILED) {
         *data = NULL;
         return errno;
@@ -282,7 +286,7 @@ int pt_whole_begin(const char *path, struct pt_whole *whole)
     static const char part[] = ".part";
     const size_t length = strlen(path);
     struct stat status;
-    *whole = (struct pt_whole){ 0 };
+    *whole = (struct pt_whole){0};
     if (!stat(path, &status) && !S_ISREG(status.st_mode)) // never in the place of a folder or a device
         return S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
     char *names = malloc(2 * length + 1 + sizeof part);

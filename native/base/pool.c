@@ -155,7 +155,7 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
     for (uint32_t i = 1; i < pool->threads; i++) {
         struct helper_start *start = malloc(sizeof *start);
         if (start)
-            *start = (struct helper_start){ pool, i };
+            *start = (struct helper_start){pool, i};
         if (!start || pt_thread_start(&pool->helpers[pool->started], helper_main, start, 0)) {
             free(start);
             pt_pool_destroy(pool);
@@ -199,13 +199,13 @@ void pt_parallel(struct pt_pool *pool, uint32_t items, uint32_t grain, pt_work *
     if (!grain)
         grain = items / (4 * pool->threads);
     grain = grain < 1 ? 1 : grain;
-    struct job job = { work, context, grain, pool->threads, pool->ranges };
+    struct job job = {work, context, grain, pool->threads, pool->ranges};
     pt_mutex_lock(&pool->caller);
     for (uint32_t t = 0; t < pool->threads; t++)
-        atomic_store_explicit(&pool->ranges[t].span,
-                              span_of((uint32_t)((uint64_t)items * t / pool->threads),
-                                      (uint32_t)((uint64_t)items * (t + 1) / pool->threads)),
-                              memory_order_relaxed);
+        atomic_store_explicit(
+            &pool->ranges[t].span,
+            span_of((uint32_t)((uint64_t)items * t / pool->threads), (uint32_t)((uint64_t)items * (t + 1) / pool->threads)),
+            memory_order_relaxed);
     if (items > grain) {
         pt_mutex_lock(&pool->lock);
         pool->job = &job;

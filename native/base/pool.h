@@ -13,7 +13,10 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch);
 
 // What to ask pt_pool_create for when work over so many points is not told how many threads to take: one where starting more
 // takes longer than they save, so that callers with many small clouds can work on several at once.
-static inline uint32_t pt_pool_threads_for(uint32_t threads, uint64_t points) { return threads || points >= 1 << 14 ? threads : 1; }
+static inline uint32_t pt_pool_threads_for(uint32_t threads, uint64_t points)
+{
+    return threads || points >= 1 << 14 ? threads : 1;
+}
 void pt_pool_destroy(struct pt_pool *pool);
 uint32_t pt_pool_threads(const struct pt_pool *pool); // the caller counts as one
 

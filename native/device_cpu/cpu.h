@@ -19,7 +19,7 @@ struct pt_cpu_call {
     struct pt_buffer *const *buffers;
     uint32_t buffer_count;
     struct pt_pool *pool;
-    const atomic_int *cancel;  // may be NULL
+    const atomic_int *cancel;       // may be NULL
     struct pt_cpu_scratch *scratch; // [PT_CPU_SCRATCHES], kept between calls
 };
 
@@ -76,11 +76,11 @@ typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
 #elif defined(__aarch64__)
 #define PT_EACH_LEVEL(X) X(neon, 1) X(scalar, 1)
 #else
-#define PT_EACH_LEVEL(X)                                                                                                           \
-    X(avx512, __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&    \
-                  __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("bmi2"))                                           \
-    X(avx2, __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2"))                                                     \
-    X(sse42, __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"))                                                \
+#define PT_EACH_LEVEL(X)                                                                                                       \
+    X(avx512, __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && \
+                  __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("bmi2"))                                        \
+    X(avx2, __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2"))                                                  \
+    X(sse42, __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"))                                             \
     X(scalar, 1)
 #endif
 

@@ -22,8 +22,8 @@ static uint32_t available_levels(const struct pt_cpu_level *levels[4])
 #if defined(__x86_64__)
     __builtin_cpu_init();
 #endif
-#define PT_X(level, known)                                                                                                         \
-    if (known)                                                                                                                     \
+#define PT_X(level, known)                                                                                                     \
+    if (known)                                                                                                                 \
         levels[count++] = &pt_cpu_level_##level;
     PT_EACH_LEVEL(PT_X)
 #undef PT_X
@@ -32,19 +32,18 @@ static uint32_t available_levels(const struct pt_cpu_level *levels[4])
 
 // ---- buffers ---------------------------------------------------------------------------------------------------------
 
-static int cpu_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow,
-                             struct pt_buffer *out)
+static int cpu_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow, struct pt_buffer *out)
 {
-    *out = (struct pt_buffer){ .size = size, .room = size, .wrapped = source && borrow };
+    *out = (struct pt_buffer){.size = size, .room = size, .wrapped = source && borrow};
     if (out->wrapped) {
         out->data = (void *)source;
         return PATINA_OK;
     }
     out->data = pt_pages_alloc(size + PT_SLACK);
     if (!out->data) {
-        *out = (struct pt_buffer){ 0 };
-        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "%s: out of memory for a buffer of %zu bytes",
-                       device->info.name, size);
+        *out = (struct pt_buffer){0};
+        return pt_fail(&device->handle, PATINA_ERROR_MEMORY, "%s: out of memory for a buffer of %zu bytes", device->info.name,
+                       size);
     }
     if (source)
         memcpy(out->data, source, size);
@@ -56,7 +55,7 @@ static void cpu_buffer_destroy(struct patina_device *device, struct pt_buffer *b
     (void)device;
     if (!buffer->wrapped && buffer->data)
         pt_pages_free(buffer->data, buffer->room + PT_SLACK);
-    *buffer = (struct pt_buffer){ 0 };
+    *buffer = (struct pt_buffer){0};
 }
 
 static int cpu_buffer_write(struct patina_device *device, struct pt_buffer *buffer, size_t offset, const void *source,
@@ -92,14 +91,14 @@ static void fill_words(void *context, uint32_t begin, uint32_t end, uint32_t thr
         job->words[i] = job->pattern;
 }
 
-static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size,
-                           uint64_t pattern, uint32_t bytes)
+static int cpu_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size, uint64_t pattern,
+                           uint32_t bytes)
 {
     struct cpu_device *cpu = (struct cpu_device *)device;
     if (bytes == 4)
         pattern = (pattern & 0xFFFFFFFFu) | pattern << 32;
     char *data = (char *)buffer->data + offset;
-    struct fill_job job = { (uint64_t *)(void *)data, pattern, size / 8 };
+    struct fill_job job = {(uint64_t *)(void *)data, pattern, size / 8};
     pt_parallel(cpu->pool, (uint32_t)((job.count + FILL_BLOCK - 1) / FILL_BLOCK), 4, fill_words, &job);
     if (size % 8)
         memcpy(data + size / 8 * 8, &pattern, size % 8);
@@ -112,12 +111,12 @@ static int cpu_run(struct patina_device *device, enum pt_kernel kernel, const vo
                    struct pt_buffer *const *buffers, uint32_t buffer_count, const atomic_int *cancel)
 {
     struct cpu_device *cpu = (struct cpu_device *)device;
-    const struct pt_cpu_call call = { .arguments = arguments,
-                                      .buffers = buffers,
-                                      .buffer_count = buffer_count,
-                                      .pool = cpu->pool,
-                                      .cancel = cancel,
-                                      .scratch = cpu->scratch };
+    const struct pt_cpu_call call = {.arguments = arguments,
+                                     .buffers = buffers,
+                                     .buffer_count = buffer_count,
+                                     .pool = cpu->pool,
+                                     .cancel = cancel,
+                                     .scratch = cpu->scratch};
     (void)argument_size;
     int error = cpu->level->kernels[kernel](&call);
     if (error == PATINA_ERROR_MEMORY)
@@ -132,12 +131,12 @@ static int cpu_finish_picture(struct patina_device *device, const struct pt_boun
     struct pt_cpu_pass *bound = malloc(count * sizeof *bound);
     int error = bound ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < count && bound; i++)
-        bound[i] = (struct pt_cpu_pass){ passes[i].kernel,
-                                         { .arguments = passes[i].arguments,
-                                           .buffers = passes[i].buffers,
-                                           .buffer_count = passes[i].buffer_count,
-                                           .pool = cpu->pool,
-                                           .scratch = cpu->scratch } };
+        bound[i] = (struct pt_cpu_pass){passes[i].kernel,
+                                        {.arguments = passes[i].arguments,
+                                         .buffers = passes[i].buffers,
+                                         .buffer_count = passes[i].buffer_count,
+                                         .pool = cpu->pool,
+                                         .scratch = cpu->scratch}};
     if (!error)
         error = cpu->level->finish(bound, count);
     free(bound);
@@ -197,7 +196,7 @@ int pt_device_cpu_create(const patina_device_desc *desc, const char *level, stru
     cpu->level = levels[chosen];
     cpu->pool = pool;
     cpu->base.memory_cap = desc->memory_cap;
-    cpu->base.info = (patina_device_info){ .struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool) };
+    cpu->base.info = (patina_device_info){.struct_size = sizeof cpu->base.info, .threads = pt_pool_threads(pool)};
     snprintf(cpu->base.info.name, sizeof cpu->base.info.name, "%s", cpu->level->name);
     pt_processor_name(cpu->base.info.description, sizeof cpu->base.info.description);
     *out = &cpu->base;

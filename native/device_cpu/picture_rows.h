@@ -13,9 +13,9 @@ static inline size_t pt_row_stride(uint32_t width) { return ((size_t)width + 15)
 // What the keys say of a row. z is +inf where the pixel is empty; the others are undefined there.
 struct pt_seen_row {
     float *z;
-    float *limit;     // d_eff of the surface shown
-    float *normal[3]; // of the surface shown, those of filled pixels times `share`
-    uint8_t *flat;    // of PT_LANES pixels each: whether all nine around each are one layer; NULL: not known
+    float *limit;        // d_eff of the surface shown
+    float *normal[3];    // of the surface shown, those of filled pixels times `share`
+    uint8_t *flat;       // of PT_LANES pixels each: whether all nine around each are one layer; NULL: not known
     uint32_t first, end; // columns between which something is seen, multiples of PT_LANES; equal where nothing is
 };
 
@@ -28,10 +28,7 @@ struct pt_planes {
     const float *normals, *deff;
 };
 
-static inline vi pt_source(const struct pt_planes *planes, size_t at)
-{
-    return pt_source_of(planes->from, at);
-}
+static inline vi pt_source(const struct pt_planes *planes, size_t at) { return pt_source_of(planes->from, at); }
 
 struct pt_span { // of z of PT_LANES columns of rows y - 1, y, y + 1
     vf near, far;
@@ -40,7 +37,7 @@ struct pt_span { // of z of PT_LANES columns of rows y - 1, y, y + 1
 static inline struct pt_span pt_span_at(const struct pt_seen_row *const rows[3], int32_t x)
 {
     vf below = vf_load(rows[0]->z + x), own = vf_load(rows[1]->z + x), above = vf_load(rows[2]->z + x);
-    return (struct pt_span){ vf_min(vf_min(below, above), own), vf_max(vf_max(below, above), own) };
+    return (struct pt_span){vf_min(vf_min(below, above), own), vf_max(vf_max(below, above), own)};
 }
 
 // What flat says of the row in the middle: no filter of 3 x 3 need tell layers apart there. 94% of the torus' vectors are.
@@ -99,13 +96,13 @@ static inline vf pt_nine_pixels(const struct pt_nine *weights, const float *cons
                        (tap[0][0] + tap[2][0]) + (tap[0][2] + tap[2][2]));
 }
 
-struct pt_column { // PT_LANES pixels
+struct pt_column {  // PT_LANES pixels
     vf own, beside; // of row y; of rows y - 1 and y + 1, the sum
 };
 
 static inline struct pt_column pt_column_at(const float *const rows[3], int32_t x)
 {
-    return (struct pt_column){ vf_load(rows[1] + x), vf_load(rows[0] + x) + vf_load(rows[2] + x) };
+    return (struct pt_column){vf_load(rows[1] + x), vf_load(rows[0] + x) + vf_load(rows[2] + x)};
 }
 
 // The same sums, times scale and at most `most`, from x to `end` where all nine are one layer: every column is loaded once.
@@ -132,10 +129,7 @@ static inline void pt_empty_columns(float *z, int32_t x, int32_t end)
     vf_store(z + end - PT_LANES, empty);
 }
 
-static inline void pt_empty_row(float *z, uint32_t width)
-{
-    pt_empty_columns(z, -PT_ROW_PAD, (int32_t)width + PT_ROW_PAD);
-}
+static inline void pt_empty_row(float *z, uint32_t width) { pt_empty_columns(z, -PT_ROW_PAD, (int32_t)width + PT_ROW_PAD); }
 
 // Asks for PT_LANES pixels of planes: hardware forgets a stream between two rows.
 static inline void pt_ask_for_keys(const struct pt_planes *planes, size_t at)

@@ -27,7 +27,7 @@ static void pt_rows_range(void *context, uint32_t begin, uint32_t end, uint32_t 
 // Calls work(call, y) for every row of the rectangle. Eight rows a batch: 32 KiB of keys at 1024 pixels.
 static inline int pt_rows(const struct pt_cpu_call *call, const struct view_args *view, pt_row_work *work)
 {
-    struct pt_rows_job job = { call, view->rect[1], work };
+    struct pt_rows_job job = {call, view->rect[1], work};
     if (view->rect[3] > view->rect[1] && view->rect[2] > view->rect[0])
         pt_parallel(call->pool, view->rect[3] - view->rect[1], 8, pt_rows_range, &job);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
@@ -96,10 +96,7 @@ static inline vf pt_least_distance(const struct view_args *view, float least, fl
 }
 
 // The measured pixels whose surfaces PT_LANES pixels from `at` on show.
-static inline vi pt_source_of(const uint32_t *from, size_t at)
-{
-    return vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED));
-}
+static inline vi pt_source_of(const uint32_t *from, size_t at) { return vi_and(vi_load(from + at), vi_set(~PT_FROM_MIXED)); }
 
 // The same of pixels anywhere.
 static inline vi pt_source_gather(const uint32_t *from, vi at, vm lanes)
@@ -141,13 +138,13 @@ static inline struct pt_row_z pt_load_row_z(const uint64_t *keys, uint32_t width
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     if (y >= height)
-        return (struct pt_row_z){ empty, empty, empty };
+        return (struct pt_row_z){empty, empty, empty};
     keys += (size_t)y * width + x;
     vf own = vi_float(vi_load_z(keys));
     if (edge && width - x < PT_LANES)
         own = vf_select(vm_first(width - x), own, empty);
-    return (struct pt_row_z){ vf_west(edge && !x ? empty : pt_z_of(keys - 1), own), own,
-                              vf_east(own, edge && width - x <= PT_LANES ? empty : pt_z_of(keys + PT_LANES)) };
+    return (struct pt_row_z){vf_west(edge && !x ? empty : pt_z_of(keys - 1), own), own,
+                             vf_east(own, edge && width - x <= PT_LANES ? empty : pt_z_of(keys + PT_LANES))};
 }
 
 #endif

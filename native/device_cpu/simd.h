@@ -49,7 +49,6 @@ typedef int32_t vi_eight __attribute__((vector_size(32), aligned(4), may_alias))
 // Words of bits side by side, four at every level: what planes of bits are worked on by.
 typedef uint64_t vi_words __attribute__((vector_size(32), aligned(8), may_alias));
 
-
 static inline vi vi_gather_id(const uint64_t *keys, vi i, vm m) // lower words of keys
 {
     return vi_gather_z((const uint64_t *)(const void *)((const char *)keys - 4), i, m);
@@ -78,11 +77,12 @@ static inline void vf_put(float *p, vf a, uint32_t count) { vf_store_where(p, a,
 static inline void vf_put3(float *p, const vf n[3], uint32_t count)
 {
     float pixels[4 * PT_LANES];
-    const vf four[4] = { n[0], n[1], n[2], vf_set(0.0f) };
+    const vf four[4] = {n[0], n[1], n[2], vf_set(0.0f)};
     vf_store4(pixels, four, PT_ALL);
     for (uint32_t i = 0; i + 1 < count; i++) // each store's fourth float is overwritten by the next point's first
         memcpy(p + 3 * i, pixels + 4 * i, 16);
-    memcpy(p + 3 * (count - 1), pixels + 4 * (count - 1), 12);}
+    memcpy(p + 3 * (count - 1), pixels + 4 * (count - 1), 12);
+}
 #endif
 
 #endif

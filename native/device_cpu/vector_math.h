@@ -78,8 +78,7 @@ static inline void vf_decode_normal(vi word, vf n[3])
 static inline vf vf_transform(const struct chunk_view *chunk, int row, vf x, vf y, vf z)
 {
     const float *r = chunk->row + 3 * row;
-    return (((vf_set(chunk->lo[row]) + vf_set(r[0]) * x) + vf_set(r[1]) * y) + vf_set(r[2]) * z) +
-           vf_set(chunk->hi[row]);
+    return (((vf_set(chunk->lo[row]) + vf_set(r[0]) * x) + vf_set(r[1]) * y) + vf_set(r[2]) * z) + vf_set(chunk->hi[row]);
 }
 
 // Normals of surface words in view space, not yet unit. Words without one give anything.
@@ -194,7 +193,8 @@ static inline vi vi_cell_of(vi pixel, uint32_t from_width, uint32_t level, uint3
 
 // How far z of a surface goes at most: as far beyond where it was measured as its span reaches along it. Where that cell of the
 // level shows something else by now, as far as z_q.
-static inline vf vf_farthest(const uint64_t *keys, const uint32_t *from, vi cell, vi source, vm lanes, vf z_q, vf span, vf inverse)
+static inline vf vf_farthest(const uint64_t *keys, const uint32_t *from, vi cell, vi source, vm lanes, vf z_q, vf span,
+                             vf inverse)
 {
     const vm shown = vm_and(lanes, vi_eq(vi_gather(from, cell, lanes), source));
     return vf_select(shown, vi_float(vi_gather_z(keys, cell, shown)) + span * vf_rcp(inverse), z_q);

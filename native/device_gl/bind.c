@@ -34,8 +34,7 @@ int pt_gl_bind_texels(struct pt_gl_device *d, enum pt_unit unit, GLuint name, si
     const size_t texels = size / pt_gl_units[unit].bytes;
     if (texels > d->texels)
         return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
-                          "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels,
-                          d->texels);
+                          "a plane of %zu pixels; this OpenGL driver's buffer textures hold %zu at most", texels, d->texels);
     d->gl.ActiveTexture(GL_TEXTURE0 + unit);
     d->gl.BindTexture(GL_TEXTURE_BUFFER, d->textures[unit]);
     d->gl.TexBufferRange(GL_TEXTURE_BUFFER, pt_gl_units[unit].format, name, (GLintptr)offset,
@@ -57,8 +56,8 @@ static int bind_row(struct pt_gl_device *d, const struct pt_gl_work *work, const
     const int missing = !buffer || !buffer->name, texture = row->unit && !(row->soft && d->base.info.hardware);
     int result = PATINA_OK;
     if (row->binding && !(texture && row->soft))
-        result = pt_gl_bind(d, row->binding, missing ? d->arguments : buffer->name, 0, missing ? work->argument_size : buffer->size,
-                            pt_kernels[work->kernel].name);
+        result = pt_gl_bind(d, row->binding, missing ? d->arguments : buffer->name, 0,
+                            missing ? work->argument_size : buffer->size, pt_kernels[work->kernel].name);
     return result == PATINA_OK && texture && !missing ? pt_gl_bind_texture(d, row->unit - 1u, buffer) : result;
 }
 
@@ -116,8 +115,7 @@ int pt_gl_dispatch(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t varia
     if (x && y) {
         d->gl.UseProgram(d->programs[kernel][variant]);
         d->gl.DispatchCompute(x, y, 1);
-        d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
-                            GL_TEXTURE_FETCH_BARRIER_BIT);
+        d->gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
     }
     char doing[64];
     snprintf(doing, sizeof doing, "running %s", pt_kernels[kernel].name);
@@ -160,7 +158,7 @@ int pt_gl_clear(struct pt_gl_device *d, const struct pt_buffer *buffer, size_t o
         return PATINA_OK;
     if (!d->base.info.hardware)
         return clear_mapped(d, offset, size, (uint64_t)words[1] << 32 | words[0], (uint64_t)words[3] << 32 | words[2]);
-    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, formats[bytes / 4 - 1], (GLintptr)offset,
-                             (GLsizeiptr)(size - size % bytes), parts[bytes / 4 - 1], GL_UNSIGNED_INT, words);
+    d->gl.ClearBufferSubData(GL_COPY_WRITE_BUFFER, formats[bytes / 4 - 1], (GLintptr)offset, (GLsizeiptr)(size - size % bytes),
+                             parts[bytes / 4 - 1], GL_UNSIGNED_INT, words);
     return pt_gl_check(d, "clearing a buffer");
 }

@@ -117,8 +117,7 @@ static void *open_context(struct egl *c, void *display, void *config)
 // Makes and binds a context on this platform's display.
 static int try_display(struct egl *c, unsigned platform, void *native, char *why, size_t why_size)
 {
-    static const int config_attributes[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
-                                            EGL_NONE};
+    static const int config_attributes[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
     void *display = c->get_platform_display ? c->get_platform_display(platform, native, NULL)
                                             : c->get_platform_display_ext(platform, native, NULL);
     if (!display || !c->initialize(display, NULL, NULL) || !c->bind_api(EGL_OPENGL_API)) {
@@ -204,9 +203,6 @@ fail:
     return NULL;
 }
 
-static pt_gl_function function(void *context, const char *name)
-{
-    return ((struct egl *)context)->get_proc(name);
-}
+static pt_gl_function function(void *context, const char *name) { return ((struct egl *)context)->get_proc(name); }
 
 const struct pt_gl_context_ops pt_gl_context_egl = {"gl-egl", create, destroy, function};

@@ -92,9 +92,6 @@ fail:
     return NULL;
 }
 
-static pt_gl_function function(void *context, const char *name)
-{
-    return ((struct osmesa *)context)->get_proc(name);
-}
+static pt_gl_function function(void *context, const char *name) { return ((struct osmesa *)context)->get_proc(name); }
 
 const struct pt_gl_context_ops pt_gl_context_osmesa = {"gl-osmesa", create, destroy, function};

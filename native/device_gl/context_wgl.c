@@ -10,10 +10,7 @@ static void *create(char *why, size_t why_size)
     return NULL;
 }
 
-static void destroy(void *context)
-{
-    (void)context;
-}
+static void destroy(void *context) { (void)context; }
 
 static pt_gl_function function(void *context, const char *name)
 {

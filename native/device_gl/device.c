@@ -235,10 +235,7 @@ static int fill_buffer(struct pt_gl_device *d, void *context)
     return pt_gl_clear(d, b->buffer, b->offset, b->size, (const uint32_t[]){low, high, low, high}, b->bytes);
 }
 
-static int run_kernel(struct pt_gl_device *d, void *context)
-{
-    return pt_gl_run(d, context);
-}
+static int run_kernel(struct pt_gl_device *d, void *context) { return pt_gl_run(d, context); }
 
 struct finish_call {
     const struct pt_bound_pass *passes;
@@ -258,8 +255,7 @@ static int finish_work(struct pt_gl_device *d, void *unused)
     return pt_gl_check(d, "waiting for the device");
 }
 
-static int op_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow,
-                            struct pt_buffer *out)
+static int op_buffer_create(struct patina_device *device, size_t size, const void *source, int borrow, struct pt_buffer *out)
 {
     (void)borrow; // the device has its own memory
     memset(out, 0, sizeof *out);
@@ -284,12 +280,11 @@ static int op_buffer_read(struct patina_device *device, const struct pt_buffer *
                           size_t size)
 {
     struct pt_buffer copy = *buffer;
-    return call(device, read_buffer,
-                &(struct buffer_call){.buffer = &copy, .offset = offset, .size = size, .target = target});
+    return call(device, read_buffer, &(struct buffer_call){.buffer = &copy, .offset = offset, .size = size, .target = target});
 }
 
-static int op_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size,
-                          uint64_t pattern, uint32_t bytes)
+static int op_buffer_fill(struct patina_device *device, struct pt_buffer *buffer, size_t offset, size_t size, uint64_t pattern,
+                          uint32_t bytes)
 {
     return call(device, fill_buffer,
                 &(struct buffer_call){.buffer = buffer, .offset = offset, .size = size, .pattern = pattern, .bytes = bytes});
@@ -299,12 +294,10 @@ static int op_run(struct patina_device *device, enum pt_kernel kernel, const voi
                   struct pt_buffer *const *buffers, uint32_t count, const atomic_int *cancel)
 {
     (void)count; // as kernels.def lists them
-    return call(device, run_kernel,
-                &(struct pt_gl_work){.kernel = kernel,
-                                     .arguments = arguments,
-                                     .argument_size = argument_size,
-                                     .buffers = buffers,
-                                     .cancel = cancel});
+    return call(
+        device, run_kernel,
+        &(struct pt_gl_work){
+            .kernel = kernel, .arguments = arguments, .argument_size = argument_size, .buffers = buffers, .cancel = cancel});
 }
 
 // What pt_gl_finish_picture is made for; z comes from the keys, what else is extracted from planes that it does not make.
@@ -332,10 +325,7 @@ static int op_finish_picture(struct patina_device *device, const struct pt_bound
     return call(device, finish_picture, &(struct finish_call){.passes = passes, .count = count});
 }
 
-static int op_finish(struct patina_device *device)
-{
-    return call(device, finish_work, NULL);
-}
+static int op_finish(struct patina_device *device) { return call(device, finish_work, NULL); }
 
 static void op_destroy(struct patina_device *device)
 {
@@ -363,8 +353,7 @@ static const struct pt_device_ops ops = {
 
 int pt_device_gl_create(const patina_device_desc *desc, const char *context, struct patina_device **out)
 {
-    static const struct pt_gl_context_ops *const kinds[] = {&pt_gl_context_egl, &pt_gl_context_osmesa,
-                                                            &pt_gl_context_wgl};
+    static const struct pt_gl_context_ops *const kinds[] = {&pt_gl_context_egl, &pt_gl_context_osmesa, &pt_gl_context_wgl};
     (void)desc; // threads and batch are the driver's matter
     *out = NULL;
     const struct pt_gl_context_ops *kind = NULL;

@@ -31,8 +31,7 @@ static int bind_scratch(struct fill *f, uint32_t binding, enum pt_gl_scratch_use
     int result = pt_gl_scratch(f->d, use, size, keep);
     const struct pt_gl_scratch *scratch = &f->d->scratch[use];
     size_t bound = scratch->size < f->d->block_size ? scratch->size : f->d->block_size & ~(size_t)15;
-    return result == PATINA_OK ? pt_gl_bind(f->d, binding, scratch->name, 0, size > bound ? size : bound, "fill")
-                               : result;
+    return result == PATINA_OK ? pt_gl_bind(f->d, binding, scratch->name, 0, size > bound ? size : bound, "fill") : result;
 }
 
 static int programs(struct fill *f)
@@ -66,7 +65,8 @@ static int prepare(struct fill *f)
     if (result == PATINA_OK)
         result = bind_scratch(f, PT_BIND_fill_changed, PT_GL_SCRATCH_PIXELS, LEAST_ENTRIES * CHANGE_SIZE, 0);
     if (result == PATINA_OK)
-        result = bind_scratch(f, PT_BIND_fill_saved, PT_GL_SCRATCH_SAVED, f->args->unfills ? LEAST_ENTRIES * SAVED_SIZE : 16, 0);
+        result = bind_scratch(f, PT_BIND_fill_saved, PT_GL_SCRATCH_SAVED, f->args->unfills ? LEAST_ENTRIES * SAVED_SIZE : 16,
+                              0);
     if (result == PATINA_OK)
         result = bind_scratch(f, PT_BIND_fill_filled, PT_GL_SCRATCH_FILLED, refills ? bits : 16, 0);
     if (result == PATINA_OK)

@@ -5,8 +5,8 @@
 
 #include <stdio.h>
 
-static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions,
-                    uint32_t width, uint32_t height)
+static int run_over(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t variant, const char *definitions, uint32_t width,
+                    uint32_t height)
 {
     GLint group[3] = {1, 1, 1};
     int result = pt_gl_kernel_program(d, kernel, variant, definitions);
@@ -33,7 +33,8 @@ static int run_focus(struct pt_gl_device *d, const struct pt_gl_work *work)
 
 static int run_extract(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
-    static const char *const definitions[] = {"#define PLANE 0\n", "#define PLANE 1\n", "#define PLANE 2\n", "#define PLANE 3\n"};
+    static const char *const definitions[] = {"#define PLANE 0\n", "#define PLANE 1\n", "#define PLANE 2\n",
+                                              "#define PLANE 3\n"};
     const struct extract_args *args = work->arguments;
     const uint32_t asked[] = {args->depth, args->normal, args->source, args->shadow};
     int result = PATINA_OK;
@@ -45,7 +46,8 @@ static int run_extract(struct pt_gl_device *d, const struct pt_gl_work *work)
 
 static int run_ink(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
-    static const char *const definitions[] = {"#define COLOR_FORMAT 0\n", "#define COLOR_FORMAT 1\n", "#define COLOR_FORMAT 2\n"};
+    static const char *const definitions[] = {"#define COLOR_FORMAT 0\n", "#define COLOR_FORMAT 1\n",
+                                              "#define COLOR_FORMAT 2\n"};
     const struct ink_args *args = work->arguments;
     const uint32_t format = args->instance.color_format % 3;
     return run_over(d, PT_KERNEL_ink, format, definitions[format], args->crop_width, args->crop_height);
@@ -57,7 +59,8 @@ static int run_surface(struct pt_gl_device *d, const struct pt_gl_work *work)
     const uint32_t normals = args->instance.has_normals != 0, sigmas = args->sigma_scale > 0.0f, span = args->with_span != 0;
     const uint32_t variant = normals + 2 * sigmas + 4 * span;
     char definitions[64];
-    snprintf(definitions, sizeof definitions, "#define NORMALS %u\n#define SIGMAS %u\n#define SPAN %u\n", normals, sigmas, span);
+    snprintf(definitions, sizeof definitions, "#define NORMALS %u\n#define SIGMAS %u\n#define SPAN %u\n", normals, sigmas,
+             span);
     int result = pt_gl_kernel_program(d, PT_KERNEL_surface, variant, definitions);
     if (result != PATINA_OK)
         return result;
@@ -94,14 +97,17 @@ static int run_peel(struct pt_gl_device *d, const struct pt_gl_work *work)
 
 // Pointwise kernels are pointwise.c's; the others have one dispatch, over their domain: tiles with points in them, or the rectangle.
 static pt_gl_runner *const runners[PT_KERNEL_COUNT] = {
-    [PT_KERNEL_sift] = pt_gl_points,         [PT_KERNEL_scatter] = pt_gl_scatter, [PT_KERNEL_splat] = pt_gl_splat,
-    [PT_KERNEL_surface] = run_surface,       [PT_KERNEL_blend] = pt_gl_blend,     [PT_KERNEL_center] = pt_gl_points,
-    [PT_KERNEL_pull] = run_pull,             [PT_KERNEL_fill] = pt_gl_fill,       [PT_KERNEL_push] = pt_gl_push,
-    [PT_KERNEL_average] = pt_gl_average,     [PT_KERNEL_raster] = pt_gl_raster,   [PT_KERNEL_lit] = pt_gl_points,
-    [PT_KERNEL_lines] = pt_gl_lines,         [PT_KERNEL_shade] = pt_gl_shade,     [PT_KERNEL_obscure] = run_obscure,
-    [PT_KERNEL_antialias] = pt_gl_antialias, [PT_KERNEL_peel] = run_peel,         [PT_KERNEL_focus] = run_focus,
-    [PT_KERNEL_extract] = run_extract,       [PT_KERNEL_ink] = run_ink,
-    [PT_KERNEL_gather] = pt_gl_gather,       [PT_KERNEL_soft] = pt_gl_soft,
+    [PT_KERNEL_sift] = pt_gl_points,   [PT_KERNEL_scatter] = pt_gl_scatter,
+    [PT_KERNEL_splat] = pt_gl_splat,   [PT_KERNEL_surface] = run_surface,
+    [PT_KERNEL_blend] = pt_gl_blend,   [PT_KERNEL_center] = pt_gl_points,
+    [PT_KERNEL_pull] = run_pull,       [PT_KERNEL_fill] = pt_gl_fill,
+    [PT_KERNEL_push] = pt_gl_push,     [PT_KERNEL_average] = pt_gl_average,
+    [PT_KERNEL_raster] = pt_gl_raster, [PT_KERNEL_lit] = pt_gl_points,
+    [PT_KERNEL_lines] = pt_gl_lines,   [PT_KERNEL_shade] = pt_gl_shade,
+    [PT_KERNEL_obscure] = run_obscure, [PT_KERNEL_antialias] = pt_gl_antialias,
+    [PT_KERNEL_peel] = run_peel,       [PT_KERNEL_focus] = run_focus,
+    [PT_KERNEL_extract] = run_extract, [PT_KERNEL_ink] = run_ink,
+    [PT_KERNEL_gather] = pt_gl_gather, [PT_KERNEL_soft] = pt_gl_soft,
 };
 
 static int run_once(struct pt_gl_device *d, const struct pt_gl_work *work)

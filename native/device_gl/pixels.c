@@ -75,8 +75,11 @@ static void shade_definitions(const struct shade_args *args, int shading, char *
              "#define SHADING %d\n#define ARRIVED %d\n#define OPACITY %u\n#define COLOR_FORMAT %u\n#define LIT %d\n"
              "#define LIGHTS %s\n#define PLAIN %d\n#define RECOLOR %d\n#define DIRECTED %d\n%s",
              shading, args->arrived != 0, opacity, instance->color_format % 6,
-             !instance->lit ? 0 : instance->specular > 0.0f ? 2 : 1, lights, plain_lights(args),
-             args->recolor.source || args->recolor.graded, args->directed && instance->lit, blend[args->blend < 2 ? args->blend : 2]);
+             !instance->lit              ? 0
+             : instance->specular > 0.0f ? 2
+                                         : 1,
+             lights, plain_lights(args), args->recolor.source || args->recolor.graded, args->directed && instance->lit,
+             blend[args->blend < 2 ? args->blend : 2]);
 }
 
 // Variants are numbered as they come; beyond the last, it gives way.
@@ -175,7 +178,8 @@ int pt_gl_antialias(struct pt_gl_device *d, const struct pt_gl_work *work)
     uint32_t count = list_length(d);
     result = pt_gl_scratch(d, PT_GL_SCRATCH_COLORS, (size_t)count * 16, 0);
     if (result == PATINA_OK && count)
-        result = pt_gl_bind(d, PT_BIND_antialias_mixed, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16, "antialias");
+        result = pt_gl_bind(d, PT_BIND_antialias_mixed, d->scratch[PT_GL_SCRATCH_COLORS].name, 0, (size_t)count * 16,
+                            "antialias");
     if (result == PATINA_OK)
         result = dispatch_list(d, PT_KERNEL_antialias, variant + MIX, count, GROUP);
     if (result == PATINA_OK)

@@ -148,8 +148,7 @@ static int fail_with_log(struct pt_gl_device *d, const struct source *s, char *l
         file < s->file_count)
         return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shaders/%s:%u: %s", s->files[file], line,
                           text + after + strspn(text + after, "():0123456789 "));
-    return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shader %s: %s", s->files[0],
-                      *text ? text : "the driver gives no reason");
+    return pt_gl_fail(d, PATINA_ERROR_DEVICE, "shader %s: %s", s->files[0], *text ? text : "the driver gives no reason");
 }
 
 static int compile(struct pt_gl_device *d, const struct source *s, GLuint *program)

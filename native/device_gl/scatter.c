@@ -8,17 +8,17 @@
 #include <stdlib.h>
 
 enum {
-    SLICES = 16,     // workgroups that share a chunk on a GPU: 4096 points are too many for one where cores abound
-    LONG_RUN = 4096, // chunks between two looks at cancel
-    DISC_RUN = 256,  // chunks, with discs: a list holds the large ones of a run
+    SLICES = 16,       // workgroups that share a chunk on a GPU: 4096 points are too many for one where cores abound
+    LONG_RUN = 4096,   // chunks between two looks at cancel
+    DISC_RUN = 256,    // chunks, with discs: a list holds the large ones of a run
     CHUNK_MOST = 4096, // points of a chunk
     DISC_STEPS = 8192, // through the loops of an invocation for a large disc: see lib/disc.glsl
 };
 
 struct instance_buffers {
     const struct pt_gl_work *work;
-    const struct pt_buffer_row *rows;  // of the kernel, from chunks on; positions follow
-    struct pt_buffer *const *buffers;  // likewise, the instance's
+    const struct pt_buffer_row *rows; // of the kernel, from chunks on; positions follow
+    struct pt_buffer *const *buffers; // likewise, the instance's
     uint32_t count;
     uint32_t large, parts; // discs: the program of large ones, and workgroups for each; 0: no discs
 };
@@ -114,8 +114,7 @@ static uint64_t most_slots(const struct pt_gl_device *d)
 }
 
 // The next run of chunks whose slots fit.
-static struct batch next_batch(const struct pt_gl_device *d, const struct chunk_view *chunks, uint32_t count,
-                               uint32_t first)
+static struct batch next_batch(const struct pt_gl_device *d, const struct chunk_view *chunks, uint32_t count, uint32_t first)
 {
     uint64_t limit = most_slots(d), begin = UINT64_MAX, end = 0;
     struct batch batch = {.first_chunk = first};
@@ -153,8 +152,7 @@ static int run_instance(struct pt_gl_device *d, const struct instance_buffers *b
     d->gl.BindBuffer(GL_COPY_READ_BUFFER, list->name);
     d->gl.GetBufferSubData(GL_COPY_READ_BUFFER, 0, (GLsizeiptr)(count * sizeof *chunks), chunks);
     int result = pt_gl_check(d, "reading a list of chunks");
-    for (struct batch batch = {0}; batch.first_chunk < count && result == PATINA_OK;
-         batch.first_chunk += batch.chunk_count) {
+    for (struct batch batch = {0}; batch.first_chunk < count && result == PATINA_OK; batch.first_chunk += batch.chunk_count) {
         batch = next_batch(d, chunks, count, batch.first_chunk);
         result = run_batch(d, b, &batch, pass);
     }
@@ -233,7 +231,8 @@ int pt_gl_splat(struct pt_gl_device *d, const struct pt_gl_work *work)
 enum { ADD = 0, MEAN = 1, BAND_BYTES = 1 << 26, SUM_BYTES = 80 }; // blend sums ten, two words each
 
 // Room for the sums of as many rows as fit, at most `height`; bound.
-static int make_sums(struct pt_gl_device *d, uint32_t width, uint32_t height, uint32_t binding, const char *what, uint32_t *rows)
+static int make_sums(struct pt_gl_device *d, uint32_t width, uint32_t height, uint32_t binding, const char *what,
+                     uint32_t *rows)
 {
     const size_t most = d->block_size < BAND_BYTES ? d->block_size : BAND_BYTES;
     *rows = (uint32_t)(most / SUM_BYTES / width);

@@ -12,14 +12,10 @@ static uint64_t next(uint64_t *state)
     *state = *state * 6364136223846793005u + 1442695040888963407u;
     uint64_t value = *state ^ *state >> 29;
     switch (*state >> 60) {
-    case 0:
-        return value & 0xFFFFFFFFu;
-    case 1:
-        return value & 0xFFFFFFFF00000000u;
-    case 2:
-        return value | 0xFFFFFFFF00000000u;
-    default:
-        return value;
+    case 0: return value & 0xFFFFFFFFu;
+    case 1: return value & 0xFFFFFFFF00000000u;
+    case 2: return value | 0xFFFFFFFF00000000u;
+    default: return value;
     }
 }
 

@@ -10,10 +10,12 @@ int pt_gl_gather(struct pt_gl_device *d, const struct pt_gl_work *work)
     const struct shade_args *args = &((const struct gather_args *)work->arguments)->shade;
     const struct instance_args *instance = &args->instance;
     const uint32_t opacity = instance->has_opacities != 0, lit = !instance->lit ? 0 : instance->specular > 0.0f ? 2 : 1;
-    const uint32_t directed = args->directed && lit, variant = instance->color_format % 5 + 5 * (lit + 3 * (opacity + 2 * directed));
+    const uint32_t directed = args->directed && lit,
+                   variant = instance->color_format % 5 + 5 * (lit + 3 * (opacity + 2 * directed));
     char definitions[128];
-    snprintf(definitions, sizeof definitions, "#define COLOR_FORMAT %u\n#define LIT %u\n#define OPACITY %u\n#define DIRECTED %u\n",
-             instance->color_format % 5, lit, opacity, directed);
+    snprintf(definitions, sizeof definitions,
+             "#define COLOR_FORMAT %u\n#define LIT %u\n#define OPACITY %u\n#define DIRECTED %u\n", instance->color_format % 5,
+             lit, opacity, directed);
     int result = pt_gl_kernel_program(d, PT_KERNEL_gather, variant, definitions);
     if (result != PATINA_OK)
         return result;
@@ -94,7 +96,8 @@ static uint32_t longest(const struct soft *soft, uint32_t first, uint32_t end)
 }
 
 // A workgroup for each of these tiles.
-static int run_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end, uint32_t part)
+static int run_tiles(struct pt_gl_device *d, const struct soft *soft, uint32_t variant, uint32_t first, uint32_t end,
+                     uint32_t part)
 {
     const GLuint program = d->programs[PT_KERNEL_soft][variant];
     if (soft->work->cancel && atomic_load(soft->work->cancel))
@@ -170,10 +173,12 @@ static int can_loop(struct pt_gl_device *d, const struct soft *soft)
     if (d->base.info.hardware)
         return PATINA_OK;
     if (soft->tiles > STEPS)
-        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "soft points: a picture of %u tiles; OpenGL in software takes %d", soft->tiles, STEPS);
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "soft points: a picture of %u tiles; OpenGL in software takes %d",
+                          soft->tiles, STEPS);
     if (soft->model != PT_SOFT_EXPRESS && most > (STEPS - PT_SOFT_PART) / 2)
-        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED, "soft points: %u balls on a tile; OpenGL in software takes %u, but for the Express model",
-                          most, (STEPS - PT_SOFT_PART) / 2);
+        return pt_gl_fail(d, PATINA_ERROR_UNSUPPORTED,
+                          "soft points: %u balls on a tile; OpenGL in software takes %u, but for the Express model", most,
+                          (STEPS - PT_SOFT_PART) / 2);
     return PATINA_OK;
 }
 

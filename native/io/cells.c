@@ -26,10 +26,7 @@ static bool parts(enum pt_parting parting, uint8_t c)
     return pt_is_blank(c) || (parting == PT_PARTED_LOOSELY && (c == ',' || c == ';'));
 }
 
-bool pt_cells_skips(enum pt_parting parting, uint8_t c)
-{
-    return parts(parting, c) && c != separator(parting);
-}
+bool pt_cells_skips(enum pt_parting parting, uint8_t c) { return parts(parting, c) && c != separator(parting); }
 
 struct span {
     const uint8_t *begin, *end;
@@ -41,7 +38,7 @@ static inline struct span take(enum pt_parting parting, const uint8_t *at, const
 {
     uint8_t between = separator(parting);
     bool quoted = at < end && *at == '"';
-    struct span found = { at + quoted, at };
+    struct span found = {at + quoted, at};
     if (quoted) {
         for (at++; at < end && *at != '"' && !pt_is_line_end(*at); at++)
             ;
@@ -85,12 +82,12 @@ static inline bool read_number(struct pt_cells *cells, enum pt_parting parting, 
 }
 
 // For one parting each, which the compiler knows: words are read in four fifths of the time.
-static inline __attribute__((always_inline)) const uint8_t *read_line(struct pt_cells *cells, enum pt_parting parting, const uint8_t *at,
-                                                                      const uint8_t *end, double *values, uint32_t most,
-                                                                      struct pt_line *line)
+static inline __attribute__((always_inline)) const uint8_t *read_line(struct pt_cells *cells, enum pt_parting parting,
+                                                                      const uint8_t *at, const uint8_t *end, double *values,
+                                                                      uint32_t most, struct pt_line *line)
 {
     uint8_t between = separator(parting);
-    struct pt_line found = { 0 };
+    struct pt_line found = {0};
     for (;;) {
         while (at < end && pt_cells_skips(parting, *at))
             at++;
@@ -217,7 +214,7 @@ static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *
 // line does not count where it holds names.
 static bool has_decimal_commas(const uint8_t *at, const uint8_t *end)
 {
-    struct pt_cells cells = { .parting = PT_PARTED_BY_BLANKS };
+    struct pt_cells cells = {.parting = PT_PARTED_BY_BLANKS};
     uint32_t wanted = 0, lines = 0;
     at = next_line(cells.parting, at, end);
     for (; at < end && lines < LOOKED_AT; at = next_line(cells.parting, line_end(at, end), end), lines++) {
@@ -239,7 +236,7 @@ static bool has_decimal_commas(const uint8_t *at, const uint8_t *end)
 
 enum pt_parting pt_cells_look(const uint8_t *at, const uint8_t *end)
 {
-    static const enum pt_parting tables[] = { PT_PARTED_BY_SEMICOLON, PT_PARTED_BY_TAB, PT_PARTED_BY_COMMA };
+    static const enum pt_parting tables[] = {PT_PARTED_BY_SEMICOLON, PT_PARTED_BY_TAB, PT_PARTED_BY_COMMA};
     for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
         if (is_table(tables[i], at, end))
             return tables[i];

@@ -9,9 +9,9 @@
 #include <stdint.h>
 
 enum pt_parting {
-    PT_PARTED_LOOSELY,      // blanks, commas and semicolons, any number of them
-    PT_PARTED_BY_BLANKS,    // commas are decimal ones
-    PT_PARTED_BY_COMMA,     // the rest are tables: exactly one between two cells, which may be empty
+    PT_PARTED_LOOSELY,   // blanks, commas and semicolons, any number of them
+    PT_PARTED_BY_BLANKS, // commas are decimal ones
+    PT_PARTED_BY_COMMA,  // the rest are tables: exactly one between two cells, which may be empty
     PT_PARTED_BY_SEMICOLON,
     PT_PARTED_BY_TAB,
 };
@@ -23,11 +23,11 @@ struct pt_cells {
 
 // What one line held.
 struct pt_line {
-    uint32_t count;   // numbers and others, at most `most`
-    uint32_t width;   // all of them
-    uint32_t strange; // words that are no numbers, NaN in the values
+    uint32_t count;           // numbers and others, at most `most`
+    uint32_t width;           // all of them
+    uint32_t strange;         // words that are no numbers, NaN in the values
     uint32_t strange_columns; // which of the first 32 they are, a bit each
-    uint32_t empty;   // cells without anything, NaN in the values
+    uint32_t empty;           // cells without anything, NaN in the values
 };
 
 // Which parting the lines from `at` have, by the first thousand of them: a table has as many separators in each, at least

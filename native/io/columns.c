@@ -30,7 +30,7 @@ int pt_file_add_attribute(struct patina_file *file, const char *name, uint32_t t
     }
     file->attributes = grown;
     struct pt_column *column = &grown[file->attribute_count++];
-    *column = (struct pt_column){ .type = type, .data = data };
+    *column = (struct pt_column){.type = type, .data = data};
     snprintf(column->name, sizeof column->name, "%s", name);
     return PATINA_OK;
 }

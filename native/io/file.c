@@ -32,8 +32,8 @@ static const char *format_of_add_on(const struct pt_input *input)
     static const struct {
         const char *start, *format;
     } known[] = {
-        { "LASF", "LAS, LAZ or COPC" }, { "ASTM-E57", "E57" }, { "# .PCD", "PCD" }, { "VERSION .7", "PCD" }, { "VERSION 0.7", "PCD" },
-        { "camera ", "conf" },          { "bmesh ", "conf" },  { "mesh ", "conf" },
+        {"LASF", "LAS, LAZ or COPC"}, {"ASTM-E57", "E57"}, {"# .PCD", "PCD"},  {"VERSION .7", "PCD"},
+        {"VERSION 0.7", "PCD"},       {"camera ", "conf"}, {"bmesh ", "conf"}, {"mesh ", "conf"},
     };
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         if (input->size >= strlen(known[i].start) && !memcmp(input->data, known[i].start, strlen(known[i].start)))
@@ -45,10 +45,11 @@ static int read_input(const struct pt_input *input, patina_file **out)
 {
     const char *elsewhere = format_of_add_on(input);
     if (elsewhere)
-        return pt_fail(NULL, PATINA_ERROR_FORMAT,
-                       "%s: a file of format %s, which Patina's add-on for Blender reads and exports as PLY; here PLY, XYZ, CSV, PTS "
-                       "and PTX are read",
-                       input->name, elsewhere);
+        return pt_fail(
+            NULL, PATINA_ERROR_FORMAT,
+            "%s: a file of format %s, which Patina's add-on for Blender reads and exports as PLY; here PLY, XYZ, CSV, PTS "
+            "and PTX are read",
+            input->name, elsewhere);
     struct patina_file *file = calloc(1, sizeof *file);
     if (!file)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
@@ -94,7 +95,7 @@ int patina_file_open(const char *path, patina_progress *progress, patina_file **
     *out = NULL;
     if (!path)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open: path is NULL");
-    struct pt_input input = { .progress = progress };
+    struct pt_input input = {.progress = progress};
     struct pt_disk disk;
     pt_clip_name(input.name, sizeof input.name, path);
     pt_progress_set(progress, 0);
@@ -113,7 +114,7 @@ int patina_file_open_memory(const void *data, size_t size, patina_file **out)
     *out = NULL;
     if (!data && size)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open_memory: data is NULL");
-    struct pt_input input = { .name = "(memory)", .data = data, .size = size };
+    struct pt_input input = {.name = "(memory)", .data = data, .size = size};
     return read_input(&input, out);
 }
 
@@ -148,13 +149,13 @@ int patina_file_get_info(const patina_file *file, patina_file_info *info)
     if (!file || !info)
         return pt_fail(file ? &file->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_file_get_info: %s is NULL",
                        file ? "info" : "file");
-    patina_file_info ours = { .count = file->count,
-                              .attributes = file->attribute_count,
-                              .position_type = file->position_type,
-                              .color_type = file->color_type,
-                              .has_normals = file->normal != NULL,
-                              .invalid_positions = file->invalid_positions,
-                              .stations = count_stations(file) };
+    patina_file_info ours = {.count = file->count,
+                             .attributes = file->attribute_count,
+                             .position_type = file->position_type,
+                             .color_type = file->color_type,
+                             .has_normals = file->normal != NULL,
+                             .invalid_positions = file->invalid_positions,
+                             .stations = count_stations(file)};
     memcpy(ours.format, file->format, sizeof ours.format);
     memcpy(ours.origin, file->origin, sizeof ours.origin);
     memcpy(ours.box_min, file->box_min, sizeof ours.box_min);
@@ -178,7 +179,7 @@ int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_fi
     int code = check_index(file, "patina_file_get_attribute", index);
     if (code)
         return code;
-    patina_file_attribute ours = { .type = file->attributes[index].type };
+    patina_file_attribute ours = {.type = file->attributes[index].type};
     memcpy(ours.name, file->attributes[index].name, sizeof ours.name);
     return pt_give(&file->handle, "patina_file_get_attribute", &ours, sizeof ours, attribute);
 }
@@ -186,16 +187,16 @@ int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_fi
 // ---- columns -------------------------------------------------------------------------------------------------------
 
 // A column of point_size bytes a point, into a buffer of `size` bytes.
-static int check_read(const patina_file *file, const char *call, bool has, const char *column, const void *buffer,
-                      size_t size, size_t point_size)
+static int check_read(const patina_file *file, const char *call, bool has, const char *column, const void *buffer, size_t size,
+                      size_t point_size)
 {
     if (!file)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: file is NULL", call);
     if (!has)
         return pt_fail(&file->handle, PATINA_ERROR_EMPTY, "%s: the file has no %s", call, column);
     if (size / point_size < file->count)
-        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: a buffer of %zu bytes cannot hold %llu points of %zu",
-                       call, size, (unsigned long long)file->count, point_size);
+        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: a buffer of %zu bytes cannot hold %llu points of %zu", call,
+                       size, (unsigned long long)file->count, point_size);
     if (!buffer && file->count)
         return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "%s: the buffer is NULL", call);
     return PATINA_OK;
@@ -211,23 +212,16 @@ int patina_file_read_positions(const patina_file *file, float *xyz, size_t size)
 
 int patina_file_read_normals(const patina_file *file, float *xyz, size_t size)
 {
-    int code =
-        check_read(file, "patina_file_read_normals", file && file->normal, "normals", xyz, size, 3 * sizeof *xyz);
+    int code = check_read(file, "patina_file_read_normals", file && file->normal, "normals", xyz, size, 3 * sizeof *xyz);
     if (!code && file->count)
         memcpy(xyz, file->normal, (size_t)file->count * 3 * sizeof *xyz);
     return code;
 }
 
 // IEC 61966-2-1, both ways.
-static float linear_from_srgb(float s)
-{
-    return s <= 0.04045f ? s / 12.92f : powf((s + 0.055f) / 1.055f, 2.4f);
-}
+static float linear_from_srgb(float s) { return s <= 0.04045f ? s / 12.92f : powf((s + 0.055f) / 1.055f, 2.4f); }
 
-static float srgb_from_linear(float l)
-{
-    return l <= 0.0031308f ? l * 12.92f : 1.055f * powf(l, 1 / 2.4f) - 0.055f;
-}
+static float srgb_from_linear(float l) { return l <= 0.0031308f ? l * 12.92f : 1.055f * powf(l, 1 / 2.4f) - 0.055f; }
 
 static uint8_t byte_from_unit(float value)
 {
@@ -259,8 +253,7 @@ int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t si
 
 int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size)
 {
-    int code =
-        check_read(file, "patina_file_read_colors_f32", file && file->color, "colours", rgba, size, 4 * sizeof *rgba);
+    int code = check_read(file, "patina_file_read_colors_f32", file && file->color, "colours", rgba, size, 4 * sizeof *rgba);
     if (code)
         return code;
     const uint8_t *u8 = file->color;

@@ -44,10 +44,7 @@ static void place_of(const struct grid *g, uint32_t point, double p[3])
         p[k] = (double)g->position[3 * (size_t)point + (size_t)k];
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // From p towards the scanner, of length 1.
 static void towards(const struct grid *g, const double p[3], double d[3])
@@ -62,7 +59,7 @@ static void towards(const struct grid *g, const double p[3], double d[3])
 // Along the direction d, and across it.
 static double depth_and_way(const double a[3], const double b[3], const double d[3], double *way)
 {
-    const double v[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
+    const double v[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
     double depth = dot(v, d);
     *way = sqrt(fmax(dot(v, v) - depth * depth, 0));
     return fabs(depth);
@@ -126,10 +123,7 @@ static int reach_of(const struct grid *g, double way)
     return WIDEST;
 }
 
-static int sign(int v)
-{
-    return (v > 0) - (v < 0);
-}
+static int sign(int v) { return (v > 0) - (v < 0); }
 
 // Takes in the cells of ring r that a cell of the ring within leads to; returns the mean way to those of them beside it.
 static double take_ring(const struct grid *g, struct window *w, int64_t column, int64_t row, int r, const double d[3])
@@ -160,7 +154,7 @@ static double take_ring(const struct grid *g, struct window *w, int64_t column, 
 // Slopes of position over column and row, by least squares over the window; false where its cells do not span a plane.
 static bool fit(const struct window *w, int r, double by_column[3], double by_row[3])
 {
-    double n = 0, su = 0, sv = 0, suu = 0, suv = 0, svv = 0, sp[3] = { 0 }, sup[3] = { 0 }, svp[3] = { 0 };
+    double n = 0, su = 0, sv = 0, suu = 0, suv = 0, svv = 0, sp[3] = {0}, sup[3] = {0}, svp[3] = {0};
     for (int u = -r; u <= r; u++)
         for (int v = -r; v <= r; v++) {
             if (!w->in[WIDEST + u][WIDEST + v])
@@ -195,7 +189,7 @@ static void find_normal(const struct grid *g, int64_t column, int64_t row, float
         take_ring(g, &w, column, row, r, d);
     if (!fit(&w, reach, a, b))
         return;
-    double n[3] = { a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0] };
+    double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     double length = sqrt(dot(n, n)) * (dot(n, d) < 0 ? -1 : 1);
     for (int k = 0; k < 3; k++)
         normal[k] = length != 0 && isfinite(length) ? (float)(n[k] / length) : 0;
@@ -252,9 +246,9 @@ int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input)
         return PATINA_OK;
     file->normal = calloc(file->count + 1, 3 * sizeof *file->normal);
     int code = file->normal ? PATINA_OK : PATINA_ERROR_MEMORY;
-    const struct cells cells = { columns->data, rows->data, columns->type == PATINA_UINT32 };
+    const struct cells cells = {columns->data, rows->data, columns->type == PATINA_UINT32};
     for (uint32_t s = 0; s < file->scan_count && !code; s++) {
-        struct grid g = { .scan = &file->scans[s], .position = file->position };
+        struct grid g = {.scan = &file->scans[s], .position = file->position};
         for (int k = 0; k < 3; k++)
             g.station[k] = g.scan->station[k] - (g.scan->parallel ? 0 : file->origin[k]);
         code = find_normals(&g, &cells, input->progress, file->normal);
@@ -275,8 +269,8 @@ int patina_grid_normals(const patina_grid_desc *given, patina_progress *progress
         return wrong;
     if (!given || (desc->count && !(desc->position && desc->column && desc->row && normals)))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grid_normals: bad arguments");
-    struct pt_scan scan = { .count = desc->count };
-    struct grid g = { .scan = &scan, .position = desc->position };
+    struct pt_scan scan = {.count = desc->count};
+    struct grid g = {.scan = &scan, .position = desc->position};
     memcpy(g.station, desc->station, sizeof g.station);
     if (desc->count)
         memset(normals, 0, desc->count * 3 * sizeof *normals);
@@ -290,6 +284,6 @@ int patina_grid_normals(const patina_grid_desc *given, patina_progress *progress
         return PATINA_OK;
     scan.columns = (uint32_t)columns;
     scan.rows = (uint32_t)rows;
-    int code = find_normals(&g, &(struct cells){ desc->column, desc->row, true }, progress, normals);
+    int code = find_normals(&g, &(struct cells){desc->column, desc->row, true}, progress, normals);
     return code ? pt_fail(NULL, code, "normals of a scanner's grid: %s", patina_error_text(code)) : PATINA_OK;
 }

@@ -14,8 +14,8 @@ enum {
     LONGEST_TOKEN = 400 // no writer prints longer ones
 };
 
-static const double power_of_ten[23] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
-                                         1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22 };
+static const double power_of_ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
+                                        1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
 struct decimal { // mantissa * 10^exponent
     uint64_t mantissa;
@@ -26,15 +26,9 @@ struct decimal { // mantissa * 10^exponent
     bool negative;
 };
 
-static bool is_digit(uint8_t c)
-{
-    return c >= '0' && c <= '9';
-}
+static bool is_digit(uint8_t c) { return c >= '0' && c <= '9'; }
 
-static bool is_token_end(const uint8_t *p, const uint8_t *end)
-{
-    return p == end || pt_is_blank(*p) || pt_is_line_end(*p);
-}
+static bool is_token_end(const uint8_t *p, const uint8_t *end) { return p == end || pt_is_blank(*p) || pt_is_line_end(*p); }
 
 // step: what a kept digit adds to the exponent (0 before the point, -1 behind it).
 static const uint8_t *take_digits(const uint8_t *p, const uint8_t *end, int step, struct decimal *d)
@@ -121,7 +115,7 @@ static const uint8_t *parse_hard(const uint8_t *start, const uint8_t *end, bool 
 
 const uint8_t *pt_parse_number(const uint8_t *start, const uint8_t *end, double *value)
 {
-    struct decimal d = { 0 };
+    struct decimal d = {0};
     const uint8_t *p = start;
     if (p != end && (*p == '-' || *p == '+'))
         d.negative = *p++ == '-';

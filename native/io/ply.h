@@ -37,9 +37,9 @@ struct ply_header {
     uint32_t property_count;
     struct ply_property properties[PLY_MOST_PROPERTIES];
     uint32_t grid_columns, grid_rows; // from "obj_info num_cols", "num_rows"
-    bool crlf;          // the header's lines end with CR LF
-    uint64_t body;      // offset of the first byte behind the header
-    uint64_t body_line; // its line number
+    bool crlf;                        // the header's lines end with CR LF
+    uint64_t body;                    // offset of the first byte behind the header
+    uint64_t body_line;               // its line number
 };
 
 // What a fault in the rows is: an error, a line in the log, nothing.
@@ -95,8 +95,8 @@ int ply_check_line_ends(const struct pt_input *input, const struct ply_header *h
 struct ply_faces {
     const float *position; // 3 a point
     uint64_t points;
-    float *normal; // 3 a point, zeros at first
-    bool strips;   // a row is a strip of triangles; -1 begins the next one (Stanford's tristrips)
+    float *normal;      // 3 a point, zeros at first
+    bool strips;        // a row is a strip of triangles; -1 begins the next one (Stanford's tristrips)
     uint64_t used, bad; // faces
     uint64_t bad_row;   // of the first bad one
     double bad_point;   // that it names

@@ -15,10 +15,7 @@ struct text {
     uint64_t line; // number of the line that `at` is in
 };
 
-static bool line_ends(const struct text *t)
-{
-    return t->at == t->end || pt_is_line_end(*t->at);
-}
+static bool line_ends(const struct text *t) { return t->at == t->end || pt_is_line_end(*t->at); }
 
 static void skip_blanks(struct text *t)
 {
@@ -81,16 +78,14 @@ static int read_value(struct text *t, uint32_t type, bool byte, const char *prop
                          (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property);
     if (type != PATINA_FLOAT32 && type != PATINA_FLOAT64 && (!fits(type, byte, *value) || *value != trunc(*value)))
         return ply_fault(t->cursor, "%s: line %llu: '%s' does not fit property %s of type %s", t->input->name,
-                         (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property,
-                         ply_type_name(type));
+                         (unsigned long long)t->line, ply_quote(quoted, t->at, token_length(t)), property, ply_type_name(type));
     t->at = behind;
     return PATINA_OK;
 }
 
 static int short_line(const struct text *t, const char *property)
 {
-    return ply_fault(t->cursor, "%s: line %llu ends before property %s", t->input->name,
-                     (unsigned long long)t->line, property);
+    return ply_fault(t->cursor, "%s: line %llu ends before property %s", t->input->name, (unsigned long long)t->line, property);
 }
 
 // The items of a list, handed on or passed over.
@@ -102,8 +97,8 @@ static int read_list(struct text *t, const struct ply_property *property, struct
     if (code)
         return code;
     if (count < 0)
-        return ply_fault(t->cursor, "%s: line %llu: list %s has the count %.0f", t->input->name,
-                         (unsigned long long)t->line, property->name, count);
+        return ply_fault(t->cursor, "%s: line %llu: list %s has the count %.0f", t->input->name, (unsigned long long)t->line,
+                         property->name, count);
     for (; (double)got < count && !code; got++) {
         skip_blanks(t);
         if (line_ends(t))
@@ -172,11 +167,11 @@ int ply_read_ascii(struct ply_cursor *at, const struct ply_element *element, con
     int code = element->properties ? ply_check_count(at, element) : PATINA_OK;
     if (code || element->properties == 0)
         return code;
-    struct text t = { .cursor = at,
-                      .input = at->input,
-                      .at = at->input->data + at->offset,
-                      .end = at->input->data + at->input->size,
-                      .line = at->line };
+    struct text t = {.cursor = at,
+                     .input = at->input,
+                     .at = at->input->data + at->offset,
+                     .end = at->input->data + at->input->size,
+                     .line = at->line};
     code = read_element(&t, element, targets, lists);
     at->offset = (uint64_t)(t.at - at->input->data);
     at->line = t.line;

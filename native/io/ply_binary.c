@@ -98,8 +98,8 @@ static uint64_t fixed_row(const struct ply_property *properties, uint32_t count)
     return size;
 }
 
-static int read_fixed(struct bytes *b, const struct ply_property *properties, const struct ply_element *element,
-                      uint64_t row, const struct ply_target *targets)
+static int read_fixed(struct bytes *b, const struct ply_property *properties, const struct ply_element *element, uint64_t row,
+                      const struct ply_target *targets)
 {
     double values[BLOCK];
     for (uint64_t first = 0; first < element->count; first += BLOCK) {
@@ -174,7 +174,7 @@ int ply_read_binary(struct ply_cursor *at, const struct ply_element *element, co
 {
     const struct ply_property *properties = at->header->properties + element->first;
     bool big_machine = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
-    struct bytes b = { .at = at, .swap = (at->header->format == PLY_BIG_ENDIAN) != big_machine };
+    struct bytes b = {.at = at, .swap = (at->header->format == PLY_BIG_ENDIAN) != big_machine};
     uint64_t row = fixed_row(properties, element->properties);
     if (element->properties == 0)
         return PATINA_OK;

@@ -7,7 +7,7 @@
 
 int64_t ply_find_corners(const struct ply_header *header, const struct ply_element *element)
 {
-    static const char *const names[] = { "vertex_indices", "vertex_index", "vertex_indexes" };
+    static const char *const names[] = {"vertex_indices", "vertex_index", "vertex_indexes"};
     for (size_t n = 0; n < sizeof names / sizeof *names; n++)
         for (uint32_t k = 0; k < element->properties; k++) {
             const struct ply_property *property = &header->properties[element->first + k];
@@ -30,10 +30,7 @@ static void cross(double c[3], const double a[3], const double b[3])
     c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Divides by the length. False for what has none.
 static bool make_unit(double v[3])
@@ -52,7 +49,7 @@ static const float *corner(const struct ply_faces *faces, const double *corners,
 // The corners are points that there are. flip: 1 or -1.
 static void add_polygon(struct ply_faces *faces, const double *corners, size_t count, double flip)
 {
-    double normal[3] = { 0 }, a[3], b[3], c[3];
+    double normal[3] = {0}, a[3], b[3], c[3];
     for (size_t i = 1; i + 1 < count; i++) { // the sum over a fan is the area's vector of any polygon
         subtract(a, corner(faces, corners, i), corner(faces, corners, 0));
         subtract(b, corner(faces, corners, i + 1), corner(faces, corners, 0));
@@ -112,7 +109,7 @@ void ply_finish_faces(struct ply_faces *faces)
 {
     for (uint64_t i = 0; i < faces->points; i++) {
         float *n = faces->normal + 3 * i;
-        double unit[3] = { (double)n[0], (double)n[1], (double)n[2] };
+        double unit[3] = {(double)n[0], (double)n[1], (double)n[2]};
         bool good = make_unit(unit);
         for (int k = 0; k < 3; k++)
             n[k] = good ? (float)unit[k] : 0;

@@ -28,12 +28,11 @@ static const struct {
     const char *name;
     uint32_t type;
 } type_names[] = {
-    { "char", PATINA_INT8 },       { "uchar", PATINA_UINT8 },    { "short", PATINA_INT16 },
-    { "ushort", PATINA_UINT16 },   { "int", PATINA_INT32 },      { "uint", PATINA_UINT32 },
-    { "float", PATINA_FLOAT32 },   { "double", PATINA_FLOAT64 }, { "int8", PATINA_INT8 },
-    { "uint8", PATINA_UINT8 },     { "int16", PATINA_INT16 },    { "uint16", PATINA_UINT16 },
-    { "int32", PATINA_INT32 },     { "uint32", PATINA_UINT32 },  { "float32", PATINA_FLOAT32 },
-    { "float64", PATINA_FLOAT64 }, { "bool", PATINA_UINT8 }, // 0 or 1: no type of the format, but written
+    {"char", PATINA_INT8},   {"uchar", PATINA_UINT8},   {"short", PATINA_INT16},     {"ushort", PATINA_UINT16},
+    {"int", PATINA_INT32},   {"uint", PATINA_UINT32},   {"float", PATINA_FLOAT32},   {"double", PATINA_FLOAT64},
+    {"int8", PATINA_INT8},   {"uint8", PATINA_UINT8},   {"int16", PATINA_INT16},     {"uint16", PATINA_UINT16},
+    {"int32", PATINA_INT32}, {"uint32", PATINA_UINT32}, {"float32", PATINA_FLOAT32}, {"float64", PATINA_FLOAT64},
+    {"bool", PATINA_UINT8}, // 0 or 1: no type of the format, but written
 };
 
 const char *ply_type_name(uint32_t type)
@@ -63,14 +62,14 @@ static bool is(struct word word, const char *text)
 static int fail(const struct reader *r, const char *what, struct word word)
 {
     char quoted[44];
-    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: header line %llu: %s '%s'", r->input->name,
-                   (unsigned long long)r->line, what, ply_quote(quoted, word.text, word.length));
+    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: header line %llu: %s '%s'", r->input->name, (unsigned long long)r->line,
+                   what, ply_quote(quoted, word.text, word.length));
 }
 
 static struct word whole_line(const struct reader *r)
 {
     const struct word *last = &r->words[(r->word_count < MOST_WORDS ? r->word_count : MOST_WORDS) - 1];
-    return (struct word){ r->words[0].text, (size_t)(last->text + last->length - r->words[0].text) };
+    return (struct word){r->words[0].text, (size_t)(last->text + last->length - r->words[0].text)};
 }
 
 static void split(struct reader *r, const uint8_t *text, size_t length)
@@ -85,7 +84,7 @@ static void split(struct reader *r, const uint8_t *text, size_t length)
         while (i < length && !pt_is_blank(text[i]) && text[i] != '\r')
             i++;
         if (r->word_count < MOST_WORDS)
-            r->words[r->word_count] = (struct word){ text + start, i - start };
+            r->words[r->word_count] = (struct word){text + start, i - start};
         r->word_count++;
     }
 }
@@ -102,8 +101,8 @@ static int next_line(struct reader *r)
             return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: no end_header in the first %d bytes", r->input->name,
                            (int)PLY_LONGEST_HEADER);
         if (!stop && r->offset >= limit)
-            return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: the header ends at byte %llu without end_header",
-                           r->input->name, (unsigned long long)r->offset);
+            return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: the header ends at byte %llu without end_header", r->input->name,
+                           (unsigned long long)r->offset);
         if (!stop)
             stop = data + limit; // the last line of a file of nothing but a header
         split(r, start, (size_t)(stop - start));
@@ -129,8 +128,8 @@ static int read_magic(struct reader *r)
     for (; i < size && i < PLY_LONGEST_HEADER && (pt_is_blank(data[i]) || pt_is_line_end(data[i])); i++)
         r->line += data[i] == '\n';
     if (size - i < 4 || memcmp(data + i, "ply", 3) || !(pt_is_blank(data[i + 3]) || pt_is_line_end(data[i + 3])))
-        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: not a PLY file, it begins with '%s' instead of 'ply'",
-                       r->input->name, ply_quote(quoted, data + i, size - i > 12 ? 12 : size - i));
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: not a PLY file, it begins with '%s' instead of 'ply'", r->input->name,
+                       ply_quote(quoted, data + i, size - i > 12 ? 12 : size - i));
     r->offset = i;
     for (i += 3; i < size && i < PLY_LONGEST_HEADER && !pt_is_line_end(data[i]); i++)
         ;
@@ -176,7 +175,7 @@ static int read_element(struct reader *r)
     if (h->element_count == PLY_MOST_ELEMENTS)
         return fail(r, "more than 64 elements, the last read is", r->words[1]);
     struct ply_element *element = &h->elements[h->element_count];
-    *element = (struct ply_element){ .first = h->property_count };
+    *element = (struct ply_element){.first = h->property_count};
     int code = take_name(r, r->words[1], element->name);
     if (code)
         return code;
@@ -211,12 +210,11 @@ static int read_property(struct reader *r)
     if (h->element_count == 0)
         return fail(r, "a property before the first element:", whole_line(r));
     if (r->word_count != (list ? 5 : 3))
-        return fail(r, "expected 'property <type> <name>' or 'property list <type> <type> <name>', found",
-                    whole_line(r));
+        return fail(r, "expected 'property <type> <name>' or 'property list <type> <type> <name>', found", whole_line(r));
     if (h->property_count == PLY_MOST_PROPERTIES)
         return fail(r, "more than 1024 properties, the last read is", r->words[2]);
     struct ply_property *property = &h->properties[h->property_count];
-    *property = (struct ply_property){ .count_type = PATINA_NONE };
+    *property = (struct ply_property){.count_type = PATINA_NONE};
     int code = list ? take_type(r, r->words[2], &property->count_type) : PATINA_OK;
     if (!code)
         code = take_type(r, r->words[list ? 3 : 1], &property->type);
@@ -254,7 +252,7 @@ static void read_info(struct reader *r)
 {
     uint32_t *size = r->word_count == 3 && is(r->words[1], "num_cols")   ? &r->header->grid_columns
                      : r->word_count == 3 && is(r->words[1], "num_rows") ? &r->header->grid_rows
-                                                                          : NULL;
+                                                                         : NULL;
     uint32_t value = 0;
     for (size_t i = 0; size && i < r->words[2].length && value < PLY_NO_CELL; i++) {
         uint8_t c = r->words[2].text[i];
@@ -288,7 +286,7 @@ static int read_line(struct reader *r)
 
 int ply_read_header(const struct pt_input *input, struct ply_header *header)
 {
-    struct reader r = { .input = input, .header = header };
+    struct reader r = {.input = input, .header = header};
     int code = read_magic(&r);
     if (!code && r.word_count != 1)
         code = fail(&r, "expected 'ply' alone, found", whole_line(&r));

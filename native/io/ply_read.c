@@ -16,15 +16,12 @@
 
 enum { FAMILY = 4 }; // names in a family: x y z, or red green blue alpha
 
-static const char *const position_names[][FAMILY] = { { "x", "y", "z", NULL } };
-static const char *const normal_names[][FAMILY] = { { "nx", "ny", "nz", NULL },
-                                                    { "normal_x", "normal_y", "normal_z", NULL },
-                                                    { "normalx", "normaly", "normalz", NULL } };
-static const char *const color_names[][FAMILY] = { { "red", "green", "blue", "alpha" },
-                                                   { "r", "g", "b", "a" },
-                                                   { "diffuse_red", "diffuse_green", "diffuse_blue",
-                                                     "diffuse_alpha" } };
-static const char *const splat_names[][FAMILY] = { { "f_dc_0", "f_dc_1", "f_dc_2", NULL } };
+static const char *const position_names[][FAMILY] = {{"x", "y", "z", NULL}};
+static const char *const normal_names[][FAMILY] = {
+    {"nx", "ny", "nz", NULL}, {"normal_x", "normal_y", "normal_z", NULL}, {"normalx", "normaly", "normalz", NULL}};
+static const char *const color_names[][FAMILY] = {
+    {"red", "green", "blue", "alpha"}, {"r", "g", "b", "a"}, {"diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"}};
+static const char *const splat_names[][FAMILY] = {{"f_dc_0", "f_dc_1", "f_dc_2", NULL}};
 static const double harmonic = 0.28209479177387814; // Y00 = sqrt(1 / (4 pi))
 
 struct plan {
@@ -64,8 +61,7 @@ static int64_t find(const struct plan *plan, const char *name)
 
 // The first family whose first three names are all scalars of the points. found[3] is -1 where the family's fourth is
 // missing.
-static bool find_family(const struct plan *plan, const char *const families[][FAMILY], size_t count,
-                        int64_t found[FAMILY])
+static bool find_family(const struct plan *plan, const char *const families[][FAMILY], size_t count, int64_t found[FAMILY])
 {
     for (size_t f = 0; f < count; f++) {
         bool all = true;
@@ -81,17 +77,14 @@ static bool find_family(const struct plan *plan, const char *const families[][FA
     return false;
 }
 
-static bool is_float(uint32_t type)
-{
-    return type == PATINA_FLOAT32 || type == PATINA_FLOAT64;
-}
+static bool is_float(uint32_t type) { return type == PATINA_FLOAT32 || type == PATINA_FLOAT64; }
 
 // ---- columns -------------------------------------------------------------------------------------------------------
 
 static void aim(struct plan *plan, int64_t property, void *data, uint32_t type, uint32_t step)
 {
     plan->taken[property] = true;
-    plan->targets[property] = (struct ply_target){ .data = data, .type = type, .step = step, .scale = 1 };
+    plan->targets[property] = (struct ply_target){.data = data, .type = type, .step = step, .scale = 1};
 }
 
 // Text may hold more digits than its declared float does, so it is staged like the types that float32 cannot hold.
@@ -190,10 +183,9 @@ static int plan_colors(struct plan *plan)
         return plan_splat_colors(plan);
     uint32_t type = color_class(p[found[0]].type);
     if (type != color_class(p[found[1]].type) || type != color_class(p[found[2]].type))
-        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: properties %s, %s and %s mix the types %s, %s and %s",
-                       plan->input->name, p[found[0]].name, p[found[1]].name, p[found[2]].name,
-                       ply_type_name(p[found[0]].type), ply_type_name(p[found[1]].type),
-                       ply_type_name(p[found[2]].type));
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: properties %s, %s and %s mix the types %s, %s and %s", plan->input->name,
+                       p[found[0]].name, p[found[1]].name, p[found[2]].name, ply_type_name(p[found[0]].type),
+                       ply_type_name(p[found[1]].type), ply_type_name(p[found[2]].type));
     size_t size = pt_type_size(type);
     file->color_type = type;
     file->color = column(plan, 4 * size);
@@ -240,7 +232,7 @@ static int plan_attributes(struct plan *plan)
 
 static const struct ply_element *find_points(const struct ply_header *header)
 {
-    static const char *const names[] = { "vertex", "vertices", "point", "points" };
+    static const char *const names[] = {"vertex", "vertices", "point", "points"};
     for (size_t n = 0; n < sizeof names / sizeof *names; n++)
         for (uint32_t e = 0; e < header->element_count; e++)
             if (!strcmp(header->elements[e].name, names[n]))
@@ -264,8 +256,8 @@ static int read_to_points(const struct plan *plan, struct ply_cursor *at, struct
 static int read_faces(const struct plan *plan, struct ply_cursor *at)
 {
     struct patina_file *file = plan->file;
-    struct ply_faces faces = { .position = file->position, .points = file->count };
-    struct ply_lists lists = { .take = ply_take_face, .context = &faces };
+    struct ply_faces faces = {.position = file->position, .points = file->count};
+    struct ply_lists lists = {.take = ply_take_face, .context = &faces};
     faces.strips = !strcmp(plan->faces->name, "tristrips");
     faces.normal = file->normal = calloc(file->count + 1, 3 * sizeof *file->normal);
     if (!file->normal)
@@ -276,7 +268,8 @@ static int read_faces(const struct plan *plan, struct ply_cursor *at)
     free(lists.items);
     ply_finish_faces(&faces);
     if (faces.bad)
-        pt_log(PT_LOG_WARNING, "%s: %llu faces name points that are not there, and were left out; the first, %llu, names %.0f of %llu",
+        pt_log(PT_LOG_WARNING,
+               "%s: %llu faces name points that are not there, and were left out; the first, %llu, names %.0f of %llu",
                plan->input->name, (unsigned long long)faces.bad, (unsigned long long)faces.bad_row, faces.bad_point,
                (unsigned long long)file->count);
     if (!faces.used) {
@@ -291,8 +284,8 @@ static int read_faces(const struct plan *plan, struct ply_cursor *at)
 static int read_grid(const struct plan *plan, struct ply_cursor *at)
 {
     struct patina_file *file = plan->file;
-    struct ply_grid grid = { .columns = plan->header->grid_columns, .points = file->count };
-    struct ply_lists lists = { .take = ply_take_cell, .context = &grid };
+    struct ply_grid grid = {.columns = plan->header->grid_columns, .points = file->count};
+    struct ply_lists lists = {.take = ply_take_cell, .context = &grid};
     lists.property = (uint32_t)ply_find_corners(plan->header, plan->grid);
     grid.row = column(plan, sizeof *grid.row);
     grid.column = column(plan, sizeof *grid.column);
@@ -310,8 +303,11 @@ static int read_grid(const struct plan *plan, struct ply_cursor *at)
         free(grid.column);
         return code;
     }
-    file->scans[0] = (struct pt_scan){ .count = file->count, .columns = plan->header->grid_columns,
-                                       .rows = plan->header->grid_rows, .station = { 0, 0, 1 }, .parallel = true };
+    file->scans[0] = (struct pt_scan){.count = file->count,
+                                      .columns = plan->header->grid_columns,
+                                      .rows = plan->header->grid_rows,
+                                      .station = {0, 0, 1},
+                                      .parallel = true};
     file->scan_count = 1;
     code = pt_file_add_attribute(file, "column", PATINA_UINT16, grid.column);
     if (code)
@@ -339,7 +335,7 @@ static int read_behind(const struct plan *plan, struct ply_cursor *at)
 
 static const struct ply_element *find_faces(const struct plan *plan)
 {
-    static const char *const names[] = { "face", "faces", "tristrips" };
+    static const char *const names[] = {"face", "faces", "tristrips"};
     const struct ply_header *header = plan->header;
     for (size_t n = 0; n < sizeof names / sizeof *names && !plan->file->normal; n++)
         for (uint32_t e = 0; e < header->element_count; e++)
@@ -363,9 +359,9 @@ static const struct ply_element *find_grid(const struct plan *plan)
 
 static int read_points(struct plan *plan)
 {
-    static const char *const formats[] = { "", "PLY ascii", "PLY binary_little_endian", "PLY binary_big_endian" };
+    static const char *const formats[] = {"", "PLY ascii", "PLY binary_little_endian", "PLY binary_big_endian"};
     struct patina_file *file = plan->file;
-    struct ply_cursor at = { plan->input, plan->header, plan->header->body, plan->header->body_line, PLY_REFUSE };
+    struct ply_cursor at = {plan->input, plan->header, plan->header->body, plan->header->body_line, PLY_REFUSE};
     // Before a byte is allocated; again by the readers of the rows, where elements stand before the points.
     int code = ply_check_count(&at, plan->points);
     if (code)
@@ -403,7 +399,7 @@ static int read_points(struct plan *plan)
 
 int pt_ply_read(struct patina_file *file, const struct pt_input *input)
 {
-    struct plan plan = { .input = input, .file = file };
+    struct plan plan = {.input = input, .file = file};
     struct ply_header *header = calloc(1, sizeof *header); // 150 KB: too much for a stack
     if (!header)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);

@@ -50,7 +50,7 @@ static uint64_t count_line_ends(const struct pt_input *input, uint64_t body)
 int ply_check_line_ends(const struct pt_input *input, const struct ply_header *header)
 {
     uint64_t count = header->crlf && header->format != PLY_ASCII ? count_line_ends(input, header->body) : 0;
-    struct ply_cursor at = { .input = input, .header = header, .offset = header->body, .tone = PLY_QUIET };
+    struct ply_cursor at = {.input = input, .header = header, .offset = header->body, .tone = PLY_QUIET};
     int code = PATINA_OK;
     if (!count)
         return PATINA_OK;

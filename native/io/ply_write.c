@@ -21,21 +21,18 @@ struct writer {
     FILE *stream;
 };
 
-static bool is_float(uint32_t type)
-{
-    return type == PATINA_FLOAT32 || type == PATINA_FLOAT64;
-}
+static bool is_float(uint32_t type) { return type == PATINA_FLOAT32 || type == PATINA_FLOAT64; }
 
 // One optional array of the descriptor.
 static int check_array(const patina_array *array, uint64_t count, bool types_fit, bool components_fit, const char *name)
 {
     if (!types_fit || !components_fit)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: %s: %u components of type %u cannot be written",
-                       name, array->components, array->type);
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: %s: %u components of type %u cannot be written", name,
+                       array->components, array->type);
     uint64_t packed = array->components * pt_type_size(array->type);
     if (array->stride && array->stride < packed)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: %s: the stride %llu is less than an element",
-                       name, (unsigned long long)array->stride);
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: %s: the stride %llu is less than an element", name,
+                       (unsigned long long)array->stride);
     if (count > (uint64_t)PTRDIFF_MAX / (array->stride ? array->stride : packed))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_write_ply: %llu points are more than memory can hold",
                        (unsigned long long)count);
@@ -61,11 +58,10 @@ static int check_desc(const patina_cloud_desc *desc)
 
 static void write_header(const struct writer *w)
 {
-    static const char *const position[] = { "x", "y", "z" }, *const normal[] = { "nx", "ny", "nz" },
-                             *const color[] = { "red", "green", "blue", "alpha" };
+    static const char *const position[] = {"x", "y", "z"}, *const normal[] = {"nx", "ny", "nz"},
+                             *const color[] = {"red", "green", "blue", "alpha"};
     const patina_cloud_desc *d = w->desc;
-    fprintf(w->stream,
-            "ply\nformat binary_little_endian 1.0\ncomment written by Patina %d.%d.%d\nelement vertex %llu\n",
+    fprintf(w->stream, "ply\nformat binary_little_endian 1.0\ncomment written by Patina %d.%d.%d\nelement vertex %llu\n",
             PATINA_VERSION_MAJOR, PATINA_VERSION_MINOR, PATINA_VERSION_PATCH, (unsigned long long)d->count);
     for (uint32_t i = 0; i < 3; i++)
         fprintf(w->stream, "property %s %s\n", ply_type_name(w->position_type), position[i]);
@@ -158,7 +154,7 @@ int patina_write_ply(const char *path, const patina_cloud_desc *given)
     code = code ? code : check_desc(desc);
     if (code)
         return code;
-    struct writer w = { .desc = desc };
+    struct writer w = {.desc = desc};
     for (int axis = 0; axis < 3; axis++)
         w.has_origin |= desc->origin[axis] != 0;
     w.position_type = w.has_origin || desc->position.type == PATINA_FLOAT64 ? PATINA_FLOAT64 : PATINA_FLOAT32;

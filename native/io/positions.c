@@ -86,7 +86,7 @@ void pt_file_place(struct patina_file *file, double *staged)
 
 void pt_file_measure(struct patina_file *file)
 {
-    float low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
+    float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     uint64_t invalid = 0;
     for (uint64_t i = 0; i < file->count; i++) {
         const float *p = file->position + 3 * i;

@@ -191,8 +191,8 @@ static void guess_colors(struct text *t, double (*rows)[MOST_COLUMNS], uint32_t 
 // ---- the scans of a PTX --------------------------------------------------------------------------------------------------
 
 struct scan {
-    uint64_t left;     // points still to come
-    uint64_t cell;     // behind the last one: column by column
+    uint64_t left; // points still to come
+    uint64_t cell; // behind the last one: column by column
     uint32_t columns, rows;
     double matrix[16]; // as in the file: rows of the transposed
 };

@@ -41,7 +41,8 @@ void pt_plan_assess(struct pt_builder *builder)
                          {pt_plane_at(PT_PLANE_KEYS, 0), pt_shapes_of(instance, i),
                           pt_plane_if(args.certainty != 0, PT_PLANE_CERTAINTY, 0),
                           pt_plane_if(args.thickness != 0, PT_PLANE_THICKNESS, 0)}),
-                  "of instance %u are asked for:%s%s", i, args.certainty ? " certainty" : "", args.thickness ? " thickness" : "");
+                  "of instance %u are asked for:%s%s", i, args.certainty ? " certainty" : "",
+                  args.thickness ? " thickness" : "");
         args.first = 0;
         plan->assessed = asked;
     }

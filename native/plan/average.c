@@ -26,17 +26,18 @@ void pt_plan_average(struct pt_builder *builder)
                                           .instance = instance->args,
                                           .normals = (uint32_t)wants_normals(builder, instance),
                                           .sifted = plan->drawn_words > 0};
-        const struct pt_ref refs[] = {pt_keys_of(builder, 0),           pt_from_of(builder, 0),
-                                      pt_plane_at(PT_PLANE_DEFF, 0),    pt_plane_at(PT_PLANE_NORMAL, 0),
-                                      pt_plane_at(PT_PLANE_ALBEDO, 0),  pt_buffer_of(PT_CHUNKS, i),
-                                      pt_buffer_of(PT_POSITIONS, i),    pt_buffer_of(PT_SURFACE, i),
-                                      pt_buffer_of(PT_COLORS, i),       args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()};
+        const struct pt_ref refs[] = {pt_keys_of(builder, 0),          pt_from_of(builder, 0),
+                                      pt_plane_at(PT_PLANE_DEFF, 0),   pt_plane_at(PT_PLANE_NORMAL, 0),
+                                      pt_plane_at(PT_PLANE_ALBEDO, 0), pt_buffer_of(PT_CHUNKS, i),
+                                      pt_buffer_of(PT_POSITIONS, i),   pt_buffer_of(PT_SURFACE, i),
+                                      pt_buffer_of(PT_COLORS, i),      args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()};
         PT_REASON(pt_add(builder, PT_KERNEL_average, "average", &args, sizeof args, refs, sizeof refs / sizeof *refs),
                   "colour%s of instance %u: means over the points about its surface", args.normals ? " and normals" : "", i);
         averaged++;
     }
     if (!averaged)
-        pt_skip(builder, "average", !builder->scene->settings.average ? "the settings ask for the nearest points"
-                                    : !plan->filled                   ? "discs are blended"
-                                                                      : "ramps and opacities of points are the nearest ones'");
+        pt_skip(builder, "average",
+                !builder->scene->settings.average ? "the settings ask for the nearest points"
+                : !plan->filled                   ? "discs are blended"
+                                                  : "ramps and opacities of points are the nearest ones'");
 }

@@ -53,27 +53,29 @@ void pt_plan_sift(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
     if (!plan->drawn_words) {
-        pt_skip(builder, "sift", plan->chunks_clipped ? "clips, classes, shapes, masks and fields take chunks whole"
-                                                      : "no clip, hidden class, hidden shape, mask or field in view");
+        pt_skip(builder, "sift",
+                plan->chunks_clipped ? "clips, classes, shapes, masks and fields take chunks whole"
+                                     : "no clip, hidden class, hidden shape, mask or field in view");
         return;
     }
-    for (uint32_t i = 0; i < plan->instance_count + plan->soft_count && builder->layer <= 1; i++) { // the words serve every layer
+    for (uint32_t i = 0; i < plan->instance_count + plan->soft_count && builder->layer <= 1;
+         i++) { // the words serve every layer
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunks_cut)
             continue;
-        struct sift_args args = { .by_class = instance->by_class != 0,
-                                  .by_shape = instance->by_shape != 0,
-                                  .by_mask = instance->by_mask != 0,
-                                  .by_field = instance->by_field != 0,
-                                  .threshold = pt_field_steps(instance->instance->style.soft_threshold) };
+        struct sift_args args = {.by_class = instance->by_class != 0,
+                                 .by_shape = instance->by_shape != 0,
+                                 .by_mask = instance->by_mask != 0,
+                                 .by_field = instance->by_field != 0,
+                                 .threshold = pt_field_steps(instance->instance->style.soft_threshold)};
         memcpy(args.hidden, instance->instance->style.hidden_classes, sizeof args.hidden);
         pt_hidden_shapes(instance->instance, args.hidden_shapes);
         PT_REASON(PT_ADD(builder, sift, args,
-                         { pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), args.by_class ? pt_buffer_of(PT_CLASSES, i) : pt_nothing(),
-                           pt_buffer_of(PT_CLIPS, i), pt_buffer_of(PT_DRAWN, i),
-                           args.by_shape ? pt_shapes_of(instance, i) : pt_nothing(),
-                           args.by_mask ? pt_buffer_of(PT_MASK, i) : pt_nothing(),
-                           args.by_field ? pt_field_of(instance, i) : pt_nothing() }),
+                         {pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
+                          args.by_class ? pt_buffer_of(PT_CLASSES, i) : pt_nothing(), pt_buffer_of(PT_CLIPS, i),
+                          pt_buffer_of(PT_DRAWN, i), args.by_shape ? pt_shapes_of(instance, i) : pt_nothing(),
+                          args.by_mask ? pt_buffer_of(PT_MASK, i) : pt_nothing(),
+                          args.by_field ? pt_field_of(instance, i) : pt_nothing()}),
                   "clips, classes, shapes, a mask or a field divide %u chunks of instance %u", instance->chunks_cut, i);
     }
 }
@@ -122,15 +124,14 @@ void pt_plan_tint(struct pt_builder *builder, enum pt_plane color)
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count)
             continue;
-        struct tint_args args = { .view = pt_view_filled(plan, instance),
-                                  .id_base = instance->args.id_base,
-                                  .id_count = instance->args.id_count,
-                                  .clip_first = plan->clip_count,
-                                  .eye_z = pt_eye_z(scene) };
+        struct tint_args args = {.view = pt_view_filled(plan, instance),
+                                 .id_base = instance->args.id_base,
+                                 .id_count = instance->args.id_count,
+                                 .clip_first = plan->clip_count,
+                                 .eye_z = pt_eye_z(scene)};
         args.clip_count = clips_in_view(builder, instance->instance);
         if (args.clip_count)
-            PT_REASON(PT_ADD(builder, tint, args,
-                             { pt_keys_of(builder, 0), pt_buffer_of(PT_CLIPS, i), pt_plane_at(color, 0) }),
+            PT_REASON(PT_ADD(builder, tint, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_CLIPS, i), pt_plane_at(color, 0)}),
                       "cuts of %u clips through instance %u", args.clip_count, i);
     }
 }

@@ -31,10 +31,10 @@ static void widen(void *context, const double corner[3])
 // Heights or distances of the corners of the cloud's chunks; of distances the least is 0 where the eye is among them.
 static struct span span_of_boxes(const struct patina_scene *scene, const struct pt_instance *instance)
 {
-    static const double as_it_is[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
+    static const double as_it_is[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     const enum patina_color_source source = instance->style.color_source;
     const double *matrix = source == PATINA_COLOR_OBJECT_HEIGHT ? as_it_is : instance->style.world_from_object;
-    struct spread spread = { .scene = scene, .distances = source == PATINA_COLOR_DISTANCE, .span = { INFINITY, -INFINITY } };
+    struct spread spread = {.scene = scene, .distances = source == PATINA_COLOR_DISTANCE, .span = {INFINITY, -INFINITY}};
     pt_camera_axes(&scene->camera, spread.axes, spread.eye);
     for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
         pt_chunk_corners(&instance->cloud->chunks[c], matrix, widen, &spread);
@@ -48,21 +48,22 @@ static struct span span_of(const struct patina_scene *scene, const struct pt_ins
         return span_of_boxes(scene, instance);
     if (range[0] == range[1])
         range = instance->cloud->info.scalar_range;
-    return (struct span){ (double)range[0], (double)range[1] };
+    return (struct span){(double)range[0], (double)range[1]};
 }
 
 // t = along . place + zero, of places in view space: world z, or object z, from 0 to 1 over the span.
 static void set_height(const struct patina_scene *scene, const struct pt_instance *instance, struct span span, double slope,
                        struct recolor_args *out)
 {
-    double axes[9], eye[3], linear[9], translation[3], cofactors[9], up[3] = { 0.0, 0.0, 1.0 };
+    double axes[9], eye[3], linear[9], translation[3], cofactors[9], up[3] = {0.0, 0.0, 1.0};
     pt_camera_axes(&scene->camera, axes, eye);
     pt_split_matrix(instance->style.world_from_object, linear, translation);
     if (instance->style.color_source == PATINA_COLOR_OBJECT_HEIGHT) { // the last row of the inverse
         pt_cofactors(linear, cofactors);
         double determinant = pt_determinant(linear);
         for (int k = 0; k < 3; k++) {
-            up[k] = determinant != 0.0 && isfinite(cofactors[3 * k + 2] / determinant) ? cofactors[3 * k + 2] / determinant : 0.0;
+            up[k] = determinant != 0.0 && isfinite(cofactors[3 * k + 2] / determinant) ? cofactors[3 * k + 2] / determinant
+                                                                                       : 0.0;
             eye[k] -= translation[k];
         }
     }
@@ -74,7 +75,7 @@ static void set_height(const struct patina_scene *scene, const struct pt_instanc
 
 static void set_ramp(const struct pt_instance *instance, struct recolor_args *out)
 {
-    static const float grey[6] = { 0.0f, 0.0f, 0.0f, 1.0f, 1.0f, 1.0f };
+    static const float grey[6] = {0.0f, 0.0f, 0.0f, 1.0f, 1.0f, 1.0f};
     out->entries = instance->style.ramp ? instance->style.ramp_count : 2;
     memcpy(out->ramp, instance->style.ramp ? instance->style.ramp : grey, 3 * (size_t)out->entries * sizeof *out->ramp);
 }

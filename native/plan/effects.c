@@ -26,7 +26,8 @@ static void plan_edl(struct pt_builder *builder, enum pt_plane color)
         args.offsets[2 * i + 1] = (int32_t)lround(radius * sin(angle));
     }
     args.reach = (uint32_t)lround((double)effects->edl_radius);
-    args.scale = (float)fmin(fmax(view->perspective ? EDL_LOG : EDL_PIXEL / ((double)view->footprint * pt_finer(builder->scene)), 1e-30), 1e30);
+    args.scale = (float)fmin(
+        fmax(view->perspective ? EDL_LOG : EDL_PIXEL / ((double)view->footprint * pt_finer(builder->scene)), 1e-30), 1e30);
     args.gain = (float)(1.4427 * (double)effects->edl_strength / PT_EDL_NEIGHBOURS);
     PT_REASON(PT_ADD(builder, edl, args, {pt_keys_of(builder, 0), pt_plane_at(color, 0)}),
               "eye-dome lighting, strength %.2f, %u pixels around", (double)effects->edl_strength, args.reach);
@@ -99,8 +100,8 @@ static void plan_obscure(struct pt_builder *builder, enum pt_plane color)
         args.turns[2 * i + 1] = (float)sin(angle);
     }
     PT_REASON(PT_ADD(builder, obscure, args,
-                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(builder->plan),
-                      pt_shading_of(builder), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_OBSCURED, 0)}),
+                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(builder->plan), pt_shading_of(builder),
+                      pt_plane_at(color, 0), pt_plane_at(PT_PLANE_OBSCURED, 0)}),
               "ambient obscurance, strength %.2f, within %.4g", (double)args.strength, radius);
 }
 
@@ -119,9 +120,8 @@ static void plan_toon(struct pt_builder *builder, enum pt_plane color)
                              .bands = (float)effects->toon_bands - 0.5f,
                              .inverse = (float)(1.0 / (effects->toon_bands - 0.5)),
                              .steepness = 1.0f / fmaxf(effects->toon_softness, TOON_SHARP)};
-    PT_REASON(
-        PT_ADD(builder, toon, args, {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_UNLIT, 0), pt_plane_at(color, 0)}),
-        "light in %u bands", effects->toon_bands);
+    PT_REASON(PT_ADD(builder, toon, args, {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_UNLIT, 0), pt_plane_at(color, 0)}),
+              "light in %u bands", effects->toon_bands);
 }
 
 // ---- hatching ------------------------------------------------------------------------------------------------------------
@@ -205,10 +205,8 @@ static void plan_contour(struct pt_builder *builder, enum pt_plane color)
         return;
     }
     const int bold = effects->contour_every > 1;
-    struct contour_args args = {.view = builder->plan->view,
-                                .eye_z = pt_eye_z(scene),
-                                .opacity = effects->contour_opacity,
-                                .kinds = bold ? 2 : 1};
+    struct contour_args args = {
+        .view = builder->plan->view, .eye_z = pt_eye_z(scene), .opacity = effects->contour_opacity, .kinds = bold ? 2 : 1};
     double axis[3] = {0.0, 0.0, 1.0}, camera[9], position[3], view[3];
     for (int k = 0; k < 3 && effects->contour_source == PATINA_CONTOUR_PLANE; k++)
         axis[k] = (double)effects->contour_axis[k];
@@ -263,10 +261,7 @@ static void plan_fog(struct pt_builder *builder, enum pt_plane color)
 
 // ---- depth of field ------------------------------------------------------------------------------------------------------
 
-static int focuses(const struct patina_scene *scene)
-{
-    return scene->effects.focus_aperture > 0.0f;
-}
+static int focuses(const struct patina_scene *scene) { return scene->effects.focus_aperture > 0.0f; }
 
 // Radius in pixels of the circle of confusion of what is infinitely far, in orthographic views of a world unit out of focus.
 static double focus_scale(const struct patina_scene *scene)
@@ -292,21 +287,20 @@ int pt_plan_focus(struct pt_builder *builder, enum pt_plane color, const struct 
         return 0;
     }
     double most = focus_most(scene), distance = (double)scene->effects.focus_distance;
-    struct focus_args args = {
-        .view = compose->view,
-        .crop_x = compose->crop_x,
-        .crop_y = compose->crop_y,
-        .crop_width = compose->crop_width,
-        .crop_height = compose->crop_height,
-        .distance = (float)(scene->camera.orthographic ? distance - scene->camera.near_clip : distance),
-        .scale = (float)focus_scale(scene),
-        .most = (float)most,
-        .reach = (uint32_t)fmin(ceil(most + 0.5), PT_FOCUS_MOST)};
+    struct focus_args args = {.view = compose->view,
+                              .crop_x = compose->crop_x,
+                              .crop_y = compose->crop_y,
+                              .crop_width = compose->crop_width,
+                              .crop_height = compose->crop_height,
+                              .distance = (float)(scene->camera.orthographic ? distance - scene->camera.near_clip : distance),
+                              .scale = (float)focus_scale(scene),
+                              .most = (float)most,
+                              .reach = (uint32_t)fmin(ceil(most + 0.5), PT_FOCUS_MOST)};
     for (int k = 0; k < 4; k++)
         args.background[k] = compose->background[k];
-    PT_REASON(PT_ADD(builder, focus, args,
-                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
-              "depth of field, sharp at %.4g, circles of at most %.1f pixels", distance, most);
+    PT_REASON(
+        PT_ADD(builder, focus, args, {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
+        "depth of field, sharp at %.4g, circles of at most %.1f pixels", distance, most);
     pt_skip(builder, "compose", "depth of field does it");
     return 1;
 }
@@ -329,8 +323,7 @@ void pt_plan_paper(struct pt_builder *builder)
                               .y = plan->pixel_offset[1],
                               .color = {tint[0], tint[1], tint[2]},
                               .grain = effects->paper_grain};
-    PT_REASON(PT_ADD(builder, paper, args, {pt_plane_at(PT_PLANE_COMBINED, 0)}), "paper, grain %.2f",
-              (double)args.grain);
+    PT_REASON(PT_ADD(builder, paper, args, {pt_plane_at(PT_PLANE_COMBINED, 0)}), "paper, grain %.2f", (double)args.grain);
 }
 
 // ---- all ---------------------------------------------------------------------------------------------------------------
@@ -340,10 +333,7 @@ int pt_effects_want_normals(const struct patina_scene *scene)
     return scene->effects.obscurance_strength > 0.0f || scene->effects.hatch_levels || scene->effects.contour_opacity > 0.0f;
 }
 
-int pt_effects_want_albedo(const struct patina_scene *scene)
-{
-    return scene->effects.toon_bands > 0;
-}
+int pt_effects_want_albedo(const struct patina_scene *scene) { return scene->effects.toon_bands > 0; }
 
 void pt_plan_shaded_effects(struct pt_builder *builder, enum pt_plane color)
 {

@@ -9,8 +9,7 @@ static const struct curve_point {
     double spacing_px; // rising within a means
     float color, coverage, depth, normal;
 } curve[] = {
-#define PT_CURVE(means, spacing, color, coverage, depth, normal) \
-    { PT_MEANS_##means, spacing, color, coverage, depth, normal },
+#define PT_CURVE(means, spacing, color, coverage, depth, normal) {PT_MEANS_##means, spacing, color, coverage, depth, normal},
 #include "expected_curves.def"
 #undef PT_CURVE
 };
@@ -19,10 +18,10 @@ static const struct {
     const char *name;
     uint32_t quality, fill;
 } table[PT_MEANS_COUNT] = {
-    [PT_MEANS_UNFILLED] = { "unfilled", PATINA_QUALITY_PAPER, PATINA_FILL_OFF },
-    [PT_MEANS_PAPER] = { "as in the paper", PATINA_QUALITY_PAPER, PATINA_FILL_PAPER },
-    [PT_MEANS_CLOSED] = { "closed, depth of the source", PATINA_QUALITY_PAPER, PATINA_FILL_CLOSED },
-    [PT_MEANS_REFINED] = { "closed, tangent planes", PATINA_QUALITY_REFINED, PATINA_FILL_CLOSED },
+    [PT_MEANS_UNFILLED] = {"unfilled", PATINA_QUALITY_PAPER, PATINA_FILL_OFF},
+    [PT_MEANS_PAPER] = {"as in the paper", PATINA_QUALITY_PAPER, PATINA_FILL_PAPER},
+    [PT_MEANS_CLOSED] = {"closed, depth of the source", PATINA_QUALITY_PAPER, PATINA_FILL_CLOSED},
+    [PT_MEANS_REFINED] = {"closed, tangent planes", PATINA_QUALITY_REFINED, PATINA_FILL_CLOSED},
 };
 
 enum pt_means pt_means_of(uint32_t quality, uint32_t fill)
@@ -68,7 +67,7 @@ static patina_expected_error on_curve(enum pt_means means, double spacing_px)
         } else if (!above)
             above = &curve[i];
     }
-    patina_expected_error error = { .doubt = means == PT_MEANS_SPLATS ? doubt_of_discs : doubt_of_filling };
+    patina_expected_error error = {.doubt = means == PT_MEANS_SPLATS ? doubt_of_discs : doubt_of_filling};
     if (!below && !above) // not measured (while the table is being made)
         return error;
     if (!above && before) {
@@ -94,7 +93,7 @@ patina_expected_error pt_expected_error(enum pt_means means, double spacing_px)
     if (spacing_px > 0.0 && spacing_px <= PT_SPACING_KNOWN)
         return on_curve(means, spacing_px);
     const float none = INFINITY;
-    return (patina_expected_error){ none, none, none, none, on_curve(means, 1.0).doubt };
+    return (patina_expected_error){none, none, none, none, on_curve(means, 1.0).doubt};
 }
 
 enum pt_means pt_means_for(double target, double spacing_px)

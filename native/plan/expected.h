@@ -6,7 +6,14 @@
 #include "patina/patina.h"
 
 // How a surface is closed: the ways of filling, cheapest first, then discs.
-enum pt_means { PT_MEANS_UNFILLED, PT_MEANS_PAPER, PT_MEANS_CLOSED, PT_MEANS_REFINED, PT_MEANS_COUNT, PT_MEANS_SPLATS = PT_MEANS_COUNT };
+enum pt_means {
+    PT_MEANS_UNFILLED,
+    PT_MEANS_PAPER,
+    PT_MEANS_CLOSED,
+    PT_MEANS_REFINED,
+    PT_MEANS_COUNT,
+    PT_MEANS_SPLATS = PT_MEANS_COUNT
+};
 
 // What settings ask for of filling, and the other way round.
 enum pt_means pt_means_of(uint32_t quality, uint32_t fill);

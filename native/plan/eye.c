@@ -37,7 +37,7 @@ void pt_object_of(const struct pt_eye *camera, const double world_from_object[16
     double size = 0.0, determinant = pt_invert(object->linear, object->inverse);
     object->scale = 0.0;
     for (int c = 0; c < 3; c++) {
-        double column[3] = { object->linear[c], object->linear[3 + c], object->linear[6 + c] };
+        double column[3] = {object->linear[c], object->linear[3 + c], object->linear[6 + c]};
         object->scale = fmax(object->scale, sqrt(pt_dot(column, column)));
     }
     size = object->scale * object->scale * object->scale;
@@ -210,7 +210,7 @@ void pt_set_chunk(const struct pt_eye *camera, const struct pt_object *object, c
                   const struct pt_instance *instance, const struct pt_chunk *chunk, uint32_t count, uint32_t cull,
                   struct chunk_view *out)
 {
-    double translation[3], eye[4] = { 0 };
+    double translation[3], eye[4] = {0};
     pt_chunk_translation(camera, object, chunk, translation);
     pt_set_product(rows, translation, out->row, out->hi, out->lo);
     if (cull)
@@ -265,8 +265,8 @@ void pt_join_rect(uint32_t rect[4], const uint32_t other[4])
 
 int pt_rect_in_window(const struct view_args *view, const double bounds[4], uint32_t pad, uint32_t rect[4])
 {
-    const double origin[2] = { (double)view->origin_x - pad, (double)view->origin_y - pad };
-    const double size[2] = { view->width, view->height };
+    const double origin[2] = {(double)view->origin_x - pad, (double)view->origin_y - pad};
+    const double size[2] = {view->width, view->height};
     for (int k = 0; k < 2; k++) { // cut first: what is left is whole numbers that fit
         double first = pt_most(bounds[k] - origin[k], 0.0), last = pt_least(bounds[2 + k] - origin[k], size[k]);
         if (!(last > 0.0) || !(first < size[k]))

@@ -9,11 +9,11 @@
 
 struct pt_eye {
     double axes[9], position[3];
-    double xs, ys;         // window units a pixel
+    double xs, ys; // window units a pixel
     double near_clip, far_clip;
-    double left, bottom;   // of the padded picture
+    double left, bottom; // of the padded picture
     int orthographic;
-    double width, height;  // padded picture, pixels
+    double width, height; // padded picture, pixels
 };
 
 // Where a box lies.

@@ -13,7 +13,10 @@ struct builder_of_lives {
     uint32_t clock;           // a pass, or as many as run as one, or a step
 };
 
-int pt_plane_is_kept(enum pt_plane which, uint32_t index) { return pt_plane_rows[which].size == PT_SIZE_CROP || (which == PT_PLANE_KEYS && !index); }
+int pt_plane_is_kept(enum pt_plane which, uint32_t index)
+{
+    return pt_plane_rows[which].size == PT_SIZE_CROP || (which == PT_PLANE_KEYS && !index);
+}
 
 static void use(struct builder_of_lives *b, enum pt_plane which, uint32_t index)
 {
@@ -21,7 +24,8 @@ static void use(struct builder_of_lives *b, enum pt_plane which, uint32_t index)
     if (pt_plane_is_kept(which, index))
         return;
     if (b->of[which][index] == NO_LIFE) {
-        plan->lives[plan->life_count++] = (struct pt_life){.plane = which, .index = index, .first = b->clock, .bytes = pt_plan_plane_bytes(plan, which, index)};
+        plan->lives[plan->life_count++] = (struct pt_life){
+            .plane = which, .index = index, .first = b->clock, .bytes = pt_plan_plane_bytes(plan, which, index)};
         b->of[which][index] = plan->life_count;
     }
     plan->lives[b->of[which][index] - 1].last = b->clock;
@@ -70,8 +74,9 @@ static uint32_t slab_for(const struct pt_plan *plan, const struct pt_life *life)
         const struct pt_slab *slab = &plan->slabs[s], *than = &plan->slabs[best];
         if (slab->last >= life->first)
             continue;
-        const int fits = slab->bytes >= life->bytes, better = best == plan->slab_count || (than->bytes >= life->bytes
-            ? fits && slab->bytes < than->bytes : slab->bytes > than->bytes);
+        const int fits = slab->bytes >= life->bytes,
+                  better = best == plan->slab_count ||
+                           (than->bytes >= life->bytes ? fits && slab->bytes < than->bytes : slab->bytes > than->bytes);
         if (better)
             best = s;
     }

@@ -93,13 +93,13 @@ uint32_t pt_shadow_groups(const struct patina_scene *scene, struct pt_shadow_gro
     for (uint32_t i = 0; i < scene->mesh_count; i++)
         casters += (uint32_t)pt_mesh_casts(&scene->meshes[i]);
     if (casters)
-        groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, PT_NO_INSTANCE, 255, 0 };
+        groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, PT_NO_INSTANCE, 255, 0};
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
         if (opaque(instance) && spares_itself(instance) && pt_receives(instance) && casters > 1)
-            groups[count++] = (struct pt_shadow_group){ PT_NO_INSTANCE, i, 255, 0 };
+            groups[count++] = (struct pt_shadow_group){PT_NO_INSTANCE, i, 255, 0};
         if (casts(instance) && loss_of(instance) && !opaque(instance))
-            groups[count++] = (struct pt_shadow_group){ i, PT_NO_INSTANCE, loss_of(instance), in_layers(instance) };
+            groups[count++] = (struct pt_shadow_group){i, PT_NO_INSTANCE, loss_of(instance), in_layers(instance)};
     }
     return count;
 }
@@ -165,14 +165,15 @@ static struct patina_scene as_cut(const struct patina_scene *scene)
 static struct extent look(const struct patina_scene *scene, const struct pt_shadow_group *group, const double axes[9],
                           const double eye[3])
 {
-    struct extent extent = { .axes = axes, .eye = eye };
+    struct extent extent = {.axes = axes, .eye = eye};
     const struct patina_scene cut = as_cut(scene);
     struct pt_inverse_clip *room = malloc((cut.clip_count + 1) * sizeof *room); // without: chunks are seen whole
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const struct pt_instance *instance = &scene->instances[i];
         if (group ? !pt_group_casts(scene, group, i) : !casts(instance))
             continue;
-        const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, PT_SOLID_POINTS, room) : (struct pt_sieve){ .instance = instance };
+        const struct pt_sieve sieve = room ? pt_sieve_make(&cut, instance, PT_SOLID_POINTS, room)
+                                           : (struct pt_sieve){.instance = instance};
         for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
             if (pt_sieve_chunk(&sieve, &instance->cloud->chunks[c], NULL, NULL) != PT_CUT_AWAY)
                 pt_chunk_corners(&instance->cloud->chunks[c], instance->style.world_from_object, extend, &extent);
@@ -192,9 +193,9 @@ static void face_axes(uint32_t face, double axes[9])
     memset(axes, 0, 9 * sizeof *axes);
     double sign = face & 1u ? -1.0 : 1.0;
     uint32_t k = face >> 1;
-    axes[6 + k] = sign;                    // z
-    axes[3 + (k + 2) % 3] = 1.0;           // y
-    axes[(k + 1) % 3] = sign;              // x = y cross z
+    axes[6 + k] = sign;          // z
+    axes[3 + (k + 2) % 3] = 1.0; // y
+    axes[(k + 1) % 3] = sign;    // x = y cross z
 }
 
 // Where the light is and looks in a sample. axes: of the light's maps, in and out: a sun turns them.
@@ -212,7 +213,8 @@ static void place_sample(const struct pt_plan_light *planned, uint32_t sample, d
     } else {
         pt_light_disc(p);
         memcpy(frame, planned->axes, sizeof frame);
-        double radius = light->type == PATINA_LIGHT_SUN ? tan(0.5 * fmin((double)light->angle, 0.99 * PI)) : (double)light->radius;
+        double radius = light->type == PATINA_LIGHT_SUN ? tan(0.5 * fmin((double)light->angle, 0.99 * PI))
+                                                        : (double)light->radius;
         across[0] = radius * p[0];
         across[1] = radius * p[1];
     }
@@ -234,9 +236,7 @@ static void place_sample(const struct pt_plan_light *planned, uint32_t sample, d
 
 static int has_area(const patina_light_desc *light)
 {
-    return light->type == PATINA_LIGHT_SUN  ? light->angle > 0.0f
-           : light->type == PATINA_LIGHT_AREA ? 1
-                                              : light->radius > 0.0f;
+    return light->type == PATINA_LIGHT_SUN ? light->angle > 0.0f : light->type == PATINA_LIGHT_AREA ? 1 : light->radius > 0.0f;
 }
 
 // ---- cameras -----------------------------------------------------------------------------------------------------------
@@ -246,7 +246,7 @@ static int has_area(const patina_light_desc *light)
 static void set_camera(const double axes[9], const double eye[3], const struct extent *extent, int parallel, int face,
                        patina_camera *camera)
 {
-    *camera = (patina_camera){ .struct_size = sizeof *camera, .orthographic = (uint32_t)parallel };
+    *camera = (patina_camera){.struct_size = sizeof *camera, .orthographic = (uint32_t)parallel};
     for (int r = 0; r < 3; r++) {
         for (int c = 0; c < 3; c++)
             camera->world_from_camera[4 * r + c] = axes[3 * c + r];
@@ -254,8 +254,8 @@ static void set_camera(const double axes[9], const double eye[3], const struct e
     }
     camera->world_from_camera[15] = 1.0;
     const double *window = extent->tangent;
-    double span[4] = { extent->lower[0], extent->lower[1], extent->upper[0], extent->upper[1] };
-    double cube[4] = { -1.0, -1.0, 1.0, 1.0 };
+    double span[4] = {extent->lower[0], extent->lower[1], extent->upper[0], extent->upper[1]};
+    double cube[4] = {-1.0, -1.0, 1.0, 1.0};
     window = parallel ? span : face ? cube : window;
     camera->left = window[0];
     camera->bottom = window[1];
@@ -316,17 +316,17 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
             meshes[out->mesh_count++] = scene->meshes[i];
     set_camera(axes, position, &extent, parallel, light->cube != 0, &out->camera);
     out->has_camera = 1;
-    out->settings = (patina_settings){ .struct_size = sizeof out->settings,
-                                       .quality = scene->settings.quality,
-                                       .fill = scene->settings.fill,
-                                       .surface = PATINA_SURFACE_FILL };
+    out->settings = (patina_settings){.struct_size = sizeof out->settings,
+                                      .quality = scene->settings.quality,
+                                      .fill = scene->settings.fill,
+                                      .surface = PATINA_SURFACE_FILL};
     patina_camera *camera = &out->camera;
     uint32_t most = scene->settings.shadow_resolution;
     out->settings.width = fit(&camera->left, &camera->right, light->texel, most);
     out->settings.height = fit(&camera->bottom, &camera->top, light->texel, most);
     out->settings.region[2] = out->settings.width;
     out->settings.region[3] = out->settings.height;
-    const double cube[4] = { -1.0, -1.0, 1.0, 1.0 }, whole[4] = { camera->left, camera->bottom, camera->right, camera->top };
+    const double cube[4] = {-1.0, -1.0, 1.0, 1.0}, whole[4] = {camera->left, camera->bottom, camera->right, camera->top};
     memcpy(window, light->cube ? cube : whole, sizeof whole);
     return 1;
 }
@@ -336,7 +336,7 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
 // Towards the middle of the casters; spots that see no further than 60 degrees look along their cone.
 static void aim(const struct patina_scene *scene, struct pt_plan_light *planned)
 {
-    static const double world[9] = { 1, 0, 0, 0, 1, 0, 0, 0, 1 }, none[3];
+    static const double world[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, none[3];
     const patina_light_desc *light = planned->light;
     if (light->type == PATINA_LIGHT_SUN) {
         pt_light_frame(light->direction, none, planned->axes);
@@ -373,12 +373,12 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
     int parallel = planned->light->type == PATINA_LIGHT_SUN;
     place_sample(planned, 0, axes, position);
     for (uint32_t face = 0; face < (planned->cube ? 6u : 1u); face++) {
-        struct patina_scene survey = { .instances = scene->instances,
-                                       .instance_count = scene->instance_count,
-                                       .clips = scene->clips,
-                                       .clip_count = as_cut(scene).clip_count,
-                                       .has_camera = 1 };
-        struct pt_plan plan = { 0 };
+        struct patina_scene survey = {.instances = scene->instances,
+                                      .instance_count = scene->instance_count,
+                                      .clips = scene->clips,
+                                      .clip_count = as_cut(scene).clip_count,
+                                      .has_camera = 1};
+        struct pt_plan plan = {0};
         if (planned->cube)
             face_axes(face, axes);
         struct extent extent = look(scene, NULL, axes, position);
@@ -388,7 +388,7 @@ static int choose_texel(const struct patina_scene *scene, struct pt_plan_light *
         patina_camera *camera = &survey.camera;
         double texel = fmax(camera->right - camera->left, camera->top - camera->bottom) / SURVEY_TEXELS;
         texel = texel > 0.0 ? texel : 1e-6;
-        survey.settings = (patina_settings){ .struct_size = sizeof survey.settings, .surface = PATINA_SURFACE_FILL };
+        survey.settings = (patina_settings){.struct_size = sizeof survey.settings, .surface = PATINA_SURFACE_FILL};
         survey.settings.width = fit(&camera->left, &camera->right, texel, SURVEY_TEXELS + 2);
         survey.settings.height = fit(&camera->bottom, &camera->top, texel, SURVEY_TEXELS + 2);
         survey.settings.region[2] = survey.settings.width;
@@ -426,14 +426,14 @@ int pt_plan_light_map(const struct patina_scene *scene, struct pt_plan *plan, ui
 
 int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, uint32_t i)
 {
-    static const char *const names[] = { "", "sun", "point light", "spot", "area light" };
+    static const char *const names[] = {"", "sun", "point light", "spot", "area light"};
     struct pt_plan_light *planned = &plan->lights[i];
     struct pt_shadow_group *groups = pt_arena_take(&plan->arena, (2 * scene->instance_count + 1) * sizeof *groups);
     struct pt_instance *instances = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *instances);
     struct pt_mesh_instance *meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *meshes);
     if (!groups || !instances || !meshes || pt_plan_light_map(scene, plan, i))
         return PATINA_ERROR_MEMORY;
-    struct patina_scene view = { 0 }; // its first map
+    struct patina_scene view = {0}; // its first map
     double window[4];
     uint32_t count = pt_shadow_groups(scene, groups), faces = planned->cube ? 6 : 1;
     for (uint32_t face = 0; face < faces && count; face++)
@@ -441,8 +441,8 @@ int pt_plan_light_text(const struct patina_scene *scene, struct pt_plan *plan, u
             break;
     snprintf(planned->reason, sizeof planned->reason, "%s, %s%u sample%s, %s %u x %u texels, %s", names[planned->light->type],
              planned->samples > 1 && scene->settings.shadow_error > 0.0f ? "to the error target, at most " : "",
-             planned->samples, planned->samples > 1 ? "s" : "", planned->cube ? "six maps of" : "a map of",
-             view.settings.width, view.settings.height, planned->capped ? "as fine as is allowed" : "as fine as its points");
+             planned->samples, planned->samples > 1 ? "s" : "", planned->cube ? "six maps of" : "a map of", view.settings.width,
+             view.settings.height, planned->capped ? "as fine as is allowed" : "as fine as its points");
     return PATINA_OK;
 }
 
@@ -452,7 +452,7 @@ void pt_plan_lights(const struct patina_scene *scene, struct pt_plan *plan)
         const patina_light_desc *light = &scene->lights[i];
         const uint32_t samples = has_area(light) ? scene->settings.shadow_samples : 1;
         if (light->shadows)
-            plan->lights[plan->light_count++] = (struct pt_plan_light){ .light = light, .samples = samples };
+            plan->lights[plan->light_count++] = (struct pt_plan_light){.light = light, .samples = samples};
     }
 }
 
@@ -553,7 +553,7 @@ static void put_instance(struct key *key, const struct patina_scene *scene, cons
 size_t pt_light_key(const struct patina_scene *scene, const struct pt_plan_light *planned, double *numbers, size_t room)
 {
     const patina_light_desc *light = planned->light;
-    struct key key = { numbers, 0, room };
+    struct key key = {numbers, 0, room};
     put(&key, (double)light->type);
     put(&key, (double)light->shape);
     put(&key, (double)light->angle);

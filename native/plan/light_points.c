@@ -10,7 +10,7 @@
 void pt_light_frame(const double direction[3], const double side[3], double axes[9])
 {
     double *x = axes, *y = axes + 3, *z = axes + 6, along, length;
-    const double poles[3][3] = { { side[0], side[1], side[2] }, { 0, 0, 1 }, { 1, 0, 0 } };
+    const double poles[3][3] = {{side[0], side[1], side[2]}, {0, 0, 1}, {1, 0, 0}};
     for (int k = 0; k < 3; k++)
         z[k] = -direction[k];
     for (int pole = 0; pole < 3; pole++) {
@@ -31,7 +31,7 @@ void pt_light_frame(const double direction[3], const double side[3], double axes
 // Two numbers in [0, 1): the additive recurrence of the plastic number, even in every prefix; the first is the middle.
 void pt_light_sample(uint32_t sample, double p[2])
 {
-    static const double steps[2] = { 0.75487766624669276, 0.56984029099805327 };
+    static const double steps[2] = {0.75487766624669276, 0.56984029099805327};
     for (int k = 0; k < 2; k++) {
         double x = 0.5 + sample * steps[k];
         p[k] = x - floor(x);
@@ -64,7 +64,7 @@ void pt_area_points(const patina_light_desc *light, double points[3 * PT_AREA_PO
     double axes[9];
     pt_light_frame(light->direction, light->side, axes);
     for (int i = 0; i < PT_AREA_POINTS; i++) { // the middles of 4 x 4 fields
-        double p[2] = { (i % 4 + 0.5) / 4.0, (i / 4 + 0.5) / 4.0 };
+        double p[2] = {(i % 4 + 0.5) / 4.0, (i / 4 + 0.5) / 4.0};
         pt_area_point(light, p);
         for (int k = 0; k < 3; k++)
             points[3 * i + k] = light->position[k] + p[0] * axes[k] + p[1] * axes[3 + k];

@@ -80,14 +80,15 @@ static int is_clear(const struct pt_plan *plan) { return plan->layers > 1 || pla
 // ---- ink -------------------------------------------------------------------------------------------------------------------
 
 // args: what is to be done; targets: of colours, of z and of shares.
-static void add_ink(struct pt_builder *builder, const struct ink_args *args, struct pt_ref colors, const struct pt_ref targets[3])
+static void add_ink(struct pt_builder *builder, const struct ink_args *args, struct pt_ref colors,
+                    const struct pt_ref targets[3])
 {
     static const char *const sources[] = {"one colour", "the points' colours", "colours by depth"};
-    PT_REASON(PT_ADD(builder, ink, *args,
-                     {pt_keys_of(builder, 0), pt_line_of(builder), nearest_of(builder), colors,
-                      targets[0], targets[1], targets[2]}),
-              "lines in %s%s%s%s", sources[args->source], args->behind ? ", behind the layers before" : "",
-              args->depth ? ", with their depth" : "", args->mask ? ", and as a pass" : "");
+    PT_REASON(
+        PT_ADD(builder, ink, *args,
+               {pt_keys_of(builder, 0), pt_line_of(builder), nearest_of(builder), colors, targets[0], targets[1], targets[2]}),
+        "lines in %s%s%s%s", sources[args->source], args->behind ? ", behind the layers before" : "",
+        args->depth ? ", with their depth" : "", args->mask ? ", and as a pass" : "");
 }
 
 // Lines of the layer at hand: a pass, or one for each instance whose points give their colours.
@@ -137,10 +138,8 @@ static void plan_ink(struct pt_builder *builder, struct ink_args args, const str
 
 static struct ink_args over_crop(const struct pt_plan *plan)
 {
-    return (struct ink_args){.crop_x = plan->crop[0],
-                             .crop_y = plan->crop[1],
-                             .crop_width = plan->crop[2],
-                             .crop_height = plan->crop[3]};
+    return (struct ink_args){
+        .crop_x = plan->crop[0], .crop_y = plan->crop[1], .crop_width = plan->crop[2], .crop_height = plan->crop[3]};
 }
 
 void pt_plan_ink_layer(struct pt_builder *builder, enum pt_plane color, enum pt_plane depth)
@@ -151,8 +150,9 @@ void pt_plan_ink_layer(struct pt_builder *builder, enum pt_plane color, enum pt_
     if (!(builder->plan->line_radius > 0.0f) || !(args.color_target || args.depth))
         return;
     const uint32_t slot = builder->layer - 1;
-    plan_ink(builder, args, (struct pt_ref[]){pt_plane_if(args.color_target != 0, color, slot),
-                                              pt_plane_if(args.depth != 0, depth, slot), pt_nothing()});
+    plan_ink(builder, args,
+             (struct pt_ref[]){pt_plane_if(args.color_target != 0, color, slot), pt_plane_if(args.depth != 0, depth, slot),
+                               pt_nothing()});
 }
 
 void pt_plan_ink(struct pt_builder *builder, const float background[4])
@@ -168,9 +168,10 @@ void pt_plan_ink(struct pt_builder *builder, const float background[4])
     args.blank = args.color_target && builder->scene->lines.surface == PATINA_LINE_SURFACE_NONE && !is_clear(plan);
     memcpy(args.background, background, sizeof args.background);
     if (args.color_target || args.depth || args.mask)
-        plan_ink(builder, args, (struct pt_ref[]){pt_plane_if(args.color_target || args.blank, PT_PLANE_COMBINED, 0),
-                                                  pt_plane_if(args.depth != 0, PT_PLANE_DEPTH, 0),
-                                                  pt_plane_if(args.mask != 0, PT_PLANE_LINES, 0)});
+        plan_ink(builder, args,
+                 (struct pt_ref[]){pt_plane_if(args.color_target || args.blank, PT_PLANE_COMBINED, 0),
+                                   pt_plane_if(args.depth != 0, PT_PLANE_DEPTH, 0),
+                                   pt_plane_if(args.mask != 0, PT_PLANE_LINES, 0)});
 }
 
 // ---- lines ---------------------------------------------------------------------------------------------------------------
@@ -211,17 +212,22 @@ void pt_plan_lines(struct pt_builder *builder)
                               .behind = builder->layer > 1};
     widen(plan, args.view.rect, pt_line_reach(plan));
     pt_line_taps(&args);
-    const struct pt_ref refs[] = {pt_keys_of(builder, 0),           pt_from_of(builder, 0),
-                                  pt_plane_at(PT_PLANE_NORMAL, 0),  pt_span_of(builder->plan),
-                                  pt_line_of(builder),              nearest_of(builder),
-                                  pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0), pt_plane_if(args.behind != 0, PT_PLANE_THROUGH, 0)};
+    const struct pt_ref refs[] = {pt_keys_of(builder, 0),
+                                  pt_from_of(builder, 0),
+                                  pt_plane_at(PT_PLANE_NORMAL, 0),
+                                  pt_span_of(builder->plan),
+                                  pt_line_of(builder),
+                                  nearest_of(builder),
+                                  pt_plane_if(args.behind != 0, PT_PLANE_LIMIT, 0),
+                                  pt_plane_if(args.behind != 0, PT_PLANE_THROUGH, 0)};
     PT_REASON(pt_add(builder, PT_KERNEL_lines, "lines", &args, sizeof args, refs, sizeof refs / sizeof *refs),
               "silhouettes of layer %u, at most %.2f pixels wide", builder->layer, (double)plan->line_radius);
     if (plan->layers > 1) {
         const struct pt_ref over = pt_plane_at(PT_PLANE_OVER, 0);
-        plan_ink(builder,
-                 (struct ink_args){.behind = 1, .color_target = 1, .crop_width = plan->view.width, .crop_height = plan->view.height},
-                 (struct pt_ref[]){over, pt_nothing(), pt_nothing()});
+        plan_ink(
+            builder,
+            (struct ink_args){.behind = 1, .color_target = 1, .crop_width = plan->view.width, .crop_height = plan->view.height},
+            (struct pt_ref[]){over, pt_nothing(), pt_nothing()});
     }
 }
 

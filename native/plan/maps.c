@@ -7,8 +7,8 @@
 #include <string.h>
 
 // Whether an instance, or PT_PIXELS, is tested against the group's maps.
-static int receives(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, uint32_t group,
-                    uint32_t instance)
+static int receives(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                    uint32_t group, uint32_t instance)
 {
     const struct pt_shadow_group *of = &picture->groups[group];
     if (instance == PT_PIXELS)
@@ -16,7 +16,8 @@ static int receives(const struct patina_scene *scene, const struct pt_plan *pict
     return round->points && pt_group_receives(scene, of, instance);
 }
 
-int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, uint32_t group)
+int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                   uint32_t group)
 {
     int some = receives(scene, picture, round, group, PT_PIXELS);
     for (uint32_t i = 0; i < scene->instance_count && !some; i++)
@@ -25,7 +26,8 @@ int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *pictu
 }
 
 // How many maps of a sample the instance is tested against.
-static uint32_t maps_of(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, uint32_t instance)
+static uint32_t maps_of(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                        uint32_t instance)
 {
     uint32_t count = 0;
     for (uint32_t g = 0; g < picture->group_count; g++)
@@ -38,8 +40,8 @@ static uint32_t maps_of(const struct patina_scene *scene, const struct pt_plan *
 // how many.
 static uint32_t keep_seen(const struct pt_plan *picture, uint32_t i, struct chunk_view *chunks, uint32_t count)
 {
-    const struct pt_plan_instance *seen[2] = { NULL, NULL };
-    uint32_t ways = 0, kept = 0, next[2] = { 0, 0 };
+    const struct pt_plan_instance *seen[2] = {NULL, NULL};
+    uint32_t ways = 0, kept = 0, next[2] = {0, 0};
     for (uint32_t k = 0; k < picture->instance_count && ways < 2; k++)
         if (picture->instances[k].of == i)
             seen[ways++] = &picture->instances[k];
@@ -68,8 +70,8 @@ static int pixels_as_cloud(const struct patina_scene *scene, const struct pt_pla
     }
     cloud->chunk_count = rows;
     cloud->slots = (uint64_t)width * picture->view.height;
-    cloud->info = (patina_cloud_info){ .count = cloud->slots, .drawn = cloud->slots, .has_normals = 1 };
-    *out = (struct pt_instance){ .cloud = cloud, .style = { .lighting = PATINA_LIGHTING_LIT } };
+    cloud->info = (patina_cloud_info){.count = cloud->slots, .drawn = cloud->slots, .has_normals = 1};
+    *out = (struct pt_instance){.cloud = cloud, .style = {.lighting = PATINA_LIGHTING_LIT}};
     for (int r = 0; r < 3; r++) {
         for (int c = 0; c < 3; c++)
             out->style.world_from_object[4 * r + c] = axes[3 * c + r];
@@ -80,7 +82,7 @@ static int pixels_as_cloud(const struct patina_scene *scene, const struct pt_pla
 }
 
 struct tests {
-    struct pt_builder builder; // of the map
+    struct pt_builder builder;               // of the map
     const struct patina_scene *scene, *view; // the picture's, and as the light sees it
     const struct pt_plan *picture;
     const struct pt_round *round;
@@ -89,7 +91,8 @@ struct tests {
     struct lit_args args;
 };
 
-static int add_lit(struct tests *tests, uint32_t instance, const struct pt_instance *receiver, struct pt_ref positions, struct pt_ref words)
+static int add_lit(struct tests *tests, uint32_t instance, const struct pt_instance *receiver, struct pt_ref positions,
+                   struct pt_ref words)
 {
     struct pt_plan *map = tests->builder.plan;
     struct pt_receiver *out = &map->receivers[map->receiver_count];
@@ -106,10 +109,16 @@ static int add_lit(struct tests *tests, uint32_t instance, const struct pt_insta
         out->chunk_count = keep_seen(tests->picture, instance, out->chunks, out->chunk_count);
     if (!out->chunk_count)
         return PATINA_OK;
-    const struct pt_ref refs[] = { tests->planes[0], tests->planes[1], tests->planes[2],
-                                   { PT_OF_RECEIVER, PT_CHUNKS, map->receiver_count }, positions, words,
-                                   pt_buffer_of(PT_MARKS, instance), pt_buffer_of(PT_SHADOWS, instance),
-                                   { PT_OF_FLAG, PT_FLAG_DIFFERS, 0 }, tests->opacities };
+    const struct pt_ref refs[] = {tests->planes[0],
+                                  tests->planes[1],
+                                  tests->planes[2],
+                                  {PT_OF_RECEIVER, PT_CHUNKS, map->receiver_count},
+                                  positions,
+                                  words,
+                                  pt_buffer_of(PT_MARKS, instance),
+                                  pt_buffer_of(PT_SHADOWS, instance),
+                                  {PT_OF_FLAG, PT_FLAG_DIFFERS, 0},
+                                  tests->opacities};
     map->receiver_count++;
     struct pt_pass *pass = pt_add(&tests->builder, PT_KERNEL_lit, "lit", &args, sizeof args, refs, sizeof refs / sizeof *refs);
     if (instance == PT_PIXELS)
@@ -132,8 +141,8 @@ static int add_tests(struct tests *tests, int close)
     for (uint32_t i = 0; i <= scene->instance_count && !error; i++) {
         const uint32_t which = i < scene->instance_count ? i : PT_PIXELS;
         const uint32_t maps = maps_of(scene, tests->picture, tests->round, which);
-        const struct pt_ref positions = { PT_OF_RECEIVER, PT_POSITIONS, map->receiver_count };
-        const struct pt_ref words = { PT_OF_RECEIVER, PT_SURFACE, map->receiver_count };
+        const struct pt_ref positions = {PT_OF_RECEIVER, PT_POSITIONS, map->receiver_count};
+        const struct pt_ref words = {PT_OF_RECEIVER, PT_SURFACE, map->receiver_count};
         struct pt_instance instance;
         if (close ? maps < 2 : !receives(scene, tests->picture, tests->round, tests->round->group, which))
             continue;
@@ -141,8 +150,8 @@ static int add_tests(struct tests *tests, int close)
         if (which != PT_PIXELS)
             error = add_lit(tests, i, &scene->instances[i], positions, words);
         else if (!(error = pixels_as_cloud(scene, tests->picture, map, pixels, &instance)))
-            error = add_lit(tests, PT_PIXELS, &instance, (struct pt_ref){ PT_OF_PICTURE, PT_PLANE_MESH_PLACES, 0 },
-                            (struct pt_ref){ PT_OF_PICTURE, PT_PLANE_MESH_WORDS, 0 });
+            error = add_lit(tests, PT_PIXELS, &instance, (struct pt_ref){PT_OF_PICTURE, PT_PLANE_MESH_PLACES, 0},
+                            (struct pt_ref){PT_OF_PICTURE, PT_PLANE_MESH_WORDS, 0});
     }
     return error ? error : tests->builder.failed;
 }
@@ -150,14 +159,14 @@ static int add_tests(struct tests *tests, int close)
 static struct tests begin_tests(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
                                 struct pt_plan *map)
 {
-    return (struct tests){ .builder = { .scene = scene, .plan = map, .as = "lit" },
-                           .scene = scene,
-                           .picture = picture,
-                           .round = round,
-                           .opacities = { PT_OF_NOTHING, 0, 0 },
-                           .args = { .samples = round->sample + 1,
-                                     .compare = (uint32_t)round->compare,
-                                     .marked = (uint32_t)pt_plan_lazy(scene, picture) } };
+    return (struct tests){.builder = {.scene = scene, .plan = map, .as = "lit"},
+                          .scene = scene,
+                          .picture = picture,
+                          .round = round,
+                          .opacities = {PT_OF_NOTHING, 0, 0},
+                          .args = {.samples = round->sample + 1,
+                                   .compare = (uint32_t)round->compare,
+                                   .marked = (uint32_t)pt_plan_lazy(scene, picture)}};
 }
 
 static void set_window(const struct pt_plan *map, const double window[4], float out[4])
@@ -173,12 +182,16 @@ static void set_window(const struct pt_plan *map, const double window[4], float 
 static void add_limit(struct tests *tests, const struct pt_shadow_group *group)
 {
     struct pt_plan *map = tests->builder.plan;
-    struct limit_args args = { .view = map->view, .caster = tests->args.caster, .loss = group->loss };
-    const uint32_t whole[4] = { 0, 0, map->view.width, map->view.height };
+    struct limit_args args = {.view = map->view, .caster = tests->args.caster, .loss = group->loss};
+    const uint32_t whole[4] = {0, 0, map->view.width, map->view.height};
     memcpy(args.view.rect, whole, sizeof whole);
     PT_REASON(PT_ADD(&tests->builder, limit, args,
-                     { tests->planes[0], tests->planes[1], tests->planes[2], tests->opacities, pt_plane_at(PT_PLANE_LIMIT, 0),
-                       { PT_OF_FLAG, PT_FLAG_SOME, 0 } }),
+                     {tests->planes[0],
+                      tests->planes[1],
+                      tests->planes[2],
+                      tests->opacities,
+                      pt_plane_at(PT_PLANE_LIMIT, 0),
+                      {PT_OF_FLAG, PT_FLAG_SOME, 0}}),
               "what lies behind layer %u of the caster", tests->round->layer + 1);
 }
 
@@ -202,19 +215,21 @@ static int plan_tests(struct tests *tests, const struct pt_shadow_group *group, 
     return error;
 }
 
-int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, struct pt_plan *map)
+int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                struct pt_plan *map)
 {
     const struct pt_shadow_group *group = &picture->groups[round->group];
-    struct patina_scene view = { 0 };
+    struct patina_scene view = {0};
     double window[4];
-    *map = (struct pt_plan){ .map = 1 };
+    *map = (struct pt_plan){.map = 1};
     struct tests tests = begin_tests(scene, picture, round, map);
     tests.view = &view;
-    struct pt_builder builder = { .scene = &view, .plan = map, .behind = round->layer > 0, .as = "light map" };
+    struct pt_builder builder = {.scene = &view, .plan = map, .behind = round->layer > 0, .as = "light map"};
     struct pt_instance *instances = pt_arena_take(&map->arena, (scene->instance_count + 1) * sizeof *instances);
     struct pt_mesh_instance *meshes = pt_arena_take(&map->arena, (scene->mesh_count + 1) * sizeof *meshes);
     int error = instances && meshes ? PATINA_OK : PATINA_ERROR_MEMORY;
-    if (error || !pt_light_scene(scene, &picture->lights[round->light], group, round->sample, round->face, instances, meshes, &view, window))
+    if (error || !pt_light_scene(scene, &picture->lights[round->light], group, round->sample, round->face, instances, meshes,
+                                 &view, window))
         return error;
     pt_handle_init(&view.handle);
     error = pt_plan_depth(&builder);
@@ -233,20 +248,25 @@ int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture,
     return error;
 }
 
-int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, struct pt_plan *map)
+int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                  struct pt_plan *map)
 {
-    static const patina_camera anywhere = { .orthographic = 1,
-                                            .world_from_camera = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 },
-                                            .left = -1, .right = 1, .bottom = -1, .top = 1, .far_clip = 1 };
-    const struct patina_scene nothing = { .camera = anywhere, .settings = { .width = 1, .height = 1 } }; // lies in no window
-    *map = (struct pt_plan){ .map = 1 };
+    static const patina_camera anywhere = {.orthographic = 1,
+                                           .world_from_camera = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
+                                           .left = -1,
+                                           .right = 1,
+                                           .bottom = -1,
+                                           .top = 1,
+                                           .far_clip = 1};
+    const struct patina_scene nothing = {.camera = anywhere, .settings = {.width = 1, .height = 1}}; // lies in no window
+    *map = (struct pt_plan){.map = 1};
     struct tests tests = begin_tests(scene, picture, round, map);
     tests.view = &nothing;
     tests.args.close = 1;
     tests.args.loss = 255;
-    tests.planes[0] = (struct pt_ref){ PT_OF_LEFT, PT_PLANE_KEYS, 0 };
-    tests.planes[1] = (struct pt_ref){ PT_OF_LEFT, PT_PLANE_FROM, 0 };
-    tests.planes[2] = (struct pt_ref){ PT_OF_LEFT, PT_PLANE_DEFF, 0 };
+    tests.planes[0] = (struct pt_ref){PT_OF_LEFT, PT_PLANE_KEYS, 0};
+    tests.planes[1] = (struct pt_ref){PT_OF_LEFT, PT_PLANE_FROM, 0};
+    tests.planes[2] = (struct pt_ref){PT_OF_LEFT, PT_PLANE_DEFF, 0};
     int error = add_tests(&tests, 1);
     pt_add_passes_step(&tests.builder, PT_STEP_PASSES);
     error = error ? error : tests.builder.failed;

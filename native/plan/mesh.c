@@ -99,7 +99,7 @@ static void plan_places(struct pt_builder *builder)
             plan_locate(builder, i);
     if (!plan->mesh_shadows)
         pt_skip(builder, "locate",
-                !plan->triangles     ? "no mesh is in view"
+                !plan->triangles    ? "no mesh is in view"
                 : plan->light_count ? "no mesh in view receives shadows"
                                     : "no light shadows anything");
 }
@@ -158,11 +158,11 @@ static void plan_shade(struct pt_builder *builder, enum pt_plane color, int unli
     pt_own_colors(color, &args);
     if (!pt_line_surface(builder, &args.instance) && args.instance.has_opacities)
         paper_with_holes(&args);
-    struct pt_pass *pass = PT_ADD(builder, shade, args,
-                     {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0),
-                      pt_span_of(plan), pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder),
-                      pt_plane_at(color, 0), pt_nothing(), unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS),
-                      pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
+    struct pt_pass *pass = PT_ADD(
+        builder, shade, args,
+        {pt_plane_at(PT_PLANE_MESH_SHOWN, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_MESH_NORMAL, 0), pt_span_of(plan),
+         pt_plane_at(PT_PLANE_MESH_ALBEDO, 0), pt_shading_of(builder), pt_plane_at(color, 0), pt_nothing(),
+         unlit ? pt_nothing() : pt_buffer_of(PT_SHADOWS, PT_PIXELS), pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
     pass->late = pt_shade_late(&args, PT_LATE_PIXELS);
     PT_REASON(pass, "meshes%s, %u lights", unlit ? " that shine" : "", args.light_count);
 }

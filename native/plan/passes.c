@@ -57,7 +57,8 @@ void pt_skip(struct pt_builder *builder, const char *name, const char *reason)
 double pt_pixel_width(const struct patina_scene *scene)
 {
     const patina_camera *camera = &scene->camera;
-    return fmax((camera->right - camera->left) / scene->settings.width, (camera->top - camera->bottom) / scene->settings.height);
+    return fmax((camera->right - camera->left) / scene->settings.width,
+                (camera->top - camera->bottom) / scene->settings.height);
 }
 
 struct view_args pt_view_at(const struct pt_plan *plan, uint32_t level)

@@ -18,7 +18,7 @@ struct pt_builder {
     const char *as;  // what statistics add its passes to; NULL: their kernels' names
     uint32_t listed; // passes that steps name already
     uint32_t step_room;
-    int failed;      // PATINA_ERROR_*: memory lacked, or a pass binds what its kernel does not list: the plan fails as a whole
+    int failed; // PATINA_ERROR_*: memory lacked, or a pass binds what its kernel does not list: the plan fails as a whole
     struct pt_pass nowhere; // written to then
     struct pt_step no_step;
 };
@@ -30,10 +30,7 @@ static inline struct pt_ref pt_plane_at(enum pt_plane which, uint32_t level)
     return (struct pt_ref){PT_OF_FRAME, which, level};
 }
 // In place of what the kernel does without.
-static inline struct pt_ref pt_nothing(void)
-{
-    return (struct pt_ref){PT_OF_NOTHING, 0, 0};
-}
+static inline struct pt_ref pt_nothing(void) { return (struct pt_ref){PT_OF_NOTHING, 0, 0}; }
 static inline struct pt_ref pt_plane_if(int wanted, enum pt_plane which, uint32_t level)
 {
     return wanted ? pt_plane_at(which, level) : pt_nothing();
@@ -99,8 +96,8 @@ int pt_check_bindings(enum pt_kernel kernel, const void *arguments, const struct
 struct pt_pass *pt_add(struct pt_builder *builder, enum pt_kernel kernel, const char *name, const void *arguments,
                        size_t argument_size, const struct pt_ref *refs, uint32_t ref_count);
 
-#define PT_ADD(builder, kernel, args, ...)                                                                             \
-    pt_add(builder, PT_KERNEL_##kernel, #kernel, &(args), sizeof(args), (struct pt_ref[])__VA_ARGS__,                  \
+#define PT_ADD(builder, kernel, args, ...)                                                                                     \
+    pt_add(builder, PT_KERNEL_##kernel, #kernel, &(args), sizeof(args), (struct pt_ref[])__VA_ARGS__,                          \
            sizeof((struct pt_ref[])__VA_ARGS__) / sizeof(struct pt_ref))
 #define PT_REASON(pass, ...) snprintf((pass)->reason, sizeof(pass)->reason, __VA_ARGS__)
 
@@ -154,7 +151,7 @@ enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words); /
 void pt_plan_splat(struct pt_builder *builder);
 int pt_tells_surfaces(const struct pt_builder *builder); // the depth asked for is that of the surface
 int pt_tells_depths(const struct pt_builder *builder);   // and discs, in the mean, tell how far off it is
-void pt_plan_blend(struct pt_builder *builder); // after pt_plan_surface of every instance
+void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_surface of every instance
 
 // average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
 void pt_plan_average(struct pt_builder *builder);
@@ -172,9 +169,10 @@ void pt_plan_soft(struct pt_builder *builder);
 void pt_plan_assess(struct pt_builder *builder);
 
 // reopen.c: what was closed where stations looked through. Of pictures of one layer, not of light maps.
-int pt_plan_reopen_find(struct pt_builder *builder); // after filling. 0: nothing asks for it; else the layer is planned again, behind
-void pt_plan_reopen_keep(struct pt_builder *builder); // before filling, the last time
-void pt_plan_reopen_take(struct pt_builder *builder); // after it
+int pt_plan_reopen_find(
+    struct pt_builder *builder); // after filling. 0: nothing asks for it; else the layer is planned again, behind
+void pt_plan_reopen_keep(struct pt_builder *builder);                      // before filling, the last time
+void pt_plan_reopen_take(struct pt_builder *builder);                      // after it
 void pt_plan_reopen_show(struct pt_builder *builder, enum pt_plane color); // after shading
 
 // plan.c: normal and layer distance of an instance's pixels.

@@ -22,7 +22,8 @@ enum { MAP_ITERATIONS = 2 };
 static void plan_scatter(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    struct scatter_args args = {.view = plan->view, .behind = builder->layer > 1 || builder->behind, .sifted = plan->drawn_words > 0};
+    struct scatter_args args = {
+        .view = plan->view, .behind = builder->layer > 1 || builder->behind, .sifted = plan->drawn_words > 0};
     struct pt_ref *refs = pt_arena_take(&plan->arena, (3 + 3 * (size_t)plan->instance_count) * sizeof *refs);
     uint64_t points = 0, chunks = 0;
     uint32_t count = 0;
@@ -81,9 +82,7 @@ void pt_plan_surface(struct pt_builder *builder, uint32_t i)
     if (!instance->args.has_normals) {
         double wanted = ceil(2.0 * plan->spacing_px);
         struct normals_args args = {.view = pt_view_of(plan, instance, 0), .instance = instance->args};
-        args.radius = wanted < ESTIMATE_LEAST  ? ESTIMATE_LEAST
-                      : wanted > ESTIMATE_MOST ? ESTIMATE_MOST
-                                               : (uint32_t)wanted;
+        args.radius = wanted < ESTIMATE_LEAST ? ESTIMATE_LEAST : wanted > ESTIMATE_MOST ? ESTIMATE_MOST : (uint32_t)wanted;
         args.steep = !builder->layer;
         PT_REASON(PT_ADD(builder, normals, args,
                          {pt_keys_of(builder, 0), pt_buffer_of(PT_SURFACE, i), pt_plane_at(PT_PLANE_NORMAL, 0)}),
@@ -149,7 +148,8 @@ static void plan_fill_level(struct pt_builder *builder, uint32_t level)
     PT_REASON(PT_ADD(builder, fill, args,
                      {pt_keys_of(builder, level), pt_from_of(builder, level), pt_plane_at(PT_PLANE_NORMAL, 0),
                       pt_plane_at(PT_PLANE_DEFF, 0), pt_span_of(plan)}),
-              "level %u: %u fills, at most %u un-fills of background, then of occluded pixels", level, args.iterations, args.unfills);
+              "level %u: %u fills, at most %u un-fills of background, then of occluded pixels", level, args.iterations,
+              args.unfills);
 }
 
 static void plan_pyramid(struct pt_builder *builder)
@@ -181,12 +181,11 @@ static void plan_pyramid(struct pt_builder *builder)
                                  .least_share = least_share(plan, level - 1),
                                  .background = plan->discs_count > 0,
                                  .from_width = plan->view.width};
-        PT_REASON(
-            PT_ADD(builder, push, args,
-                   {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),
-                    pt_from_of(builder, level - 1), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0),
-                    pt_span_of(plan)}),
-            "level %u to level %u", level, level - 1);
+        PT_REASON(PT_ADD(builder, push, args,
+                         {pt_keys_of(builder, level), pt_from_of(builder, level), pt_keys_of(builder, level - 1),
+                          pt_from_of(builder, level - 1), pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0),
+                          pt_span_of(plan)}),
+                  "level %u to level %u", level, level - 1);
     }
 }
 
@@ -246,11 +245,11 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
     enum pt_instance_buffer colors = args.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     struct pt_pass *pass = PT_ADD(builder, shade, args,
-                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
-                      pt_span_of(plan),
-                      of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i), pt_shading_of(builder),
-                      pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i), pt_buffer_of(PT_SHADOWS, instance->of),
-                      pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
+                                  {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
+                                   pt_span_of(plan), of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i),
+                                   pt_shading_of(builder), pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i),
+                                   pt_buffer_of(PT_SHADOWS, instance->of),
+                                   pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
     pass->late = pt_shade_late(&args, PT_LATE_POINTS);
     PT_REASON(pass, "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
               args.instance.lit ? "lit" : "unlit", args.light_count, args.blend, args.recolor.source ? ", ramp" : "");
@@ -270,8 +269,8 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
         struct smooth_args args = {
             .view = plan->view, .center = w[0], .edge = w[1], .corner = w[2], .translucent = plan->transparent != 0};
         PT_REASON(PT_ADD(builder, smooth, args,
-                         {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan),
-                          pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COLOR_B, 0)}),
+                         {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan), pt_plane_at(color, 0),
+                          pt_plane_at(PT_PLANE_COLOR_B, 0)}),
                   "%s, 3 x 3", names[settings->smooth]);
         color = PT_PLANE_COLOR_B;
     } else {
@@ -300,15 +299,15 @@ static enum pt_plane plan_image_filters(struct pt_builder *builder)
 static void plan_peel(struct pt_builder *builder, enum pt_plane color)
 {
     const struct pt_plan *plan = builder->plan;
-    struct peel_args args = {
-        .view = plan->view, .first = builder->layer == 1, .stop = !builder->scene->settings.layer_passes,
-        .inked = plan->line_radius > 0.0f};
-    PT_REASON(
-        PT_ADD(builder, peel, args,
-               {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan), pt_shading_of(builder),
-                pt_plane_at(color, 0), pt_plane_at(PT_PLANE_LIMIT, 0), pt_plane_at(PT_PLANE_THROUGH, 0),
-                pt_plane_at(PT_PLANE_OVER, 0), pt_plane_at(PT_PLANE_TILES, PT_TILE_LEVEL)}),
-        "layer %u of at most %u is blended, what may lie behind it is marked", builder->layer, plan->layers);
+    struct peel_args args = {.view = plan->view,
+                             .first = builder->layer == 1,
+                             .stop = !builder->scene->settings.layer_passes,
+                             .inked = plan->line_radius > 0.0f};
+    PT_REASON(PT_ADD(builder, peel, args,
+                     {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(plan), pt_shading_of(builder),
+                      pt_plane_at(color, 0), pt_plane_at(PT_PLANE_LIMIT, 0), pt_plane_at(PT_PLANE_THROUGH, 0),
+                      pt_plane_at(PT_PLANE_OVER, 0), pt_plane_at(PT_PLANE_TILES, PT_TILE_LEVEL)}),
+              "layer %u of at most %u is blended, what may lie behind it is marked", builder->layer, plan->layers);
 }
 
 static struct compose_args compose_args(const struct pt_plan *plan)
@@ -364,10 +363,9 @@ static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
         PT_REASON(PT_ADD(builder, extract, extract,
                          {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_shading_of(builder),
                           pt_plane_if(extract.depth != 0, PT_PLANE_LAYER_DEPTH, slot),
-                          pt_plane_if(extract.normal != 0, PT_PLANE_LAYER_NORMALS, slot), pt_nothing(), pt_nothing(), pt_nothing(),
-                          pt_nothing(), pt_nothing()}),
-                  "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "",
-                  extract.normal ? " normal" : "");
+                          pt_plane_if(extract.normal != 0, PT_PLANE_LAYER_NORMALS, slot), pt_nothing(), pt_nothing(),
+                          pt_nothing(), pt_nothing(), pt_nothing()}),
+                  "of layer %u are asked for:%s%s", layer, extract.depth ? " depth" : "", extract.normal ? " normal" : "");
     pt_plan_ink_layer(builder, passes >> PATINA_PASS_COMBINED & 1u ? PT_PLANE_LAYER_COMBINED : PT_PLANE_COUNT,
                       extract.depth ? PT_PLANE_LAYER_DEPTH : PT_PLANE_COUNT);
 }
@@ -399,8 +397,10 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
     if (!pt_plan_focus(builder, color, &compose))
         PT_REASON(PT_ADD(builder, compose, compose,
                          {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(color, 0), pt_plane_at(PT_PLANE_COMBINED, 0)}),
-                  "%s", settings->film_transparent ? "transparent film"
-                        : settings->own_background ? "over its own background" : "over the world colour");
+                  "%s",
+                  settings->film_transparent ? "transparent film"
+                  : settings->own_background ? "over its own background"
+                                             : "over the world colour");
 
     struct extract_args extract = extract_args(builder, settings->passes);
     extract.centered = pt_tells_surfaces(builder) ? (uint32_t)builder->scene->points : 0;
@@ -408,14 +408,16 @@ static void plan_output(struct pt_builder *builder, enum pt_plane color)
         pt_skip(builder, "extract", "no pass beside the combined one is asked for");
         return;
     }
-    PT_REASON(PT_ADD(builder, extract, extract,
-                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_if(extract.source || extract.centered, PT_PLANE_FROM, 0),
-                      pt_plane_if(extract.normal != 0, PT_PLANE_SHADING, 0), pt_plane_if(extract.depth != 0, PT_PLANE_DEPTH, 0),
-                      pt_plane_if(extract.normal != 0, PT_PLANE_NORMALS, 0), pt_plane_if(extract.source != 0, PT_PLANE_SOURCE, 0),
-                      pt_plane_if(extract.shadow != 0, PT_PLANE_ARRIVED, 0), pt_plane_if(extract.shadow != 0, PT_PLANE_SHADOW, 0),
-                      pt_plane_if(extract.discs_count != 0, PT_PLANE_AWAY, 0), pt_plane_if(extract.centered != 0, PT_PLANE_OFFSET, 0)}),
-              "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "",
-              extract.source ? " source" : "", extract.shadow ? " shadow" : "");
+    PT_REASON(
+        PT_ADD(builder, extract, extract,
+               {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_if(extract.source || extract.centered, PT_PLANE_FROM, 0),
+                pt_plane_if(extract.normal != 0, PT_PLANE_SHADING, 0), pt_plane_if(extract.depth != 0, PT_PLANE_DEPTH, 0),
+                pt_plane_if(extract.normal != 0, PT_PLANE_NORMALS, 0), pt_plane_if(extract.source != 0, PT_PLANE_SOURCE, 0),
+                pt_plane_if(extract.shadow != 0, PT_PLANE_ARRIVED, 0), pt_plane_if(extract.shadow != 0, PT_PLANE_SHADOW, 0),
+                pt_plane_if(extract.discs_count != 0, PT_PLANE_AWAY, 0),
+                pt_plane_if(extract.centered != 0, PT_PLANE_OFFSET, 0)}),
+        "asked for:%s%s%s%s", extract.depth ? " depth" : "", extract.normal ? " normal" : "", extract.source ? " source" : "",
+        extract.shadow ? " shadow" : "");
 }
 
 // Why no light casts a shadow, or NULL.
@@ -445,10 +447,10 @@ static void plan_marks(struct pt_builder *builder)
     int lazy = pt_plan_lazy(builder->scene, plan);
     if (none || !lazy)
         pt_skip(builder, "mark",
-                none               ? none
-                : plan->layers > 1 ? "what later layers show is not known yet"
+                none                                   ? none
+                : plan->layers > 1                     ? "what later layers show is not known yet"
                 : builder->scene->settings.shadow_lazy ? "the error target is measured on whole shadow textures"
-                                   : "whole shadow textures, to be kept");
+                                                       : "whole shadow textures, to be kept");
     if (none)
         pt_skip(builder, "lit", none);
     if (none || !pt_casts_in_layers(builder->scene))
@@ -457,9 +459,8 @@ static void plan_marks(struct pt_builder *builder)
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count || !pt_receives(instance->instance))
             continue;
-        struct mark_args args = {.view = pt_view_filled(plan, instance),
-                                 .id_base = instance->args.id_base,
-                                 .id_count = instance->args.id_count};
+        struct mark_args args = {
+            .view = pt_view_filled(plan, instance), .id_base = instance->args.id_base, .id_count = instance->args.id_count};
         PT_REASON(PT_ADD(builder, mark, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_MARKS, instance->of)}),
                   "only points of instance %u that the picture shows need shadows", i);
     }
@@ -509,9 +510,9 @@ static void plan_measured(struct pt_builder *builder)
     if (points)
         plan_scatter(builder);
     else
-        pt_skip(builder, "scatter", builder->scene->settings.surface == PATINA_SURFACE_SPLATS
-                                        ? "the settings ask for discs"
-                                        : "all footprints in view are wide enough for discs");
+        pt_skip(builder, "scatter",
+                builder->scene->settings.surface == PATINA_SURFACE_SPLATS ? "the settings ask for discs"
+                                                                          : "all footprints in view are wide enough for discs");
     if (discs) {
         pt_plan_splat(builder);
     } else {
@@ -529,7 +530,8 @@ static void plan_measured(struct pt_builder *builder)
             estimate |= !plan->instances[i].args.has_normals;
         }
     if (!pt_tells_surfaces(builder) || !plan->filled)
-        pt_skip(builder, "center", !plan->filled ? "discs have the depth of their surface" : "the depth asked for is the points'");
+        pt_skip(builder, "center",
+                !plan->filled ? "discs have the depth of their surface" : "the depth asked for is the points'");
     if (!estimate)
         pt_skip(builder, "normals", "every cloud in view has normals");
     if (discs)
@@ -617,10 +619,7 @@ static int reads_planes(enum pt_kernel kernel) { return kernel == PT_KERNEL_smoo
 
 static int gives_picture(enum pt_kernel kernel) { return kernel == PT_KERNEL_compose || kernel == PT_KERNEL_peel; }
 
-static int runs_with_others(enum pt_kernel kernel)
-{
-    return pt_kernels[kernel].stage == PT_STAGE_finish || pointwise(kernel);
-}
+static int runs_with_others(enum pt_kernel kernel) { return pt_kernels[kernel].stage == PT_STAGE_finish || pointwise(kernel); }
 
 // From shading on, passes may run as one where nobody asks for what lies between them; or from behind the last of those that look
 // around in the colours, if smoothing or anti-aliasing follow.
@@ -681,8 +680,8 @@ static void plan_points(struct pt_builder *builder)
         loop = pt_open_step(builder, PT_STEP_LAYERS);
         pt_step_at(builder, loop)->most = plan->layers - 1;
         pt_step_at(builder, loop)->ends = PT_END_LAYER_EMPTY | PT_END_SPENT;
-        PT_REASON(pt_step_at(builder, loop), "%s", plan->transparent ? "something in view lets light through"
-                                                                     : "passes of every layer are asked for");
+        PT_REASON(pt_step_at(builder, loop), "%s",
+                  plan->transparent ? "something in view lets light through" : "passes of every layer are asked for");
     }
     for (; builder->layer >= 2 && builder->layer <= plan->layers; builder->layer++) {
         const uint32_t layer = pt_open_step(builder, PT_STEP_LAYER);
@@ -760,7 +759,7 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
         if (pt_plan_shows(plan))
             plan_points(&builder);
         else
-            plan_nothing(&builder, scene->mesh_count       ? "nothing is in view"
+            plan_nothing(&builder, scene->mesh_count        ? "nothing is in view"
                                    : !scene->instance_count ? "the scene has no cloud"
                                    : plan->soft_count       ? "everything in view is soft"
                                    : !plan->chunks          ? "the clouds have no points"
@@ -775,4 +774,3 @@ int pt_plan_create(const struct patina_scene *scene, struct pt_plan *plan)
         pt_plan_destroy(plan);
     return error;
 }
-

@@ -21,52 +21,52 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 //         plan->soft_records of them; BINS: as many as these need
 //   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
 //   carried: from layer to layer
-#define PT_PLANES(X)                                  \
-    X(KEYS,             key,   WINDOW, LEVELS, 0)     \
-    X(FROM,             u32,   WINDOW, LEVELS, 0)     \
-    X(NORMAL,           f32x4, WINDOW, ONE,    0)     \
-    X(DEFF,             f32,   WINDOW, ONE,    0)     \
-    X(SPAN,             f32,   WINDOW, ONE,    0)     \
-    X(SHADING,          f32x4, WINDOW, ONE,    0)     \
-    X(ARRIVED,          f32,   WINDOW, ONE,    0)     \
-    X(ALBEDO,           f32x4, WINDOW, ONE,    0)     \
-    X(AWAY,             f32,   WINDOW, ONE,    0)     \
-    X(OFFSET,           f32,   WINDOW, ONE,    0)     \
-    X(OBSCURED,         f32,   WINDOW, ONE,    0)     \
-    X(UNLIT,            f32x4, WINDOW, ONE,    0)     \
-    X(COLOR_A,          f32x4, WINDOW, ONE,    0)     \
-    X(COLOR_B,          f32x4, WINDOW, ONE,    0)     \
-    X(KEYS_BEHIND,      key,   WINDOW, ONE,    0)     \
-    X(FROM_BEHIND,      u32,   WINDOW, ONE,    0)     \
-    X(SHADING_BEHIND,   f32x4, WINDOW, ONE,    0)     \
-    X(LIMIT,            f32,   WINDOW, ONE,    1)     \
-    X(THROUGH,          f32,   WINDOW, ONE,    1)     \
-    X(OVER,             f32x4, WINDOW, ONE,    1)     \
-    X(TILES,            tile,  TILES,  ONE,    1)     \
-    X(MESH_KEYS,        key,   WINDOW, ONE,    0)     \
-    X(MESH_SHOWN,       key,   WINDOW, ONE,    0)     \
-    X(MESH_NORMAL,      f32x4, WINDOW, ONE,    0)     \
-    X(MESH_ALBEDO,      f32x4, WINDOW, ONE,    0)     \
-    X(MESH_PLACES,      f32x3, WINDOW, ONE,    0)     \
-    X(MESH_WORDS,       u32,   WINDOW, ONE,    0)     \
-    X(LINE,             f32,   WINDOW, ONE,    0)     \
-    X(NEAREST,          u32,   WINDOW, ONE,    0)     \
-    X(LINE_BEHIND,      f32,   WINDOW, ONE,    0)     \
-    X(NEAREST_BEHIND,   u32,   WINDOW, ONE,    0)     \
-    X(KEYS_KEPT,        key,   WINDOW, ONE,    0)     \
-    X(COMBINED,         f32x4, CROP,   ONE,    0)     \
-    X(DEPTH,            f32,   CROP,   ONE,    0)     \
-    X(NORMALS,          f32x3, CROP,   ONE,    0)     \
-    X(SOURCE,           f32,   CROP,   ONE,    0)     \
-    X(SHADOW,           f32,   CROP,   ONE,    0)     \
-    X(LINES,            f32,   CROP,   ONE,    0)     \
-    X(SOFT_POINTS,      record, RECORDS, ONE,  0)     \
-    X(SOFT_BINS,        bins,  BINS,   ONE,    0)     \
-    X(CERTAINTY,        f32,   CROP,   ONE,    0)     \
-    X(THICKNESS,        f32,   CROP,   ONE,    0)     \
-    X(LAYER_COMBINED,   f32x4, CROP,   LAYERS, 0)     \
-    X(LAYER_DEPTH,      f32,   CROP,   LAYERS, 0)     \
-    X(LAYER_NORMALS,    f32x3, CROP,   LAYERS, 0)
+#define PT_PLANES(X)                                                                                                           \
+    X(KEYS, key, WINDOW, LEVELS, 0)                                                                                            \
+    X(FROM, u32, WINDOW, LEVELS, 0)                                                                                            \
+    X(NORMAL, f32x4, WINDOW, ONE, 0)                                                                                           \
+    X(DEFF, f32, WINDOW, ONE, 0)                                                                                               \
+    X(SPAN, f32, WINDOW, ONE, 0)                                                                                               \
+    X(SHADING, f32x4, WINDOW, ONE, 0)                                                                                          \
+    X(ARRIVED, f32, WINDOW, ONE, 0)                                                                                            \
+    X(ALBEDO, f32x4, WINDOW, ONE, 0)                                                                                           \
+    X(AWAY, f32, WINDOW, ONE, 0)                                                                                               \
+    X(OFFSET, f32, WINDOW, ONE, 0)                                                                                             \
+    X(OBSCURED, f32, WINDOW, ONE, 0)                                                                                           \
+    X(UNLIT, f32x4, WINDOW, ONE, 0)                                                                                            \
+    X(COLOR_A, f32x4, WINDOW, ONE, 0)                                                                                          \
+    X(COLOR_B, f32x4, WINDOW, ONE, 0)                                                                                          \
+    X(KEYS_BEHIND, key, WINDOW, ONE, 0)                                                                                        \
+    X(FROM_BEHIND, u32, WINDOW, ONE, 0)                                                                                        \
+    X(SHADING_BEHIND, f32x4, WINDOW, ONE, 0)                                                                                   \
+    X(LIMIT, f32, WINDOW, ONE, 1)                                                                                              \
+    X(THROUGH, f32, WINDOW, ONE, 1)                                                                                            \
+    X(OVER, f32x4, WINDOW, ONE, 1)                                                                                             \
+    X(TILES, tile, TILES, ONE, 1)                                                                                              \
+    X(MESH_KEYS, key, WINDOW, ONE, 0)                                                                                          \
+    X(MESH_SHOWN, key, WINDOW, ONE, 0)                                                                                         \
+    X(MESH_NORMAL, f32x4, WINDOW, ONE, 0)                                                                                      \
+    X(MESH_ALBEDO, f32x4, WINDOW, ONE, 0)                                                                                      \
+    X(MESH_PLACES, f32x3, WINDOW, ONE, 0)                                                                                      \
+    X(MESH_WORDS, u32, WINDOW, ONE, 0)                                                                                         \
+    X(LINE, f32, WINDOW, ONE, 0)                                                                                               \
+    X(NEAREST, u32, WINDOW, ONE, 0)                                                                                            \
+    X(LINE_BEHIND, f32, WINDOW, ONE, 0)                                                                                        \
+    X(NEAREST_BEHIND, u32, WINDOW, ONE, 0)                                                                                     \
+    X(KEYS_KEPT, key, WINDOW, ONE, 0)                                                                                          \
+    X(COMBINED, f32x4, CROP, ONE, 0)                                                                                           \
+    X(DEPTH, f32, CROP, ONE, 0)                                                                                                \
+    X(NORMALS, f32x3, CROP, ONE, 0)                                                                                            \
+    X(SOURCE, f32, CROP, ONE, 0)                                                                                               \
+    X(SHADOW, f32, CROP, ONE, 0)                                                                                               \
+    X(LINES, f32, CROP, ONE, 0)                                                                                                \
+    X(SOFT_POINTS, record, RECORDS, ONE, 0)                                                                                    \
+    X(SOFT_BINS, bins, BINS, ONE, 0)                                                                                           \
+    X(CERTAINTY, f32, CROP, ONE, 0)                                                                                            \
+    X(THICKNESS, f32, CROP, ONE, 0)                                                                                            \
+    X(LAYER_COMBINED, f32x4, CROP, LAYERS, 0)                                                                                  \
+    X(LAYER_DEPTH, f32, CROP, LAYERS, 0)                                                                                       \
+    X(LAYER_NORMALS, f32x3, CROP, LAYERS, 0)
 
 enum pt_plane {
 #define PT_X(name, format, size, slots, carried) PT_PLANE_##name,
@@ -103,8 +103,24 @@ _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_S
 // PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole; PT_MASK to
 // the instance's mask. PT_FIELD: its field, or 1 where all points are soft, with the points' radii; PT_FIELD_ONE: with radii of 1.
 enum pt_instance_buffer {
-    PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_COLORS, PT_OPACITIES, PT_RADII, PT_SCALARS, PT_CLASSES, PT_SHAPES, PT_SIGHTS,
-    PT_INSTANCE_BUFFERS, PT_MARKS = PT_INSTANCE_BUFFERS, PT_SHADOWS, PT_CLIPS, PT_DRAWN, PT_MASK, PT_FIELD, PT_FIELD_ONE
+    PT_CHUNKS,
+    PT_POSITIONS,
+    PT_SURFACE,
+    PT_COLORS,
+    PT_OPACITIES,
+    PT_RADII,
+    PT_SCALARS,
+    PT_CLASSES,
+    PT_SHAPES,
+    PT_SIGHTS,
+    PT_INSTANCE_BUFFERS,
+    PT_MARKS = PT_INSTANCE_BUFFERS,
+    PT_SHADOWS,
+    PT_CLIPS,
+    PT_DRAWN,
+    PT_MASK,
+    PT_FIELD,
+    PT_FIELD_ONE
 };
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
@@ -114,8 +130,8 @@ enum pt_late { PT_LATE_NOTHING, PT_LATE_POINTS, PT_LATE_PIXELS };
 
 struct pt_pass {
     enum pt_kernel kernel;
-    uint32_t layer;        // from 1 on; 0: of the whole picture
-    const char *name;      // what statistics add it to
+    uint32_t layer;   // from 1 on; 0: of the whole picture
+    const char *name; // what statistics add it to
     char reason[96];
     const void *arguments; // owned by the plan
     size_t argument_size;
@@ -141,12 +157,12 @@ struct pt_bounds {
 // A light whose shadow texture the frame needs.
 struct pt_plan_light {
     const patina_light_desc *light;
-    uint32_t samples;  // wanted
+    uint32_t samples; // wanted
     // pt_plan_light_map
-    uint32_t cube;     // six maps a sample instead of one
-    uint32_t capped;   // its texels are wider than the points' spacing asks for
-    double texel;      // width of a texel: at distance 1, or of suns anywhere
-    double axes[9];    // of its maps (not of a cube's): rows x, y, z, looks down -z
+    uint32_t cube;   // six maps a sample instead of one
+    uint32_t capped; // its texels are wider than the points' spacing asks for
+    double texel;    // width of a texel: at distance 1, or of suns anywhere
+    double axes[9];  // of its maps (not of a cube's): rows x, y, z, looks down -z
     char reason[128];
 };
 
@@ -158,14 +174,14 @@ struct pt_plan_instance {
     uint32_t discs; // 1: its points are discs
     struct instance_args args;
     float radius, radius_scale, radius_most, surface_scale; // of discs, as disc_args has them
-    struct chunk_view *chunks; // those in view
-    struct pt_bounds *bounds;  // of each of them
+    struct chunk_view *chunks;                              // those in view
+    struct pt_bounds *bounds;                               // of each of them
     uint32_t chunk_count;
-    uint64_t points;        // of these chunks, drawn ones
-    uint32_t rect[4]; // of its points in the planes; empty: x0 >= x1
-    uint32_t chunks_cut; // of its chunks, those that are sifted
+    uint64_t points;                           // of these chunks, drawn ones
+    uint32_t rect[4];                          // of its points in the planes; empty: x0 >= x1
+    uint32_t chunks_cut;                       // of its chunks, those that are sifted
     int by_class, by_shape, by_mask, by_field; // some of them by class, by shape, by mask, by field
-    int marked;             // shown with what stations saw through in magenta
+    int marked;                                // shown with what stations saw through in magenta
 };
 
 // What one pass draws of the soft points: rows of the picture, a slab of depth, and which instances of the plan hold its points.
@@ -189,7 +205,10 @@ struct pt_shadow_group {
     uint32_t loss;          // 1..255
     int faint;              // its points have opacities of their own
 };
-enum { PT_NO_INSTANCE = 0xFFFFFFFFu, PT_PIXELS = 0xFFFFFFFEu }; // PT_PIXELS: those that show meshes, of which shadows are kept, too
+enum {
+    PT_NO_INSTANCE = 0xFFFFFFFFu,
+    PT_PIXELS = 0xFFFFFFFEu
+};                            // PT_PIXELS: those that show meshes, of which shadows are kept, too
 enum { PT_FAINT_LAYERS = 8 }; // of a caster whose points have opacities of their own, at most
 
 // What is tested against a light's map.
@@ -212,12 +231,13 @@ struct pt_slab {
 };
 
 struct pt_plan {
-    struct view_args view;  // level 0; rect: union over instances and meshes
-    uint32_t levels;        // coarse levels
-    uint32_t crop[4];       // x, y, width, height of the picture in the planes
+    struct view_args view;    // level 0; rect: union over instances and meshes
+    uint32_t levels;          // coarse levels
+    uint32_t crop[4];         // x, y, width, height of the picture in the planes
     uint32_t pixel_offset[2]; // of the crop in the full picture
     uint32_t guard;           // pixels by which the padded picture is wider on each side
-    struct pt_plan_instance *instances; // behind those that the count counts: soft ones, whole, and then what parts draw of them
+    struct pt_plan_instance
+        *instances; // behind those that the count counts: soft ones, whole, and then what parts draw of them
     uint32_t instance_count;
     uint32_t soft_count, soft_entries; // soft instances in view; those and what parts draw
     struct pt_soft_part *soft_parts;   // those farther away first, rows beside each other
@@ -238,7 +258,7 @@ struct pt_plan {
     uint32_t life_count;
     struct pt_slab *slabs;
     uint32_t slab_count;
-    uint64_t peak; // bytes of all planes together, those of light maps apart
+    uint64_t peak;                  // bytes of all planes together, those of light maps apart
     struct pt_shadow_group *groups; // of casters
     uint32_t group_count;
     struct pt_receiver *receivers; // of a light's map
@@ -259,11 +279,11 @@ struct pt_plan {
     int map;                // of a light
     enum pt_means means;    // that `expected` is of
     patina_expected_error expected;
-    uint32_t layers;        // at most so many are peeled; 1: no peeling
-    int transparent;        // something in view lets light through
-    float line_radius;      // of the widest line, pixels; 0: none
-    uint32_t reopens;       // how often points are drawn where closed pixels are taken back: 2; 0: none are
-    uint32_t assessed;      // of PATINA_PASS_CERTAINTY and _THICKNESS, bits 1 << those that are asked for and known of something
+    uint32_t layers;   // at most so many are peeled; 1: no peeling
+    int transparent;   // something in view lets light through
+    float line_radius; // of the widest line, pixels; 0: none
+    uint32_t reopens;  // how often points are drawn where closed pixels are taken back: 2; 0: none are
+    uint32_t assessed; // of PATINA_PASS_CERTAINTY and _THICKNESS, bits 1 << those that are asked for and known of something
     struct pt_arena *arena;
 };
 
@@ -353,7 +373,7 @@ struct pt_sieve;
 // Gives a chunk its clips and drawn words, where it is divided.
 int pt_plan_divide(struct pt_plan *plan, struct pt_plan_instance *instance, const struct pt_sieve *sieve,
                    const struct pt_chunk *chunk, struct chunk_view *out);
-void pt_plan_sift(struct pt_builder *builder);                       // passes before scatter
+void pt_plan_sift(struct pt_builder *builder);                      // passes before scatter
 void pt_plan_tint(struct pt_builder *builder, enum pt_plane color); // passes on a layer's colour
 
 // ---- colours: color.c -------------------------------------------------------------------------------------------------
@@ -373,11 +393,14 @@ struct pt_round {
 
 // maps.c, pure as all planning: the sub-plan of a light's map with its tests; without passes where there is nothing to see. picture:
 // the plan with the loops. Those of other threads may be made at the same time.
-int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, struct pt_plan *map);
+int pt_plan_map(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                struct pt_plan *map);
 // What the round's maps took together goes into the sum, of receivers that several were tested for.
-int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, struct pt_plan *map);
+int pt_plan_close(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                  struct pt_plan *map);
 // Whether anything is tested against the group's maps.
-int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round, uint32_t group);
+int pt_plan_tested(const struct patina_scene *scene, const struct pt_plan *picture, const struct pt_round *round,
+                   uint32_t group);
 // shading.c: writes what is known late into a copy of the pass's arguments; samples: of each light, in the words.
 void pt_plan_late(const struct pt_pass *pass, const uint32_t samples[PT_MAX_LIGHTS], void *arguments);
 // plan.c: the loops of all shadow textures, without a picture.

@@ -74,7 +74,8 @@ static struct reopen_args *arguments_of(struct pt_builder *builder, uint32_t i, 
     for (uint32_t s = 0; s < sights->count; s++) {
         const struct pt_sight *sight = &sights->each[s];
         const float grow = 1.0f + sight->share;
-        stations[s] = (struct station_args){.grow = grow * grow, .first = sight->first, .across = sight->across, .base = sight->base};
+        stations[s] = (struct station_args){
+            .grow = grow * grow, .first = sight->first, .across = sight->across, .base = sight->base};
         for (int k = 0; k < 3; k++) // float64 until here: the difference is small where both are far from the origin
             stations[s].eye[k] = (float)(eye[k] - sight->place[k]);
     }
@@ -134,7 +135,8 @@ static int add_passes(struct pt_builder *builder, uint32_t free_space, uint32_t 
 
 int pt_plan_reopen_find(struct pt_builder *builder)
 {
-    return builder->layer == 1 && builder->plan->reopens == 2 && add_passes(builder, PATINA_FREE_SPACE_USE, PT_REOPEN_FIND, PT_PLANE_COLOR_A);
+    return builder->layer == 1 && builder->plan->reopens == 2 &&
+           add_passes(builder, PATINA_FREE_SPACE_USE, PT_REOPEN_FIND, PT_PLANE_COLOR_A);
 }
 
 void pt_plan_reopen_keep(struct pt_builder *builder)
@@ -150,8 +152,8 @@ void pt_plan_reopen_take(struct pt_builder *builder)
     if (!builder->layer)
         return;
     if (!builder->plan->reopens || !add_passes(builder, PATINA_FREE_SPACE_USE, PT_REOPEN_TAKE, PT_PLANE_COLOR_A))
-        pt_skip(builder, "reopen", builder->plan->reopens ? "no cloud in view knows what its stations saw"
-                                                          : "no cloud's free space is used");
+        pt_skip(builder, "reopen",
+                builder->plan->reopens ? "no cloud in view knows what its stations saw" : "no cloud's free space is used");
 }
 
 void pt_plan_reopen_show(struct pt_builder *builder, enum pt_plane color)

@@ -43,8 +43,7 @@ static void set_light(const struct patina_scene *scene, const patina_light_desc 
 }
 
 // receives: whether the instance's shadow words are there to be read.
-static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, int receives,
-                       struct shade_args *args)
+static void set_lights(const struct pt_plan *plan, const struct patina_scene *scene, int receives, struct shade_args *args)
 {
     uint32_t casting = 0;
     for (uint32_t i = 0; i < scene->light_count; i++) { // patina_scene_add_light keeps them to PT_MAX_LIGHTS
@@ -90,8 +89,7 @@ void pt_shade_lights(const struct pt_builder *builder, int receives, struct shad
     memcpy(args->world, scene->settings.world_color, sizeof args->world);
     set_ambient(scene, args);
     args->eye_z = pt_eye_z(scene);
-    args->arrived =
-        builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
+    args->arrived = builder->layer <= 1 && builder->plan->light_count && (scene->settings.passes >> PATINA_PASS_SHADOW & 1u);
     set_lights(builder->plan, scene, receives, args);
 }
 

@@ -31,13 +31,14 @@ struct placing {
     struct depths **depths;         // of their chunks
     struct depths *seen;            // of all that the whole picture shows
     uint32_t seen_count;
-    uint32_t entries;               // of plan->instances, behind the whole ones
-    int filling;                    // parts are written, and not only counted
+    uint32_t entries; // of plan->instances, behind the whole ones
+    int filling;      // parts are written, and not only counted
 };
 
 // ---- what is in view -----------------------------------------------------------------------------------------------------
 
-static double thinned_scale(const struct patina_scene *scene, const struct pt_instance *instance, const struct pt_object *object)
+static double thinned_scale(const struct patina_scene *scene, const struct pt_instance *instance,
+                            const struct pt_object *object)
 {
     return (instance->style.soft_radius > 0.0f ? (double)instance->style.soft_radius : object->scale) * pt_thinning(scene);
 }
@@ -66,9 +67,10 @@ static int place_chunk(struct placing *p, struct pt_plan_instance *out, struct d
         return PATINA_OK;
     for (int k = 0; k < 4; k++)
         extent.rect[k] += k < 2 ? -2.0 * (double)PT_SOFT_LEAST : 2.0 * (double)PT_SOFT_LEAST;
-    const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) * (double)PT_SOFT_LEAST;
-    const struct depths own = { nextafterf((float)(extent.z_before - pixel), -INFINITY), nextafterf((float)(extent.z_beyond + pixel), INFINITY),
-                                chunk->padded };
+    const double pixel = (double)plan->view.footprint * (plan->view.perspective ? fabs(extent.z_beyond) : 1.0) *
+                         (double)PT_SOFT_LEAST;
+    const struct depths own = {nextafterf((float)(extent.z_before - pixel), -INFINITY),
+                               nextafterf((float)(extent.z_beyond + pixel), INFINITY), chunk->padded};
     p->seen[p->seen_count++] = own;
     struct pt_bounds *bounds = &out->bounds[out->chunk_count];
     struct chunk_view *view = &out->chunks[out->chunk_count];
@@ -92,7 +94,7 @@ static int place_instance(struct placing *p, uint32_t i)
     struct pt_object object;
     double rows[9];
     int error = PATINA_OK;
-    *out = (struct pt_plan_instance){ .instance = instance, .of = i, .marked = pt_is_marked(instance) };
+    *out = (struct pt_plan_instance){.instance = instance, .of = i, .marked = pt_is_marked(instance)};
     out->chunks = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->chunks);
     out->bounds = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *out->bounds);
     struct depths *depths = p->depths[p->plan->soft_count] = pt_arena_take(arena, (cloud->chunk_count + 1) * sizeof *depths);
@@ -126,7 +128,8 @@ static uint32_t slab_ends(struct placing *p, float ends[MOST_SLABS])
     uint32_t count = 0;
     for (uint32_t i = 0; i < p->seen_count; i++)
         total += p->seen[i].records;
-    const uint64_t wanted = total <= PART_RECORDS ? 1 : 2 * total / PART_RECORDS + 1, slabs = wanted < MOST_SLABS ? wanted : MOST_SLABS;
+    const uint64_t wanted = total <= PART_RECORDS ? 1 : 2 * total / PART_RECORDS + 1,
+                   slabs = wanted < MOST_SLABS ? wanted : MOST_SLABS;
     qsort(p->seen, p->seen_count, sizeof *p->seen, by_middle);
     for (uint32_t i = 0; i < p->seen_count && slabs > 1; i++) {
         const float middle = 0.5f * p->seen[i].before + 0.5f * p->seen[i].beyond;
@@ -187,14 +190,15 @@ static int place_part(struct placing *p, struct pt_soft_part part)
     for (uint32_t i = 0; i < plan->soft_count; i++)
         records += records_of(p, i, &part);
     if (records > PART_RECORDS && part.rows[1] - part.rows[0] > LEAST_ROWS) {
-        struct pt_soft_part half[2] = { part, part };
+        struct pt_soft_part half[2] = {part, part};
         half[0].rows[1] = half[1].rows[0] = part.rows[0] + pt_round_up((part.rows[1] - part.rows[0]) / 2, LEAST_ROWS);
         const int error = place_part(p, half[0]);
         return error || half[1].rows[0] >= half[1].rows[1] ? error : place_part(p, half[1]);
     }
     if (records >= 1u << 26) // bins are counted by 16 bytes, and lists by 32 bits
-        return pt_fail(&p->scene->handle, PATINA_ERROR_MEMORY, "%llu soft points lie behind one another in %u rows: render in regions",
-                       (unsigned long long)records, part.rows[1] - part.rows[0]);
+        return pt_fail(&p->scene->handle, PATINA_ERROR_MEMORY,
+                       "%llu soft points lie behind one another in %u rows: render in regions", (unsigned long long)records,
+                       part.rows[1] - part.rows[0]);
     uint32_t placed = 0;
     for (uint32_t i = 0; i < plan->soft_count && records; i++) {
         const uint64_t own = records_of(p, i, &part);
@@ -219,15 +223,15 @@ static int place_parts(struct placing *p, const float *ends, uint32_t count)
     p->entries = p->plan->instance_count + p->plan->soft_count;
     p->plan->soft_part_count = 0;
     for (uint32_t k = count + 1; k-- > 0 && !error;) // the farthest first
-        error = place_part(p, (struct pt_soft_part){ .rows = { crop[1], crop[1] + crop[3] },
-                                                     .z_from = k ? ends[k - 1] : -1.0f,
-                                                     .z_to = k < count ? ends[k] : INFINITY });
+        error = place_part(p, (struct pt_soft_part){.rows = {crop[1], crop[1] + crop[3]},
+                                                    .z_from = k ? ends[k - 1] : -1.0f,
+                                                    .z_to = k < count ? ends[k] : INFINITY});
     return error;
 }
 
 int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_eye *eye)
 {
-    struct placing p = { .scene = scene, .plan = plan, .eye = eye };
+    struct placing p = {.scene = scene, .plan = plan, .eye = eye};
     uint32_t instances = 0;
     uint64_t chunks = 0;
     float ends[MOST_SLABS];
@@ -264,15 +268,15 @@ int pt_place_soft(const struct patina_scene *scene, struct pt_plan *plan, const 
 
 // ---- passes --------------------------------------------------------------------------------------------------------------
 
-static const char *const models[] = { "Base", "Concentric", "Express" };
+static const char *const models[] = {"Base", "Concentric", "Express"};
 
 static void plan_gather(struct pt_builder *builder, uint32_t i)
 {
     const struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
     const patina_cloud_style *style = &instance->instance->style;
-    struct gather_args args = { .radius_scale = instance->radius_scale, .opacity = style->soft_opacity, .within = 1,
-                                .sifted = plan->drawn_words > 0 };
+    struct gather_args args = {
+        .radius_scale = instance->radius_scale, .opacity = style->soft_opacity, .within = 1, .sifted = plan->drawn_words > 0};
     pt_shade_lights(builder, 0, &args.shade);
     args.shade.view = plan->view;
     args.shade.instance = instance->args;
@@ -285,10 +289,9 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
                                                        : fmaxf((1.0f - style->soft_modulation) / PT_FIELD_MOST, 1e-12f);
     const enum pt_instance_buffer colors = args.shade.recolor.source == PT_RAMP_SCALAR ? PT_SCALARS : PT_COLORS;
     PT_REASON(PT_ADD(builder, gather, args,
-                     { pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
-                       pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i),
-                       pt_buffer_of(colors, i), pt_buffer_of(PT_OPACITIES, i), pt_nothing(),
-                       args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing() }),
+                     {pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
+                      pt_buffer_of(PT_SURFACE, i), pt_field_of(instance, i), pt_buffer_of(colors, i),
+                      pt_buffer_of(PT_OPACITIES, i), pt_nothing(), args.sifted ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing()}),
               "%llu soft points of instance %u, %s", (unsigned long long)instance->points, instance->of,
               args.shade.instance.lit ? "lit" : "unlit");
 }
@@ -299,25 +302,26 @@ static void plan_part(struct pt_builder *builder, const struct pt_soft_part *par
     const patina_cloud_style *style = &plan->instances[part->first].instance->style;
     for (uint32_t k = 0; k < part->count; k++)
         plan_gather(builder, part->first + k);
-    struct soft_args args = { .view = plan->view,
-                              .records = part->records,
-                              .model = style->soft_model == PATINA_SOFT_BASE         ? PT_SOFT_BASE
-                                       : style->soft_model == PATINA_SOFT_CONCENTRIC ? PT_SOFT_CONCENTRIC
-                                                                                     : PT_SOFT_EXPRESS,
-                              .mu = PT_SOFT_EVEN,
-                              .shells = style->soft_shells,
-                              .z_from = part->z_from,
-                              .z_to = part->z_to,
-                              .crop_x = plan->crop[0],
-                              .crop_y = plan->crop[1],
-                              .crop_width = plan->crop[2] };
-    const uint32_t rect[4] = { plan->crop[0], part->rows[0], plan->crop[0] + plan->crop[2], part->rows[1] };
+    struct soft_args args = {.view = plan->view,
+                             .records = part->records,
+                             .model = style->soft_model == PATINA_SOFT_BASE         ? PT_SOFT_BASE
+                                      : style->soft_model == PATINA_SOFT_CONCENTRIC ? PT_SOFT_CONCENTRIC
+                                                                                    : PT_SOFT_EXPRESS,
+                             .mu = PT_SOFT_EVEN,
+                             .shells = style->soft_shells,
+                             .z_from = part->z_from,
+                             .z_to = part->z_to,
+                             .crop_x = plan->crop[0],
+                             .crop_y = plan->crop[1],
+                             .crop_width = plan->crop[2]};
+    const uint32_t rect[4] = {plan->crop[0], part->rows[0], plan->crop[0] + plan->crop[2], part->rows[1]};
     memcpy(args.view.rect, rect, sizeof rect);
     PT_REASON(PT_ADD(builder, soft, args,
-                     { pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_plane_at(PT_PLANE_SOFT_BINS, 0), pt_nothing(),
-                       pt_plane_at(PT_PLANE_COMBINED, 0), pt_nothing() }),
-              "%s, part %u of %u, z %.4g to %.4g, rows %u to %u: %u records", models[style->soft_model], number + 1, plan->soft_part_count,
-              fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1], part->rows[1] - plan->crop[1], part->records);
+                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_plane_at(PT_PLANE_SOFT_BINS, 0),
+                      pt_nothing(), pt_plane_at(PT_PLANE_COMBINED, 0), pt_nothing()}),
+              "%s, part %u of %u, z %.4g to %.4g, rows %u to %u: %u records", models[style->soft_model], number + 1,
+              plan->soft_part_count, fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1],
+              part->rows[1] - plan->crop[1], part->records);
 }
 
 void pt_plan_soft(struct pt_builder *builder)

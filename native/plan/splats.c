@@ -52,8 +52,11 @@ static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref
         points += instance->points;
         count += bind_instance(refs + count, i, blend);
     }
-    struct splat_args splat = {.view = plan->view, .instances = instances, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
-    struct blend_args mix = {.view = plan->view, .instances = instances, .sifted = plan->drawn_words > 0,
+    struct splat_args splat = {
+        .view = plan->view, .instances = instances, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
+    struct blend_args mix = {.view = plan->view,
+                             .instances = instances,
+                             .sifted = plan->drawn_words > 0,
                              .depths = (uint32_t)pt_tells_depths(builder)};
     memcpy(args, blend ? (void *)&mix : (void *)&splat, head);
     struct pt_pass *pass = pt_add(builder, blend ? PT_KERNEL_blend : PT_KERNEL_splat, blend ? "blend" : "splat", args,
@@ -78,8 +81,8 @@ void pt_plan_splat(struct pt_builder *builder)
 
 void pt_plan_blend(struct pt_builder *builder)
 {
-    const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
-                                    pt_plane_at(PT_PLANE_ALBEDO, 0), pt_plane_at(PT_PLANE_AWAY, 0),
-                                    pt_plane_if(pt_tells_depths(builder), PT_PLANE_OFFSET, 0)};
+    const struct pt_ref planes[] = {pt_keys_of(builder, 0),          pt_plane_at(PT_PLANE_DEFF, 0),
+                                    pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_ALBEDO, 0),
+                                    pt_plane_at(PT_PLANE_AWAY, 0),   pt_plane_if(pt_tells_depths(builder), PT_PLANE_OFFSET, 0)};
     add_discs(builder, 1, planes, 6, 0);
 }

@@ -34,7 +34,10 @@ struct pt_step *pt_step_at(struct pt_builder *builder, uint32_t at)
     return builder->failed ? &builder->no_step : &builder->plan->steps[at];
 }
 
-void pt_close_step(struct pt_builder *builder, uint32_t at) { pt_step_at(builder, at)->inside = builder->plan->step_count - at - 1; }
+void pt_close_step(struct pt_builder *builder, uint32_t at)
+{
+    pt_step_at(builder, at)->inside = builder->plan->step_count - at - 1;
+}
 
 void pt_add_passes_step(struct pt_builder *builder, enum pt_step_of of)
 {
@@ -84,7 +87,8 @@ void pt_plan_peeling(struct pt_builder *builder)
 {
     if (builder->plan->line_radius > 0.0f)
         add_clear(builder, pt_plane_at(PT_PLANE_OVER, 0), 0, 4, "lines find nothing before them");
-    add_clear(builder, pt_plane_at(PT_PLANE_THROUGH, 0), 0x3F800000u, 4, "all light comes through, outside the points' rectangle too");
+    add_clear(builder, pt_plane_at(PT_PLANE_THROUGH, 0), 0x3F800000u, 4,
+              "all light comes through, outside the points' rectangle too");
 }
 
 // ---- lights --------------------------------------------------------------------------------------------------------------

@@ -9,14 +9,14 @@
 
 // What a pass binds: a plane at a level, a buffer of an instance or a mesh.
 enum pt_ref_of {
-    PT_OF_FRAME,    // a plane of the plan's own pixels
-    PT_OF_LEFT,     // the same as an earlier plan left it, whatever its size: bound and not read
-    PT_OF_PICTURE,  // of a light's map: a plane of the picture that it serves
+    PT_OF_FRAME,   // a plane of the plan's own pixels
+    PT_OF_LEFT,    // the same as an earlier plan left it, whatever its size: bound and not read
+    PT_OF_PICTURE, // of a light's map: a plane of the picture that it serves
     PT_OF_INSTANCE,
     PT_OF_RECEIVER, // of a light's map: what is tested against it
     PT_OF_MESH,
-    PT_OF_FLAG,     // one word: pt_flag
-    PT_OF_NOTHING,  // the kernel does not look at it
+    PT_OF_FLAG,    // one word: pt_flag
+    PT_OF_NOTHING, // the kernel does not look at it
 };
 
 enum pt_flag { PT_FLAG_DIFFERS, PT_FLAG_SOME, PT_FLAGS }; // see lit, limit
@@ -28,7 +28,7 @@ struct pt_ref {
 };
 
 enum pt_step_of {
-    PT_STEP_CLEAR,   // a plane holds one word everywhere
+    PT_STEP_CLEAR, // a plane holds one word everywhere
     PT_STEP_PASSES,
     PT_STEP_MARK,    // passes, where some shadow texture is not at hand
     PT_STEP_LAYERS,  // a loop whose rounds are listed one by one, for their planes differ

@@ -23,7 +23,8 @@ void pt_plan_plane_size(const struct pt_plan *plan, enum pt_plane which, uint32_
         return;
     }
     if (row->size == PT_SIZE_RECORDS || row->size == PT_SIZE_BINS) {
-        size[0] = row->size == PT_SIZE_RECORDS ? plan->soft_records : PT_SOFT_BINS_HEAD + PT_SOFT_BINS_EACH * plan->soft_records;
+        size[0] = row->size == PT_SIZE_RECORDS ? plan->soft_records
+                                               : PT_SOFT_BINS_HEAD + PT_SOFT_BINS_EACH * plan->soft_records;
         size[1] = 1;
         return;
     }
@@ -59,7 +60,7 @@ static void put_passes(struct text *text, const struct pt_plan *plan, uint32_t f
 // "at most 5, until a layer is empty: reason"
 static void put_loop(struct text *text, const char *name, const struct pt_step *step, const char *reason, uint32_t depth)
 {
-    static const char *const ends[] = { "a layer is empty", "no light is left", "nothing changes", "the error is met" };
+    static const char *const ends[] = {"a layer is empty", "no light is left", "nothing changes", "the error is met"};
     char when[128] = "";
     for (uint32_t k = 0, length = 0; k < 4 && length < sizeof when; k++)
         if (step->ends >> k & 1u)
@@ -70,14 +71,14 @@ static void put_loop(struct text *text, const char *name, const struct pt_step *
         put_line(text, depth, "loop %-10s %s", name, reason);
 }
 
-static void put_steps(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
-                      const struct pt_step *end, uint32_t depth);
+static void put_steps(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan,
+                      const struct pt_step *step, const struct pt_step *end, uint32_t depth);
 
 // The first of the maps that the step stands for; where the light sees nothing there, the next face's.
 static void put_map(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
                     uint32_t depth)
 {
-    struct pt_round round = { .light = step->light, .group = step->group, .points = 1, .pixels = plan->mesh_shadows };
+    struct pt_round round = {.light = step->light, .group = step->group, .points = 1, .pixels = plan->mesh_shadows};
     struct pt_plan map;
     put_line(text, depth, "plan %-10s %s%s", "map", step->reason, step->layer > 1 ? ", as of layer 1" : "");
     if (step->layer > 1)
@@ -86,16 +87,16 @@ static void put_map(struct text *text, const struct patina_scene *scene, const s
         if (!pt_plan_tested(scene, plan, &round, step->group) || pt_plan_map(scene, plan, &round, &map))
             return; // without memory it stays untold
         if ((some = map.step_count > 0)) {
-            put_line(text, depth + 1, "planes %u x %u, %u coarse levels, %llu points, %llu triangles", map.view.width, map.view.height,
-                     map.levels, (unsigned long long)map.points_scattered, (unsigned long long)map.triangles);
+            put_line(text, depth + 1, "planes %u x %u, %u coarse levels, %llu points, %llu triangles", map.view.width,
+                     map.view.height, map.levels, (unsigned long long)map.points_scattered, (unsigned long long)map.triangles);
             put_steps(text, scene, &map, map.steps, map.steps + map.step_count, depth + 1);
         }
         pt_plan_destroy(&map);
     }
 }
 
-static void put_step(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
-                     uint32_t depth)
+static void put_step(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan,
+                     const struct pt_step *step, uint32_t depth)
 {
     switch (step->of) {
     case PT_STEP_CLEAR: put_line(text, depth, "fill %-10s %s", pt_plane_rows[step->plane.which].name, step->reason); break;
@@ -118,8 +119,8 @@ static void put_step(struct text *text, const struct patina_scene *scene, const 
     }
 }
 
-static void put_steps(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan, const struct pt_step *step,
-                      const struct pt_step *end, uint32_t depth)
+static void put_steps(struct text *text, const struct patina_scene *scene, const struct pt_plan *plan,
+                      const struct pt_step *step, const struct pt_step *end, uint32_t depth)
 {
     for (; step < end; step = pt_step_after(step)) {
         put_step(text, scene, plan, step, depth);
@@ -130,16 +131,16 @@ static void put_steps(struct text *text, const struct patina_scene *scene, const
 // Slabs of memory with the planes that lie in them one after another, from a time to a time.
 static void put_memory(struct text *text, const struct pt_plan *plan)
 {
-    put_line(text, 0, "memory %.1f MB of planes at most: %u of them share %u slabs", 1e-6 * (double)plan->peak, plan->life_count,
-             plan->slab_count);
+    put_line(text, 0, "memory %.1f MB of planes at most: %u of them share %u slabs", 1e-6 * (double)plan->peak,
+             plan->life_count, plan->slab_count);
     for (uint32_t s = 0; s < plan->slab_count; s++) {
         char names[512];
         size_t length = 0;
         for (uint32_t i = 0; i < plan->life_count; i++) {
             const struct pt_life *life = &plan->lives[i];
             if (life->slab == s && length + 64 < sizeof names)
-                length += (size_t)snprintf(names + length, sizeof names - length, ", %s %u (%u to %u)", pt_plane_rows[life->plane].name, life->index,
-                                           life->first, life->last);
+                length += (size_t)snprintf(names + length, sizeof names - length, ", %s %u (%u to %u)",
+                                           pt_plane_rows[life->plane].name, life->index, life->first, life->last);
         }
         put_line(text, 1, "slab %.1f MB: %s", 1e-6 * (double)plan->slabs[s].bytes, names + 2);
     }
@@ -147,16 +148,17 @@ static void put_memory(struct text *text, const struct pt_plan *plan)
 
 size_t pt_plan_text(const struct patina_scene *scene, struct pt_plan *plan, char *buffer, size_t size)
 {
-    struct text text = { buffer, size, 0 };
+    struct text text = {buffer, size, 0};
     for (uint32_t i = 0; i < plan->light_count; i++)
         pt_plan_light_text(scene, plan, i); // without memory it stays untold
-    put_line(&text, 0, "planes %u x %u, crop %u x %u at %u, %u, %u coarse levels", plan->view.width, plan->view.height, plan->crop[2],
-             plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
+    put_line(&text, 0, "planes %u x %u, crop %u x %u at %u, %u, %u coarse levels", plan->view.width, plan->view.height,
+             plan->crop[2], plan->crop[3], plan->crop[0], plan->crop[1], plan->levels);
     put_line(&text, 0, "expected error: colour %.4f of white, coverage %.4f, depth %.2f spacings, normals %.2f degrees (%s)",
              (double)plan->expected.color, (double)plan->expected.coverage, (double)plan->expected.depth,
              (double)plan->expected.normal, pt_means_name(plan->means));
     put_line(&text, 0, "points %llu, scattered %llu, chunks %llu, culled %llu", (unsigned long long)plan->points,
-             (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks, (unsigned long long)plan->chunks_culled);
+             (unsigned long long)plan->points_scattered, (unsigned long long)plan->chunks,
+             (unsigned long long)plan->chunks_culled);
     if (plan->chunks_clipped || plan->chunks_cut)
         put_line(&text, 0, "chunks clipped %llu, cut %llu", (unsigned long long)plan->chunks_clipped,
                  (unsigned long long)plan->chunks_cut);

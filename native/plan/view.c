@@ -32,8 +32,8 @@
 // One chunk in view, before it is known which window the planes get.
 struct seen {
     uint32_t chunk;
-    uint32_t cull, away; // test each point's normal; every point faces away
-    struct pt_extent extent;  // on screen in pixels of the picture without its padding
+    uint32_t cull, away;     // test each point's normal; every point faces away
+    struct pt_extent extent; // on screen in pixels of the picture without its padding
     double spacing_px, area_px;
     uint32_t wide; // its points are discs
 };
@@ -60,7 +60,8 @@ static double own_reach(const struct patina_scene *scene, const struct pt_instan
         return (double)instance->cloud->info.radius_most * object->scale * thinned;
     if (instance->cloud->shapes)
         return (double)(surface_scale(scene) * (most ? chunk->reach : chunk->footprint)) * object->scale * thinned;
-    return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale * thinned; // classes of spacings are 1.19 wide
+    return 1.2 * (double)PT_DISC_SPACINGS * (double)chunk->spacing * object->scale *
+           thinned; // classes of spacings are 1.19 wide
 }
 
 // Radii of the chunk's discs, world units: the largest, or what nine of ten stay below. 0 where points stay pixels.
@@ -102,10 +103,10 @@ static const double right_angle = 1.57079632679489661923;
 
 static enum facing chunk_facing(int known, double angle, double spread)
 {
-    return !known                            ? FACES_BOTH
+    return !known                         ? FACES_BOTH
            : angle + spread < right_angle ? FACES_US
            : angle - spread > right_angle ? FACES_AWAY
-                                             : FACES_BOTH;
+                                          : FACES_BOTH;
 }
 
 // The largest |n.v| that the chunk may show: a tilted surface has more points a pixel by 1 / |n.v|.
@@ -142,7 +143,8 @@ static double stretch_of(const struct pt_eye *camera, const struct pt_extent *ex
 {
     double middle = 1.0, out = 1.0;
     for (int k = 0; k < 2; k++) {
-        const double size = k ? camera->height : camera->width, start = k ? camera->bottom : camera->left, step = k ? camera->ys : camera->xs;
+        const double size = k ? camera->height : camera->width, start = k ? camera->bottom : camera->left,
+                     step = k ? camera->ys : camera->xs;
         const double low = start + step * pt_least(pt_most(extent->rect[k], 0.0), size);
         const double high = start + step * pt_least(pt_most(extent->rect[2 + k], 0.0), size);
         const double farther = pt_most(fabs(low), fabs(high));
@@ -176,7 +178,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
     pt_object_rows(camera, object, rows);
     for (uint32_t c = 0; c < cloud->chunk_count && instance->style.transparency < 1.0f && !pt_all_soft(instance); c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
-        struct seen seen = { .chunk = c };
+        struct seen seen = {.chunk = c};
         double translation[3], eye[4], angle = 0.0, spread = 0.0;
         if (pt_sieve_chunk(&survey->sieves[i], chunk, NULL, NULL) == PT_CUT_AWAY) {
             plan->chunks_clipped++;
@@ -188,7 +190,8 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         if (cull && facing == FACES_AWAY)
             continue;
         pt_chunk_translation(camera, object, chunk, translation);
-        if (!pt_chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), 0, &seen.extent))
+        if (!pt_chunk_bounds(camera, chunk, rows, translation, disc_reach(scene, instance, object, chunk, apart, 1), 0,
+                             &seen.extent))
             continue;
         double rim;
         const double stretch = stretch_of(camera, &seen.extent, &rim);
@@ -199,11 +202,11 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
         double footprint = pixel * (camera->orthographic ? 1.0 : middle);
         // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
-        double nearest = plan->map && !camera->orthographic ? pixel * pt_most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle) : footprint;
+        double nearest = plan->map && !camera->orthographic ? pixel * pt_most(2.0 * middle - seen.extent.z_beyond, 0.5 * middle)
+                                                            : footprint;
         uint32_t count = pt_drawn_points(scene, chunk);
         double thinned = sqrt((double)chunk->count / count);
-        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / nearest *
-                          sqrt(chunk_cosine(known, angle, spread));
+        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / nearest * sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = pt_least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         const double reach = disc_reach(scene, instance, object, chunk, apart, 0) * stretch;
@@ -237,7 +240,7 @@ static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *su
             const struct seen *seen = &survey->seen[i][c];
             if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away))
                 continue;
-            list[count++] = (struct weighted){ seen->spacing_px, seen->area_px };
+            list[count++] = (struct weighted){seen->spacing_px, seen->area_px};
             *area += seen->area_px;
         }
     return count;
@@ -311,7 +314,7 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         uint32_t count = pt_drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
         pt_set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
-                  &out->chunks[out->chunk_count]);
+                     &out->chunks[out->chunk_count]);
         out->chunks[out->chunk_count].id_base += id_base;
         out->chunks[out->chunk_count].row_first = rect[1];
         out->chunks[out->chunk_count].row_end = rect[3];
@@ -367,7 +370,7 @@ static void place_mesh(struct pt_plan *plan, const struct pt_eye *camera, const 
     struct pt_object object;
     double rows[9], translation[3];
     struct pt_extent extent;
-    *out = (struct pt_plan_mesh){ .instance = instance };
+    *out = (struct pt_plan_mesh){.instance = instance};
     pt_object_of(camera, instance->style.world_from_object, &object);
     pt_object_rows(camera, &object, rows);
     pt_chunk_translation(camera, &object, &mesh->box, translation);
@@ -411,13 +414,13 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
 
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
 {
-    struct survey survey = { 0 };
+    struct survey survey = {0};
     return look_around(scene, plan, &survey);
 }
 
 int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
 {
-    struct survey survey = { 0 };
+    struct survey survey = {0};
     plan->instances = pt_arena_take(&plan->arena, (2 * (size_t)scene->instance_count + 1) * sizeof *plan->instances);
     plan->mesh_count = scene->mesh_count;
     plan->meshes = pt_arena_take(&plan->arena, (scene->mesh_count + 1) * sizeof *plan->meshes);
@@ -430,7 +433,8 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
     plan->filled = survey.points;
-    plan->reaches = plan->discs_count && pt_knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
+    plan->reaches = plan->discs_count &&
+                    pt_knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
     plan->sigmas = pt_knows_sigmas(scene);
     pt_choose_filling(scene, plan);
     pt_choose_layers(&scene->settings, plan);
@@ -473,6 +477,7 @@ int pt_plan_chunks(const struct patina_scene *scene, struct pt_plan *plan, const
     double rows[9];
     pt_object_rows(&camera, &object, rows);
     for (uint32_t c = 0; c < instance->cloud->chunk_count; c++)
-        pt_set_chunk(&camera, &object, rows, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0, &(*chunks)[c]);
+        pt_set_chunk(&camera, &object, rows, instance, &instance->cloud->chunks[c], instance->cloud->chunks[c].count, 0,
+                     &(*chunks)[c]);
     return PATINA_OK;
 }

@@ -96,14 +96,14 @@ static uint32_t reach_of(const struct pt_plan *plan, const patina_settings *sett
     uint32_t layer = PT_REACH_normals;
     for (uint32_t level = 0; level <= plan->levels; level++)
         layer += (5 * plan->iterations * PT_REACH_fill + PT_REACH_push) << level;
-    return (plan->reopens ? plan->reopens : plan->layers) * layer + (settings->average ? PT_REACH_average : 0) + PT_REACH_shade +
-           PT_REACH_smooth + PT_REACH_antialias + pt_line_reach(plan);
+    return (plan->reopens ? plan->reopens : plan->layers) * layer + (settings->average ? PT_REACH_average : 0) +
+           PT_REACH_shade + PT_REACH_smooth + PT_REACH_antialias + pt_line_reach(plan);
 }
 
 void pt_choose_window(const struct patina_scene *scene, struct pt_plan *plan, uint32_t guard)
 {
     const uint32_t *region = scene->settings.region, cell = 1u << plan->levels;
-    const uint32_t full[2] = { scene->settings.width + 2 * guard, scene->settings.height + 2 * guard };
+    const uint32_t full[2] = {scene->settings.width + 2 * guard, scene->settings.height + 2 * guard};
     uint32_t reach = reach_of(plan, &scene->settings) + pt_effects_reach(scene), origin[2], size[2];
     for (int k = 0; k < 2; k++) {
         uint32_t first = region[k] + guard, last = region[2 + k] + guard;

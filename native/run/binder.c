@@ -119,9 +119,10 @@ static int bind_receiver(struct pt_binder *binder, const struct pt_ref *ref, str
     struct pt_bound_instance *bound = &binder->receivers[ref->index];
     if (ref->which == PT_CHUNKS) {
         *out = &bound->chunks;
-        return bound->chunks.size ? PATINA_OK
-                                  : binder->device->ops->buffer_create(binder->device, receiver->chunk_count * sizeof *receiver->chunks,
-                                                                       receiver->chunks, 1, &bound->chunks);
+        return bound->chunks.size
+                   ? PATINA_OK
+                   : binder->device->ops->buffer_create(binder->device, receiver->chunk_count * sizeof *receiver->chunks,
+                                                        receiver->chunks, 1, &bound->chunks);
     }
     int error = take_cloud(binder, bound, receiver->cloud);
     *out = error ? NULL : &bound->cloud->buffers[ref->which];

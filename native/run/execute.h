@@ -15,22 +15,22 @@ struct pt_execution {
     struct pt_binder binder;
     struct pt_times *times;
     const atomic_int *cancel;
-    _Atomic float *progress;              // NULL: nobody looks
-    float progress_done, progress_share;  // before this plan, and by it
-    int writing;                          // the picture: from then on nothing stops it
-    void **late;                          // per pass: its arguments with what is known late; NULL: as planned
+    _Atomic float *progress;             // NULL: nobody looks
+    float progress_done, progress_share; // before this plan, and by it
+    int writing;                         // the picture: from then on nothing stops it
+    void **late;                         // per pass: its arguments with what is known late; NULL: as planned
     // of layers
-    struct pt_layer *layers;              // NULL: of a map
-    uint32_t layer_count;                 // begun
-    struct chunk_view **behind;           // per instance: those of the layer at hand, behind the first
-    struct pt_tile *tiles;                // what the last layer left
-    int ended;                            // there are no further layers
+    struct pt_layer *layers;    // NULL: of a map
+    uint32_t layer_count;       // begun
+    struct chunk_view **behind; // per instance: those of the layer at hand, behind the first
+    struct pt_tile *tiles;      // what the last layer left
+    int ended;                  // there are no further layers
     // of lights
     struct pt_round round;
-    int begun;                            // 1 + the layer whose pixels are ready for tests
-    int shown, stale;                     // some pixel shows a mesh; some texture is to be tested
-    double tested;                        // when the last light was through
-    uint32_t maps, map_size[2];           // drawn; of the largest
+    int begun;                  // 1 + the layer whose pixels are ready for tests
+    int shown, stale;           // some pixel shows a mesh; some texture is to be tested
+    double tested;              // when the last light was through
+    uint32_t maps, map_size[2]; // drawn; of the largest
 };
 
 uint32_t pt_passes_together(const void *device, const struct pt_pass *passes); // pt_together; device: struct patina_device
@@ -46,7 +46,7 @@ int pt_walk(struct pt_execution *execution, const struct pt_step *step, const st
 int pt_run_passes(struct pt_execution *execution, uint32_t first, uint32_t count); // passes.c
 int pt_run_layer(struct pt_execution *execution, const struct pt_step *step);      // layers.c
 int pt_read_covered(struct pt_execution *execution, const struct pt_step *step);
-int pt_run_light(struct pt_execution *execution, const struct pt_step *step);      // lights.c
+int pt_run_light(struct pt_execution *execution, const struct pt_step *step); // lights.c
 int pt_run_faces(struct pt_execution *execution, const struct pt_step *step);
 int pt_run_faint(struct pt_execution *execution, const struct pt_step *step);
 int pt_run_map(struct pt_execution *execution, const struct pt_step *step);

@@ -14,11 +14,11 @@ struct pt_mean;
 struct pt_shown {
     patina_frame_stats stats;
     uint32_t soft_parts, soft_records; // of soft points; in the largest part
-    uint64_t peak;         // bytes of planes that the plan came to, those of light maps apart
-    uint32_t passes;       // bits of what was rendered
-    uint32_t assessed;     // passes of certainty and thickness that have planes, bits 1 << PATINA_PASS_*
-    uint32_t layer_most;   // that the settings allowed
-    uint32_t layer_passes; // bits of what was kept of each
+    uint64_t peak;                     // bytes of planes that the plan came to, those of light maps apart
+    uint32_t passes;                   // bits of what was rendered
+    uint32_t assessed;                 // passes of certainty and thickness that have planes, bits 1 << PATINA_PASS_*
+    uint32_t layer_most;               // that the settings allowed
+    uint32_t layer_passes;             // bits of what was kept of each
     uint32_t crop[4], plane_width;
     int picture_valid;
     int has_lines;
@@ -44,8 +44,8 @@ struct patina_frame {
     struct pt_skipped skipped[PT_KERNEL_COUNT + 4];
     uint32_t skipped_count;
     struct pt_layer layers[PATINA_MAX_LAYERS];
-    uint32_t layer_count;     // scattered
-    uint32_t light_count;     // that cast shadows
+    uint32_t layer_count; // scattered
+    uint32_t light_count; // that cast shadows
     int keys_valid;
 };
 
@@ -53,7 +53,8 @@ int pt_frame_render(struct patina_frame *frame, const struct patina_scene *scene
 // One picture, whatever the scene says of samples: what rendering does over and over.
 int pt_frame_draw(struct patina_frame *frame, const struct patina_scene *scene); // frame_draw.c
 struct pt_plan;
-int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan); // on the frame's planes
+int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scene,
+                     struct pt_plan *plan); // on the frame's planes
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size);
 int pt_frame_read_keys(const struct patina_frame *frame, uint64_t *keys, size_t size);

@@ -14,22 +14,21 @@ int pt_frame_number(struct patina_frame *frame, const struct patina_scene *scene
                : PATINA_OK;
 }
 
-static void keep_statistics(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan,
-                            double ms)
+static void keep_statistics(struct patina_frame *frame, const struct patina_scene *scene, const struct pt_plan *plan, double ms)
 {
     struct pt_shown *shown = &frame->shown;
-    shown->stats = (patina_frame_stats){ .struct_size = sizeof shown->stats,
-                                         .width = plan->crop[2],
-                                         .height = plan->crop[3],
-                                         .points = plan->points,
-                                         .points_scattered = plan->points_scattered,
-                                         .triangles = plan->triangles,
-                                         .chunks = plan->chunks,
-                                         .chunks_culled = plan->chunks_culled,
-                                         .chunks_clipped = plan->chunks_clipped,
-                                         .chunks_cut = plan->chunks_cut,
-                                         .pixel_samples = 1,
-                                         .ms = ms };
+    shown->stats = (patina_frame_stats){.struct_size = sizeof shown->stats,
+                                        .width = plan->crop[2],
+                                        .height = plan->crop[3],
+                                        .points = plan->points,
+                                        .points_scattered = plan->points_scattered,
+                                        .triangles = plan->triangles,
+                                        .chunks = plan->chunks,
+                                        .chunks_culled = plan->chunks_culled,
+                                        .chunks_clipped = plan->chunks_clipped,
+                                        .chunks_cut = plan->chunks_cut,
+                                        .pixel_samples = 1,
+                                        .ms = ms};
     shown->peak = plan->peak;
     shown->soft_parts = plan->soft_part_count;
     shown->soft_records = plan->soft_records;
@@ -78,26 +77,26 @@ static void link_planes(struct patina_frame *frame)
 // The plan of a picture, or of textures alone, on the frame's planes.
 int pt_frame_execute(struct patina_frame *frame, const struct patina_scene *scene, struct pt_plan *plan)
 {
-    struct pt_execution execution = { .device = frame->device,
-                                      .scene = scene,
-                                      .plan = plan,
-                                      .times = &frame->times,
-                                      .cancel = &frame->cancel,
-                                      .progress = &frame->progress,
-                                      .progress_done = frame->progress_done,
-                                      .progress_share = frame->progress_share,
-                                      .layers = frame->layers,
-                                      .layer_count = pt_plan_shows(plan),
-                                      .binder = { .device = frame->device,
-                                                  .plan = plan,
-                                                  .residency = &frame->residency,
-                                                  .planes = &frame->planes,
-                                                  .picture = &frame->planes,
-                                                  .clips = &frame->clips,
-                                                  .shadows = &frame->shadows } };
+    struct pt_execution execution = {.device = frame->device,
+                                     .scene = scene,
+                                     .plan = plan,
+                                     .times = &frame->times,
+                                     .cancel = &frame->cancel,
+                                     .progress = &frame->progress,
+                                     .progress_done = frame->progress_done,
+                                     .progress_share = frame->progress_share,
+                                     .layers = frame->layers,
+                                     .layer_count = pt_plan_shows(plan),
+                                     .binder = {.device = frame->device,
+                                                .plan = plan,
+                                                .residency = &frame->residency,
+                                                .planes = &frame->planes,
+                                                .picture = &frame->planes,
+                                                .clips = &frame->clips,
+                                                .shadows = &frame->shadows}};
     frame->keys_valid = 0;
     link_planes(frame);
-    frame->layers[0] = (struct pt_layer){ .points = plan->points_scattered };
+    frame->layers[0] = (struct pt_layer){.points = plan->points_scattered};
     int error = pt_shadows_open(frame->device, &frame->shadows, scene, plan);
     if (!error)
         error = pt_execute(&execution);

@@ -39,7 +39,6 @@ struct pt_mean {
     struct aside aside;
 };
 
-
 static void swap_bytes(void *a, void *b, size_t size)
 {
     unsigned char *x = a, *y = b;
@@ -135,11 +134,11 @@ static int is_told(const struct pt_mean *mean)
 // its colours, near sRGB's levels. Of each pixel the colour, or the alpha, that is off most.
 static float noise(const struct pt_mean *mean)
 {
-    uint32_t count[2] = { 0, 0 };
+    uint32_t count[2] = {0, 0};
     for (uint32_t i = 0; i < mean->done; i++)
         count[pt_sample_half(&mean->sampling, i)]++;
     const float finer = (float)(mean->sampling.grid * mean->sampling.grid);
-    const float share[2] = { 1.0f / (finer * (float)count[0]), 1.0f / (finer * (float)count[1]) };
+    const float share[2] = {1.0f / (finer * (float)count[0]), 1.0f / (finer * (float)count[1])};
     const double all = count[0] + count[1];
     double sum = 0.0, pixels = 0.0;
     for (size_t i = 0; i < (size_t)mean->width * mean->height; i++) {
@@ -178,9 +177,8 @@ static void end_picture(struct patina_frame *frame, struct pt_mean *mean)
     mean->rows = 0;
     if (is_told(mean))
         stats->pixel_error = noise(mean);
-    mean->ended = mean->done == mean->sampling.shifts ||
-                  (mean->settings.pixel_noise > 0.0f && mean->done >= PT_NOISE_SHIFTS && is_told(mean) &&
-                   stats->pixel_error <= mean->settings.pixel_noise);
+    mean->ended = mean->done == mean->sampling.shifts || (mean->settings.pixel_noise > 0.0f && mean->done >= PT_NOISE_SHIFTS &&
+                                                          is_told(mean) && stats->pixel_error <= mean->settings.pixel_noise);
     frame->sampling[0] = mean->sampling.grid;
     frame->sampling[1] = mean->done;
     stats->pixel_samples = mean->sampling.grid * mean->sampling.grid * mean->done;
@@ -213,7 +211,10 @@ static int draw_step(struct patina_frame *frame, const struct patina_scene *scen
 }
 
 // Whether a picture has its fellow on the other side of the pixel's middle: without it the mean lies aside.
-static int is_paired(const struct pt_mean *mean) { return mean->sampling.shifts == 1 || !((mean->sampling.shifts - mean->done) & 1u); }
+static int is_paired(const struct pt_mean *mean)
+{
+    return mean->sampling.shifts == 1 || !((mean->sampling.shifts - mean->done) & 1u);
+}
 
 // Writes the mean of what there is into the picture that readers see, a band at a time.
 static int show(struct patina_frame *frame)
@@ -225,7 +226,8 @@ static int show(struct patina_frame *frame)
         const uint32_t end = y + most < have ? y + most : have;
         for (uint32_t row = y; row < end; row++) {
             const float share = 1.0f / (float)(finer * (mean->done + (row < mean->rows)));
-            for (size_t i = 4 * (size_t)row * width, to = 4 * (size_t)(row - y) * width; i < 4 * (size_t)(row + 1) * width; i++, to++)
+            for (size_t i = 4 * (size_t)row * width, to = 4 * (size_t)(row - y) * width; i < 4 * (size_t)(row + 1) * width;
+                 i++, to++)
                 mean->fine[to] = (mean->sums[0][i] + (mean->sampling.shifts > 1 ? mean->sums[1][i] : 0.0f)) * share;
         }
         int error = frame->device->ops->buffer_write(frame->device, &frame->planes.at[PT_PLANE_COMBINED][0],
@@ -252,8 +254,9 @@ static int advance(struct patina_frame *frame, const struct patina_scene *scene,
     swap(frame, &mean->aside);
     const int shown = mean->done == 1 && !is_paired(mean) ? PATINA_OK : show(frame);
     frame->shown.stats.ms += pt_milliseconds() - start;
-    frame->shown.stats.pixel_pending =
-        mean->ended ? 0 : mean->sampling.grid * mean->sampling.grid * (mean->sampling.shifts - mean->done);
+    frame->shown.stats.pixel_pending = mean->ended
+                                           ? 0
+                                           : mean->sampling.grid * mean->sampling.grid * (mean->sampling.shifts - mean->done);
     if (mean->ended) {
         pt_mean_destroy(frame);
         atomic_store(&frame->progress, 1.0f);

@@ -12,14 +12,14 @@ static const struct {
     uint32_t channels;
     const char *name;
 } pass_table[PATINA_PASS_COUNT] = {
-    [PATINA_PASS_COMBINED] = { PT_PLANE_COMBINED, 4, "COMBINED" },
-    [PATINA_PASS_DEPTH] = { PT_PLANE_DEPTH, 1, "DEPTH" },
-    [PATINA_PASS_NORMAL] = { PT_PLANE_NORMALS, 3, "NORMAL" },
-    [PATINA_PASS_SOURCE] = { PT_PLANE_SOURCE, 1, "SOURCE" },
-    [PATINA_PASS_SHADOW] = { PT_PLANE_SHADOW, 1, "SHADOW" },
-    [PATINA_PASS_LINE] = { PT_PLANE_LINES, 1, "LINE" },
-    [PATINA_PASS_CERTAINTY] = { PT_PLANE_CERTAINTY, 1, "CERTAINTY" },
-    [PATINA_PASS_THICKNESS] = { PT_PLANE_THICKNESS, 1, "THICKNESS" },
+    [PATINA_PASS_COMBINED] = {PT_PLANE_COMBINED, 4, "COMBINED"},
+    [PATINA_PASS_DEPTH] = {PT_PLANE_DEPTH, 1, "DEPTH"},
+    [PATINA_PASS_NORMAL] = {PT_PLANE_NORMALS, 3, "NORMAL"},
+    [PATINA_PASS_SOURCE] = {PT_PLANE_SOURCE, 1, "SOURCE"},
+    [PATINA_PASS_SHADOW] = {PT_PLANE_SHADOW, 1, "SHADOW"},
+    [PATINA_PASS_LINE] = {PT_PLANE_LINES, 1, "LINE"},
+    [PATINA_PASS_CERTAINTY] = {PT_PLANE_CERTAINTY, 1, "CERTAINTY"},
+    [PATINA_PASS_THICKNESS] = {PT_PLANE_THICKNESS, 1, "THICKNESS"},
 };
 
 int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels, size_t size)
@@ -27,13 +27,12 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
     if (pass >= PATINA_PASS_COUNT)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: no pass %u", pass);
     if (!frame->shown.picture_valid || !(frame->shown.passes >> pass & 1u))
-        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read: no %s pass was rendered",
-                       pass_table[pass].name);
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "patina_frame_read: no %s pass was rendered", pass_table[pass].name);
     size_t expected = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels * sizeof *pixels;
     if (size != expected)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu",
-                       pass_table[pass].name, frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, expected,
-                       size);
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT,
+                       "patina_frame_read: %s is %u x %u x %u floats, %zu bytes; got %zu", pass_table[pass].name,
+                       frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, expected, size);
     const uint32_t known = 1u << PATINA_PASS_CERTAINTY | 1u << PATINA_PASS_THICKNESS;
     if ((pass == PATINA_PASS_SHADOW && frame->shown.all_lit) || (pass == PATINA_PASS_LINE && !frame->shown.has_lines) ||
         (known & ~frame->shown.assessed) >> pass & 1u) { // no plane
@@ -47,9 +46,9 @@ int pt_frame_read(const struct patina_frame *frame, uint32_t pass, float *pixels
 
 int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32_t pass, float *pixels, size_t size)
 {
-    static const enum pt_plane planes[] = { [PATINA_PASS_COMBINED] = PT_PLANE_LAYER_COMBINED,
-                                            [PATINA_PASS_DEPTH] = PT_PLANE_LAYER_DEPTH,
-                                            [PATINA_PASS_NORMAL] = PT_PLANE_LAYER_NORMALS };
+    static const enum pt_plane planes[] = {[PATINA_PASS_COMBINED] = PT_PLANE_LAYER_COMBINED,
+                                           [PATINA_PASS_DEPTH] = PT_PLANE_LAYER_DEPTH,
+                                           [PATINA_PASS_NORMAL] = PT_PLANE_LAYER_NORMALS};
     if (pass > PATINA_PASS_NORMAL || !layer || layer > PATINA_MAX_LAYERS)
         return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: no pass %u of a layer %u", pass, layer);
     if (!frame->keys_valid || !(frame->shown.layer_passes >> pass & 1u) || layer > frame->shown.layer_most)
@@ -57,8 +56,9 @@ int pt_frame_read_layer(const struct patina_frame *frame, uint32_t layer, uint32
                        pass_table[pass].name, layer);
     size_t count = (size_t)frame->shown.stats.width * frame->shown.stats.height * pass_table[pass].channels;
     if (size != count * sizeof *pixels)
-        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT, "patina_frame_read_layer: %s is %u x %u x %u floats; got %zu bytes",
-                       pass_table[pass].name, frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, size);
+        return pt_fail(&frame->handle, PATINA_ERROR_ARGUMENT,
+                       "patina_frame_read_layer: %s is %u x %u x %u floats; got %zu bytes", pass_table[pass].name,
+                       frame->shown.stats.width, frame->shown.stats.height, pass_table[pass].channels, size);
     if (layer > frame->layer_count) { // peeling ended before
         for (size_t i = 0; i < count; i++)
             pixels[i] = pass == PATINA_PASS_DEPTH ? INFINITY : 0.0f;
@@ -144,8 +144,8 @@ int pt_frame_read_shadows(const struct patina_frame *frame, uint32_t instance, u
 size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_t size)
 {
     size_t length = 0;
-#define PUT(...)                                                                                                  \
-    length += (size_t)snprintf(buffer && length < size ? buffer + length : NULL, buffer && length < size ? size - length : 0, \
+#define PUT(...)                                                                                                               \
+    length += (size_t)snprintf(buffer && length < size ? buffer + length : NULL, buffer && length < size ? size - length : 0,  \
                                __VA_ARGS__)
     PUT("{\"passes\":{");
     for (uint32_t i = 0; i < frame->times.count; i++) { // whole numbers: a locale may write 0,5 for 0.5
@@ -165,8 +165,8 @@ size_t pt_frame_stats_json(const struct patina_frame *frame, char *buffer, size_
         unsigned long long parts = (unsigned long long)((double)light->error * 1e6 + 0.5);
         PUT("%s{\"samples\":%u,\"error\":%llu.%06llu}", i ? "," : "", light->samples, parts / 1000000, parts % 1000000);
     }
-    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u},\"planes\":{\"peak\":%llu,\"held\":%llu", frame->sampling[0], frame->sampling[1],
-        (unsigned long long)frame->shown.peak, (unsigned long long)frame->shown.stats.plane_bytes);
+    PUT("],\"samples\":{\"grid\":%u,\"shifts\":%u},\"planes\":{\"peak\":%llu,\"held\":%llu", frame->sampling[0],
+        frame->sampling[1], (unsigned long long)frame->shown.peak, (unsigned long long)frame->shown.stats.plane_bytes);
     if (frame->shown.soft_parts)
         PUT(",\"soft\":{\"parts\":%u,\"records\":%u}", frame->shown.soft_parts, frame->shown.soft_records);
     PUT("}}");
@@ -181,7 +181,8 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
         for (int level = 0; level < PT_SLOTS; level++) {
             const struct pt_buffer *plane = &frame->planes.at[p][level];
             char path[4096];
-            if (!plane->size || frame->planes.lost[p][level] || (sampled && p != PT_PLANE_KEYS && pt_plane_rows[p].size != PT_SIZE_CROP))
+            if (!plane->size || frame->planes.lost[p][level] ||
+                (sampled && p != PT_PLANE_KEYS && pt_plane_rows[p].size != PT_SIZE_CROP))
                 continue;
             void *copy = malloc(plane->size);
             if (!copy)
@@ -193,12 +194,15 @@ int pt_frame_dump(const struct patina_frame *frame, const char *folder)
             free(copy);
             if (error || !file || fclose(file) || written != plane->size)
                 return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
-            uint32_t width = pt_plane_rows[p].size == PT_SIZE_CROP ? frame->shown.crop[2] : (frame->shown.plane_width + (1u << level) - 1) >> level;
+            uint32_t width = pt_plane_rows[p].size == PT_SIZE_CROP ? frame->shown.crop[2]
+                                                                   : (frame->shown.plane_width + (1u << level) - 1) >> level;
             snprintf(path, sizeof path, "%s/%s_%d.txt", folder, pt_plane_rows[p].name, level);
             file = pt_stream_open(path, "w");
-            if (!file || fprintf(file, "%s level %d: %u pixels wide, %zu rows, %u bytes a pixel, row 0 at the bottom\n",
-                                 pt_plane_rows[p].name, level, width, width ? plane->size / pt_plane_bytes((enum pt_plane)p) / width : 0,
-                                 pt_plane_bytes((enum pt_plane)p)) < 0 || fclose(file))
+            if (!file ||
+                fprintf(file, "%s level %d: %u pixels wide, %zu rows, %u bytes a pixel, row 0 at the bottom\n",
+                        pt_plane_rows[p].name, level, width, width ? plane->size / pt_plane_bytes((enum pt_plane)p) / width : 0,
+                        pt_plane_bytes((enum pt_plane)p)) < 0 ||
+                fclose(file))
                 return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be written", path);
         }
     return PATINA_OK;

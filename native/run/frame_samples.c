@@ -23,9 +23,9 @@
 // sphere 53.3 dB for 47.0, a knot 42.6 for 42.3).
 #define FILLED_SPACING 0.85
 enum {
-    WIDEST = 65536,   // pixels of a side
-    NOISE_GRID = 4,   // with a noise target: what is drawn at once is not much more than what is asked for
-    EDL_WIDEST = 16,  // radius, pixels
+    WIDEST = 65536,  // pixels of a side
+    NOISE_GRID = 4,  // with a noise target: what is drawn at once is not much more than what is asked for
+    EDL_WIDEST = 16, // radius, pixels
 };
 
 static uint32_t at_most(uint32_t value, uint32_t most) { return value < most ? value : most; }
@@ -57,11 +57,11 @@ static uint32_t filled_grid(double spacing)
 struct pt_sampling pt_choose_sampling(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     const uint32_t samples = scene->settings.pixel_samples;
-    struct pt_sampling sampling = { 1, 1, 0 };
+    struct pt_sampling sampling = {1, 1, 0};
     if (samples < 2 || !pt_plan_shows(plan))
         return sampling;
     if (!scene->instance_count) // meshes alone
-        return (struct pt_sampling){ 1, samples, 1 };
+        return (struct pt_sampling){1, samples, 1};
     uint32_t grid = (uint32_t)sqrt((double)samples); // exact below 2^26
     if (scene->settings.pixel_noise > 0.0f && samples >= PT_NOISE_SHIFTS)
         grid = at_most((uint32_t)sqrt((double)(samples / PT_NOISE_SHIFTS)), NOISE_GRID);

@@ -12,7 +12,7 @@
 #include <string.h>
 
 enum { VERSION = 3, HEADER_BYTES = 32 };
-static const char magic[8] = { 'p', 'a', 't', 's', 'h', 'a', 'd', 'o' };
+static const char magic[8] = {'p', 'a', 't', 's', 'h', 'a', 'd', 'o'};
 
 // ---- writing -----------------------------------------------------------------------------------------------------------
 
@@ -83,8 +83,7 @@ static int put_textures(const struct patina_frame *frame, uint32_t width, struct
     return bytes->failed ? pt_fail(&frame->handle, PATINA_ERROR_MEMORY, "saving shadows: out of memory") : PATINA_OK;
 }
 
-static int write_file(const struct patina_frame *frame, const char *path, const struct bytes *header,
-                      const struct bytes *body)
+static int write_file(const struct patina_frame *frame, const char *path, const struct bytes *header, const struct bytes *body)
 {
     FILE *file = pt_stream_open(path, "wb");
     int good = file && fwrite(header->data, 1, header->size, file) == header->size &&
@@ -97,12 +96,13 @@ static int write_file(const struct patina_frame *frame, const char *path, const 
 int pt_frame_save_shadows(const struct patina_frame *frame, const char *path)
 {
     const struct pt_shadows *shadows = &frame->shadows;
-    struct bytes body = { 0 }, header = { 0 };
+    struct bytes body = {0}, header = {0};
     int whole = shadows->light_count > 0;
     for (uint32_t i = 0; i < shadows->light_count; i++)
         whole &= shadows->lights[i].samples && !shadows->lights[i].partial;
     if (!whole)
-        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "%s: the frame holds no whole shadow textures; bake them first", path);
+        return pt_fail(&frame->handle, PATINA_ERROR_EMPTY, "%s: the frame holds no whole shadow textures; bake them first",
+                       path);
     uint32_t width = bytes_a_word(shadows);
     int error = put_textures(frame, width, &body);
     if (!error) {
@@ -198,7 +198,8 @@ static int take_light(struct reader *reader, const struct patina_scene *scene, c
         take(reader, &count, 4))
         return PATINA_ERROR_FORMAT;
     double *key = malloc(wanted * sizeof *key), *ours = malloc(wanted * sizeof *ours);
-    int error = key && ours ? PATINA_OK : pt_fail(&reader->frame->handle, PATINA_ERROR_MEMORY, "loading shadows: out of memory");
+    int error = key && ours ? PATINA_OK
+                            : pt_fail(&reader->frame->handle, PATINA_ERROR_MEMORY, "loading shadows: out of memory");
     if (!error && count != wanted)
         error = refuse(reader, "damaged: a light of another kind");
     if (!error)
@@ -209,10 +210,10 @@ static int take_light(struct reader *reader, const struct patina_scene *scene, c
             error = pt_fail(&reader->frame->handle, PATINA_ERROR_FORMAT,
                             "%s: stale: light %u, a cloud, or how they lie to each other changed since it was baked",
                             reader->path, i);
-        else if (!light->samples || light->samples > 4096 ||
-                 (light->samples != plan->lights[i].samples && !light->settled))
-            error = pt_fail(&reader->frame->handle, PATINA_ERROR_FORMAT, "%s: stale: light %u was baked with %u samples, the scene asks for %u",
-                            reader->path, i, light->samples, plan->lights[i].samples);
+        else if (!light->samples || light->samples > 4096 || (light->samples != plan->lights[i].samples && !light->settled))
+            error = pt_fail(&reader->frame->handle, PATINA_ERROR_FORMAT,
+                            "%s: stale: light %u was baked with %u samples, the scene asks for %u", reader->path, i,
+                            light->samples, plan->lights[i].samples);
     }
     free(ours);
     if (error) {
@@ -259,7 +260,7 @@ static int check_instances(struct reader reader, const struct patina_scene *scen
 static int take_textures(struct reader *reader, struct patina_frame *frame, const struct patina_scene *scene,
                          const struct pt_plan *plan)
 {
-    struct pt_shadow_light lights[PT_MAX_LIGHTS] = { 0 };
+    struct pt_shadow_light lights[PT_MAX_LIGHTS] = {0};
     int error = PATINA_OK;
     for (uint32_t i = 0; i < reader->lights && !error; i++)
         error = take_light(reader, scene, plan, i, &lights[i]);
@@ -285,12 +286,12 @@ static int take_textures(struct reader *reader, struct patina_frame *frame, cons
 
 int pt_frame_load_shadows(struct patina_frame *frame, const struct patina_scene *scene, const char *path)
 {
-    struct pt_plan plan = { 0 };
+    struct pt_plan plan = {0};
     size_t size;
     unsigned char *data = read_file(path, &size);
     if (!data)
         return pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: cannot be read", path);
-    struct reader reader = { .frame = frame, .path = path, .at = data, .end = data + size };
+    struct reader reader = {.frame = frame, .path = path, .at = data, .end = data + size};
     pt_plan_lights(scene, &plan);
     int error = check_header(&reader, scene, &plan);
     if (!error)

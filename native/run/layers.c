@@ -41,8 +41,8 @@ static int may_show(const struct pt_bounds *bounds, const struct pt_tile *tiles,
     return 0;
 }
 
-uint32_t pt_layer_chunks(const struct pt_plan *plan, uint32_t instance, const struct pt_tile *tiles,
-                         struct chunk_view *out, uint64_t *points)
+uint32_t pt_layer_chunks(const struct pt_plan *plan, uint32_t instance, const struct pt_tile *tiles, struct chunk_view *out,
+                         uint64_t *points)
 {
     const struct pt_plan_instance *from = &plan->instances[instance];
     uint32_t columns = columns_of(plan), count = 0;
@@ -92,7 +92,7 @@ int pt_run_layer(struct pt_execution *e, const struct pt_step *step)
     int some = 0;
     if (e->ended)
         return PATINA_OK;
-    *layer = (struct pt_layer){ 0 };
+    *layer = (struct pt_layer){0};
     int error = layer[-1].pixels ? choose_chunks(e, layer, &some) : PATINA_OK;
     e->ended = !some;
     if (error || !some)

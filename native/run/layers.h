@@ -5,7 +5,7 @@
 
 #include "plan/plan.h"
 
-struct pt_tile { // as the TILES plane has it
+struct pt_tile {      // as the TILES plane has it
     float least;      // limit; +inf: every pixel is finished
     uint32_t covered; // pixels
 };
@@ -21,7 +21,7 @@ uint64_t pt_layer_pixels(const struct pt_plan *plan, const struct pt_tile *tiles
 
 // The chunks of an instance that have a point beyond some limit of the tiles they may fall on; left out are only such whose
 // points would all be refused. out: room for all of them. Returns their number, adds to *points.
-uint32_t pt_layer_chunks(const struct pt_plan *plan, uint32_t instance, const struct pt_tile *tiles,
-                         struct chunk_view *out, uint64_t *points);
+uint32_t pt_layer_chunks(const struct pt_plan *plan, uint32_t instance, const struct pt_tile *tiles, struct chunk_view *out,
+                         uint64_t *points);
 
 #endif

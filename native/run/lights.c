@@ -6,7 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIRST_COMPARED = 4 }; // samples after which a light may stop, because all agree or enough is known; then at every doubling
+enum {
+    FIRST_COMPARED = 4
+}; // samples after which a light may stop, because all agree or enough is known; then at every doubling
 
 // ---- maps ----------------------------------------------------------------------------------------------------------------
 
@@ -14,18 +16,18 @@ enum { FIRST_COMPARED = 4 }; // samples after which a light may stop, because al
 static int run_plan(struct pt_execution *e, struct pt_plan *plan)
 {
     struct pt_shadows *shadows = e->binder.shadows;
-    struct pt_execution inner = { .device = e->device,
-                                  .scene = e->scene,
-                                  .plan = plan,
-                                  .times = e->times,
-                                  .cancel = e->cancel,
-                                  .binder = { .device = e->device,
-                                              .plan = plan,
-                                              .residency = e->binder.residency,
-                                              .planes = &shadows->planes,
-                                              .picture = e->binder.planes,
-                                              .clips = &shadows->clips,
-                                              .shadows = shadows } };
+    struct pt_execution inner = {.device = e->device,
+                                 .scene = e->scene,
+                                 .plan = plan,
+                                 .times = e->times,
+                                 .cancel = e->cancel,
+                                 .binder = {.device = e->device,
+                                            .plan = plan,
+                                            .residency = e->binder.residency,
+                                            .planes = &shadows->planes,
+                                            .picture = e->binder.planes,
+                                            .clips = &shadows->clips,
+                                            .shadows = shadows}};
     const int error = pt_execute(&inner);
     pt_execution_close(&inner);
     return error;
@@ -96,11 +98,11 @@ int pt_run_faces(struct pt_execution *e, const struct pt_step *step)
 // points: they are tested; pixels are, as far as they want so many samples.
 static int take_sample(struct pt_execution *e, const struct pt_step *step, uint32_t sample, int points, int compare)
 {
-    e->round = (struct pt_round){ .light = step->light,
-                                  .sample = sample,
-                                  .points = points,
-                                  .pixels = e->shown && sample < e->binder.shadows->pixels.samples[step->light],
-                                  .compare = compare };
+    e->round = (struct pt_round){.light = step->light,
+                                 .sample = sample,
+                                 .points = points,
+                                 .pixels = e->shown && sample < e->binder.shadows->pixels.samples[step->light],
+                                 .compare = compare};
     return e->round.points || e->round.pixels ? pt_walk(e, step + 1, pt_step_after(step)) : PATINA_OK;
 }
 
@@ -115,7 +117,7 @@ static int measures_at(const struct pt_step *step, uint32_t samples)
 static int measure_error(struct pt_execution *e, uint32_t index, struct pt_shadow_sums *before)
 {
     struct pt_shadow_light *light = &e->binder.shadows->lights[index];
-    struct pt_shadow_sums now = { 0 };
+    struct pt_shadow_sums now = {0};
     int error = pt_shadow_sums_read(e->device, e->binder.shadows, index, &now);
     if (!error && before->words && before->samples < now.samples) {
         light->error = pt_shadow_error(before, &now);
@@ -152,7 +154,7 @@ static int test_sample(struct pt_execution *e, const struct pt_step *step, uint3
 static int test_points(struct pt_execution *e, const struct pt_step *step, uint32_t done, uint32_t wanted, uint32_t *end)
 {
     struct pt_shadow_light *light = &e->binder.shadows->lights[step->light];
-    struct pt_shadow_sums before = { 0 };
+    struct pt_shadow_sums before = {0};
     int error = done ? PATINA_OK : pt_shadows_clear(e->device, e->binder.shadows, step->light);
     if (!error && measures_at(step, done))
         error = measure_error(e, step->light, &before);

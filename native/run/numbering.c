@@ -10,19 +10,19 @@ void pt_numbering_release(struct pt_numbering *numbering)
     for (uint32_t i = 0; i < numbering->count; i++)
         pt_alive_release(numbering->clouds[i].alive);
     free(numbering->clouds);
-    *numbering = (struct pt_numbering){ 0 };
+    *numbering = (struct pt_numbering){0};
 }
 
 int pt_numbering_take(struct pt_numbering *numbering, const struct patina_scene *scene)
 {
-    struct pt_numbering taken = { .clouds = calloc(scene->instance_count + 1u, sizeof *taken.clouds) };
+    struct pt_numbering taken = {.clouds = calloc(scene->instance_count + 1u, sizeof *taken.clouds)};
     if (!taken.clouds)
         return PATINA_ERROR_MEMORY;
     for (; taken.count < scene->instance_count; taken.count++) {
         const struct pt_instance *instance = &scene->instances[taken.count];
         const struct patina_cloud *cloud = instance->cloud;
-        taken.clouds[taken.count] =
-            (struct pt_numbered){ cloud, cloud->alive, instance->id_base, (uint32_t)cloud->slots, taken.points };
+        taken.clouds[taken.count] = (struct pt_numbered){cloud, cloud->alive, instance->id_base, (uint32_t)cloud->slots,
+                                                         taken.points};
         atomic_fetch_add(&cloud->alive->references, 1);
         taken.slots += (uint32_t)cloud->slots;
         taken.points += (uint32_t)cloud->info.count;

@@ -12,7 +12,10 @@ static uint64_t total_of(const struct pt_planes *planes)
     return total;
 }
 
-uint64_t pt_planes_total(const struct pt_planes *planes) { return total_of(planes) + (planes->other ? total_of(planes->other) : 0); }
+uint64_t pt_planes_total(const struct pt_planes *planes)
+{
+    return total_of(planes) + (planes->other ? total_of(planes->other) : 0);
+}
 
 static int check_cap(const struct patina_device *device, const struct pt_plan *plan, uint64_t total)
 {
@@ -20,8 +23,8 @@ static int check_cap(const struct patina_device *device, const struct pt_plan *p
     if (!cap || total <= cap)
         return PATINA_OK;
     return pt_fail(&device->handle, PATINA_ERROR_MEMORY,
-                   "the planes of a %u x %u picture take more than the %llu MB allowed: render it in regions",
-                   plan->crop[2], plan->crop[3], (unsigned long long)(cap >> 20));
+                   "the planes of a %u x %u picture take more than the %llu MB allowed: render it in regions", plan->crop[2],
+                   plan->crop[3], (unsigned long long)(cap >> 20));
 }
 
 // Frames of a moving camera differ by some pixels of margin, maps of one light by a texel or two: that is not worth new memory
@@ -33,7 +36,8 @@ static size_t room_for(const struct patina_device *device, const struct pt_plane
 }
 
 // Makes room, unless there is, and not much too much.
-static int ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, struct pt_buffer *buffer, size_t bytes)
+static int ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, struct pt_buffer *buffer,
+                  size_t bytes)
 {
     if (buffer->room < bytes || buffer->room >= 2 * bytes) {
         const size_t room = planes->varies || buffer->room ? room_for(device, planes, bytes) : bytes;
@@ -50,7 +54,8 @@ static int ensure(struct patina_device *device, struct pt_planes *planes, const 
 
 // ---- slabs ---------------------------------------------------------------------------------------------------------------
 
-static void set_view(struct pt_planes *planes, enum pt_plane which, uint32_t index, const struct pt_buffer *slab, uint32_t number, size_t bytes)
+static void set_view(struct pt_planes *planes, enum pt_plane which, uint32_t index, const struct pt_buffer *slab,
+                     uint32_t number, size_t bytes)
 {
     struct pt_buffer *view = &planes->at[which][index];
     *view = *slab;
@@ -65,7 +70,7 @@ static void drop_views(struct pt_planes *planes)
     for (int p = 0; p < PT_PLANE_COUNT; p++)
         for (int k = 0; k < PT_SLOTS; k++)
             if (planes->view[p][k]) {
-                planes->at[p][k] = (struct pt_buffer){ 0 };
+                planes->at[p][k] = (struct pt_buffer){0};
                 planes->view[p][k] = 0;
             }
 }
@@ -97,7 +102,8 @@ static void make_way(struct patina_device *device, struct pt_planes *planes, con
 int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan)
 {
     if (plan->slab_count > PT_SLABS)
-        return pt_fail(&device->handle, PATINA_ERROR_INTERNAL, "the plan has %u slabs, of at most %d", plan->slab_count, PT_SLABS);
+        return pt_fail(&device->handle, PATINA_ERROR_INTERNAL, "the plan has %u slabs, of at most %d", plan->slab_count,
+                       PT_SLABS);
     int error = PATINA_OK;
     make_way(device, planes, plan);
     for (int again = 0; again < 2; again++) // those that shrink first
@@ -114,7 +120,8 @@ int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const
 
 static const uint64_t poison = 0x7FA5A5A5; // not a number; as an index, beyond every plane
 
-int pt_planes_poison(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, uint32_t when, int ends)
+int pt_planes_poison(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, uint32_t when,
+                     int ends)
 {
     int error = PATINA_OK;
     for (uint32_t i = 0; i < plan->life_count && planes->poisoned && !error; i++) {
@@ -167,7 +174,7 @@ int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, con
     if (planes->view[which][level]) {
         if (plane->size == bytes)
             return PATINA_OK;
-        *plane = (struct pt_buffer){ 0 };
+        *plane = (struct pt_buffer){0};
         planes->view[which][level] = 0;
     }
     if (planes->borrowed && plane->room < bytes) {
@@ -181,7 +188,8 @@ int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, con
 // Of keys all but what is known to be empty still.
 static int clear_keys(struct patina_device *device, struct pt_buffer *plane, const struct pt_plan *plan, uint64_t word)
 {
-    int error = device->ops->buffer_fill(device, plane, plane->clean[0], plane->room - plane->clean[0] - plane->clean[1], word, 8);
+    int error = device->ops->buffer_fill(device, plane, plane->clean[0], plane->room - plane->clean[0] - plane->clean[1], word,
+                                         8);
     if (error)
         return error;
     plane->clean[0] = 8 * (size_t)plan->view.width * plan->view.rect[1]; // no pass writes beyond the rectangle
@@ -189,7 +197,8 @@ static int clear_keys(struct patina_device *device, struct pt_buffer *plane, con
     return PATINA_OK;
 }
 
-int pt_planes_clear(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, const struct pt_step *clear)
+int pt_planes_clear(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan,
+                    const struct pt_step *clear)
 {
     const enum pt_plane which = clear->plane.which;
     struct pt_buffer *plane = &planes->at[which][clear->plane.index];
@@ -202,7 +211,7 @@ int pt_planes_clear(struct patina_device *device, struct pt_planes *planes, cons
 
 int pt_planes_ensure_picture(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan)
 {
-    struct pt_buffer made[PT_PLANE_COUNT] = { 0 };
+    struct pt_buffer made[PT_PLANE_COUNT] = {0};
     uint64_t total = pt_planes_total(planes);
     int error = PATINA_OK;
     for (int p = 0; p < PT_PLANE_COUNT && !error; p++) {

@@ -13,9 +13,9 @@ struct pt_planes {
     struct pt_buffer slabs[PT_SLABS];
     uint8_t view[PT_PLANE_COUNT][PT_SLOTS]; // 1 + its slab; 0: it has memory of its own
     uint8_t lost[PT_PLANE_COUNT][PT_SLOTS]; // another plane took its slab since
-    int apart;         // no slab is shared
-    int poisoned;      // pt_planes_poison writes: a test of lifetimes
-    uint64_t borrowed; // bits of the other's slabs that planes may be views of: pt_planes_borrow
+    int apart;                              // no slab is shared
+    int poisoned;                           // pt_planes_poison writes: a test of lifetimes
+    uint64_t borrowed;                      // bits of the other's slabs that planes may be views of: pt_planes_borrow
     const struct pt_planes *other;
     int varies; // in size from plan to plan, from the beginning
 };
@@ -25,7 +25,8 @@ uint64_t pt_planes_total(const struct pt_planes *planes); // bytes that both hol
 int pt_planes_open(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan);
 // Where planes are poisoned: what holds nothing yet is overwritten before a pass at `when`, what is no longer needed behind it (`ends`),
 // so that a picture that depends on it differs.
-int pt_planes_poison(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, uint32_t when, int ends);
+int pt_planes_poison(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, uint32_t when,
+                     int ends);
 // The same of slabs: bits.
 int pt_planes_poison_slabs(struct patina_device *device, struct pt_planes *planes, uint64_t slabs);
 // Until the next call planes may lie in these slabs of the other's.
@@ -34,7 +35,8 @@ void pt_planes_borrow(struct pt_planes *planes, uint64_t slabs);
 int pt_planes_ensure(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, enum pt_plane which,
                      uint32_t level);
 // One word everywhere.
-int pt_planes_clear(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan, const struct pt_step *clear);
+int pt_planes_clear(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan,
+                    const struct pt_step *clear);
 // Room for the whole picture before any of it is written: what cannot be had leaves the last picture as it is.
 int pt_planes_ensure_picture(struct patina_device *device, struct pt_planes *planes, const struct pt_plan *plan);
 void pt_planes_release(struct patina_device *device, struct pt_planes *planes);

@@ -72,9 +72,9 @@ static int upload(struct patina_device *device, const struct patina_cloud *cloud
         const void *data;
         size_t size;
     } parts[] = {
-        { PT_POSITIONS, cloud->positions, cloud->slots * 12 },
-        { PT_OPACITIES, cloud->opacities, cloud->slots },
-        { PT_CLASSES, cloud->classes, cloud->slots },
+        {PT_POSITIONS, cloud->positions, cloud->slots * 12},
+        {PT_OPACITIES, cloud->opacities, cloud->slots},
+        {PT_CLASSES, cloud->classes, cloud->slots},
     };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         if (!parts[i].data)
@@ -143,8 +143,8 @@ int pt_residency_take(struct pt_residency *residency, struct patina_device *devi
 
 int pt_residency_mark(struct patina_device *device, const struct patina_cloud *cloud, struct pt_resident *resident)
 {
-    static const uint8_t magenta[3] = { 255, 0, 255 };
-    static const float linear_magenta[3] = { 1.0f, 0.0f, 1.0f }, grey[3] = { 0.8f, 0.8f, 0.8f };
+    static const uint8_t magenta[3] = {255, 0, 255};
+    static const float linear_magenta[3] = {1.0f, 0.0f, 1.0f}, grey[3] = {0.8f, 0.8f, 0.8f};
     const uint32_t colors = atomic_load(&cloud->alive->colors), shapes = atomic_load(&cloud->alive->shapes);
     const enum pt_color_format format = cloud->color_format ? cloud->color_format : PT_COLOR_FLOAT;
     const size_t size = pt_color_size(format);
@@ -181,7 +181,8 @@ int pt_residency_field(struct patina_device *device, const struct patina_cloud *
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
         for (uint32_t slot = chunk->first; slot < chunk->first + chunk->padded; slot++)
-            words[slot] = pt_soft_word(steps ? steps[slot] : (uint32_t)PT_FIELD_MOST, one ? 1.0f : pt_soft_radius(cloud, chunk, slot));
+            words[slot] = pt_soft_word(steps ? steps[slot] : (uint32_t)PT_FIELD_MOST,
+                                       one ? 1.0f : pt_soft_radius(cloud, chunk, slot));
     }
     const int error = device->ops->buffer_create(device, cloud->slots * sizeof *words, words, 0, field);
     free(words);
@@ -211,8 +212,8 @@ int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device 
     return end(residency, device, resident, error, out);
 }
 
-int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive, const void *data,
-                            size_t size, struct pt_resident **out)
+int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive,
+                            const void *data, size_t size, struct pt_resident **out)
 {
     struct pt_resident *resident = *out = find(residency, device, alive);
     if (resident)
@@ -223,8 +224,8 @@ int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device
     return end(residency, device, resident, error, out);
 }
 
-int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device, const struct patina_texture *texture,
-                              struct pt_resident **out)
+int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device,
+                              const struct patina_texture *texture, struct pt_resident **out)
 {
     return pt_residency_take_bytes(residency, device, texture->alive, texture->texels, texture->bytes, out);
 }

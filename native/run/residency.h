@@ -15,12 +15,13 @@ struct pt_residency {
 struct pt_resident {
     struct pt_resident *next;
     struct pt_alive *alive;
-    uint32_t colors, shapes; // the states of alive->colors and alive->shapes that the buffers hold
-    struct pt_buffer marked; // colours with what stations saw through in magenta; made when first asked for
+    uint32_t colors, shapes;               // the states of alive->colors and alive->shapes that the buffers hold
+    struct pt_buffer marked;               // colours with what stations saw through in magenta; made when first asked for
     uint32_t marked_colors, marked_shapes; // the states that it holds
-    struct pt_buffer fields[2]; // PT_FIELD, PT_FIELD_ONE; made when first asked for
-    uint32_t field_shapes;      // the state of shapes that the first holds
-    struct pt_buffer buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh or texture by pt_mesh_buffer; PT_CHUNKS is unused
+    struct pt_buffer fields[2];            // PT_FIELD, PT_FIELD_ONE; made when first asked for
+    uint32_t field_shapes;                 // the state of shapes that the first holds
+    struct pt_buffer
+        buffers[PT_INSTANCE_BUFFERS]; // by pt_instance_buffer, of a mesh or texture by pt_mesh_buffer; PT_CHUNKS is unused
 };
 
 // The cloud's buffers on the device, uploaded at the first call; forgets dead clouds on the way.
@@ -34,13 +35,13 @@ int pt_residency_see(struct patina_device *device, const struct patina_cloud *cl
 int pt_residency_field(struct patina_device *device, const struct patina_cloud *cloud, const uint16_t *steps,
                        struct pt_resident *resident, int one);
 // Likewise of what a mask or a grade holds: `size` bytes that live as long as `alive` says, in buffers[0], or none.
-int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive, const void *data,
-                            size_t size, struct pt_resident **out);
+int pt_residency_take_bytes(struct pt_residency *residency, struct patina_device *device, struct pt_alive *alive,
+                            const void *data, size_t size, struct pt_resident **out);
 // Likewise of a mesh.
 int pt_residency_take_mesh(struct pt_residency *residency, struct patina_device *device, const struct patina_mesh *mesh,
                            struct pt_resident **out);
-int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device, const struct patina_texture *texture,
-                              struct pt_resident **out);
+int pt_residency_take_texture(struct pt_residency *residency, struct patina_device *device,
+                              const struct patina_texture *texture, struct pt_resident **out);
 void pt_residency_release(struct pt_residency *residency, struct patina_device *device);
 
 #endif

@@ -31,7 +31,8 @@ static int run_pass(struct pt_execution *e, uint32_t i)
     const struct pt_pass *pass = &e->plan->passes[i];
     const void *arguments;
     struct pt_buffer *few[16], **bound = pass->ref_count <= 16 ? few : calloc(pass->ref_count, sizeof *bound);
-    int error = bound ? arguments_of(e, i, &arguments) : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
+    int error = bound ? arguments_of(e, i, &arguments)
+                      : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t k = 0; k < pass->ref_count && !error; k++)
         error = pt_bind(&e->binder, &pass->refs[k], &bound[k]);
     // the picture is written last and at one go: a cancelled frame leaves the one before it
@@ -44,14 +45,11 @@ static int run_pass(struct pt_execution *e, uint32_t i)
 }
 
 // Planes that lie between passes that run as one are neither made nor written. Those that go from layer to layer are.
-static int is_made(const struct pt_ref *ref)
-{
-    return ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].carried;
-}
+static int is_made(const struct pt_ref *ref) { return ref->of != PT_OF_FRAME || pt_plane_rows[ref->which].carried; }
 
 static int bind_between(struct pt_binder *binder, const struct pt_ref *ref, struct pt_buffer **out)
 {
-    const struct pt_ref as_it_is = { PT_OF_LEFT, ref->which, ref->index };
+    const struct pt_ref as_it_is = {PT_OF_LEFT, ref->which, ref->index};
     return pt_bind(binder, is_made(ref) ? ref : &as_it_is, out);
 }
 
@@ -65,7 +63,7 @@ uint32_t pt_passes_together(const void *of, const struct pt_pass *passes)
     if (!device->ops->finishes)
         return passes->together;
     for (uint32_t i = 0; i < passes->together; i++)
-        some[i] = (struct pt_bound_pass){ .kernel = passes[i].kernel, .arguments = passes[i].arguments };
+        some[i] = (struct pt_bound_pass){.kernel = passes[i].kernel, .arguments = passes[i].arguments};
     return device->ops->finishes(some, passes->together);
 }
 
@@ -79,7 +77,7 @@ static int run_together(struct pt_execution *e, uint32_t first, uint32_t count)
     struct pt_buffer **buffers = calloc(refs, sizeof *buffers), **next = buffers;
     int error = bound && buffers ? PATINA_OK : pt_fail(&e->device->handle, PATINA_ERROR_MEMORY, "a frame: out of memory");
     for (uint32_t i = 0; i < count && !error; i++) {
-        bound[i] = (struct pt_bound_pass){ passes[i].kernel, NULL, next, passes[i].ref_count };
+        bound[i] = (struct pt_bound_pass){passes[i].kernel, NULL, next, passes[i].ref_count};
         error = arguments_of(e, first + i, &bound[i].arguments);
         for (uint32_t k = 0; k < passes[i].ref_count && !error; k++)
             error = bind_between(&e->binder, &passes[i].refs[k], next++);

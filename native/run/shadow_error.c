@@ -14,10 +14,11 @@ static const double caution = 1.5;
 void pt_shadow_sums_free(struct pt_shadow_sums *sums)
 {
     free(sums->words);
-    *sums = (struct pt_shadow_sums){ 0 };
+    *sums = (struct pt_shadow_sums){0};
 }
 
-int pt_shadow_sums_read(struct patina_device *device, const struct pt_shadows *shadows, uint32_t light, struct pt_shadow_sums *sums)
+int pt_shadow_sums_read(struct patina_device *device, const struct pt_shadows *shadows, uint32_t light,
+                        struct pt_shadow_sums *sums)
 {
     size_t at = 0;
     pt_shadow_sums_free(sums);

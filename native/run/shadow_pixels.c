@@ -15,14 +15,15 @@ enum { ERROR_MOST = 256 }; // samples, where an error is asked for
 static uint64_t view_of(const struct patina_scene *scene, const struct pt_plan *plan)
 {
     const patina_camera *c = &scene->camera;
-    const double window[] = { c->left, c->right, c->bottom, c->top, c->near_clip, c->far_clip, (double)c->orthographic };
+    const double window[] = {c->left, c->right, c->bottom, c->top, c->near_clip, c->far_clip, (double)c->orthographic};
     uint64_t words = pt_fingerprint(0, &plan->view, sizeof plan->view);
     words = pt_fingerprint(words, c->world_from_camera, sizeof c->world_from_camera);
     words = pt_fingerprint(words, window, sizeof window);
     for (uint32_t i = 0; i < scene->mesh_count; i++) {
         const uint64_t mesh = atomic_load(&scene->meshes[i].mesh->alive->fingerprint);
         words = pt_fingerprint(words, &mesh, sizeof mesh);
-        words = pt_fingerprint(words, scene->meshes[i].style.world_from_object, sizeof scene->meshes[i].style.world_from_object);
+        words = pt_fingerprint(words, scene->meshes[i].style.world_from_object,
+                               sizeof scene->meshes[i].style.world_from_object);
     }
     return words;
 }

@@ -82,8 +82,8 @@ int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shad
             continue;
         int error = light_count * points > UINT32_MAX
                         ? pt_fail(&device->handle, PATINA_ERROR_TOO_MANY_POINTS,
-                                  "shadows of %u lights on %llu points: their product must stay below 4294967296",
-                                  light_count, (unsigned long long)points)
+                                  "shadows of %u lights on %llu points: their product must stay below 4294967296", light_count,
+                                  (unsigned long long)points)
                         : device->ops->buffer_create(device, light_count * points * 4, NULL, 0, &shadows->words[i]);
         if (error) {
             forget_lights(shadows);
@@ -94,7 +94,8 @@ int pt_shadows_make_places(struct patina_device *device, struct pt_shadows *shad
     return PATINA_OK;
 }
 
-uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan, uint32_t i)
+uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan,
+                           uint32_t i)
 {
     const struct pt_shadow_light *light = &shadows->lights[i];
     const struct pt_plan_light *planned = &plan->lights[i];
@@ -151,7 +152,7 @@ int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, co
     for (uint32_t i = 0; i < shadows->instance_count && !error; i++) {
         if (shadows->fingerprints[i] && !shadows->marks[i].size)
             error = device->ops->buffer_create(device, (scene->instances[i].cloud->slots + 3) / 4 * 4, NULL, 0,
-                                       &shadows->marks[i]);
+                                               &shadows->marks[i]);
         if (!error && shadows->marks[i].size)
             error = device->ops->buffer_fill(device, &shadows->marks[i], 0, shadows->marks[i].size, 0, 4);
     }

@@ -25,14 +25,14 @@ struct pt_shadow_pixels {
 };
 
 struct pt_shadows {
-    struct pt_planes planes; // of the maps
+    struct pt_planes planes;         // of the maps
     struct pt_buffer *words, *marks; // per instance of the scene; empty where it receives none
     uint64_t *fingerprints;          // per instance: of whose points the words are; 0: none
     uint32_t instance_count;
     struct pt_shadow_light lights[PT_MAX_LIGHTS]; // in the plan's order
     uint32_t light_count;
     struct pt_buffer flags[PT_FLAGS]; // one word each
-    struct pt_clip_buffers clips; // of the map at hand
+    struct pt_clip_buffers clips;     // of the map at hand
     struct pt_shadow_pixels pixels;
     struct pt_buffer none; // never written: kernels that bind it do not touch it
 };
@@ -45,7 +45,8 @@ int pt_shadows_open(struct patina_device *device, struct pt_shadows *shadows, co
                     const struct pt_plan *plan);
 int pt_shadows_stale(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan);
 // Samples that the light has after this render.
-uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan, uint32_t light);
+uint32_t pt_samples_wanted(const struct pt_shadows *shadows, const struct patina_scene *scene, const struct pt_plan *plan,
+                           uint32_t light);
 // A light's words at zero: no sample yet. Other lights' lie in the same buffers.
 int pt_shadows_clear(struct patina_device *device, struct pt_shadows *shadows, uint32_t light);
 int pt_flag_write(struct patina_device *device, struct pt_shadows *shadows, enum pt_flag flag, uint32_t word);
@@ -76,7 +77,8 @@ struct pt_shadow_sums {
     size_t count;
     uint32_t samples;
 };
-int pt_shadow_sums_read(struct patina_device *device, const struct pt_shadows *shadows, uint32_t light, struct pt_shadow_sums *sums);
+int pt_shadow_sums_read(struct patina_device *device, const struct pt_shadows *shadows, uint32_t light,
+                        struct pt_shadow_sums *sums);
 void pt_shadow_sums_free(struct pt_shadow_sums *sums);
 // Expected error of `after`, root mean square over the points in the penumbra, from `before` with some of its samples.
 float pt_shadow_error(const struct pt_shadow_sums *before, const struct pt_shadow_sums *after);

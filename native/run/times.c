@@ -11,6 +11,6 @@ void pt_note_time(struct pt_times *times, const char *name, double ms)
     if (i == PT_TIMINGS)
         return;
     if (i == times->count)
-        times->each[times->count++] = (struct pt_timing){ .name = name };
+        times->each[times->count++] = (struct pt_timing){.name = name};
     times->each[i].ms += ms;
 }

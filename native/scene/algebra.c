@@ -67,7 +67,7 @@ int pt_camera_axes(const patina_camera *camera, double axes[9], double position[
     double linear[9];
     pt_split_matrix(camera->world_from_camera, linear, position);
     for (int axis = 0; axis < 3; axis++) {
-        double column[3] = { linear[axis], linear[3 + axis], linear[6 + axis] };
+        double column[3] = {linear[axis], linear[3 + axis], linear[6 + axis]};
         double length = sqrt(pt_dot(column, column));
         if (!(length > 0.0) || !isfinite(length) || !isfinite(position[axis]))
             return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "camera: world_from_camera is singular or not finite");

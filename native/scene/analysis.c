@@ -28,7 +28,7 @@ struct walk {
     int given; // normals that the cloud has know their side
     struct tally {
         uint32_t kinds[6], estimated, unoriented;
-    } *tallies; // a chunk
+    } * tallies; // a chunk
     atomic_uint done;
 };
 
@@ -140,7 +140,8 @@ static int orient(const struct pt_beam *beam, const double p[3], uint32_t given,
 static const struct pt_beam *beam_of(const struct walk *walk, const struct pt_chunk *chunk, uint32_t slot, double p[3])
 {
     for (uint32_t k = 0; k < 3; k++)
-        p[k] = chunk->origin[k] + (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + slot - chunk->first];
+        p[k] = chunk->origin[k] +
+               (double)walk->cloud->positions[3 * (size_t)chunk->first + k * chunk->padded + slot - chunk->first];
     return walk->beams.count ? &walk->beams.each[pt_station_of(walk->desc, walk->cloud->order[slot], p)] : NULL;
 }
 
@@ -165,8 +166,8 @@ static void limit_point(void *context, uint32_t place, const struct pt_sample *s
 {
     const struct limited *limited = context;
     double p[3];
-    const struct pt_beam *beam =
-        beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk], limited->walk->tree.slots[place], p);
+    const struct pt_beam *beam = beam_of(limited->walk, &limited->walk->cloud->chunks[limited->chunk],
+                                         limited->walk->tree.slots[place], p);
     if (beam)
         pt_beam_limit(beam, p, sample, hood);
     else if (!limited->walk->rows)
@@ -223,7 +224,7 @@ static int compare_floats(const void *a, const void *b)
 static void finish_chunk(struct walk *walk, struct pt_chunk *chunk, float *spacings, uint32_t known)
 {
     uint32_t *surface = walk->out->surface + chunk->first, *shapes = walk->out->shapes + chunk->first;
-    uint32_t histogram[64] = { 0 }, most = 0, below = 0, at = 0;
+    uint32_t histogram[64] = {0}, most = 0, below = 0, at = 0;
     for (uint32_t i = 0; i < chunk->count; i++) {
         histogram[shapes[i] & 63u]++;
         most = (shapes[i] & 63u) > most ? shapes[i] & 63u : most;
@@ -248,7 +249,7 @@ static void walk_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     float spacings[PT_CHUNK_POINTS];
     (void)thread;
     for (uint32_t c = begin; c < end; c++) {
-        struct limited limited = { walk, c };
+        struct limited limited = {walk, c};
         uint32_t known = 0;
         for (uint32_t leaf = walk->tree.chunk_leaf[c]; leaf < walk->tree.chunk_leaf[c + 1]; leaf++) {
             if (pt_progress_cancelled(walk->progress))
@@ -322,15 +323,15 @@ static void gather_shapes(struct pt_chunk *chunk, const uint32_t *shapes)
 
 static int mark_free_space(struct walk *walk, struct pt_pool *pool)
 {
-    struct pt_free_space job = { .cloud = walk->cloud,
-                                 .desc = walk->desc,
-                                 .beams = &walk->beams,
-                                 .spacing_base = walk->out->spacing_base,
-                                 .progress = walk->progress,
-                                 .begin = 0.8,
-                                 .end = 1.0,
-                                 .shapes = walk->out->shapes,
-                                 .sights = &walk->out->sights };
+    struct pt_free_space job = {.cloud = walk->cloud,
+                                .desc = walk->desc,
+                                .beams = &walk->beams,
+                                .spacing_base = walk->out->spacing_base,
+                                .progress = walk->progress,
+                                .begin = 0.8,
+                                .end = 1.0,
+                                .shapes = walk->out->shapes,
+                                .sights = &walk->out->sights};
     const int error = pt_free_space_mark(&job, pool);
     walk->out->seen_through = job.marked;
     return error;
@@ -353,7 +354,8 @@ static int vote_sides(struct walk *walk, struct pt_pool *pool)
     for (uint32_t slot = 0; told && slot < cloud->slots; slot++)
         told[slot / 32] |= (uint32_t)((cloud->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << slot % 32;
     walk->out->oriented = PATINA_SIDES_VOTED;
-    const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surface, walk->out->shapes, pool, walk->progress, 0.85, 1.0);
+    const int error = pt_orient(&walk->tree, walk->out->chunks, told, walk->out->surface, walk->out->shapes, pool,
+                                walk->progress, 0.85, 1.0);
     pt_pages_free(told, size);
     return error;
 }
@@ -409,13 +411,13 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
 {
     patina_analysis_desc checked = *desc;
     check_arrays(&checked); // checked already
-    struct walk walk = { .cloud = cloud,
-                         .desc = &checked,
-                         .out = out,
-                         .progress = progress,
-                         .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
-                         .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED };
-    *out = (struct pt_analysis){ .slots = cloud->slots };
+    struct walk walk = {.cloud = cloud,
+                        .desc = &checked,
+                        .out = out,
+                        .progress = progress,
+                        .k = desc->neighbours ? desc->neighbours : NEIGHBOURS,
+                        .given = cloud->info.has_normals && cloud->info.normals_oriented != PATINA_SIDES_VOTED};
+    *out = (struct pt_analysis){.slots = cloud->slots};
     struct pt_pool *pool = pt_pool_create(pt_pool_threads_for(desc->threads, cloud->info.count), 0);
     int error = pool ? compute(&walk, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
@@ -423,10 +425,10 @@ int pt_analysis_compute(const patina_cloud *cloud, const patina_analysis_desc *d
     free(walk.tallies);
     if (error)
         pt_analysis_free(out);
-    return !error                              ? PATINA_OK
-           : error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "analysing the cloud was cancelled")
-                                             : pt_fail(NULL, error, "analysing %llu points: out of memory",
-                                                       (unsigned long long)cloud->info.drawn);
+    return !error ? PATINA_OK
+           : error == PATINA_ERROR_CANCELLED
+               ? pt_fail(NULL, error, "analysing the cloud was cancelled")
+               : pt_fail(NULL, error, "analysing %llu points: out of memory", (unsigned long long)cloud->info.drawn);
 }
 
 void pt_analysis_free(struct pt_analysis *analysis)
@@ -435,7 +437,7 @@ void pt_analysis_free(struct pt_analysis *analysis)
     pt_pages_free(analysis->shapes, analysis->slots * 4);
     free(analysis->chunks);
     pt_sights_free(&analysis->sights);
-    *analysis = (struct pt_analysis){ 0 };
+    *analysis = (struct pt_analysis){0};
 }
 
 // What cannot fail comes last: a cloud is analysed or as it was.
@@ -469,7 +471,7 @@ int pt_analysis_apply(patina_cloud *cloud, struct pt_analysis *analysis)
     cloud->beside = pt_shapes_beside(cloud->shapes, cloud->slots);
     cloud->chunks = analysis->chunks;
     cloud->spacing_base = analysis->spacing_base;
-    *analysis = (struct pt_analysis){ 0 };
+    *analysis = (struct pt_analysis){0};
     atomic_store(&cloud->alive->fingerprint, 0);
     atomic_fetch_add(&cloud->alive->shapes, 1);
     return PATINA_OK;

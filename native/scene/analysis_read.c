@@ -141,9 +141,8 @@ static void clear(const patina_neighbourhoods *to, size_t count)
     const struct {
         void *data;
         size_t size;
-    } arrays[] = { { to->normal, 12 },   { to->axis, 12 },     { to->spacing, 4 },     { to->half_axes, 8 },  { to->sigma, 4 },
-                   { to->kind, 1 },      { to->certainty, 4 }, { to->soft_radius, 4 }, { to->uncertainty, 4 },
-                   { to->seen_through, 1 } };
+    } arrays[] = {{to->normal, 12}, {to->axis, 12},     {to->spacing, 4},     {to->half_axes, 8},   {to->sigma, 4},
+                  {to->kind, 1},    {to->certainty, 4}, {to->soft_radius, 4}, {to->uncertainty, 4}, {to->seen_through, 1}};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         if (arrays[i].data)
             memset(arrays[i].data, 0, count * arrays[i].size);
@@ -175,7 +174,8 @@ int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbou
     patina_neighbourhoods taken;
     const patina_neighbourhoods *const wanted = &taken;
     if (!cloud || !given)
-        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_neighbourhoods: cloud or wanted is NULL");
+        return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT,
+                       "patina_cloud_neighbourhoods: cloud or wanted is NULL");
     int error = pt_take(&cloud->handle, "patina_cloud_neighbourhoods", given, &taken, sizeof taken);
     if (error)
         return error;
@@ -183,14 +183,15 @@ int patina_cloud_neighbourhoods(const patina_cloud *cloud, const patina_neighbou
     if (walks && (wanted->neighbours < 1 || wanted->neighbours > PT_NEIGHBOURS_MOST))
         return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT, "patina_cloud_neighbourhoods: neighbours: 1 to %d, not %u",
                        PT_NEIGHBOURS_MOST, wanted->neighbours);
-    struct reading reading = { .cloud = cloud, .wanted = wanted, .progress = progress };
+    struct reading reading = {.cloud = cloud, .wanted = wanted, .progress = progress};
     struct pt_pool *pool = pt_pool_create(wanted->threads, 0);
     clear(wanted, cloud->info.count);
     error = pool ? read_all(&reading, pool) : PATINA_ERROR_MEMORY;
     pt_pool_destroy(pool);
     if (!error)
         pt_progress_set(progress, 1.0);
-    return error ? pt_fail(&cloud->handle, error, error == PATINA_ERROR_CANCELLED ? "reading neighbourhoods was cancelled"
-                                                                                  : "reading neighbourhoods: out of memory")
+    return error ? pt_fail(&cloud->handle, error,
+                           error == PATINA_ERROR_CANCELLED ? "reading neighbourhoods was cancelled"
+                                                           : "reading neighbourhoods: out of memory")
                  : PATINA_OK;
 }

@@ -18,7 +18,8 @@
 #define CERTAIN 0.3      // least certainty of a plane that may lean: others are dots
 #define FLATTEST 0.03    // |n . ray| below counts as this: a grazing beam's cell ends somewhere
 #define NEAR 0.4         // of an interval, or 3 sigma: so near the plane are neighbours on it
-#define LEAST_BESIDE 0.3 // intervals: neighbours nearer, or farther than MOST_BESIDE, say nothing; nor do those ASIDE of the row
+#define LEAST_BESIDE                                                                                                           \
+    0.3 // intervals: neighbours nearer, or farther than MOST_BESIDE, say nothing; nor do those ASIDE of the row
 #define MOST_BESIDE 1.6
 #define ASIDE 0.8
 
@@ -27,7 +28,7 @@ static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a
 int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc *desc, struct pt_pool *pool,
                     struct pt_beams *out)
 {
-    *out = (struct pt_beams){ .count = desc->station_count };
+    *out = (struct pt_beams){.count = desc->station_count};
     if (!desc->station_count)
         return PATINA_OK;
     struct pt_interval *intervals = calloc(desc->station_count, sizeof *intervals);
@@ -46,7 +47,7 @@ int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc
 void pt_beams_destroy(struct pt_beams *beams)
 {
     free(beams->each);
-    *beams = (struct pt_beams){ 0 };
+    *beams = (struct pt_beams){0};
 }
 
 // ---- cells -------------------------------------------------------------------------------------------------------------------
@@ -75,8 +76,8 @@ static void ellipse_of(const double a[3], const double b[3], double axis[3], dou
 
 // Whether neighbours lie beside the point on both sides along the cell's first direction, and along its second: within an
 // interval and a half, no farther off the plane than NEAR of one.
-static void look_beside(const struct pt_sample *sample, const double ray[3], const double n[3], double facing, const double a[3],
-                        const double b[3], double near, int beside[2])
+static void look_beside(const struct pt_sample *sample, const double ray[3], const double n[3], double facing,
+                        const double a[3], const double b[3], double near, int beside[2])
 {
     const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), determinant = aa * bb - ab * ab;
     int sides = 0;
@@ -85,7 +86,8 @@ static void look_beside(const struct pt_sample *sample, const double ray[3], con
         if (fabs(dot(sample->offset[i], n)) > near)
             continue;
         carry(sample->offset[i], ray, n, facing, o);
-        const double oa = dot(o, a), ob = dot(o, b), s = (bb * oa - ab * ob) / determinant, t = (aa * ob - ab * oa) / determinant;
+        const double oa = dot(o, a), ob = dot(o, b), s = (bb * oa - ab * ob) / determinant,
+                     t = (aa * ob - ab * oa) / determinant;
         if (fabs(s) > LEAST_BESIDE && fabs(s) < MOST_BESIDE && fabs(t) < ASIDE)
             sides |= s > 0.0 ? 1 : 2;
         if (fabs(t) > LEAST_BESIDE && fabs(t) < MOST_BESIDE && fabs(s) < ASIDE)

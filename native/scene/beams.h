@@ -12,7 +12,7 @@ struct pt_beams {
     struct pt_beam {
         double place[3]; // object units
         struct pt_interval interval;
-    } *each;
+    } * each;
 };
 
 // Of the descriptor's stations and the drawn points that it gives to each. 0 or PATINA_ERROR_MEMORY.
@@ -21,6 +21,7 @@ int pt_beams_create(const struct patina_cloud *cloud, const patina_analysis_desc
 void pt_beams_destroy(struct pt_beams *beams);
 
 // Shrinks the footprint at p to the beam's cell where that is smaller; what is not a surface becomes a dot of its width.
-void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct pt_sample *sample, struct pt_neighbourhood *hood);
+void pt_beam_limit(const struct pt_beam *beam, const double p[3], const struct pt_sample *sample,
+                   struct pt_neighbourhood *hood);
 
 #endif

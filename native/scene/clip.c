@@ -74,7 +74,7 @@ struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_
                               struct pt_inverse_clip *room)
 {
     const patina_cloud_info *info = &instance->cloud->info;
-    struct pt_sieve sieve = { .instance = instance, .clips = room };
+    struct pt_sieve sieve = {.instance = instance, .clips = room};
     sieve.hiding_shapes = pt_hidden_shapes(instance, sieve.hidden_shapes);
     sieve.mask = pt_mask_of(instance);
     if (points != PT_EVERY_POINT && instance->style.soft == PATINA_SOFT_FIELD) {
@@ -150,7 +150,8 @@ static enum pt_masked leaves(const struct pt_sieve *sieve, size_t chunk)
 {
     if (!sieve->field)
         return PT_MASKED_NONE;
-    const int some_soft = sieve->field->chunks[chunk][1] > sieve->threshold, all_soft = sieve->field->chunks[chunk][0] > sieve->threshold;
+    const int some_soft = sieve->field->chunks[chunk][1] > sieve->threshold,
+              all_soft = sieve->field->chunks[chunk][0] > sieve->threshold;
     if (sieve->soft)
         return all_soft ? PT_MASKED_NONE : some_soft ? PT_MASKED_SOME : PT_MASKED_ALL;
     return all_soft ? PT_MASKED_ALL : some_soft ? PT_MASKED_SOME : PT_MASKED_NONE;
@@ -172,7 +173,7 @@ static int meet(const struct pt_sieve *sieve, uint32_t i, const struct pt_chunk 
 enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk *chunk, struct clip_view *entries,
                             struct pt_division *division)
 {
-    struct pt_division found = { 0 };
+    struct pt_division found = {0};
     double linear[9], object[3], origin[3];
     if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes && !sieve->mask && !sieve->field)
         return PT_WHOLE; // of most scenes all are
@@ -203,14 +204,11 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
     return found.count || found.by_class || found.by_shape || found.by_mask || found.by_field ? PT_DIVIDED : PT_WHOLE;
 }
 
-void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3],
-                      struct clip_view *out)
+void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3], struct clip_view *out)
 {
     double row[9], translation[3];
     chunk_frame(clip, linear, origin, row, translation);
-    *out = (struct clip_view){ .shape = clip->shape,
-                               .strength = clip->clip->tint_strength,
-                               .width = clip->clip->tint_width };
+    *out = (struct clip_view){.shape = clip->shape, .strength = clip->clip->tint_strength, .width = clip->clip->tint_width};
     for (int k = 0; k < 9; k++)
         out->row[k] = (float)row[k];
     for (int k = 0; k < 3; k++) {

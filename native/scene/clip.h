@@ -17,11 +17,11 @@ struct pt_sieve {
     const struct pt_instance *instance;
     struct pt_inverse_clip *clips; // those that keep come first
     uint32_t count, keeps;
-    int keeping; // some box keeps, if only a flat one
-    int hiding;  // some class that the cloud has is hidden
+    int keeping;               // some box keeps, if only a flat one
+    int hiding;                // some class that the cloud has is hidden
     uint32_t hidden_shapes[8]; // what pt_hidden_shapes says
     int hiding_shapes;
-    const struct patina_mask *mask; // that hides some of its points, or NULL
+    const struct patina_mask *mask;   // that hides some of its points, or NULL
     const struct patina_field *field; // that leaves points to the other of both, or NULL
     uint32_t threshold;
     int soft; // what is above it stays

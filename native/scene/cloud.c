@@ -60,8 +60,7 @@ static uint8_t read_opacity(const patina_array *array, uint64_t index)
     float f;
     uint16_t v;
     switch (array->type) {
-    case PATINA_UINT8:
-        return *at;
+    case PATINA_UINT8: return *at;
     case PATINA_UINT16:
         memcpy(&v, at, sizeof v);
         value = v / 65535.0;
@@ -70,8 +69,7 @@ static uint8_t read_opacity(const patina_array *array, uint64_t index)
         memcpy(&f, at, sizeof f);
         value = (double)f;
         break;
-    default:
-        memcpy(&value, at, sizeof value);
+    default: memcpy(&value, at, sizeof value);
     }
     return isnan(value) ? 255 : (uint8_t)(255.0 * fmin(fmax(value, 0.0), 1.0) + 0.5);
 }
@@ -85,21 +83,21 @@ struct build {
     struct patina_progress *progress;
     uint64_t *words, *scratch; // Morton code << 32 | id of the drawn points
     uint32_t drawn;
-    uint32_t cell_bits;        // the grid of cells has 2^cell_bits cells a side
-    uint32_t *cells;           // first word of each cell, and one past the last
-    uint32_t *begins;          // first word of each chunk
-    uint32_t chunk_room;       // chunks that the arrays have room for
+    uint32_t cell_bits;  // the grid of cells has 2^cell_bits cells a side
+    uint32_t *cells;     // first word of each cell, and one past the last
+    uint32_t *begins;    // first word of each chunk
+    uint32_t chunk_room; // chunks that the arrays have room for
     double box_min[3], box_max[3];
     struct block {
         uint32_t drawn, offset;
         uint64_t invalid_positions;
         double box_min[3], box_max[3];
-    } *blocks;
+    } * blocks;
     uint32_t block_count;
     struct tally { // of the points of a chunk
         uint32_t invalid_normals, invalid_colors, translucent;
         float radius_most;
-    } *tallies;
+    } * tallies;
     atomic_uint chunks_done;
     double cell[3], cell_min[3]; // of the Morton grid being coded
 };
@@ -358,7 +356,7 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 void pt_chunk_cone(struct pt_chunk *chunk, const uint32_t *surface)
 {
-    double axis[3] = { 0.0, 0.0, 0.0 }, n[3], cosine = 1.0;
+    double axis[3] = {0.0, 0.0, 0.0}, n[3], cosine = 1.0;
     chunk->cone_cosine = -2.0f;
     for (uint32_t i = 0; i < chunk->count; i++) {
         if ((surface[i] & PT_NORMAL_BITS) == PT_NORMAL_NONE)
@@ -499,7 +497,7 @@ static int add_chunk(struct build *build, uint32_t begin, uint32_t count)
     }
     build->begins[cloud->chunk_count] = begin;
     struct pt_chunk *chunk = &cloud->chunks[cloud->chunk_count++];
-    *chunk = (struct pt_chunk){ .count = count, .first = (uint32_t)cloud->slots };
+    *chunk = (struct pt_chunk){.count = count, .first = (uint32_t)cloud->slots};
     chunk->padded = (count + PT_CHUNK_ALIGN - 1) / PT_CHUNK_ALIGN * PT_CHUNK_ALIGN;
     cloud->slots += chunk->padded;
     return PATINA_OK;
@@ -560,9 +558,8 @@ static int allocate(struct build *build)
     cloud->colors = cloud->color_format ? pt_pages_alloc(color_bytes(cloud)) : NULL;
     cloud->opacities = cloud->info.has_opacities ? pt_pages_alloc(opacity_bytes(cloud)) : NULL;
     cloud->radii = cloud->info.has_radii ? pt_pages_alloc(cloud->slots * 4) : NULL;
-    if (!build->tallies || !cloud->positions || !cloud->order || !cloud->surface ||
-        (cloud->color_format && !cloud->colors) || (cloud->info.has_opacities && !cloud->opacities) ||
-        (cloud->info.has_radii && !cloud->radii))
+    if (!build->tallies || !cloud->positions || !cloud->order || !cloud->surface || (cloud->color_format && !cloud->colors) ||
+        (cloud->info.has_opacities && !cloud->opacities) || (cloud->info.has_radii && !cloud->radii))
         return PATINA_ERROR_MEMORY;
     cloud->info.bytes = cloud->slots * (cloud->radii ? 24 : 20) + (cloud->colors ? color_bytes(cloud) : 0) +
                         (cloud->opacities ? opacity_bytes(cloud) : 0) + cloud->chunk_count * sizeof *cloud->chunks;
@@ -642,7 +639,7 @@ static enum pt_color_format color_format(const patina_array *color)
 
 int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progress, patina_cloud **out)
 {
-    struct build build = { .progress = progress };
+    struct build build = {.progress = progress};
     if (!out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_create: out is NULL");
     *out = NULL;
@@ -664,13 +661,13 @@ int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progres
         atomic_init(&alive->alive, 1);
         cloud->threads = desc->threads;
         cloud->alive = alive;
-        cloud->info = (patina_cloud_info){ .struct_size = sizeof cloud->info,
-                                           .count = desc->count,
-                                           .has_normals = desc->normal.data != NULL,
-                                           .normals_oriented = desc->normal.data != NULL,
-                                           .has_colors = desc->color.data != NULL,
-                                           .has_opacities = desc->opacity.data != NULL,
-                                           .has_radii = desc->radius.data != NULL };
+        cloud->info = (patina_cloud_info){.struct_size = sizeof cloud->info,
+                                          .count = desc->count,
+                                          .has_normals = desc->normal.data != NULL,
+                                          .normals_oriented = desc->normal.data != NULL,
+                                          .has_colors = desc->color.data != NULL,
+                                          .has_opacities = desc->opacity.data != NULL,
+                                          .has_radii = desc->radius.data != NULL};
         memcpy(cloud->info.origin, desc->origin, sizeof desc->origin);
         cloud->color_format = color_format(&desc->color);
         build.cloud = cloud;
@@ -693,8 +690,7 @@ int patina_cloud_create(const patina_cloud_desc *given, patina_progress *progres
         return error == PATINA_ERROR_CANCELLED ? pt_fail(NULL, error, "building the cloud was cancelled")
                : error == PATINA_ERROR_TOO_MANY_POINTS
                    ? pt_fail(NULL, error, "a cloud of %llu points: too many, split it", (unsigned long long)desc->count)
-                   : pt_fail(NULL, error, "building a cloud of %llu points: out of memory",
-                             (unsigned long long)desc->count);
+                   : pt_fail(NULL, error, "building a cloud of %llu points: out of memory", (unsigned long long)desc->count);
     }
     *out = cloud;
     return PATINA_OK;
@@ -732,7 +728,7 @@ int patina_cloud_set_colors(patina_cloud *cloud, const patina_array *color)
 {
     if (!cloud || !color)
         return pt_fail(cloud ? &cloud->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_cloud_set_colors: bad arguments");
-    struct build build = { .cloud = cloud, .desc = { .count = cloud->info.count, .color = *color } };
+    struct build build = {.cloud = cloud, .desc = {.count = cloud->info.count, .color = *color}};
     const uint32_t types = 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32;
     int error = pt_check_array(&build.desc.color, "color", types, 3, 4);
     if (error)

@@ -22,15 +22,15 @@ struct pt_chunk {
     uint32_t first;                  // slot of the first point
     uint32_t count, padded;          // padded slots repeat the last point
     uint32_t classes[8];             // of its points: bits as in patina_cloud_info.class_bits
-    uint32_t shapes[8];              // of its points, drawn or not: bit c % 32 of word c / 32: the byte c from PT_SHAPE_SIGHT_SHIFT on
-    float reach, footprint;          // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
+    uint32_t shapes[8];     // of its points, drawn or not: bit c % 32 of word c / 32: the byte c from PT_SHAPE_SIGHT_SHIFT on
+    float reach, footprint; // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
 };
 
 // Whether a cloud still lives, shared with the devices that hold its buffers.
 struct pt_alive {
     atomic_int references, alive;
-    atomic_uint colors; // counts how often they and the scalars were set
-    atomic_uint shapes; // counts how often surface words and shapes were
+    atomic_uint colors;           // counts how often they and the scalars were set
+    atomic_uint shapes;           // counts how often surface words and shapes were
     _Atomic uint64_t fingerprint; // 0: nobody has asked for it yet
 };
 
@@ -48,21 +48,21 @@ struct patina_cloud {
     uint64_t slots; // padded points
     uint32_t chunk_count;
     struct pt_chunk *chunks;
-    float *positions;  // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
-    uint32_t *order;   // slots: index in the caller's arrays
-    uint32_t *surface; // slots: octahedral normal and spacing class (kernel_args.h)
-    int beside;        // pt_shapes_beside
-    uint32_t *shapes;  // slots: footprint, thickness, kind (kernel_args.h), or NULL where the cloud was not analysed
-    void *colors;      // slots x 3 uint8 (sRGB) or float (linear), or NULL
+    float *positions;   // 3 * slots: per chunk x[padded], y[padded], z[padded], relative to the chunk's origin
+    uint32_t *order;    // slots: index in the caller's arrays
+    uint32_t *surface;  // slots: octahedral normal and spacing class (kernel_args.h)
+    int beside;         // pt_shapes_beside
+    uint32_t *shapes;   // slots: footprint, thickness, kind (kernel_args.h), or NULL where the cloud was not analysed
+    void *colors;       // slots x 3 uint8 (sRGB) or float (linear), or NULL
     uint8_t *opacities; // slots, or NULL where every point is opaque
     float *radii;       // slots, object units, or NULL
     float *scalars;     // slots, or NULL
     uint8_t *classes;   // slots, or NULL
     uint64_t class_hash;
     enum pt_color_format color_format;
-    uint32_t threads;    // at most, as the caller said; 0: not said
+    uint32_t threads;        // at most, as the caller said; 0: not said
     struct pt_sights sights; // what its stations saw; empty where nobody asked for free space
-    double spacing_base; // class 0: no spacing; class c: base * 2^((c - 1) / 4)
+    double spacing_base;     // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 
 // Points of a chunk that the first `strata` of PT_STRATA strata hold: every 2^(PT_STRATA - strata)-th in Morton order.

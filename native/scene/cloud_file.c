@@ -41,10 +41,10 @@ int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress
     patina_cloud_desc desc = {
         .struct_size = sizeof desc,
         .count = file->count,
-        .position = { .data = file->position, .type = PATINA_FLOAT32, .components = 3 },
-        .normal = { .data = file->normal, .type = PATINA_FLOAT32, .components = 3 },
-        .color = { .data = file->color, .type = file->color_type, .components = 4 },
-        .origin = { file->origin[0], file->origin[1], file->origin[2] },
+        .position = {.data = file->position, .type = PATINA_FLOAT32, .components = 3},
+        .normal = {.data = file->normal, .type = PATINA_FLOAT32, .components = 3},
+        .color = {.data = file->color, .type = file->color_type, .components = 4},
+        .origin = {file->origin[0], file->origin[1], file->origin[2]},
         .threads = threads,
     };
     const struct pt_column *column = class_column(file);
@@ -52,7 +52,7 @@ int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress
     if (column && !classes)
         return pt_fail(&file->handle, PATINA_ERROR_MEMORY, "classes of %llu points: out of memory",
                        (unsigned long long)file->count);
-    desc.classes = (patina_array){ .data = classes, .type = PATINA_UINT8, .components = 1 };
+    desc.classes = (patina_array){.data = classes, .type = PATINA_UINT8, .components = 1};
     int error = patina_cloud_create(&desc, progress, out);
     free(classes);
     return error ? pt_fail_again(&file->handle, error) : PATINA_OK;

@@ -50,10 +50,7 @@ static uint64_t sum_of(const struct section *section)
     return sum;
 }
 
-static uint64_t round_section(uint64_t size)
-{
-    return (size + SECTION - 1) / SECTION * SECTION;
-}
+static uint64_t round_section(uint64_t size) { return (size + SECTION - 1) / SECTION * SECTION; }
 
 static void list_sections(struct patina_cloud *cloud, struct section sections[SECTIONS])
 {
@@ -96,8 +93,7 @@ static int write_sections(FILE *file, const struct header *header, const struct 
     int good = fwrite(header, sizeof *header, 1, file) == 1;
     uint64_t at = SECTION;
     for (int i = 0; i < SECTIONS && good; i++) {
-        good = !pt_stream_seek(file, at) &&
-               (!sections[i].size || fwrite(*sections[i].data, sections[i].size, 1, file) == 1);
+        good = !pt_stream_seek(file, at) && (!sections[i].size || fwrite(*sections[i].data, sections[i].size, 1, file) == 1);
         at += round_section(sections[i].size);
     }
     return good && !pt_stream_resize(file, header->size);
@@ -137,10 +133,7 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
 
 // ---- open --------------------------------------------------------------------------------------------------------------
 
-static int refuse(const char *path, const char *what)
-{
-    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: %s", path, what);
-}
+static int refuse(const char *path, const char *what) { return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: %s", path, what); }
 
 // What is trusted: chunks within the slots, and each slot's point among the caller's.
 static int check_cloud(const char *path, const struct patina_cloud *cloud)
@@ -150,8 +143,7 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
         const struct pt_chunk *chunk = &cloud->chunks[c];
         double sum = (double)chunk->spacing + (double)chunk->reach + (double)chunk->footprint;
         for (int k = 0; k < 3; k++)
-            sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] +
-                   (double)chunk->cone_axis[k];
+            sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] + (double)chunk->cone_axis[k];
         if (chunk->first != next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||
             chunk->padded > cloud->slots - next || !isfinite(sum) || !isfinite(chunk->cone_cosine))
             return refuse(path, "a chunk is damaged");
@@ -176,13 +168,13 @@ static int check_header(const char *path, const struct header *header, uint64_t 
     if (header->size != size)
         return refuse(path, "a saved cloud that was cut short");
     if (header->color_format > PT_COLOR_FLOAT || header->info.count > 0x7FFFFFFF ||
-        header->info.chunks != header->chunk_count ||
-        header->slots > 2 * header->info.count + 16ull * header->chunk_count ||
+        header->info.chunks != header->chunk_count || header->slots > 2 * header->info.count + 16ull * header->chunk_count ||
         header->chunk_count > header->info.count || header->info.drawn > header->info.count ||
         header->info.has_colors != (header->color_format != PT_COLOR_NONE) || header->info.has_opacities > 1 ||
         header->info.has_normals > 1 || header->info.has_radii > 1 || !isfinite(header->info.radius_most) ||
-        header->sight_count > header->sight_room || header->sight_room > 1u << 16 || header->sight_bytes > 2u * PT_SIGHT_BYTES ||
-        header->info.has_scalars > 1 || header->info.has_shapes > 1 || header->info.has_classes > 1 || !isfinite(header->spacing_base))
+        header->sight_count > header->sight_room || header->sight_room > 1u << 16 ||
+        header->sight_bytes > 2u * PT_SIGHT_BYTES || header->info.has_scalars > 1 || header->info.has_shapes > 1 ||
+        header->info.has_classes > 1 || !isfinite(header->spacing_base))
         return refuse(path, "its header is damaged");
     return PATINA_OK;
 }
@@ -215,8 +207,8 @@ static int read_header(const char *path, const struct pt_disk *disk, struct pati
     cloud->color_format = header->color_format;
     cloud->spacing_base = header->spacing_base;
     cloud->class_hash = header->class_hash;
-    cloud->sights = (struct pt_sights){.count = (uint32_t)header->sight_count, .room = (uint32_t)header->sight_room,
-                                       .bytes = header->sight_bytes};
+    cloud->sights = (struct pt_sights){
+        .count = (uint32_t)header->sight_count, .room = (uint32_t)header->sight_room, .bytes = header->sight_bytes};
     list_sections(cloud, sections);
     return file_size(sections) == header->size ? PATINA_OK : refuse(path, "its header is damaged");
 }
@@ -248,8 +240,8 @@ static int open_disk(const char *path, const struct pt_disk *disk, struct patina
 // ---- verify ------------------------------------------------------------------------------------------------------------
 
 // Whether a section of the file, from byte `at` on, still has the sum that it was written with.
-static int verify_section(const char *path, const struct pt_disk *disk, uint64_t at, uint64_t size, uint64_t wanted, char *buffer,
-                          patina_progress *progress)
+static int verify_section(const char *path, const struct pt_disk *disk, uint64_t at, uint64_t size, uint64_t wanted,
+                          char *buffer, patina_progress *progress)
 {
     uint64_t sum = VERSION;
     for (uint64_t done = 0; done < size;) {

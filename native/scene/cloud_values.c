@@ -10,16 +10,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components,
-                   uint32_t most_components)
+int pt_check_array(patina_array *array, const char *what, uint32_t types, uint32_t least_components, uint32_t most_components)
 {
     if (!array->data)
         return PATINA_OK;
     if (array->type > PATINA_INT32 || !(types >> array->type & 1u))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: element type %u is not supported", what, array->type);
     if (array->components < least_components || array->components > most_components)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: %u components; %u%s needed", what, array->components,
-                       least_components, most_components > 3 ? " or 4 are" : most_components > 1 ? " are" : " is");
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "%s: %u components; %u%s needed", what, array->components, least_components,
+                       most_components > 3   ? " or 4 are"
+                       : most_components > 1 ? " are"
+                                             : " is");
     if (!array->stride)
         array->stride = array->components * pt_type_size(array->type);
     return PATINA_OK;

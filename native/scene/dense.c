@@ -197,8 +197,8 @@ static int add_points(struct search *search)
         const struct pt_chunk *chunk = &search->cloud->chunks[c];
         for (uint32_t i = 0, n = is_wide(search, chunk) ? samples_of(search, chunk) : 0; i < n; i++) {
             struct cell cell;
-            const double p[3] = { coordinate(search->cloud, chunk, i, 0), coordinate(search->cloud, chunk, i, 1),
-                                  coordinate(search->cloud, chunk, i, 2) };
+            const double p[3] = {coordinate(search->cloud, chunk, i, 0), coordinate(search->cloud, chunk, i, 1),
+                                 coordinate(search->cloud, chunk, i, 2)};
             if (cell_of(search, p, &cell) && add(search, &cell))
                 return PATINA_ERROR_MEMORY;
         }
@@ -235,12 +235,12 @@ static void own_box(const struct pt_chunk *chunk, struct pt_dense *box)
 
 static void dense_box(const struct search *search, const struct pt_chunk *chunk, struct pt_dense *box)
 {
-    struct pt_dense found = { { INFINITY, INFINITY, INFINITY }, { -INFINITY, -INFINITY, -INFINITY } };
+    struct pt_dense found = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     const uint32_t samples = samples_of(search, chunk);
     uint32_t strays = 0;
     for (uint32_t i = 0; i < samples; i++) {
-        const double p[3] = { coordinate(search->cloud, chunk, i, 0), coordinate(search->cloud, chunk, i, 1),
-                              coordinate(search->cloud, chunk, i, 2) };
+        const double p[3] = {coordinate(search->cloud, chunk, i, 0), coordinate(search->cloud, chunk, i, 1),
+                             coordinate(search->cloud, chunk, i, 2)};
         if (!is_dense(search, p)) {
             strays++;
             continue;
@@ -256,7 +256,7 @@ static void dense_box(const struct search *search, const struct pt_chunk *chunk,
 
 int pt_dense_chunks(const struct patina_cloud *cloud, struct pt_dense *boxes)
 {
-    struct search search = { .cloud = cloud, .strata = PT_STRATA };
+    struct search search = {.cloud = cloud, .strata = PT_STRATA};
     uint64_t wide = 0;
     if (find_spacing(&search))
         return PATINA_ERROR_MEMORY;

@@ -5,10 +5,7 @@
 
 #include <stdio.h>
 
-static int within(float value, float least, float most)
-{
-    return value >= least && value <= most;
-} // NaN is not
+static int within(float value, float least, float most) { return value >= least && value <= most; } // NaN is not
 
 static int refuse(const patina_scene *scene, const char *what)
 {
@@ -32,34 +29,34 @@ static int all_within(const float v[3], float least, float most)
 // A table row each, in the order of the struct.
 static int check(const patina_scene *scene, patina_effects *e)
 {
-#define PATINA_EFFECT_NUMBER(field, when, least, most, zero, ...)                                                      \
-    if (e->field == 0.0f)                                                                                              \
-        e->field = zero;                                                                                               \
-    else if (!within(e->field, least, most))                                                                           \
+#define PATINA_EFFECT_NUMBER(field, when, least, most, zero, ...)                                                              \
+    if (e->field == 0.0f)                                                                                                      \
+        e->field = zero;                                                                                                       \
+    else if (!within(e->field, least, most))                                                                                   \
         return out_of_range(scene, #field, (double)(least), (double)(most), (double)(zero));
-#define PATINA_EFFECT_COUNT(field, when, least, most, zero, ...)                                                       \
-    if (e->field == 0)                                                                                                 \
-        e->field = zero;                                                                                               \
-    else if (e->field < least || e->field > most)                                                                      \
+#define PATINA_EFFECT_COUNT(field, when, least, most, zero, ...)                                                               \
+    if (e->field == 0)                                                                                                         \
+        e->field = zero;                                                                                                       \
+    else if (e->field < least || e->field > most)                                                                              \
         return out_of_range(scene, #field, least, most, zero);
-#define PATINA_EFFECT_COLOR(field, when, zero, ...)                                                                    \
-    if (!all_within(e->field, 0.0f, 65504.0f))                                                                         \
-        return out_of_range(scene, #field, 0.0, 65504.0, zero);                                                        \
-    if (!e->exact && pt_is_zero(e->field))                                                                             \
+#define PATINA_EFFECT_COLOR(field, when, zero, ...)                                                                            \
+    if (!all_within(e->field, 0.0f, 65504.0f))                                                                                 \
+        return out_of_range(scene, #field, 0.0, 65504.0, zero);                                                                \
+    if (!e->exact && pt_is_zero(e->field))                                                                                     \
         e->field[0] = e->field[1] = e->field[2] = zero;
-#define PATINA_EFFECT_AXIS(field, ...)                                                                                 \
-    if (!all_within(e->field, -1e15f, 1e15f))                                                                          \
-        return out_of_range(scene, #field, -1e15, 1e15, 0.0);                                                          \
-    if (pt_is_zero(e->field))                                                                                          \
+#define PATINA_EFFECT_AXIS(field, ...)                                                                                         \
+    if (!all_within(e->field, -1e15f, 1e15f))                                                                                  \
+        return out_of_range(scene, #field, -1e15, 1e15, 0.0);                                                                  \
+    if (pt_is_zero(e->field))                                                                                                  \
         e->field[2] = 1.0f;
-#define PATINA_EFFECT_SWITCH(field, ...)                                                                               \
-    if (e->field > 1)                                                                                                  \
+#define PATINA_EFFECT_SWITCH(field, ...)                                                                                       \
+    if (e->field > 1)                                                                                                          \
         return refuse(scene, #field " must be 0 or 1");
-#define PATINA_EFFECT_CHOICE(field, when, count, ...)                                                                  \
-    if (e->field >= count)                                                                                             \
+#define PATINA_EFFECT_CHOICE(field, when, count, ...)                                                                          \
+    if (e->field >= count)                                                                                                     \
         return refuse(scene, #field " is none of its choices");
-#define PATINA_EFFECT_RULE(while_, holds, message)                                                                     \
-    if ((while_) && !(holds))                                                                                          \
+#define PATINA_EFFECT_RULE(while_, holds, message)                                                                             \
+    if ((while_) && !(holds))                                                                                                  \
         return refuse(scene, message);
 #include "patina/effects.def"
     return e->exact > 1 ? refuse(scene, "exact must be 0 or 1") : PATINA_OK;

@@ -18,10 +18,10 @@ enum { SAMPLE = 1 << 16, NEIGHBOURS = 16 };
 struct fill {
     const struct patina_cloud *cloud;
     const patina_field_desc *desc;
-    const float *values;   // in the given order, or NULL
+    const float *values;              // in the given order, or NULL
     double linear[9], translation[3]; // the shape's coordinates from the cloud's: rows of unit length
     struct patina_field *field;
-    float *numbers;        // in chunk order
+    float *numbers;         // in chunk order
     double from, by, start; // F = start + (number - from) by
 };
 
@@ -29,7 +29,7 @@ struct fill {
 
 static double luminance(const struct patina_cloud *cloud, size_t slot)
 {
-    static const double luma[3] = { 0.2126, 0.7152, 0.0722 };
+    static const double luma[3] = {0.2126, 0.7152, 0.0722};
     double sum = 0.0;
     for (int k = 0; k < 3; k++)
         sum += luma[k] * (cloud->color_format == PT_COLOR_SRGB8 ? ((const uint8_t *)cloud->colors)[3 * slot + (size_t)k] / 255.0
@@ -155,7 +155,7 @@ static int is_finite(const double matrix[16])
 
 static void take_matrix(const double given[16], double linear[9], double translation[3])
 {
-    static const double zero[16], identity[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
+    static const double zero[16], identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     pt_split_matrix(memcmp(given, zero, sizeof zero) ? given : identity, linear, translation);
 }
 
@@ -165,7 +165,7 @@ static int place_shape(struct fill *fill)
     double object[9], object_at[3], shape[9], shape_at[3], axes[9], from[3];
     take_matrix(fill->desc->world_from_object, object, object_at);
     take_matrix(fill->desc->world_from_shape, shape, shape_at);
-    double x[3] = { shape[0], shape[3], shape[6] }, y[3] = { shape[1], shape[4], shape[7] }, z[3] = { shape[2], shape[5], shape[8] };
+    double x[3] = {shape[0], shape[3], shape[6]}, y[3] = {shape[1], shape[4], shape[7]}, z[3] = {shape[2], shape[5], shape[8]};
     double *third = fill->desc->shape == PATINA_FIELD_FROM_AXIS ? z : NULL, across[3];
     if (!third)
         for (int k = 0; k < 3; k++)
@@ -199,13 +199,15 @@ static int check(const patina_cloud *cloud, const patina_field_desc *desc)
     if (source == PATINA_FIELD_VALUES && (desc->count != cloud->info.count || (desc->count && !desc->values)))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: %llu values for %llu points",
                        desc->values ? (unsigned long long)desc->count : 0, (unsigned long long)cloud->info.count);
-    if (!isfinite(desc->range[0]) || !isfinite(desc->range[1]) || !is_finite(desc->world_from_object) || !is_finite(desc->world_from_shape))
+    if (!isfinite(desc->range[0]) || !isfinite(desc->range[1]) || !is_finite(desc->world_from_object) ||
+        !is_finite(desc->world_from_shape))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: range and matrices must be finite");
     const char *missing = source == PATINA_FIELD_SCALAR && !cloud->scalars     ? "scalars"
                           : source == PATINA_FIELD_LUMINANCE && !cloud->colors ? "colours"
                           : source == PATINA_FIELD_CLASSES && !cloud->classes  ? "classes"
                                                                                : NULL;
-    return missing && cloud->slots ? pt_fail(NULL, PATINA_ERROR_EMPTY, "patina_field_create: the cloud has no %s", missing) : PATINA_OK;
+    return missing && cloud->slots ? pt_fail(NULL, PATINA_ERROR_EMPTY, "patina_field_create: the cloud has no %s", missing)
+                                   : PATINA_OK;
 }
 
 static struct patina_field *field_begin(const patina_cloud *cloud)
@@ -233,7 +235,7 @@ static int fill_field(struct fill *fill, patina_progress *progress)
     int error = pool && fill->numbers && fill->field ? PATINA_OK : PATINA_ERROR_MEMORY;
     if (!error && fill->desc->source == PATINA_FIELD_UNCERTAINTY) {
         walked = malloc((cloud->info.count + 1) * sizeof *walked);
-        const patina_neighbourhoods wanted = { .struct_size = sizeof wanted, .neighbours = NEIGHBOURS, .uncertainty = walked };
+        const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .neighbours = NEIGHBOURS, .uncertainty = walked};
         error = walked ? patina_cloud_neighbourhoods(cloud, &wanted, progress) : PATINA_ERROR_MEMORY;
         fill->values = walked;
     }
@@ -259,8 +261,11 @@ int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc
     int error = pt_take(NULL, "patina_field_create", desc, &checked, sizeof checked);
     if (error || (error = check(cloud, &checked)))
         return error;
-    struct fill fill = { .cloud = cloud, .desc = &checked, .values = checked.values, .field = field_begin(cloud),
-                         .numbers = malloc((cloud->slots + 1) * sizeof *fill.numbers) };
+    struct fill fill = {.cloud = cloud,
+                        .desc = &checked,
+                        .values = checked.values,
+                        .field = field_begin(cloud),
+                        .numbers = malloc((cloud->slots + 1) * sizeof *fill.numbers)};
     if (checked.source == PATINA_FIELD_DISTANCE && !place_shape(&fill))
         error = pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: the shape is flat");
     else if ((error = fill_field(&fill, progress)) == PATINA_ERROR_MEMORY)

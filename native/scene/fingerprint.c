@@ -17,7 +17,7 @@ static uint64_t mix(uint64_t hash, uint64_t word)
 
 uint64_t pt_fingerprint(uint64_t seed, const void *data, size_t size)
 {
-    uint64_t ways[WAYS] = { seed, seed + 1, seed + 2, seed + 3 }, words[WAYS] = { 0 };
+    uint64_t ways[WAYS] = {seed, seed + 1, seed + 2, seed + 3}, words[WAYS] = {0};
     const char *at = data;
     for (; size >= sizeof words; size -= sizeof words, at += sizeof words) {
         memcpy(words, at, sizeof words);
@@ -61,19 +61,21 @@ uint64_t pt_cloud_fingerprint(const struct patina_cloud *cloud)
 // The bytes of an array and what they mean; `hash` is what came before.
 static uint64_t add_array(uint64_t hash, const patina_array *array, uint64_t count)
 {
-    static const uint64_t bytes[] = { 0, 4, 8, 1, 2, 4, 1, 2, 4 }; // by patina_type
+    static const uint64_t bytes[] = {0, 4, 8, 1, 2, 4, 1, 2, 4}; // by patina_type
     hash = mix(mix(mix(hash, array->data != NULL), array->type), array->components);
     return array->data ? pt_fingerprint(hash, array->data, count * array->components * bytes[array->type]) : hash;
 }
 
 int pt_desc_fingerprint(const patina_cloud_desc *desc, uint64_t values[2])
 {
-    const patina_array *arrays[] = { &desc->position, &desc->normal, &desc->opacity, &desc->radius,
-                                     &desc->classes,  &desc->color,  &desc->scalar };
+    const patina_array *arrays[] = {&desc->position, &desc->normal, &desc->opacity, &desc->radius,
+                                    &desc->classes,  &desc->color,  &desc->scalar};
     for (int i = 0; i < 7; i++)
         if (arrays[i]->data && (arrays[i]->type > PATINA_INT32 || arrays[i]->stride))
-            return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_task_fingerprint: array %d is not tightly packed, or of an "
-                           "unknown type", i);
+            return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
+                           "patina_task_fingerprint: array %d is not tightly packed, or of an "
+                           "unknown type",
+                           i);
     values[0] = mix(0, desc->count);
     values[1] = mix(1, desc->count);
     for (int i = 0; i < 7; i++)

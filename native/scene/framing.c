@@ -21,7 +21,7 @@ static void keep_corner(void *context, const double corner[3])
     struct framing *f = context;
     if (f->count == f->room) {
         const size_t room = f->room ? 2 * f->room : 1024;
-        double (*corners)[3] = realloc(f->corners, room * sizeof *corners);
+        double(*corners)[3] = realloc(f->corners, room * sizeof *corners);
         if (!corners) {
             f->error = PATINA_ERROR_MEMORY;
             return;
@@ -93,9 +93,9 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
     const double degree = 3.14159265358979323846 / 180.0;
     const double ca = cos(azimuth * degree), sa = sin(azimuth * degree);
     const double ce = cos(elevation * degree), se = sin(elevation * degree);
-    const double x[3] = { ca, sa, 0.0 }, y[3] = { -sa * se, ca * se, ce }, z[3] = { sa * ce, -ca * ce, se };
+    const double x[3] = {ca, sa, 0.0}, y[3] = {-sa * se, ca * se, ce}, z[3] = {sa * ce, -ca * ce, se};
     const double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
-    struct framing framing = { .half_y = tan(0.5 * fov * degree) };
+    struct framing framing = {.half_y = tan(0.5 * fov * degree)};
     framing.half_x = framing.half_y * scene->settings.width / scene->settings.height;
     int error = keep_scene(scene, &framing);
     for (int k = 0; k < 3; k++)
@@ -109,12 +109,12 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
         return pt_fail(&scene->handle, error, "framing the scene: out of memory");
     const double distance = framing.distance > 0.0 ? framing.distance : 1.0; // a single point, or nothing
     const double radius = framing.radius > 0.0 ? 1.01 * framing.radius : distance;
-    patina_camera found = { .left = -framing.half_x,
-                            .right = framing.half_x,
-                            .bottom = -framing.half_y,
-                            .top = framing.half_y,
-                            .near_clip = fmax(distance - radius, 1e-3 * distance),
-                            .far_clip = distance + radius };
+    patina_camera found = {.left = -framing.half_x,
+                           .right = framing.half_x,
+                           .bottom = -framing.half_y,
+                           .top = framing.half_y,
+                           .near_clip = fmax(distance - radius, 1e-3 * distance),
+                           .far_clip = distance + radius};
     for (int k = 0; k < 3; k++) {
         found.world_from_camera[4 * k] = x[k];
         found.world_from_camera[4 * k + 1] = y[k];

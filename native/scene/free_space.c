@@ -28,9 +28,9 @@ struct look { // of one station
     const patina_array *station;
     uint32_t number;
     double eye[3];
-    uint32_t across, up;          // cells
-    double cell[2];               // radians
-    atomic_uint *grid;            // float bits of the nearest range; +inf: none
+    uint32_t across, up; // cells
+    double cell[2];      // radians
+    atomic_uint *grid;   // float bits of the nearest range; +inf: none
     double farthest;
     atomic_uint farthest_bits;
     struct pt_sight_builder sight; // the same for pictures; without cells where none is asked for
@@ -72,8 +72,7 @@ static int is_own(const struct look *look, const struct pt_chunk *chunk, uint32_
 static void least(atomic_uint *word, uint32_t bits)
 {
     uint32_t seen = atomic_load_explicit(word, memory_order_relaxed);
-    while (bits < seen &&
-           !atomic_compare_exchange_weak_explicit(word, &seen, bits, memory_order_relaxed, memory_order_relaxed))
+    while (bits < seen && !atomic_compare_exchange_weak_explicit(word, &seen, bits, memory_order_relaxed, memory_order_relaxed))
         ;
 }
 
@@ -274,8 +273,7 @@ int pt_free_space_check(const patina_analysis_desc *desc)
     if (!desc->station_count || !desc->stations)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "free space: the places of the stations are not known (stations)");
     if (!desc->station.data)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
-                       "free space: which station each point is of is not known (station)");
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "free space: which station each point is of is not known (station)");
     return PATINA_OK;
 }
 

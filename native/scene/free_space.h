@@ -13,8 +13,8 @@ struct pt_free_space {
     double spacing_base;              // that sigmas in the shapes are in
     patina_progress *progress;        // goes from `begin` to `end`
     double begin, end;
-    uint32_t *shapes; // slots: PT_SHAPE_SEEN_THROUGH is set and cleared
-    uint64_t marked;  // how many points have it
+    uint32_t *shapes;         // slots: PT_SHAPE_SEEN_THROUGH is set and cleared
+    uint64_t marked;          // how many points have it
     struct pt_sights *sights; // what the stations saw, for pictures: empty before, the caller's in any case. NULL: not wanted
 };
 

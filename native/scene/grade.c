@@ -29,15 +29,9 @@ struct grading {
     struct patina_grade *grade;
 };
 
-static double to_srgb(double linear)
-{
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055;
-}
+static double to_srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055; }
 
-static double to_linear(double srgb)
-{
-    return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
-}
+static double to_linear(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4); }
 
 // Warm: more red and less blue, at the luminance of white.
 static void set_factors(const patina_scan_grade *grade, struct tone *tone)
@@ -113,15 +107,18 @@ static void grade_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
 static int check(const patina_cloud *cloud, const patina_scan_grade *grades, uint32_t count)
 {
     if (!cloud || cloud->handle.magic != PT_MAGIC || !grades || !count || count > MOST_SCANS)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: a cloud that was destroyed, or not 1 to %d scans", MOST_SCANS);
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: a cloud that was destroyed, or not 1 to %d scans",
+                       MOST_SCANS);
     if (!cloud->colors)
         return pt_fail(&cloud->handle, PATINA_ERROR_EMPTY, "patina_grade_create: the cloud has no colours");
     for (uint32_t i = 0; i < count; i++) {
         const patina_scan_grade *g = &grades[i];
         if (!(g->gain >= 0.0f && g->gain <= 65504.0f) || !(g->gamma >= 0.01f && g->gamma <= 100.0f) ||
             !(g->saturation >= 0.0f && g->saturation <= 100.0f) || !(fabsf(g->temperature) <= 16.0f))
-            return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT,
-                           "patina_grade_create: scan %u: gain 0 to 65504, gamma 0.01 to 100, saturation 0 to 100, temperature -16 to 16", i);
+            return pt_fail(
+                &cloud->handle, PATINA_ERROR_ARGUMENT,
+                "patina_grade_create: scan %u: gain 0 to 65504, gamma 0.01 to 100, saturation 0 to 100, temperature -16 to 16",
+                i);
     }
     return PATINA_OK;
 }
@@ -174,7 +171,8 @@ int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const 
     pt_pool_destroy(pool);
     *out = good ? grade : NULL;
     return good ? PATINA_OK
-                : pt_fail(NULL, PATINA_ERROR_MEMORY, "colours of %llu points: out of memory", (unsigned long long)cloud->info.count);
+                : pt_fail(NULL, PATINA_ERROR_MEMORY, "colours of %llu points: out of memory",
+                          (unsigned long long)cloud->info.count);
 }
 
 void patina_grade_destroy(patina_grade *grade)

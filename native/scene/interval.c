@@ -19,7 +19,7 @@ struct line { // means of rows' elevations and columns' azimuths, in fixed point
     atomic_uint count;
 };
 
-struct lines { // of a station
+struct lines {                 // of a station
     atomic_uint rows, columns; // how many; more than LINES_MOST: these words are no grid's
     struct line *row, *column; // NULL: not told
 };
@@ -87,7 +87,8 @@ static uint32_t look(const struct count *count, const struct pt_chunk *chunk, ui
 static void most(atomic_uint *word, uint32_t value)
 {
     uint32_t seen = atomic_load_explicit(word, memory_order_relaxed);
-    while (value > seen && !atomic_compare_exchange_weak_explicit(word, &seen, value, memory_order_relaxed, memory_order_relaxed))
+    while (value > seen &&
+           !atomic_compare_exchange_weak_explicit(word, &seen, value, memory_order_relaxed, memory_order_relaxed))
         ;
 }
 

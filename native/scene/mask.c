@@ -58,7 +58,8 @@ static void sum_up(struct patina_mask *mask, uint32_t chunk_count)
         mask->hash = (mask->hash ^ (mask->words[i] & 0xFFFFu)) * 0x100000001B3ull; // FNV-1a
 }
 
-int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const uint8_t *selected, size_t size, patina_mask **out)
+int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const uint8_t *selected, size_t size,
+                       patina_mask **out)
 {
     if (!cloud || !out || cloud->handle.magic != PT_MAGIC)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mask_create: cloud or out is NULL, or the cloud destroyed");
@@ -87,7 +88,8 @@ int patina_mask_create(const patina_cloud *cloud, const uint8_t *hidden, const u
     }
     pt_pool_destroy(pool);
     return good ? PATINA_OK
-                : pt_fail(NULL, PATINA_ERROR_MEMORY, "a mask of %llu points: out of memory", (unsigned long long)cloud->info.count);
+                : pt_fail(NULL, PATINA_ERROR_MEMORY, "a mask of %llu points: out of memory",
+                          (unsigned long long)cloud->info.count);
 }
 
 void patina_mask_destroy(patina_mask *mask)

@@ -31,9 +31,9 @@ struct patina_field {
     struct pt_handle handle;
     struct pt_alive *alive, *of; // as a mask's
     uint64_t slots;
-    uint16_t *steps;             // in chunk order, of PT_FIELD_MOST; padding as what it repeats
-    uint16_t (*chunks)[2];       // least and greatest of each
-    uint64_t hash;               // of the steps
+    uint16_t *steps;       // in chunk order, of PT_FIELD_MOST; padding as what it repeats
+    uint16_t (*chunks)[2]; // least and greatest of each
+    uint64_t hash;         // of the steps
 };
 
 // t of points that are solid up to it, in steps of a field.

@@ -27,8 +27,9 @@ static int check_desc(patina_mesh_desc *desc)
         return fail("fewer vertices than three a triangle, and no indices");
     for (uint64_t i = 0; desc->indices && i < 3 * desc->triangle_count; i++)
         if (desc->indices[i] >= desc->vertex_count)
-            return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_mesh_create: index %u of triangle %llu is not below %llu vertices",
-                           desc->indices[i], (unsigned long long)(i / 3), (unsigned long long)desc->vertex_count);
+            return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
+                           "patina_mesh_create: index %u of triangle %llu is not below %llu vertices", desc->indices[i],
+                           (unsigned long long)(i / 3), (unsigned long long)desc->vertex_count);
     return PATINA_OK;
 }
 
@@ -111,10 +112,10 @@ static int build(const patina_mesh_desc *desc, struct patina_mesh *mesh)
     if (!mesh->alive || !mesh->vertices || !mesh->indices)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "a mesh of %llu vertices and %llu triangles: out of memory",
                        (unsigned long long)desc->vertex_count, (unsigned long long)desc->triangle_count);
-    mesh->info = (patina_mesh_info){ .struct_size = sizeof mesh->info,
-                                     .vertex_count = desc->vertex_count,
-                                     .triangle_count = desc->triangle_count,
-                                     .bytes = vertex_bytes + index_bytes };
+    mesh->info = (patina_mesh_info){.struct_size = sizeof mesh->info,
+                                    .vertex_count = desc->vertex_count,
+                                    .triangle_count = desc->triangle_count,
+                                    .bytes = vertex_bytes + index_bytes};
     find_box(desc, mesh);
     take_vertices(desc, mesh);
     atomic_init(&mesh->alive->references, 1);

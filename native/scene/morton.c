@@ -55,7 +55,7 @@ static void scatter_blocks(void *context, uint32_t begin, uint32_t end, uint32_t
 
 int pt_morton_sort(struct pt_pool *pool, uint64_t *words, uint64_t *scratch, uint32_t count)
 {
-    struct sort sort = { .from = words, .to = scratch, .count = count };
+    struct sort sort = {.from = words, .to = scratch, .count = count};
     sort.offsets = malloc(BLOCKS * sizeof *sort.offsets);
     if (!sort.offsets)
         return PATINA_ERROR_MEMORY;

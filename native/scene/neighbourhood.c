@@ -9,27 +9,27 @@
 
 // ---- the rule of footprints: what is tuned, in one place -------------------------------------------------------------------
 
-#define COVER 1.2           // half axes in spacings: of random points exp(-pi r^2) stay uncovered, 1 %, which filling closes
-#define COVER_BORDER 0.35   // across a border
-#define COVER_LINE 0.6      // of a line's points, in spacings along it
-#define COVER_DOT 0.2       // of volume and strays, in distances to the nearest neighbour
-#define COVER_ROUGH 0.2     // of what is hardly a volume (creases, ornaments), in spacings, so that no cracks show there
-#define ROUGH 0.35          // thickness over width, squared: between FLATTEST and this the one turns into the other
-#define UNEVEN 2.5          // spacings along and across differ less than this by chance: of random points two in three
-#define UNEVEN_DOUBT 4.0    // 16 neighbours on rows 1 : 5 hold too few of the rows beside: they overrate them
-#define UNEVEN_MOST 13.0    // what a shape word holds
+#define COVER 1.2         // half axes in spacings: of random points exp(-pi r^2) stay uncovered, 1 %, which filling closes
+#define COVER_BORDER 0.35 // across a border
+#define COVER_LINE 0.6    // of a line's points, in spacings along it
+#define COVER_DOT 0.2     // of volume and strays, in distances to the nearest neighbour
+#define COVER_ROUGH 0.2   // of what is hardly a volume (creases, ornaments), in spacings, so that no cracks show there
+#define ROUGH 0.35        // thickness over width, squared: between FLATTEST and this the one turns into the other
+#define UNEVEN 2.5        // spacings along and across differ less than this by chance: of random points two in three
+#define UNEVEN_DOUBT 4.0  // 16 neighbours on rows 1 : 5 hold too few of the rows beside: they overrate them
+#define UNEVEN_MOST 13.0  // what a shape word holds
 
-#define FLATTEST 0.1        // thickness over width, squared: what still is a surface
-#define FLATTEST_AFAR 0.2    // from afar: noise of two spacings has 0.1
-#define FACING 0.35          // from afar: a volume's dots lie on its plane
-#define THICKEST 3.0         // spacings: what is thicker is a volume, however flat from afar
-#define SLIMMEST 0.03       // narrowness squared of a line
+#define FLATTEST 0.1          // thickness over width, squared: what still is a surface
+#define FLATTEST_AFAR 0.2     // from afar: noise of two spacings has 0.1
+#define FACING 0.35           // from afar: a volume's dots lie on its plane
+#define THICKEST 3.0          // spacings: what is thicker is a volume, however flat from afar
+#define SLIMMEST 0.03         // narrowness squared of a line
 #define BORDER_GAP -0.8660254 // cosine of 150 degrees without a neighbour: 16 random ones leave them by chance at 0.5 %
-#define BORDER_OFFSET 0.2   // of their mean from the point, in distances of the farthest, where gaps are looked for
+#define BORDER_OFFSET 0.2     // of their mean from the point, in distances of the farthest, where gaps are looked for
 #define HALF_OFFSET (4.0 / (3.0 * PI)) // of half a disc
-#define STRAY_OFFSET 0.5    // of the mean, likewise, to be a stray: what it is far from lies on one side
-#define STRAY_DISTANCE 3.5  // to the second nearest neighbour, in distances of neighbours among each other
-#define ON_PLANE 0.25       // spacings: how near to a plane its points lie
+#define STRAY_OFFSET 0.5               // of the mean, likewise, to be a stray: what it is far from lies on one side
+#define STRAY_DISTANCE 3.5             // to the second nearest neighbour, in distances of neighbours among each other
+#define ON_PLANE 0.25                  // spacings: how near to a plane its points lie
 
 // Half axes at most, in neighbours' distances from each other; where a surface is even only those beyond FAR_MUTUAL are cut down.
 #define MOST_MUTUAL 1.6
@@ -106,7 +106,7 @@ static int is_stray(const struct pt_sample *sample, struct pt_neighbourhood *out
     const uint32_t count = sample->count;
     if (count < 6 || sample->square[2] < 0.36 * sample->square[count - 1])
         return 0;
-    double mean[3] = { 0.0, 0.0, 0.0 };
+    double mean[3] = {0.0, 0.0, 0.0};
     for (uint32_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
             mean[k] += sample->offset[i][k] / count;
@@ -122,14 +122,14 @@ static int is_stray(const struct pt_sample *sample, struct pt_neighbourhood *out
 // ---- on the plane ------------------------------------------------------------------------------------------------------------
 
 struct flat {
-    uint32_t count; // neighbours on the plane, and apart from the point
+    uint32_t count;                                      // neighbours on the plane, and apart from the point
     double u[PT_NEIGHBOURS_MOST], v[PT_NEIGHBOURS_MOST]; // along axis[2] and axis[1] of the plane
     double farthest, mean[2];
 };
 
 static void flatten(const struct pt_sample *sample, const struct pt_plane *plane, struct flat *flat)
 {
-    double most = 0.0, sum[2] = { 0.0, 0.0 };
+    double most = 0.0, sum[2] = {0.0, 0.0};
     flat->count = 0;
     for (uint32_t i = 0; i < sample->count; i++) {
         const double u = dot(plane->axis[2], sample->offset[i]), v = dot(plane->axis[1], sample->offset[i]);
@@ -213,7 +213,7 @@ static double widest_gap(const struct flat *flat, double direction[2])
         if (gap >= widest)
             continue;
         widest = gap;
-        const double m[2] = { x * one + z * two, y * one + w * two }, length = sqrt(m[0] * m[0] + m[1] * m[1]);
+        const double m[2] = {x * one + z * two, y * one + w * two}, length = sqrt(m[0] * m[0] + m[1] * m[1]);
         const double side = turned > 0.0 ? 1.0 : -1.0;
         direction[0] = length > 1e-6 ? side * m[0] / length : -y * one; // opposite: a quarter on
         direction[1] = length > 1e-6 ? side * m[1] / length : x * one;
@@ -228,12 +228,13 @@ static void set_axis(const struct pt_plane *plane, const double direction[2], st
 }
 
 // The footprint ends at the border: across it the ellipse shrinks.
-static void end_at_border(const struct pt_plane *plane, const double major[2], const double gap[2], struct pt_neighbourhood *out)
+static void end_at_border(const struct pt_plane *plane, const double major[2], const double gap[2],
+                          struct pt_neighbourhood *out)
 {
     const double c = gap[0] * major[0] + gap[1] * major[1], s = gap[1] * major[0] - gap[0] * major[1];
     const double across = COVER_BORDER / COVER / sqrt(c * c / (out->major * out->major) + s * s / (out->minor * out->minor));
     const double along = 1.0 / sqrt(s * s / (out->major * out->major) + c * c / (out->minor * out->minor));
-    const double side[2] = { -gap[1], gap[0] };
+    const double side[2] = {-gap[1], gap[0]};
     out->kind = PT_KIND_BORDER;
     out->major = fmax(along, across);
     out->minor = fmin(along, across);
@@ -243,7 +244,7 @@ static void end_at_border(const struct pt_plane *plane, const double major[2], c
 static void be_surface(const struct pt_sample *sample, const struct pt_plane *plane, struct pt_neighbourhood *out)
 {
     struct flat flat;
-    double major[2] = { 1.0, 0.0 }, gap[2] = { 1.0, 0.0 };
+    double major[2] = {1.0, 0.0}, gap[2] = {1.0, 0.0};
     flatten(sample, plane, &flat);
     out->kind = PT_KIND_SURFACE;
     out->has_normal = 1;
@@ -265,13 +266,15 @@ static void be_line(const struct pt_sample *sample, const struct pt_plane *plane
 {
     const double spacing = 2.0 * sqrt(sample->square[sample->count - 1]) / sample->count;
     const double width = 1.5 * sqrt(plane->value[1]);
-    be_dot(PT_KIND_LINE, fmax(COVER_LINE * spacing, width), spacing, 1.0 - sqrt(plane->value[1] / (SLIMMEST * plane->value[2])), out);
+    be_dot(PT_KIND_LINE, fmax(COVER_LINE * spacing, width), spacing, 1.0 - sqrt(plane->value[1] / (SLIMMEST * plane->value[2])),
+           out);
     out->sigma = sqrt(plane->value[0]);
     for (int k = 0; k < 3; k++)
         out->axis[k] = plane->axis[2][k];
 }
 
-static void be_volume(const struct pt_sample *sample, const struct pt_plane *plane, double nearest, struct pt_neighbourhood *out)
+static void be_volume(const struct pt_sample *sample, const struct pt_plane *plane, double nearest,
+                      struct pt_neighbourhood *out)
 {
     const double farthest = sqrt(sample->square[sample->count - 1]);
     const double spacing = farthest * cbrt(4.0 * PI / (3.0 * sample->count));
@@ -285,7 +288,7 @@ static void be_volume(const struct pt_sample *sample, const struct pt_plane *pla
 int pt_neighbourhood_from_afar(const struct pt_sample *sample, const struct pt_plane *plane, double thinning,
                                struct pt_neighbourhood *out)
 {
-    struct pt_neighbourhood surface = { .kind = 0 };
+    struct pt_neighbourhood surface = {.kind = 0};
     if (plane->value[0] >= FACING * plane->value[1] || plane->value[1] <= SLIMMEST * plane->value[2])
         return 0;
     out->has_normal = out->certainty * out->certainty > ROUGH; // not at creases, whose two sides it would lie between
@@ -315,7 +318,7 @@ void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *
 {
     uint32_t distinct;
     const double nearest = nearest_of(sample, &distinct);
-    *out = (struct pt_neighbourhood){ .kind = 0 };
+    *out = (struct pt_neighbourhood){.kind = 0};
     if (!distinct) // alone, or all at one place
         return;
     if (distinct < 3) {
@@ -331,7 +334,8 @@ void pt_neighbourhood_of(const struct pt_sample *sample, const struct pt_plane *
     struct pt_plane other;
     const int doubtful = pt_plane_is_doubtful(plane);
     const double width = sqrt(PI * sample->square[sample->count - 1] / sample->count); // about a spacing
-    if (doubtful && pt_plane_through_most(sample, plane, ON_PLANE * width, &other) && other.value[1] > SLIMMEST * other.value[2])
+    if (doubtful && pt_plane_through_most(sample, plane, ON_PLANE * width, &other) &&
+        other.value[1] > SLIMMEST * other.value[2])
         be_surface(sample, &other, out);
     else if (plane->value[0] < FLATTEST * plane->value[1])
         be_surface(sample, plane, out);

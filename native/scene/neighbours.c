@@ -95,7 +95,7 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         const float *xyz = tree->cloud->positions + 3 * (size_t)chunk->first;
         const uint32_t first = tree->chunk_leaf[c], count = pt_neighbours_of_chunk(tree, c);
         for (uint32_t i = 0; i < count; i++)
-            places[i] = (struct place){ { xyz[i], xyz[chunk->padded + i], xyz[2 * chunk->padded + i] }, chunk->first + i };
+            places[i] = (struct place){{xyz[i], xyz[chunk->padded + i], xyz[2 * chunk->padded + i]}, chunk->first + i};
         split(tree, places, count, first, tree->nodes + 2 * (size_t)first);
         for (uint32_t leaf = first; leaf < tree->chunk_leaf[c + 1]; leaf++)
             tree->leaf_chunk[leaf] = c;
@@ -136,7 +136,7 @@ static int compare_z(const void *a, const void *b) { return compare_axis(a, b, 2
 static void split_chunks(struct pt_neighbours *tree, struct middle *middles, uint32_t count, uint32_t at, double slack,
                          struct pt_chunk_node *node)
 {
-    static int (*const compare[3])(const void *, const void *) = { compare_x, compare_y, compare_z };
+    static int (*const compare[3])(const void *, const void *) = {compare_x, compare_y, compare_z};
     int axis = 0;
     for (int k = 0; k < 3; k++) {
         node->low[k] = INFINITY;
@@ -197,7 +197,7 @@ uint32_t pt_neighbours_of_chunk(const struct pt_neighbours *tree, uint32_t chunk
 int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *cloud, uint32_t strata, struct pt_pool *pool,
                          struct patina_progress *progress, double begin, double end)
 {
-    *tree = (struct pt_neighbours){ .cloud = cloud, .chunk_count = cloud->chunk_count, .strata = strata, .level = best_level() };
+    *tree = (struct pt_neighbours){.cloud = cloud, .chunk_count = cloud->chunk_count, .strata = strata, .level = best_level()};
     int error = PATINA_ERROR_MEMORY;
     tree->chunk_leaf = malloc((cloud->chunk_count + 1) * sizeof *tree->chunk_leaf);
     if (!tree->chunk_leaf)
@@ -218,7 +218,7 @@ int pt_neighbours_create(struct pt_neighbours *tree, const struct patina_cloud *
     if (tree->places && tree->slots && tree->leaf_chunk && tree->nodes && tree->chunk_nodes && tree->chunk_order)
         error = build_chunk_nodes(tree);
     if (!error) {
-        struct fill fill = { .tree = tree, .progress = progress, .begin = begin, .end = end };
+        struct fill fill = {.tree = tree, .progress = progress, .begin = begin, .end = end};
         pt_parallel(pool, tree->chunk_count, 1, fill_chunks, &fill);
         error = pt_progress_cancelled(progress) ? PATINA_ERROR_CANCELLED : PATINA_OK;
     }
@@ -236,5 +236,5 @@ void pt_neighbours_destroy(struct pt_neighbours *tree)
     free(tree->chunk_leaf);
     free(tree->chunk_nodes);
     free(tree->chunk_order);
-    *tree = (struct pt_neighbours){ 0 };
+    *tree = (struct pt_neighbours){0};
 }

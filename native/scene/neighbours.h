@@ -21,21 +21,21 @@ struct pt_chunk_node { // over chunks, in the cloud's frame; widened by what its
 struct pt_neighbours {
     const struct patina_cloud *cloud;
     uint32_t leaf_count, chunk_count, strata; // strata: PT_STRATA, or fewer: of each chunk's first alone
-    float *places;         // a leaf: x[16], y[16], z[16], relative to the chunk's origin; +inf where there is no point
-    uint32_t *slots;       // of leaf * 16 + lane
-    uint32_t *leaf_chunk;  // chunk of each leaf
-    uint32_t *chunk_leaf;  // first leaf of each chunk, and one past the last
+    float *places;             // a leaf: x[16], y[16], z[16], relative to the chunk's origin; +inf where there is no point
+    uint32_t *slots;           // of leaf * 16 + lane
+    uint32_t *leaf_chunk;      // chunk of each leaf
+    uint32_t *chunk_leaf;      // first leaf of each chunk, and one past the last
     struct pt_box_node *nodes; // a chunk of n leaves has 2 n - 1 from 2 first leaves on, in preorder: left half, right half
     struct pt_chunk_node *chunk_nodes; // 2 chunks - 1, in preorder
-    uint32_t *chunk_order; // of the leaves of that tree
-    double origin[3];      // of the cloud's frame
-    int level;             // of instructions: 0 plain, 1 AVX2, 2 AVX-512. Never changes a result
+    uint32_t *chunk_order;             // of the leaves of that tree
+    double origin[3];                  // of the cloud's frame
+    int level;                         // of instructions: 0 plain, 1 AVX2, 2 AVX-512. Never changes a result
 };
 
 // What the points of one leaf have found. Nearest first, equal distances by the caller's number; the point itself is not
 // among them, its duplicates are.
 struct pt_found {
-    double square[PT_LEAF][PT_NEIGHBOURS_MOST]; // of the distance; infinite where the cloud has no more points
+    double square[PT_LEAF][PT_NEIGHBOURS_MOST];  // of the distance; infinite where the cloud has no more points
     uint32_t place[PT_LEAF][PT_NEIGHBOURS_MOST]; // leaf * 16 + lane
     uint32_t count[PT_LEAF];
 };

@@ -12,9 +12,9 @@
 #endif
 
 struct walk {
-    _Alignas(64) double place[3][PT_LEAF]; // of the lanes, in the frame that is walked
-    _Alignas(64) double worst[PT_LEAF];    // square of the distance to the k-th found; negative: a lane that does not look
-    double middle[3];                      // of them: what is nearest to it is walked first
+    _Alignas(64) double place[3][PT_LEAF];   // of the lanes, in the frame that is walked
+    _Alignas(64) double worst[PT_LEAF];      // square of the distance to the k-th found; negative: a lane that does not look
+    double middle[3];                        // of them: what is nearest to it is walked first
     const struct pt_neighbours *tree, *from; // that is walked, that the lanes are of
     struct pt_found *found;
     uint32_t leaf, k, frame; // frame: a chunk, or one of these two
@@ -64,10 +64,7 @@ static void enter_cloud(struct walk *walk)
         set_frame(walk, walk->tree->origin, FRAME_OF_CLOUD);
 }
 
-static uint32_t number(const struct walk *walk, uint32_t place)
-{
-    return walk->tree->cloud->order[walk->tree->slots[place]];
-}
+static uint32_t number(const struct walk *walk, uint32_t place) { return walk->tree->cloud->order[walk->tree->slots[place]]; }
 
 // ---- a lane's sorted list --------------------------------------------------------------------------------------------------
 
@@ -89,11 +86,12 @@ static inline void take_each(struct walk *walk, uint32_t lane, const double squa
     for (; near; near &= near - 1) {
         const uint32_t other = (uint32_t)__builtin_ctz(near), place = first + other;
         const double x = square[other];
-        if (count == walk->k && (x > squares[count - 1] ||
-                                 (x == squares[count - 1] && number(walk, place) > number(walk, places[count - 1]))))
+        if (count == walk->k &&
+            (x > squares[count - 1] || (x == squares[count - 1] && number(walk, place) > number(walk, places[count - 1]))))
             continue;
         uint32_t at = count < walk->k ? count++ : count - 1;
-        while (at > 0 && (squares[at - 1] > x || (squares[at - 1] == x && number(walk, places[at - 1]) > number(walk, place)))) {
+        while (at > 0 &&
+               (squares[at - 1] > x || (squares[at - 1] == x && number(walk, places[at - 1]) > number(walk, place)))) {
             squares[at] = squares[at - 1];
             places[at] = places[at - 1];
             at--;
@@ -160,7 +158,8 @@ TARGET static inline uint32_t near_box_avx2(const struct walk *walk, const doubl
         __m256d square = _mm256_setzero_pd();
         for (int k = 0; k < 3; k++) {
             const __m256d p = _mm256_load_pd(&walk->place[k][i]);
-            const __m256d most = _mm256_max_pd(_mm256_sub_pd(_mm256_set1_pd(low[k]), p), _mm256_sub_pd(p, _mm256_set1_pd(high[k])));
+            const __m256d most = _mm256_max_pd(_mm256_sub_pd(_mm256_set1_pd(low[k]), p),
+                                               _mm256_sub_pd(p, _mm256_set1_pd(high[k])));
             const __m256d out = _mm256_max_pd(most, _mm256_setzero_pd());
             square = _mm256_add_pd(square, _mm256_mul_pd(out, out));
         }
@@ -183,7 +182,8 @@ TARGET static inline uint32_t near_points_avx2(const float *xyz, const double pl
     return lanes;
 }
 
-TARGET static inline void take_avx2(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first)
+TARGET static inline void take_avx2(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near,
+                                    uint32_t first)
 {
     take_each(walk, lane, square, near, first);
 }
@@ -203,7 +203,8 @@ TARGET static inline uint32_t near_box_avx512(const struct walk *walk, const dou
         __m512d square = _mm512_setzero_pd();
         for (int k = 0; k < 3; k++) {
             const __m512d p = _mm512_load_pd(&walk->place[k][i]);
-            const __m512d most = _mm512_max_pd(_mm512_sub_pd(_mm512_set1_pd(low[k]), p), _mm512_sub_pd(p, _mm512_set1_pd(high[k])));
+            const __m512d most = _mm512_max_pd(_mm512_sub_pd(_mm512_set1_pd(low[k]), p),
+                                               _mm512_sub_pd(p, _mm512_set1_pd(high[k])));
             const __m512d out = _mm512_max_pd(most, _mm512_setzero_pd());
             square = _mm512_add_pd(square, _mm512_mul_pd(out, out));
         }
@@ -228,8 +229,9 @@ TARGET static inline uint32_t near_points_avx512(const float *xyz, const double 
 
 // The list in registers, `rounds` of 8: what is nearer stays, the rest moves up by one, and the greatest of what moved there
 // and the new one is right for every place. Equal distances go the slow way.
-TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk *walk, uint32_t lane, const double square[PT_LEAF],
-                                                                     uint32_t near, uint32_t first, const uint32_t rounds)
+TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk *walk, uint32_t lane,
+                                                                     const double square[PT_LEAF], uint32_t near,
+                                                                     uint32_t first, const uint32_t rounds)
 {
     double *squares = walk->found->square[lane];
     uint32_t *places = walk->found->place[lane], count = walk->found->count[lane];
@@ -261,7 +263,8 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
         const __m256i place = _mm256_set1_epi32((int)(first + other));
         for (uint32_t i = rounds; i-- > 0;) {
             const __m512d below = i ? d[i - 1] : x;
-            const __m512d moved = _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(d[i]), _mm512_castpd_si512(below), 7));
+            const __m512d moved = _mm512_castsi512_pd(
+                _mm512_alignr_epi64(_mm512_castpd_si512(d[i]), _mm512_castpd_si512(below), 7));
             const __m256i moved_place = _mm256_alignr_epi32(p[i], i ? p[i - 1] : place, 7);
             const __mmask8 carried = i ? nearer[i - 1] >> 7 : 1, at = (__mmask8)((nearer[i] << 1 | carried) & ~nearer[i]);
             d[i] = _mm512_mask_blend_pd(nearer[i], _mm512_max_pd(moved, x), d[i]);
@@ -277,7 +280,8 @@ TARGET static inline __attribute__((always_inline)) void take_rounds(struct walk
     walk->worst[lane] = count > last ? squares[last] : INFINITY;
 }
 
-TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first)
+TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near,
+                                      uint32_t first)
 {
     if (walk->k <= 8)
         take_rounds(walk, lane, square, near, first, 1);
@@ -297,7 +301,7 @@ TARGET static inline void take_avx512(struct walk *walk, uint32_t lane, const do
 void pt_neighbours_find(const struct pt_neighbours *tree, const struct pt_neighbours *from, uint32_t leaf, uint32_t lanes,
                         uint32_t k, struct pt_found *found)
 {
-    struct walk walk = { .tree = tree, .from = from, .found = found, .leaf = leaf, .k = k, .frame = NO_FRAME };
+    struct walk walk = {.tree = tree, .from = from, .found = found, .leaf = leaf, .k = k, .frame = NO_FRAME};
     for (int i = 0; i < PT_LEAF; i++)
         walk.worst[i] = -1.0;
     for (uint32_t left = lanes; left; left &= left - 1)

@@ -8,7 +8,8 @@ TARGET static inline uint32_t LEVEL(near_box)(const struct walk *walk, const dou
 TARGET static inline uint32_t LEVEL(near_points)(const float *xyz, const double place[3], double worst, double square[PT_LEAF]);
 
 // Takes those that `near` marks into the lane's list.
-TARGET static inline void LEVEL(take)(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near, uint32_t first);
+TARGET static inline void LEVEL(take)(struct walk *walk, uint32_t lane, const double square[PT_LEAF], uint32_t near,
+                                      uint32_t first);
 
 TARGET static void LEVEL(walk_leaf)(struct walk *walk, uint32_t leaf, uint32_t lanes)
 {
@@ -18,7 +19,7 @@ TARGET static void LEVEL(walk_leaf)(struct walk *walk, uint32_t leaf, uint32_t l
     const uint32_t held = pt_leaf_lanes(tree, leaf);
     for (; lanes; lanes &= lanes - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(lanes);
-        const double place[3] = { walk->place[0][lane], walk->place[1][lane], walk->place[2][lane] };
+        const double place[3] = {walk->place[0][lane], walk->place[1][lane], walk->place[2][lane]};
         uint32_t near = LEVEL(near_points)(xyz, place, walk->worst[lane], square);
         if (leaf == walk->leaf && tree == walk->from)
             near &= ~(1u << lane);
@@ -32,7 +33,7 @@ TARGET static void LEVEL(walk_chunk)(struct walk *walk, uint32_t chunk)
 {
     struct {
         uint32_t node, leaf, leaves;
-    } stack[32], at = { 0, 0, walk->tree->chunk_leaf[chunk + 1] - walk->tree->chunk_leaf[chunk] };
+    } stack[32], at = {0, 0, walk->tree->chunk_leaf[chunk + 1] - walk->tree->chunk_leaf[chunk]};
     const uint32_t first = walk->tree->chunk_leaf[chunk];
     const struct pt_box_node *nodes = walk->tree->nodes + 2 * (size_t)first;
     uint32_t depth = 0;
@@ -40,8 +41,8 @@ TARGET static void LEVEL(walk_chunk)(struct walk *walk, uint32_t chunk)
     for (;; at = stack[--depth]) {
         for (;;) {
             const struct pt_box_node *node = &nodes[at.node];
-            const double low[3] = { (double)node->low[0], (double)node->low[1], (double)node->low[2] };
-            const double high[3] = { (double)node->high[0], (double)node->high[1], (double)node->high[2] };
+            const double low[3] = {(double)node->low[0], (double)node->low[1], (double)node->low[2]};
+            const double high[3] = {(double)node->high[0], (double)node->high[1], (double)node->high[2]};
             const uint32_t lanes = LEVEL(near_box)(walk, low, high);
             if (!lanes)
                 break;
@@ -80,7 +81,7 @@ TARGET static void LEVEL(walk_cloud)(struct walk *walk)
 {
     struct {
         uint32_t node, chunk, chunks;
-    } stack[48], at = { 0, 0, walk->tree->chunk_count };
+    } stack[48], at = {0, 0, walk->tree->chunk_count};
     const struct pt_chunk_node *nodes = walk->tree->chunk_nodes;
     uint32_t depth = 0;
     LEVEL(walk_chunk)(walk, walk->from->leaf_chunk[walk->leaf]); // its own first: most lanes then need no other

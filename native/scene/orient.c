@@ -13,18 +13,18 @@
 #include <string.h>
 
 enum { AXES = 32, GRID = 2048, NEIGHBOURS = 16, ROUNDS = 3 };
-#define TEXEL 2.5f      // spacings of the 90th percentile of chunks: one in 500 texels of a random surface is empty
-#define STEEPEST 0.3f   // |n . axis| below: says little, and lies too deep in its texel
-#define BEHIND 0.5f     // texels behind the first: and 1.5 times the tilt
-#define VOTE 32.0f      // of a view from straight ahead
-#define FEW 96          // of 500 that a convex shape's point gets
+#define TEXEL 2.5f    // spacings of the 90th percentile of chunks: one in 500 texels of a random surface is empty
+#define STEEPEST 0.3f // |n . axis| below: says little, and lies too deep in its texel
+#define BEHIND 0.5f   // texels behind the first: and 1.5 times the tilt
+#define VOTE 32.0f    // of a view from straight ahead
+#define FEW 96        // of 500 that a convex shape's point gets
 
 struct orient {
     const struct pt_neighbours *tree;
     const struct pt_chunk *chunks;
     uint32_t *surface, *shapes;
     const uint32_t *told;
-    int16_t *votes, *next; // of the normal as it is: positive stays
+    int16_t *votes, *next;          // of the normal as it is: positive stays
     _Atomic uint32_t *front, *back; // greatest and least depth of a texel, as float bits
     float axis[3][3];               // of the grid: u, v, depth
     double low[3];                  // of the grid, along them
@@ -70,12 +70,12 @@ static int measure(struct orient *orient)
             for (uint32_t c = 0; c < count; c++) {
                 const struct pt_chunk *chunk = &orient->chunks[c];
                 const double edge = (double)(high ? chunk->box_max[k] : chunk->box_min[k]);
-                list[c] = (struct weighed){ chunk->origin[k] + edge, chunk->count };
+                list[c] = (struct weighed){chunk->origin[k] + edge, chunk->count};
             }
             *(high ? &orient->box_high[k] : &orient->box_low[k]) = quantile(list, count, high ? 0.995 : 0.005);
         }
     for (uint32_t c = 0; c < count; c++)
-        list[c] = (struct weighed){ (double)orient->chunks[c].spacing, orient->chunks[c].count };
+        list[c] = (struct weighed){(double)orient->chunks[c].spacing, orient->chunks[c].count};
     orient->texel = TEXEL * (float)quantile(list, count, 0.9);
     free(list);
     return PATINA_OK;
@@ -89,7 +89,7 @@ static void set_axes(struct orient *orient, int i, double turn[2])
     turn[0] = c * turn[0] - s * turn[1];
     turn[1] = s * t + c * turn[1];
     const double q = -1.0 / (1.0 + z), b = x * y * q;
-    const double axes[3][3] = { { 1.0 + x * x * q, b, -x }, { b, 1.0 + y * y * q, -y }, { x, y, z } };
+    const double axes[3][3] = {{1.0 + x * x * q, b, -x}, {b, 1.0 + y * y * q, -y}, {x, y, z}};
     double high[3];
     for (int a = 0; a < 3; a++) {
         orient->low[a] = high[a] = 0.0;
@@ -106,7 +106,8 @@ static void set_axes(struct orient *orient, int i, double turn[2])
     orient->height = (uint32_t)((float)(high[1] - orient->low[1]) / orient->texel) + 1;
     orient->width = orient->width < GRID ? orient->width : GRID;
     orient->height = orient->height < GRID ? orient->height : GRID;
-    orient->low[2] -= 2.0 * (high[2] - orient->low[2]) + (double)orient->texel; // depths above 0, for strays too or they are left out
+    orient->low[2] -= 2.0 * (high[2] - orient->low[2]) +
+                      (double)orient->texel; // depths above 0, for strays too or they are left out
 }
 
 struct projected {
@@ -117,7 +118,7 @@ struct projected {
 static void project(const struct orient *orient, const struct pt_chunk *chunk, struct projected *out)
 {
     const float *x = orient->tree->cloud->positions + 3 * (size_t)chunk->first, *y = x + chunk->padded, *z = y + chunk->padded;
-    float *const to[3] = { out->u, out->v, out->depth };
+    float *const to[3] = {out->u, out->v, out->depth};
     for (int a = 0; a < 3; a++) {
         const float ax = orient->axis[a][0], ay = orient->axis[a][1], az = orient->axis[a][2];
         double place = -orient->low[a];
@@ -148,7 +149,8 @@ static void face(const struct orient *orient, const struct pt_chunk *chunk, stru
 // The point's texel; 0 when it has none.
 static int texel_of(const struct orient *orient, const struct projected *p, uint32_t i, size_t *texel)
 {
-    if (!(p->u[i] >= 0.0f && p->v[i] >= 0.0f && p->u[i] < (float)orient->width && p->v[i] < (float)orient->height && p->depth[i] > 0.0f))
+    if (!(p->u[i] >= 0.0f && p->v[i] >= 0.0f && p->u[i] < (float)orient->width && p->v[i] < (float)orient->height &&
+          p->depth[i] > 0.0f))
         return 0;
     *texel = (size_t)(uint32_t)p->v[i] * GRID + (uint32_t)p->u[i];
     return 1;
@@ -169,10 +171,12 @@ static void scatter(void *context, uint32_t begin, uint32_t end, uint32_t thread
                 continue;
             memcpy(&depth, &p.depth[i], 4); // positive: bits go as values
             seen = atomic_load_explicit(&orient->front[at], memory_order_relaxed);
-            while (depth > seen && !atomic_compare_exchange_weak_explicit(&orient->front[at], &seen, depth, memory_order_relaxed, memory_order_relaxed))
+            while (depth > seen && !atomic_compare_exchange_weak_explicit(&orient->front[at], &seen, depth,
+                                                                          memory_order_relaxed, memory_order_relaxed))
                 ;
             seen = atomic_load_explicit(&orient->back[at], memory_order_relaxed);
-            while (depth < seen && !atomic_compare_exchange_weak_explicit(&orient->back[at], &seen, depth, memory_order_relaxed, memory_order_relaxed))
+            while (depth < seen && !atomic_compare_exchange_weak_explicit(&orient->back[at], &seen, depth, memory_order_relaxed,
+                                                                          memory_order_relaxed))
                 ;
         }
     }
@@ -223,7 +227,8 @@ static void share_votes(void *context, uint32_t begin, uint32_t end, uint32_t th
         for (uint32_t left = pt_leaf_lanes(tree, leaf); left; left &= left - 1) {
             const uint32_t lane = (uint32_t)__builtin_ctz(left), slot = tree->slots[leaf * PT_LEAF + lane];
             orient->next[slot] = orient->votes[slot];
-            few |= (uint32_t)(abs(orient->votes[slot]) < FEW && (orient->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE) << lane;
+            few |= (uint32_t)(abs(orient->votes[slot]) < FEW && (orient->surface[slot] & PT_NORMAL_BITS) != PT_NORMAL_NONE)
+                   << lane;
         }
         if (few)
             pt_neighbours_find(tree, tree, leaf, few, NEIGHBOURS, &found);
@@ -278,7 +283,7 @@ static void turn_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 static int run(struct orient *orient, struct pt_pool *pool, struct patina_progress *progress, double begin, double end)
 {
     const uint32_t count = orient->tree->chunk_count;
-    double at[2] = { 1.0, 0.0 };
+    double at[2] = {1.0, 0.0};
     int error = measure(orient);
     for (int i = 0; i < AXES && !error; i++) {
         set_axes(orient, i, at);
@@ -305,12 +310,12 @@ int pt_orient(const struct pt_neighbours *tree, const struct pt_chunk *chunks, c
               uint32_t *shapes, struct pt_pool *pool, struct patina_progress *progress, double begin, double end)
 {
     const size_t votes = tree->cloud->slots * sizeof(int16_t), grid = (size_t)GRID * GRID * 4;
-    struct orient orient = { .tree = tree, .chunks = chunks, .told = told, .surface = surface, .shapes = shapes };
+    struct orient orient = {.tree = tree, .chunks = chunks, .told = told, .surface = surface, .shapes = shapes};
     orient.votes = pt_pages_alloc(votes);
     orient.next = pt_pages_alloc(votes);
     orient.front = pt_pages_alloc(grid);
     orient.back = pt_pages_alloc(grid);
-    int16_t *const both[2] = { orient.votes, orient.next };
+    int16_t *const both[2] = {orient.votes, orient.next};
     int error = PATINA_ERROR_MEMORY;
     if (orient.votes && orient.next && orient.front && orient.back)
         error = run(&orient, pool, progress, begin, end);

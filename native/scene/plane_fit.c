@@ -11,9 +11,10 @@
 #define BENT 7e-4     // a quadric may explain it: at less, sigma is below a thirtieth of the spacing
 #define TIGHT 0.4     // RMS in parts of a slab's half thickness; of points spread over it, 0.58
 #define TIGHTER 0.1   // nobody's noise: two in five are enough then
-#define APART 1.1     // of the neighbours' mean spacing: sheets of one surface lie nearer; from about 0.9 of their own on they are two
-#define SHEET 0.3     // spread of their distances from the plane in parts of the mean: at a crease 0.58
-#define LINEAR 0.1    // narrowness squared: 16 neighbours on one row of a scan
+#define APART                                                                                                                  \
+    1.1 // of the neighbours' mean spacing: sheets of one surface lie nearer; from about 0.9 of their own on they are two
+#define SHEET 0.3  // spread of their distances from the plane in parts of the mean: at a crease 0.58
+#define LINEAR 0.1 // narrowness squared: 16 neighbours on one row of a scan
 
 static void rotate(double a[3][3], double v[3][3], int p, int q)
 {
@@ -66,9 +67,11 @@ static void solve_symmetric(double a[3][3], double value[3], double v[3][3])
 
 void pt_plane_fit(const struct pt_sample *sample, uint64_t inside, struct pt_plane *plane)
 {
-    double sum[3] = { 0.0, 0.0, 0.0 }, a[3][3] = { { 0.0 } };
-    *plane = (struct pt_plane){ .inside = inside, .count = 1 };
-    const double scale = sample->count && sample->square[sample->count - 1] > 0.0 ? 1.0 / sqrt(sample->square[sample->count - 1]) : 1.0;
+    double sum[3] = {0.0, 0.0, 0.0}, a[3][3] = {{0.0}};
+    *plane = (struct pt_plane){.inside = inside, .count = 1};
+    const double scale = sample->count && sample->square[sample->count - 1] > 0.0
+                             ? 1.0 / sqrt(sample->square[sample->count - 1])
+                             : 1.0;
     for (uint32_t i = 0; i < sample->count; i++) {
         if (!(inside >> i & 1u))
             continue;
@@ -127,7 +130,7 @@ int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane 
     for (uint32_t i = 0; i < TRIED && i < sample->count; i++)
         for (uint32_t j = 0; j < i; j++) {
             const double *a = sample->offset[i], *b = sample->offset[j];
-            double n[3] = { a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0] };
+            double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
             const double square = along(n, n);
             if (!(square > 0.1 * sample->square[i] * sample->square[j]))
                 continue; // too slim a triangle
@@ -160,14 +163,14 @@ int pt_plane_through_most(const struct pt_sample *sample, const struct pt_plane 
 // squares of what is left, or a negative number where they do not determine it.
 static double quadric_residual(const struct pt_sample *sample, const struct pt_plane *plane, double scale)
 {
-    double m[6][7] = { { 0.0 } }, squares = 0.0;
+    double m[6][7] = {{0.0}}, squares = 0.0;
     for (uint32_t i = 0; i <= sample->count; i++) {
         static const double none[3];
         const double *o = i < sample->count ? sample->offset[i] : none; // the point itself last
         if (i < sample->count && !(plane->inside >> i & 1u))
             continue;
         const double x = along(plane->axis[2], o) * scale, y = along(plane->axis[1], o) * scale;
-        const double z = along(plane->axis[0], o) * scale, basis[7] = { 1.0, x, y, x * x, x * y, y * y, z };
+        const double z = along(plane->axis[0], o) * scale, basis[7] = {1.0, x, y, x * x, x * y, y * y, z};
         for (int r = 0; r < 6; r++)
             for (int c = r; c < 7; c++)
                 m[r][c] += basis[r] * basis[c];

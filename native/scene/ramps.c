@@ -12,19 +12,19 @@ static const struct {
     const char *name;
     uint32_t count, stops[MOST_STOPS]; // 0xRRGGBB
 } ramps[] = {
-    { "grey", 2, { 0x000000, 0xFFFFFF } },
-    { "viridis", 9, { 0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30, 0xFDE725 } },
-    { "heat", 6, { 0x08030C, 0x5A1235, 0xB3303A, 0xEE6A24, 0xFBC04A, 0xFFFBE8 } },
-    { "spectrum", 7, { 0x30307C, 0x2D6FD2, 0x22B4B8, 0x4CC45A, 0xC8D23C, 0xF0902C, 0xA81E1E } },
-    { "relief", 7, { 0x1E4E5C, 0x3F8F5F, 0x8DBB62, 0xE3D68A, 0xBE8E56, 0x8A6A58, 0xF4F2F0 } },
-    { "diverging", 5, { 0x2C4C9C, 0x8FB0DC, 0xEFEDEA, 0xE29A7C, 0x9C2430 } },
+    {"grey", 2, {0x000000, 0xFFFFFF}},
+    {"viridis", 9, {0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30, 0xFDE725}},
+    {"heat", 6, {0x08030C, 0x5A1235, 0xB3303A, 0xEE6A24, 0xFBC04A, 0xFFFBE8}},
+    {"spectrum", 7, {0x30307C, 0x2D6FD2, 0x22B4B8, 0x4CC45A, 0xC8D23C, 0xF0902C, 0xA81E1E}},
+    {"relief", 7, {0x1E4E5C, 0x3F8F5F, 0x8DBB62, 0xE3D68A, 0xBE8E56, 0x8A6A58, 0xF4F2F0}},
+    {"diverging", 5, {0x2C4C9C, 0x8FB0DC, 0xEFEDEA, 0xE29A7C, 0x9C2430}},
 };
 
 // By LAS class, from 0 on: never classified, unassigned, ground, low, medium and high vegetation, building, low point, key
 // point, water, rail, road, overlap, wire guard and conductor, tower, connector, bridge, high noise.
-static const uint32_t classes[CLASSES] = { 0x8C8C8C, 0xB4B4B4, 0xA9794A, 0xB5D77C, 0x6DB24C, 0x2C7A36, 0xD9663B,
-                                           0xD23CC8, 0xE8C890, 0x3C78D2, 0x6E5A78, 0x5A5F66, 0x9C9CC8, 0xE6C83C,
-                                           0xF0A01E, 0x96503C, 0xC8A03C, 0xA08C78, 0xFF3C96 };
+static const uint32_t classes[CLASSES] = {0x8C8C8C, 0xB4B4B4, 0xA9794A, 0xB5D77C, 0x6DB24C, 0x2C7A36, 0xD9663B,
+                                          0xD23CC8, 0xE8C890, 0x3C78D2, 0x6E5A78, 0x5A5F66, 0x9C9CC8, 0xE6C83C,
+                                          0xF0A01E, 0x96503C, 0xC8A03C, 0xA08C78, 0xFF3C96};
 
 static float linear(double srgb) { return (float)pt_linear_of_srgb(srgb); }
 
@@ -66,6 +66,6 @@ int patina_ramp(const char *name, float colors[PATINA_MAX_RAMP][3])
         }
         return PATINA_OK;
     }
-    return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "there is no ramp '%s'; there are grey, viridis, heat, spectrum, relief, diverging, classes",
-                   name);
+    return pt_fail(NULL, PATINA_ERROR_ARGUMENT,
+                   "there is no ramp '%s'; there are grey, viridis, heat, spectrum, relief, diverging, classes", name);
 }

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double identity[16] = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
+static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
 static int fail(const patina_scene *scene, const char *what)
 {
@@ -42,7 +42,7 @@ int patina_scene_create(patina_scene **out)
     if (!scene)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "a scene: out of memory");
     pt_handle_init(&scene->handle);
-    const patina_settings defaults = { .struct_size = sizeof defaults };
+    const patina_settings defaults = {.struct_size = sizeof defaults};
     patina_scene_set_effects(scene, NULL);
     return patina_scene_set_settings(scene, &defaults);
 }
@@ -152,11 +152,13 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style, cons
                        (uint32_t)PT_SOFT_SHELLS);
     if (!(style->soft_radius >= 0.0f) || !isfinite(style->soft_radius))
         return fail(scene, "cloud style: soft_radius must be 0 or more");
-    if (!(style->soft_opacity >= 0.0f && style->soft_opacity <= 1.0f) || !(style->soft_modulation >= 0.0f && style->soft_modulation <= 1.0f))
+    if (!(style->soft_opacity >= 0.0f && style->soft_opacity <= 1.0f) ||
+        !(style->soft_modulation >= 0.0f && style->soft_modulation <= 1.0f))
         return fail(scene, "cloud style: soft_opacity and soft_modulation must be within 0 and 1");
     if (!(style->soft_threshold >= 0.0f && style->soft_threshold <= 1.0f))
         return fail(scene, "cloud style: soft_threshold must be within 0 and 1");
-    if (style->field ? style->field->handle.magic != PT_MAGIC || style->field->of != cloud->alive : style->soft == PATINA_SOFT_FIELD)
+    if (style->field ? style->field->handle.magic != PT_MAGIC || style->field->of != cloud->alive
+                     : style->soft == PATINA_SOFT_FIELD)
         return fail(scene, "cloud style: the field is missing, destroyed, or of another cloud");
     style->soft_opacity = style->soft_opacity == 0.0f ? 0.5f : style->soft_opacity;
     if (!style->soft)
@@ -164,8 +166,10 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style, cons
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         const patina_cloud_style *other = &scene->instances[i].style;
         if (other->soft && (other->soft_model != style->soft_model || other->soft_shells != style->soft_shells))
-            return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT,
-                           "cloud style: soft clouds of a scene are drawn together, and instance %u has another soft_model or soft_shells", i);
+            return pt_fail(
+                &scene->handle, PATINA_ERROR_ARGUMENT,
+                "cloud style: soft clouds of a scene are drawn together, and instance %u has another soft_model or soft_shells",
+                i);
     }
     if (style->soft == PATINA_SOFT_ALL)
         style->shadow_off = PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE;
@@ -183,12 +187,11 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
         return fail(scene, "cloud style: transparency must be within 0 and 1");
     if (style->lighting > PATINA_LIGHTING_LIT)
         return fail(scene, "cloud style: no such lighting");
-    if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) ||
-        !isfinite(style->ambient + style->diffuse + style->specular))
+    if (!isfinite(c[0]) || !isfinite(c[1]) || !isfinite(c[2]) || !isfinite(style->ambient + style->diffuse + style->specular))
         return fail(scene, "cloud style: colour and Phong factors must be finite");
     if (style->lighting == PATINA_LIGHTING_AUTO)
         style->lighting = cloud->info.has_colors && style->color_source == PATINA_COLOR_OWN ? PATINA_LIGHTING_UNLIT
-                                                                                           : PATINA_LIGHTING_LIT;
+                                                                                            : PATINA_LIGHTING_LIT;
     if (style->exact > 1)
         return fail(scene, "cloud style: exact is 0 or 1");
     if (!style->exact)
@@ -235,8 +238,8 @@ int patina_scene_add_cloud(patina_scene *scene, const patina_cloud *cloud, const
     if (copy_ramp(&checked))
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for the ramp of instance %u",
                        scene->instance_count);
-    scene->instances[scene->instance_count++] =
-        (struct pt_instance){ .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points };
+    scene->instances[scene->instance_count++] = (struct pt_instance){
+        .cloud = cloud, .style = checked, .id_base = (uint32_t)scene->points};
     scene->points += cloud->slots;
     scene->given += cloud->info.count;
     return PATINA_OK;
@@ -256,7 +259,8 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
         return fail(scene, "mesh style: colour must be finite");
     if (checked.shadow_off & ~(uint32_t)(PATINA_SHADOW_NO_CAST | PATINA_SHADOW_NO_RECEIVE))
         return fail(scene, "mesh style: shadow_off has unknown bits");
-    if (checked.unlit > 1 || checked.alpha > PATINA_ALPHA_BLEND || !(checked.alpha_least >= 0.0f && checked.alpha_least <= 1.0f))
+    if (checked.unlit > 1 || checked.alpha > PATINA_ALPHA_BLEND ||
+        !(checked.alpha_least >= 0.0f && checked.alpha_least <= 1.0f))
         return fail(scene, "mesh style: unlit is 0 or 1, alpha is a patina_alpha, alpha_least within 0..1");
     if (checked.texture && checked.texture->handle.magic != PT_MAGIC)
         return fail(scene, "mesh style: texture was destroyed");
@@ -276,7 +280,7 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
     if (!grown)
         return pt_fail(&scene->handle, PATINA_ERROR_MEMORY, "scene: out of memory for mesh %u", scene->mesh_count);
     scene->meshes = grown;
-    scene->meshes[scene->mesh_count++] = (struct pt_mesh_instance){ .mesh = mesh, .style = checked };
+    scene->meshes[scene->mesh_count++] = (struct pt_mesh_instance){.mesh = mesh, .style = checked};
     scene->triangles += mesh->info.triangle_count;
     return PATINA_OK;
 }
@@ -435,7 +439,8 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
     if (s.average > 1)
         return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: average %u is none of 0 and 1", s.average);
     if (s.pixel_samples > 4096)
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u samples a pixel; the most is 4096", s.pixel_samples);
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "settings: %u samples a pixel; the most is 4096",
+                       s.pixel_samples);
     if (!(s.pixel_noise >= 0.0f) || !isfinite(s.pixel_noise) || s.pixel_progressive > 1)
         return fail(scene, "settings: pixel_noise is negative or not finite, or pixel_progressive not 0 or 1");
     s.pixel_samples = s.pixel_samples ? s.pixel_samples : s.pixel_noise > 0.0f ? 256 : 1;
@@ -461,7 +466,8 @@ int patina_scene_set_lines(patina_scene *scene, const patina_lines *lines)
     if (l.world && l.width == 0.0f)
         return fail(scene, "lines: a width in world units must be above 0");
     if (!l.world && l.width > PT_LINE_MOST)
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "lines: %g pixels wide; the most is %d", (double)l.width, PT_LINE_MOST);
+        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "lines: %g pixels wide; the most is %d", (double)l.width,
+                       PT_LINE_MOST);
     if (!(l.transparency >= 0.0f && l.transparency <= 1.0f) || !(l.soft >= 0.0f && l.soft <= 1.0f))
         return fail(scene, "lines: transparency and soft must be between 0 and 1");
     if (l.exact > 1 || l.source > PATINA_LINE_DEPTH || l.surface > PATINA_LINE_SURFACE_NONE)

@@ -50,7 +50,7 @@ static inline uint32_t pt_finer(const struct patina_scene *scene) { return scene
 // Small 3 x 3 algebra in float64, row-major.
 double pt_determinant(const double m[9]);
 void pt_cofactors(const double m[9], double out[9]); // inverse transposed = cofactors / determinant
-double pt_invert(const double m[9], double out[9]); // returns the determinant; out is anything where that is 0
+double pt_invert(const double m[9], double out[9]);  // returns the determinant; out is anything where that is 0
 void pt_multiply(const double a[9], const double b[9], double out[9]);
 static inline double pt_dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 static inline void pt_apply(const double m[9], const double v[3], double out[3])

@@ -127,9 +127,9 @@ int pt_sights_good(const struct pt_sights *sights)
     for (uint32_t i = 0; i < sights->room && good; i++) {
         const struct pt_sight *sight = &sights->each[i];
         const uint64_t end = sight->first + (uint64_t)FACES * sight->across * sight->across;
-        good = i >= sights->count || (sight->across && sight->across <= PT_SIGHT_MOST && end <= sights->bytes / 2 &&
-               isfinite(sight->share) && sight->base <= 0xE0000000u &&
-               isfinite(sight->place[0] + sight->place[1] + sight->place[2]));
+        good = i >= sights->count ||
+               (sight->across && sight->across <= PT_SIGHT_MOST && end <= sights->bytes / 2 && isfinite(sight->share) &&
+                sight->base <= 0xE0000000u && isfinite(sight->place[0] + sight->place[1] + sight->place[2]));
     }
     return good;
 }

@@ -16,8 +16,9 @@ struct pt_sight {
     double place[3]; // of the station, object units
     uint32_t first;  // of its cells, 6 x across x across: that cell is in the upper half of words[first / 2] where it is odd
     uint32_t across;
-    uint32_t base;   // cell << PT_SIGHT_SHIFT, and this added: bits of the range up to which it looked; a cell of 0: nothing is known
-    float share;     // of the range, by which what was seen must lie behind a place
+    uint32_t
+        base; // cell << PT_SIGHT_SHIFT, and this added: bits of the range up to which it looked; a cell of 0: nothing is known
+    float share; // of the range, by which what was seen must lie behind a place
 };
 
 struct pt_sights {

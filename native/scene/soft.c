@@ -20,13 +20,15 @@ float pt_soft_radius(const struct patina_cloud *cloud, const struct pt_chunk *ch
 {
     if (cloud->radii)
         return cloud->radii[slot];
-    const double own = cloud->spacing_base * pt_spacing_of_class(cloud->surface[slot] >> PT_SPACING_SHIFT), mean = (double)chunk->spacing;
+    const double own = cloud->spacing_base * pt_spacing_of_class(cloud->surface[slot] >> PT_SPACING_SHIFT),
+                 mean = (double)chunk->spacing;
     return (float)(RADIUS_SPACINGS * (own > 0.0 ? fmin(own, widest(cloud) * mean) : mean));
 }
 
 double pt_soft_reach(const struct patina_cloud *cloud, const struct pt_chunk *chunk)
 {
-    return ROUNDED * (cloud->radii ? (double)cloud->info.radius_most : widest(cloud) * RADIUS_SPACINGS * (double)chunk->spacing);
+    return ROUNDED *
+           (cloud->radii ? (double)cloud->info.radius_most : widest(cloud) * RADIUS_SPACINGS * (double)chunk->spacing);
 }
 
 uint32_t pt_soft_word(uint32_t step, float radius)

@@ -76,7 +76,7 @@ static int tame_strays(struct patina_cloud *cloud)
         return PATINA_ERROR_MEMORY;
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         if (cloud->chunks[c].count > 1) {
-            list[count++] = (struct counted){ (double)cloud->chunks[c].spacing, cloud->chunks[c].count };
+            list[count++] = (struct counted){(double)cloud->chunks[c].spacing, cloud->chunks[c].count};
             points += cloud->chunks[c].count;
         }
     qsort(list, count, sizeof *list, compare_doubles);

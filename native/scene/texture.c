@@ -64,13 +64,17 @@ static void write_texel(struct patina_texture *texture, const struct curve *curv
     texture->texels[index] = 0;
     for (uint32_t k = 0; k < 4; k++) {
         const float value = fminf(fmaxf(c[k], 0.0f), 1.0f);
-        texture->texels[index] |= (k < 3 && texture->format == PT_TEXELS_SRGB ? srgb_of(curve, value) : byte_of(value)) << 8 * k;
+        texture->texels[index] |= (k < 3 && texture->format == PT_TEXELS_SRGB ? srgb_of(curve, value) : byte_of(value))
+                                  << 8 * k;
     }
 }
 
 // ---- the caller's image ------------------------------------------------------------------------------------------------
 
-static float finite_or(float value, float other) { return isfinite(value) ? fminf(fmaxf(value, -PT_BRIGHTEST), PT_BRIGHTEST) : other; }
+static float finite_or(float value, float other)
+{
+    return isfinite(value) ? fminf(fmaxf(value, -PT_BRIGHTEST), PT_BRIGHTEST) : other;
+}
 
 static void take_bytes(const patina_texture_desc *desc, struct patina_texture *texture, const uint8_t *from, size_t index)
 {
@@ -81,7 +85,7 @@ static void take_bytes(const patina_texture_desc *desc, struct patina_texture *t
 
 static void take_floats(const patina_texture_desc *desc, struct patina_texture *texture, const uint8_t *from, size_t index)
 {
-    float c[4] = { 0, 0, 0, 1 };
+    float c[4] = {0, 0, 0, 1};
     for (uint32_t k = 0; k < 4 && k < desc->pixels.components; k++) {
         uint16_t word;
         if (desc->pixels.type == PATINA_FLOAT32) {
@@ -127,7 +131,7 @@ static uint32_t covered(uint32_t i, uint32_t fine, uint32_t coarse, uint32_t *fi
 static void make_texel(struct patina_texture *texture, const struct curve *curve, const uint32_t *fine, const uint32_t *coarse,
                        uint32_t x, uint32_t y)
 {
-    float across[4], up[4], c[4], sum[4] = { 0, 0, 0, 0 }, plain[3] = { 0, 0, 0 };
+    float across[4], up[4], c[4], sum[4] = {0, 0, 0, 0}, plain[3] = {0, 0, 0};
     uint32_t left, below;
     const uint32_t columns = covered(x, fine[0], coarse[0], &left, across), rows = covered(y, fine[1], coarse[1], &below, up);
     for (uint32_t j = 0; j < rows; j++)
@@ -181,8 +185,8 @@ static int check_desc(patina_texture_desc *desc)
 {
     const uint32_t types = 1u << PATINA_UINT8 | 1u << PATINA_UINT16 | 1u << PATINA_FLOAT32;
     if (!desc->width || !desc->height || desc->width > MOST_TEXELS || desc->height > MOST_TEXELS)
-        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_texture_create: %u x %u texels; 1 to %d a side are possible", desc->width,
-                       desc->height, MOST_TEXELS);
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_texture_create: %u x %u texels; 1 to %d a side are possible",
+                       desc->width, desc->height, MOST_TEXELS);
     if (!desc->pixels.data)
         return fail("pixels has no data");
     if (desc->raw > 1 || desc->nearest > 1 || desc->wrap > PATINA_WRAP_CLIP)
@@ -205,7 +209,7 @@ static int build(const patina_texture_desc *desc, struct patina_texture *texture
     make_levels(texture);
     atomic_init(&texture->alive->references, 1);
     atomic_init(&texture->alive->alive, 1);
-    const uint32_t how[] = { texture->format, texture->nearest, texture->wrap };
+    const uint32_t how[] = {texture->format, texture->nearest, texture->wrap};
     const uint64_t words = pt_fingerprint(pt_fingerprint(0, how, sizeof how), texture->sizes, sizeof texture->sizes);
     atomic_init(&texture->alive->fingerprint, pt_fingerprint(words, texture->texels, texture->bytes));
     return PATINA_OK;

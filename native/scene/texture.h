@@ -11,7 +11,7 @@ struct patina_texture {
     struct pt_alive *alive;
     uint32_t format, nearest, wrap; // as in struct texture_args
     uint32_t levels, sizes[3 * PT_TEXTURE_LEVELS];
-    uint32_t opaque; // every texel is, and a place beyond the image too
+    uint32_t opaque;  // every texel is, and a place beyond the image too
     uint32_t *texels; // words, or four floats each
     size_t bytes;
 };

@@ -80,13 +80,14 @@ static int write_ply(const char *path, const struct columns *c, const double ori
     if (error)
         return error;
     FILE *file = whole.stream;
-    fprintf(file,
-            "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
-            "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
-            "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nproperty "
-            "uchar seen_through\nend_header\n",
-            __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
-            type, type);
+    fprintf(
+        file,
+        "ply\nformat binary_%s_endian 1.0\ncomment written by Patina %s\nelement vertex %llu\nproperty %s x\nproperty %s "
+        "y\nproperty %s z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float spacing\nproperty float "
+        "radius\nproperty float radius_minor\nproperty float sigma\nproperty float certainty\nproperty uchar kind\nproperty "
+        "uchar seen_through\nend_header\n",
+        __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? "little" : "big", patina_version(), (unsigned long long)c->count, type,
+        type, type);
     int good = write_rows(file, c, origin, wide) && !ferror(file);
     return pt_whole_end(&whole, good);
 }
@@ -117,9 +118,14 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, patina_
     tool_free_stations(&stations);
     if (!code)
         code = patina_cloud_get_info(cloud, &built);
-    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .normal = columns->normal, .spacing = columns->spacing,
-                                          .half_axes = columns->half_axes, .sigma = columns->sigma, .kind = columns->kind,
-                                          .certainty = columns->certainty, .seen_through = columns->seen_through};
+    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted,
+                                          .normal = columns->normal,
+                                          .spacing = columns->spacing,
+                                          .half_axes = columns->half_axes,
+                                          .sigma = columns->sigma,
+                                          .kind = columns->kind,
+                                          .certainty = columns->certainty,
+                                          .seen_through = columns->seen_through};
     if (!code)
         code = patina_cloud_neighbourhoods(cloud, &wanted, NULL);
     int result = code ? tool_failed(in, NULL, code) : TOOL_OK;

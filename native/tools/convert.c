@@ -7,8 +7,7 @@
 static const char out_of_memory[] = "out of memory";
 
 // Reads the columns that the file has into desc; the arrays are the caller's to free, on failure too.
-static int read_columns(const patina_file *file, const patina_file_info *info, patina_cloud_desc *desc,
-                        void *columns[3])
+static int read_columns(const patina_file *file, const patina_file_info *info, patina_cloud_desc *desc, void *columns[3])
 {
     const size_t count = (size_t)info->count;
     int code = PATINA_OK;

@@ -6,8 +6,7 @@
 
 static const char *type_name(uint32_t type)
 {
-    static const char *const names[] = {"none",   "float32", "float64", "uint8", "uint16",
-                                        "uint32", "int8",    "int16",   "int32"};
+    static const char *const names[] = {"none", "float32", "float64", "uint8", "uint16", "uint32", "int8", "int16", "int32"};
     return type < sizeof names / sizeof *names ? names[type] : "?";
 }
 

@@ -181,10 +181,7 @@ void tool_cancellable(patina_progress *progress, patina_frame *frame)
     pt_mutex_unlock(&cancel_lock);
 }
 
-int tool_cancelled(void)
-{
-    return atomic_load(&cancelled);
-}
+int tool_cancelled(void) { return atomic_load(&cancelled); }
 
 // ------------------------------------------------------------------------------------------------------------------
 

@@ -153,10 +153,7 @@ static int parse_sun(const char *text, struct tool_options *options)
     return 0;
 }
 
-static int parse_width(const char *text, double *width)
-{
-    return parse_numbers(text, width, 1, 1) < 0 || *width <= 0 ? -1 : 0;
-}
+static int parse_width(const char *text, double *width) { return parse_numbers(text, width, 1, 1) < 0 || *width <= 0 ? -1 : 0; }
 
 enum outcome { GOOD, BAD_VALUE, UNKNOWN };
 
@@ -429,7 +426,8 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
         return tool_misuse("--free-space, --hide-kinds and --least-certainty need the analysis");
     if (!options->file_count && !options->mesh_count)
         return tool_misuse("render: no file given");
-    if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan && !options->repeat)
+    if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan &&
+        !options->repeat)
         return tool_misuse("render: nothing to do; name the picture with -o OUT.png");
     if (options->output && is_other_picture(options->output))
         return tool_misuse("-o %s: pictures are written as PNG; name it .png", options->output);

@@ -32,7 +32,10 @@ int tool_parse_pass(const char *value, struct tool_options *options)
     if (!options->has_pass_range)
         return 0;
     const double *range = options->pass_range;
-    return passes[found].channels > 1 || parse_numbers(value + length + 1, options->pass_range, 2, 2) < 0 || !(range[0] < range[1]) ? -1 : 0;
+    return passes[found].channels > 1 || parse_numbers(value + length + 1, options->pass_range, 2, 2) < 0 ||
+                   !(range[0] < range[1])
+               ? -1
+               : 0;
 }
 
 static int compare_floats(const void *a, const void *b)

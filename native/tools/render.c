@@ -40,10 +40,8 @@ static void destroy(struct job *job)
 
 static int open_device(struct job *job)
 {
-    const patina_device_desc desc = {.struct_size = sizeof desc,
-                                     .name = job->options.device,
-                                     .threads = job->options.threads,
-                                     .batch = job->options.batch};
+    const patina_device_desc desc = {
+        .struct_size = sizeof desc, .name = job->options.device, .threads = job->options.threads, .batch = job->options.batch};
     int code = patina_device_create(&desc, &job->device);
     if (code)
         return tool_failed(job->options.device ? job->options.device : "auto", NULL, code);
@@ -188,7 +186,8 @@ static int shadows(struct job *job)
         code = patina_frame_bake_shadows(job->frame, job->scene);
     if (!code && options->save_shadows)
         code = patina_frame_save_shadows(job->frame, options->save_shadows);
-    return code ? tool_failed(options->load_shadows ? options->load_shadows : options->save_shadows, job->frame, code) : TOOL_OK;
+    return code ? tool_failed(options->load_shadows ? options->load_shadows : options->save_shadows, job->frame, code)
+                : TOOL_OK;
 }
 
 static int dump_plan(struct job *job)
@@ -226,8 +225,7 @@ static int draw(struct job *job, double *ms)
     if (!code && job->options.output) {
         const size_t size = (size_t)job->stats.width * job->stats.height * 4 * sizeof(float);
         job->pixels = malloc(size);
-        code = job->pixels ? patina_frame_read(job->frame, PATINA_PASS_COMBINED, job->pixels, size)
-                           : PATINA_ERROR_MEMORY;
+        code = job->pixels ? patina_frame_read(job->frame, PATINA_PASS_COMBINED, job->pixels, size) : PATINA_ERROR_MEMORY;
         if (!code && job->options.pass != PATINA_PASS_COMBINED)
             code = tool_color_pass(&job->options, job->frame, (size_t)job->stats.width * job->stats.height, job->pixels);
     }

@@ -146,10 +146,7 @@ static double median(const double *values, int count)
     return result;
 }
 
-double tool_times_median(const struct tool_times *times)
-{
-    return median(times->ms, times->frames);
-}
+double tool_times_median(const struct tool_times *times) { return median(times->ms, times->frames); }
 
 static void print_string(const char *text)
 {
@@ -176,8 +173,7 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     }
     printf("{\"device\": ");
     print_string(device);
-    printf(", \"points\": %llu, \"width\": %u, \"height\": %u", (unsigned long long)stats->points, stats->width,
-           stats->height);
+    printf(", \"points\": %llu, \"width\": %u, \"height\": %u", (unsigned long long)stats->points, stats->width, stats->height);
     printf(", \"ms_median\": %.4f, \"ms_min\": %.4f, \"ms_max\": %.4f", tool_times_median(times), least, most);
     printf(", \"passes\": {");
     for (int i = 0; i < times->pass_count; i++) {
@@ -191,8 +187,9 @@ void tool_times_print(struct tool_times *times, const char *device, const patina
     const patina_expected_error *expected = &stats->expected;
     printf(", \"spacing_px\": %.4f, \"expected_error\": ", (double)stats->spacing_px);
     if (isfinite(expected->color))
-        printf("{\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f, \"doubt\": %.1f}", (double)expected->color,
-               (double)expected->coverage, (double)expected->depth, (double)expected->normal, (double)expected->doubt);
+        printf("{\"color\": %.6f, \"coverage\": %.6f, \"depth\": %.4f, \"normal\": %.4f, \"doubt\": %.1f}",
+               (double)expected->color, (double)expected->coverage, (double)expected->depth, (double)expected->normal,
+               (double)expected->doubt);
     else
         printf("null"); // not known
     printf(", \"analysis_ms\": %.1f", analysis_ms);

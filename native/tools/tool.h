@@ -73,21 +73,21 @@ struct tool_options {
     double radius;                  // of discs, world units; 0: automatic
     double largest_gap;             // that they close, world units; 0: automatic
     struct {
-        uint32_t model;             // 0: none is soft; 1 + patina_soft_model
+        uint32_t model;                 // 0: none is soft; 1 + patina_soft_model
         uint32_t files[TOOL_OPACITIES]; // which of the files are, from 1 on
-        int file_count;             // 0: all
+        int file_count;                 // 0: all
         uint32_t shells;
         double radius, opacity, modulation;
-        int shaped;                 // one of the four is given
+        int shaped; // one of the four is given
     } soft;
-    int opacity_count;              // 0: all opaque
+    int opacity_count;               // 0: all opaque
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;
-    uint32_t analysis;              // 0: clouds are analysed, 1: not
+    uint32_t analysis; // 0: clouds are analysed, 1: not
     int cull, transparent, shadows, headlight, sun, json, dump_plan, verbose;
     float ambient[3];
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
-    int repeat; // measured frames; 0 = just the picture
+    int repeat;       // measured frames; 0 = just the picture
     patina_settings settings;
     patina_effects effects;
     struct tool_color color;
@@ -119,7 +119,7 @@ int tool_parse_color(const char *name, const char *value, struct tool_color *col
 struct tool_stations {
     uint32_t count;
     double *places;
-    uint16_t *station;    // of each point
+    uint16_t *station;     // of each point
     int32_t *row, *column; // NULL: not known
 };
 

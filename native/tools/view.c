@@ -7,10 +7,7 @@
 
 #define PI 3.14159265358979323846
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 static void normalize(double v[3])
 {
@@ -97,8 +94,7 @@ int tool_camera(const struct tool_options *options, const patina_scene *scene, c
     if (options->view == VIEW_LOOK) {
         look(options, turn, camera);
     } else {
-        const int code = patina_scene_frame_camera(scene, options->azimuth + turn, options->elevation, options->fov,
-                                                   camera);
+        const int code = patina_scene_frame_camera(scene, options->azimuth + turn, options->elevation, options->fov, camera);
         if (code)
             return code;
     }

@@ -38,8 +38,8 @@ from typing import Any
 import analysis
 import case as cases
 import imports
-import meshes
 import machine
+import meshes
 import page
 import papers
 import peers

@@ -20,8 +20,9 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "addon"), str(Path(__f
 
 import machine  # noqa: E402
 import metrics  # noqa: E402
-import native  # noqa: E402  the add-on's binding, the only one there is
 import stage as stages  # noqa: E402
+
+import native  # noqa: E402  the add-on's binding, the only one there is
 
 WARM_UP = 4
 PATIENCE = 6.0  # seconds of frames, after which a slow case stops at five

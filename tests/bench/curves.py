@@ -14,8 +14,9 @@ sys.path[:0] = [str(ROOT / "addon"), str(Path(__file__).resolve().parent)]
 
 import case as cases  # noqa: E402
 import metrics  # noqa: E402
-import native  # noqa: E402
 import stage as stages  # noqa: E402
+
+import native  # noqa: E402
 
 MEANS = {"UNFILLED": {"quality": 1, "fill": 2}, "PAPER": {"quality": 1, "fill": 1}, "CLOSED": {"quality": 1, "fill": 0},
          "REFINED": {"quality": 0, "fill": 0}, "SPLATS": {"surface": 1}}  # as enum pt_means

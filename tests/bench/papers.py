@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from stage import ROOT, Stage, kept
-
 from truth import look
 from truth.surfaces import Torus
 

@@ -11,7 +11,6 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
-
 from report import count, joined, name_of, pass_names  # noqa: E402
 
 Row = dict[str, Any]

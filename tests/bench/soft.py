@@ -14,11 +14,11 @@ from typing import Any
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "addon"), str(Path(__file__).resolve().parent)]
 
-import native  # noqa: E402
 import numpy as np  # noqa: E402
 import stage  # noqa: E402
-
 from truth.light import visibility  # noqa: E402
+
+import native  # noqa: E402
 
 POINTS, ANGLE, MOST = 60_000, 0.2, 4096
 STEPS = tuple(2**k for k in range(9))  # samples

@@ -10,6 +10,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import curves  # noqa: E402
+
 import native  # noqa: E402
 
 FACTOR = 2.0  # other shapes have more outline or less; the figures say what was found, and how far a gyroid is off

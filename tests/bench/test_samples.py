@@ -12,8 +12,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import case  # noqa: E402
 import metrics  # noqa: E402
-import native  # noqa: E402
 import stage  # noqa: E402
+
+import native  # noqa: E402
 
 SIZE, SAMPLES = 192, (1, 2, 4, 8, 16, 32, 64)
 BLUR = 0.5  # dB that a mean of two may lose to one picture: it is as wide again

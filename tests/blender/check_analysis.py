@@ -7,10 +7,24 @@ import bpy
 import numpy as np
 from check_import import import_ply
 from check_linked import dense
-from harness import (SCRATCH, Skip, add_light, add_points, check, check_close, engine, linear, new_scene, render, reports,
-                     saved, sphere, stats, written)
+from harness import (
+    SCRATCH,
+    Skip,
+    add_light,
+    add_points,
+    check,
+    check_close,
+    engine,
+    linear,
+    new_scene,
+    render,
+    reports,
+    saved,
+    sphere,
+    stats,
+    written,
+)
 from mathutils import Matrix
-
 from patina import native
 from patina.sync import analysis, analyzing, clouds, linked
 

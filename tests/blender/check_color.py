@@ -9,7 +9,6 @@ import numpy as np
 from check_points import grid, pixel
 from harness import SCRATCH, add_points, check, check_close, drawn, linear, new_scene, render, reports
 from mathutils import Matrix, Vector
-
 from patina import native
 
 GREEN = (30, 180, 90, 255)

@@ -6,7 +6,6 @@ import json
 import bpy
 import numpy as np
 from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, render, sphere
-
 from patina import cryptomatte
 from patina import render as drawing
 

@@ -6,13 +6,12 @@ import traceback
 from types import SimpleNamespace
 
 import bpy
-from harness import SCRATCH, add_light, add_points, check, sphere
-from window import area, settled, setup, window_region
-
 from check_panels import Drawing, Row, context_of, panels
+from harness import SCRATCH, add_light, add_points, check, sphere
 from patina import viewport
 from patina.sync.analysis import SCANNERS
 from patina.ui import rows
+from window import area, settled, setup, window_region
 
 TABS = {"render": 'RENDER', "view_layer": 'VIEW_LAYER', "object": 'OBJECT', "data": 'DATA', "material": 'MATERIAL',
         "world": 'WORLD'}

@@ -4,7 +4,6 @@
 import bpy
 import numpy as np
 from harness import SCRATCH, add_points, check, new_scene, patina, render, reports, sphere
-
 from patina.importers import library
 
 

@@ -6,7 +6,6 @@ import numpy as np
 from check_import import import_ply, write_ply
 from check_linked import dense
 from harness import SCRATCH, check, check_close, drawn, new_scene, patina, render, reports
-
 from patina.importers import library
 from patina.sync import edits
 

@@ -10,7 +10,6 @@ from check_passes import dense_scene
 from check_points import pixel
 from harness import add_points, check, check_close, new_scene, patina, render, set_world, sphere, stats, written
 from mathutils import Matrix, Vector
-
 from patina import engine, jobs, memory, native, options
 from patina import render as drawing
 from patina.sync import attributes, clouds

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from check_import import import_ply as import_points
 from check_import import attribute_of, positions_of
+from check_import import import_ply as import_points
 from harness import REPOSITORY, SCRATCH, Skip, check, check_close, drawn, new_scene, render
-
 from patina import importers, native
 from patina.importers import e57, las, pcd, reading
 

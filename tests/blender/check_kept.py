@@ -11,7 +11,6 @@ import numpy as np
 from check_import import import_ply
 from check_linked import dense
 from harness import SCRATCH, check, new_scene, patina, render
-
 from patina.importers import library
 from patina.sync import clouds, kept, linked
 

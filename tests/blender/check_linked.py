@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 from check_import import columns, import_ply, write_ply
 from harness import SCRATCH, check, check_close, new_scene, patina, render, reports, stats
-
 from patina.importers import las, library
 from patina.sync import linked
 

@@ -6,7 +6,6 @@ import numpy as np
 from check_points import grid, mesh_to_points, pixel
 from check_splats import size_of
 from harness import add_points, check, check_close, drawn, new_scene, render, reports
-
 from patina.sync import clouds
 
 

@@ -5,7 +5,6 @@ import contextlib
 
 import bpy
 from harness import SCRATCH, add_points, check, new_scene, render, reports
-
 from patina import migrate
 
 CURRENT = len(migrate.STEPS)

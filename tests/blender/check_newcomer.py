@@ -9,10 +9,9 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from window import area, invoke_import, screenshot, shown, window_region
 from harness import REPOSITORY, SCRATCH, check, saved
-
 from patina.operators import set_up
+from window import area, invoke_import, screenshot, shown, window_region
 
 POINTS = int(os.environ.get("PATINA_NEWCOMER_POINTS", "20000"))
 

@@ -9,7 +9,6 @@ from check_import import columns, import_ply, write_ply
 from check_panorama import stage
 from check_points import mesh_to_points
 from harness import SCRATCH, Skip, add_points, check, check_close, new_scene, patina, render, reports, sphere
-
 from patina.importers import crs, library
 from patina.operators import points_keys
 

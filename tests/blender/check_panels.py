@@ -6,9 +6,8 @@ from types import SimpleNamespace
 
 import bpy
 import numpy as np
-from harness import REPOSITORY, add_points, check, new_scene
-
 import patina
+from harness import REPOSITORY, add_points, check, new_scene
 
 GROUPS = (bpy.types.Scene, bpy.types.Object, bpy.types.ViewLayer, bpy.types.World)
 SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "per", "the", "to", "with"}

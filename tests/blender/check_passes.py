@@ -4,10 +4,22 @@
 import bpy
 import numpy as np
 from check_points import pixel
-from harness import (SCRATCH, add_points, check, check_close, drawn, new_scene, render, render_layers, reports, saved,
-                     set_world, sphere, stats)
+from harness import (
+    SCRATCH,
+    add_points,
+    check,
+    check_close,
+    drawn,
+    new_scene,
+    render,
+    render_layers,
+    reports,
+    saved,
+    set_world,
+    sphere,
+    stats,
+)
 from mathutils import Matrix, Vector
-
 from patina import sample
 
 

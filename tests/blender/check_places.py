@@ -12,7 +12,6 @@ import check_linked  # noqa: F401  no test leaves files with the user
 import numpy as np
 from check_import import columns, import_ply, positions_of, values, write_ply
 from harness import SCRATCH, add_points, check, check_close, failing_render, new_scene, render, reports, sphere
-
 from patina.importers import crs, las, library, origin
 from patina.importers.reading import Filter, Progress
 

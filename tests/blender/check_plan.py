@@ -4,7 +4,6 @@
 import bpy
 import numpy as np
 from harness import SCRATCH, add_points, check, check_close, new_scene
-
 from patina.operators import plan, view_transform
 
 

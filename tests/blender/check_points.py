@@ -4,9 +4,8 @@
 import bpy
 import numpy as np
 from check_camera import to_pixels
-from harness import (Skip, add_points, check, check_close, drawn, linear, new_scene, patina, render, reports, sphere)
+from harness import Skip, add_points, check, check_close, drawn, linear, new_scene, patina, render, reports, sphere
 from mathutils import Euler, Matrix
-
 from patina.sync import attributes, clouds
 
 

@@ -13,7 +13,6 @@ import check_linked  # noqa: F401  no test leaves files with the user
 from check_import import import_ply
 from check_linked import dense
 from harness import REPOSITORY, SCRATCH, Skip, check, new_scene, render
-
 from patina import importers, memory, preferences, readers
 from patina.operators import preferences as operators
 from patina.sync import cache, kept, linked, settings
@@ -168,8 +167,8 @@ def test_readers_by_pip():
 
 def test_what_lacks_is_told_in_the_preview():
     path = SCRATCH / "packed.laz"
-    from check_places import las_file
     import numpy as np
+    from check_places import las_file
     head = bytearray(las_file("plain.las", np.zeros((3, 3))).read_bytes())
     head[104] |= 0x80
     path.write_bytes(bytes(head))

@@ -6,7 +6,6 @@ import re
 import numpy as np
 from check_motion import stage
 from harness import add_points, check, new_scene, render, reports, sphere, stats
-
 from patina import engine
 from patina import render as drawing
 

@@ -6,7 +6,6 @@ import check_linked  # noqa: F401  no test leaves files with the user
 import numpy as np
 from check_import import write_ply
 from harness import SCRATCH, add_points, check, check_close, new_scene, render, reports, set_world
-
 from patina.sync import clouds, linked, sequence
 
 SIZE = 64

@@ -9,7 +9,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 from harness import Skip, add_points, check, drawn, failing_render, new_scene, patina, render, reports, sphere
-
 from patina import engine, jobs, native, passes
 from patina import render as drawing
 

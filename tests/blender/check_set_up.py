@@ -7,7 +7,6 @@ import numpy as np
 from check_import import columns, import_ply, write_ply
 from check_places import las_file
 from harness import SCRATCH, check, new_scene, render, sphere
-
 from patina.operators import set_up
 
 

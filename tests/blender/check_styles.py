@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, render, reports, set_world, sphere
 from mathutils import Matrix
-
 from patina import sample, styles, thumbnails
 
 OWN = SCRATCH / "scripts"  # not the user's

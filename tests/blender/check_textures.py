@@ -4,7 +4,6 @@
 import bpy
 import numpy as np
 from harness import SCRATCH, Skip, add_light, add_points, check, check_close, linear, new_scene, render, reports, saved, set_world, sphere
-
 from patina import sync, viewport
 from patina.sync import clouds, images
 

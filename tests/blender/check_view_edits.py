@@ -8,9 +8,8 @@ import numpy as np
 from check_edits import ROWS, chosen, wall
 from check_import import import_ply
 from harness import check
-from window import area, newer, screenshot, settled, setup, shown, window_region
-
 from patina.sync import edits
+from window import area, newer, screenshot, settled, setup, shown, window_region
 
 GREEN = (40, 200, 60)
 MARGIN = 160  # pixels of the view on all sides of its middle, that hold the wall and none of Blender's own

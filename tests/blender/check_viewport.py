@@ -7,9 +7,8 @@ from check_combine import hide_each_other
 from check_world import image_of, sky, world_with
 from harness import add_light, add_points, check, check_close, render, sphere
 from mathutils import Matrix, Quaternion
-from window import (area, clip_border, newer, screenshot, settled, setup, shown, toggle_local_view, view, window_region)
-
 from patina import backdrop, pace, viewport
+from window import area, clip_border, newer, screenshot, settled, setup, shown, toggle_local_view, view, window_region
 
 
 def test_draws_points():

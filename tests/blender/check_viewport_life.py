@@ -14,11 +14,10 @@ from check_import import import_ply as import_points
 from check_linked import dense
 from harness import SCRATCH, add_light, add_points, check, check_close, new_scene, patina, sphere
 from mathutils import Quaternion
-from window import area, invoke_import, newer, screenshot, settled, setup, shown, view, window_region
-
 from patina import pace, viewport
 from patina.importers import las
 from patina.sync.analyzing import ANALYSES
+from window import area, invoke_import, newer, screenshot, settled, setup, shown, view, window_region
 
 
 def test_styles_at_once_and_one_step_of_undo():

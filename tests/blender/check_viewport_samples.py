@@ -7,10 +7,9 @@ import bpy
 import numpy as np
 from harness import _rect, add_points, check, render, sphere
 from mathutils import Quaternion
-from window import area, screenshot, settled, setup, shown, view, window_region
-
 from patina import engine, passes, viewport
 from patina import render as drawing
+from window import area, screenshot, settled, setup, shown, view, window_region
 
 
 def scene_of(samples, count=40000):

@@ -18,11 +18,10 @@ from statistics import median, mode
 
 import gpu
 import numpy as np
-from window import area, settled, setup, shown, view, window_region
 from harness import add_points
 from mathutils import Quaternion
-
 from patina import viewport
+from window import area, settled, setup, shown, view, window_region
 
 SECONDS = 6.0  # of each kind of motion
 

@@ -8,11 +8,10 @@ import bpy
 import numpy as np
 from check_linked import dense
 from check_sequence import scans
-from window import area, settled, setup, view, window_region
 from harness import SCRATCH, check, render
 from mathutils import Matrix, Quaternion
-
 from patina import viewport
+from window import area, settled, setup, view, window_region
 
 POINTS = 100000
 SCAN = 4  # points of each of the linked ones

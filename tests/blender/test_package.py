@@ -16,8 +16,8 @@ import tempfile
 import traceback
 from pathlib import Path
 
-import bpy
 import addon_utils  # is there once bpy is
+import bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 LEGACY = bpy.app.version < (4, 2, 0)

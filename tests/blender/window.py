@@ -7,7 +7,6 @@ import bpy
 import numpy as np
 from harness import SCRATCH, new_scene
 from mathutils import Quaternion
-
 from patina import pace, viewport
 from patina.sync.analyzing import ANALYSES
 

@@ -27,7 +27,7 @@ static inline void fuzz_read_columns(const patina_file *file, const patina_file_
     REQUIRE((code == PATINA_OK) == (info->color_type != PATINA_NONE));
     REQUIRE(patina_file_read_colors_u8(file, (uint8_t *)floats, count * 4) == code);
     for (uint32_t i = 0; i < info->attributes; i++) {
-        patina_file_attribute attribute = { .struct_size = sizeof attribute };
+        patina_file_attribute attribute = {.struct_size = sizeof attribute};
         REQUIRE(patina_file_get_attribute(file, i, &attribute) == PATINA_OK);
         REQUIRE(patina_file_read_attribute(file, i, floats, count * sizeof *floats) == PATINA_OK);
         for (size_t k = 0; info->stations && !strcmp(attribute.name, "scan") && k < count; k++)
@@ -48,7 +48,7 @@ static inline int64_t fuzz_open_points(const uint8_t *data, size_t size)
         REQUIRE(!file && patina_message(NULL, message, sizeof message) > 0);
         return -1;
     }
-    patina_file_info info = { .struct_size = sizeof info };
+    patina_file_info info = {.struct_size = sizeof info};
     REQUIRE(patina_file_get_info(file, &info) == PATINA_OK);
     REQUIRE(info.count <= size && info.invalid_positions <= info.count); // a point takes three bytes at least
     fuzz_read_columns(file, &info);
@@ -64,7 +64,7 @@ struct fuzz_file {
 
 static inline struct fuzz_file fuzz_file(void)
 {
-    struct fuzz_file file = { .descriptor = memfd_create("fuzz", MFD_CLOEXEC) };
+    struct fuzz_file file = {.descriptor = memfd_create("fuzz", MFD_CLOEXEC)};
     REQUIRE(file.descriptor >= 0);
     snprintf(file.path, sizeof file.path, "/proc/self/fd/%d", file.descriptor);
     return file;
@@ -86,21 +86,22 @@ static inline patina_cloud *fuzz_cloud(int with_opacities)
         float z = 1 - 2 * ((float)i + 0.5f) / FUZZ_POINTS;
         uint32_t random = (uint32_t)i * 2654435761u;
         float side = 1 - z * z > 0 ? 1 - z * z : 0;
-        position[i][0] = side * ((float)(random >> 16) / 32768 - 1), position[i][1] = side * ((float)(random & 0xFFFF) / 32768 - 1);
+        position[i][0] = side * ((float)(random >> 16) / 32768 - 1),
+        position[i][1] = side * ((float)(random & 0xFFFF) / 32768 - 1);
         position[i][2] = z;
         value[i] = 0.05f + (float)(i % 7) / 50;
         memcpy(byte[i], &random, 4);
     }
-    patina_cloud_desc desc = { .struct_size = sizeof desc,
-                               .count = FUZZ_POINTS,
-                               .position = { position, PATINA_FLOAT32, 3, 0 },
-                               .normal = { position, PATINA_FLOAT32, 3, 0 },
-                               .color = { byte, PATINA_UINT8, 3, 4 },
-                               .opacity = { byte, PATINA_UINT8, 1, 4 },
-                               .scalar = { value, PATINA_FLOAT32, 1, 0 },
-                               .classes = { byte, PATINA_UINT8, 1, 4 },
-                               .radius = { value, PATINA_FLOAT32, 1, 0 },
-                               .threads = 1 };
+    patina_cloud_desc desc = {.struct_size = sizeof desc,
+                              .count = FUZZ_POINTS,
+                              .position = {position, PATINA_FLOAT32, 3, 0},
+                              .normal = {position, PATINA_FLOAT32, 3, 0},
+                              .color = {byte, PATINA_UINT8, 3, 4},
+                              .opacity = {byte, PATINA_UINT8, 1, 4},
+                              .scalar = {value, PATINA_FLOAT32, 1, 0},
+                              .classes = {byte, PATINA_UINT8, 1, 4},
+                              .radius = {value, PATINA_FLOAT32, 1, 0},
+                              .threads = 1};
     if (!with_opacities)
         desc.opacity.data = NULL;
     patina_cloud *cloud = NULL;
@@ -111,7 +112,7 @@ static inline patina_cloud *fuzz_cloud(int with_opacities)
 static inline patina_device *fuzz_device(void)
 {
     patina_device *device = NULL;
-    patina_device_desc desc = { .struct_size = sizeof desc, .name = "cpu", .threads = 1 };
+    patina_device_desc desc = {.struct_size = sizeof desc, .name = "cpu", .threads = 1};
     REQUIRE(patina_device_create(&desc, &device) == PATINA_OK);
     return device;
 }
@@ -120,11 +121,22 @@ static inline patina_device *fuzz_device(void)
 static inline patina_scene *fuzz_scene(patina_cloud *cloud, const patina_cloud_style *style, uint32_t surface)
 {
     patina_scene *scene = NULL;
-    patina_settings settings = { .struct_size = sizeof settings, .width = 24, .height = 24, .surface = surface, .shadow_resolution = 32,
-                                 .film_transparent = 1 };
-    patina_camera camera = { .struct_size = sizeof camera, .world_from_camera = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1 },
-                             .left = -0.4, .right = 0.4, .bottom = -0.4, .top = 0.4, .near_clip = 0.1, .far_clip = 100 };
-    patina_light_desc light = { .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .direction = { 1, 0, -1 }, .shadows = 1 };
+    patina_settings settings = {.struct_size = sizeof settings,
+                                .width = 24,
+                                .height = 24,
+                                .surface = surface,
+                                .shadow_resolution = 32,
+                                .film_transparent = 1};
+    patina_camera camera = {.struct_size = sizeof camera,
+                            .world_from_camera = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1},
+                            .left = -0.4,
+                            .right = 0.4,
+                            .bottom = -0.4,
+                            .top = 0.4,
+                            .near_clip = 0.1,
+                            .far_clip = 100};
+    patina_light_desc light = {
+        .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .direction = {1, 0, -1}, .shadows = 1};
     REQUIRE(patina_scene_create(&scene) == PATINA_OK && patina_scene_add_cloud(scene, cloud, style) == PATINA_OK &&
             patina_scene_add_light(scene, &light) == PATINA_OK && patina_scene_set_camera(scene, &camera) == PATINA_OK &&
             patina_scene_set_settings(scene, &settings) == PATINA_OK);

@@ -21,7 +21,8 @@ static void set_up(void)
     int descriptor = mkstemp(path);
     fuzz.file = fuzz_file();
     fuzz.device = fuzz_device();
-    REQUIRE(descriptor >= 0 && patina_frame_create(fuzz.device, &fuzz.frame) == PATINA_OK && patina_cloud_save(cloud, path) == PATINA_OK);
+    REQUIRE(descriptor >= 0 && patina_frame_create(fuzz.device, &fuzz.frame) == PATINA_OK &&
+            patina_cloud_save(cloud, path) == PATINA_OK);
     FILE *file = fopen(path, "rb");
     REQUIRE(file && !fseek(file, 0, SEEK_END));
     fuzz.size = (size_t)ftell(file);
@@ -36,9 +37,13 @@ static void set_up(void)
 
 static void draw(patina_cloud *cloud, size_t way)
 {
-    float ramp[6] = { 0, 0, 0, 1, 1, 1 };
-    patina_cloud_style style = { .struct_size = sizeof style, .hidden_classes = { way == 2 }, .transparency = way == 1 ? 0.5f : 0,
-                                 .ramp = ramp, .ramp_count = 2, .color_source = way == 2 ? PATINA_COLOR_SCALAR : 0 };
+    float ramp[6] = {0, 0, 0, 1, 1, 1};
+    patina_cloud_style style = {.struct_size = sizeof style,
+                                .hidden_classes = {way == 2},
+                                .transparency = way == 1 ? 0.5f : 0,
+                                .ramp = ramp,
+                                .ramp_count = 2,
+                                .color_source = way == 2 ? PATINA_COLOR_SCALAR : 0};
     patina_scene *scene = fuzz_scene(cloud, &style, way == 2 ? PATINA_SURFACE_SPLATS : 0);
     patina_frame_render(fuzz.frame, scene); // an error is an answer, too
     patina_scene_destroy(scene);
@@ -64,7 +69,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         REQUIRE(!cloud && patina_message(NULL, message, sizeof message) > 0);
         return 0;
     }
-    patina_cloud_info info = { .struct_size = sizeof info };
+    patina_cloud_info info = {.struct_size = sizeof info};
     REQUIRE(patina_cloud_get_info(cloud, &info) == PATINA_OK && info.count == FUZZ_POINTS);
     draw(cloud, size % 3);
     patina_cloud_destroy(cloud);

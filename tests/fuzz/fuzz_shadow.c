@@ -37,7 +37,7 @@ static void set_up(void)
 {
     fuzz.file = fuzz_file();
     fuzz.device = fuzz_device();
-    patina_cloud_style style = { .struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT };
+    patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT};
     fuzz.scene = fuzz_scene(fuzz_cloud(0), &style, 0);
     patina_frame *frame = NULL;
     char path[] = "/tmp/patina-fuzz-XXXXXX";

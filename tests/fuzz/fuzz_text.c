@@ -5,8 +5,14 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static const char *const heads[8] = { "", "1 2 3\n", "2\n", "x,y,z,red,green,blue\n", "1 2 3 0 0 1 9 9 9\n", "X Y Z nx ny nz a\n",
-                                          "# a\n1;2;3;4\n", "1 2 3 0.5 0.25 1\n" };
+    static const char *const heads[8] = {"",
+                                         "1 2 3\n",
+                                         "2\n",
+                                         "x,y,z,red,green,blue\n",
+                                         "1 2 3 0 0 1 9 9 9\n",
+                                         "X Y Z nx ny nz a\n",
+                                         "# a\n1;2;3;4\n",
+                                         "1 2 3 0.5 0.25 1\n"};
     const char *head = size ? heads[data[size - 1] & 7] : heads[0];
     size_t before = strlen(head);
     uint8_t *text = malloc(before + size + 1);

@@ -24,9 +24,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "tests")]
 
-import native  # noqa: E402
 from truth import Camera, Light, Scene, look, orbit  # noqa: E402
 from truth.surfaces import Rectangle, Sphere  # noqa: E402
+
+import native  # noqa: E402
 
 EMPTY = 0x7F800000FFFFFFFF
 DEVICES = ("cpu", "cpu-scalar", "cpu-sse42", "cpu-avx2", "cpu-avx512", "gl-egl", "gl-osmesa")

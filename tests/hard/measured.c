@@ -4,10 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static double outside(double value, double low)
-{
-    return fmax(fmax(low - value, value - (low + 1.0)), 0.0);
-}
+static double outside(double value, double low) { return fmax(fmax(low - value, value - (low + 1.0)), 0.0); }
 
 struct measured measured_compare(const struct picture *picture, const double *world, uint64_t count,
                                  const patina_camera *camera, double margin)
@@ -70,8 +67,7 @@ void measured_assert_sane(const struct picture *picture, const char *what)
         if (empty ? depth != HUGE_VALF : !(depth >= 0.0f && isfinite(depth)))
             support_die("%s: depth of pixel %llu is %g, key %016llx", what, (unsigned long long)i, (double)depth,
                         (unsigned long long)picture->keys[i]);
-        double length = sqrt((double)normal[0] * normal[0] + (double)normal[1] * normal[1] +
-                             (double)normal[2] * normal[2]);
+        double length = sqrt((double)normal[0] * normal[0] + (double)normal[1] * normal[1] + (double)normal[2] * normal[2]);
         if (!(length < 1e-6 || fabs(length - 1.0) < 1e-5))
             support_die("%s: normal of pixel %llu has length %g", what, (unsigned long long)i, length);
         if (!isfinite(source) || (empty && source > 0.0f) || (!empty && source == 0.0f))

@@ -17,8 +17,7 @@ static patina_camera usual_camera(uint32_t width, uint32_t height)
 }
 
 // Draws on every device, checks each picture for sanity and all for equal keys; returns the first device's.
-static struct picture draw(patina_scene *scene, const patina_camera *camera, const patina_settings *settings,
-                           const char *what)
+static struct picture draw(patina_scene *scene, const patina_camera *camera, const patina_settings *settings, const char *what)
 {
     struct picture first = {0};
     for (uint32_t k = 0; k < support_device_count(); k++) {
@@ -143,8 +142,7 @@ static void test_huge_positions(void **state)
     patina_camera camera = usual_camera(67, 45);
     patina_settings settings = settings_default(67, 45);
     picture = draw(scene, &camera, &settings, "huge float64 positions");
-    printf("  one point at the origin among eight at 10^300: %llu pixels\n",
-           (unsigned long long)picture_count(&picture));
+    printf("  one point at the origin among eight at 10^300: %llu pixels\n", (unsigned long long)picture_count(&picture));
     picture_free(&picture);
     patina_scene_destroy(scene);
     patina_cloud_destroy(cloud);

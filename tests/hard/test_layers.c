@@ -104,9 +104,8 @@ static void test_oblique_planes(void **state)
             struct picture closed = picture_render(device, scene, &camera, &settings);
             measured_assert_sane(&closed, "oblique plane");
             uint64_t before = measured_pixels(&open), after = measured_pixels(&closed);
-            printf("  %5.1f degrees, d~ %-6g measured %llu, after filling %llu, shown %llu\n", degrees[i],
-                   (double)style.d_min, (unsigned long long)before, (unsigned long long)after,
-                   (unsigned long long)picture_count(&closed));
+            printf("  %5.1f degrees, d~ %-6g measured %llu, after filling %llu, shown %llu\n", degrees[i], (double)style.d_min,
+                   (unsigned long long)before, (unsigned long long)after, (unsigned long long)picture_count(&closed));
             assert_int_equal(before, after);
             if (degrees[i] == 90.0) // one row of pixels or two: filling must not thicken it
                 assert_true(picture_count(&closed) <= picture_count(&open) + SIZE / 8);
@@ -207,8 +206,7 @@ static void test_inside_a_sphere(void **state)
             double z = (-od + sqrt(od * od - dd * (oo - 1.0))) / dd;
             worst = fmax(worst, fabs(z - (double)picture.depth[i]));
         }
-        printf("  inside a sphere, %s: depth off by at most %.4f (a pixel is 0.016 wide)\n", support_device_name(k),
-               worst);
+        printf("  inside a sphere, %s: depth off by at most %.4f (a pixel is 0.016 wide)\n", support_device_name(k), worst);
         assert_true(worst < 0.05);
         picture_free(&picture);
         patina_device_destroy(device);

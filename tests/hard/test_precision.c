@@ -30,8 +30,7 @@ static patina_cloud *upload_doubles(const double *position, uint64_t count)
 
 // Every picture is drawn from one of four descriptions of the same cloud in the same place.
 enum way { AT_ORIGIN, BY_ORIGIN, BY_POSITIONS, BY_MATRIX, WAYS };
-static const char *const way_names[] = {"at the origin", "origin in the descriptor", "float64 positions",
-                                        "object matrix"};
+static const char *const way_names[] = {"at the origin", "origin in the descriptor", "float64 positions", "object matrix"};
 
 static patina_cloud *far_cloud(const struct points *points, const double place[3], enum way way)
 {
@@ -118,8 +117,7 @@ static void test_far_box(void **state)
 
 // Draws points without filling and holds every pixel against float64. parts: clouds that share the points evenly.
 static struct measured draw_parts(patina_device *device, const double *world, uint64_t count, uint32_t parts,
-                                  const patina_camera *camera, uint32_t width, uint32_t height, double margin,
-                                  const char *what)
+                                  const patina_camera *camera, uint32_t width, uint32_t height, double margin, const char *what)
 {
     patina_cloud *clouds[16];
     patina_scene *scene = NULL;
@@ -163,10 +161,8 @@ static void test_sixteen_kilometres(void **state)
     struct pcg random = pcg_seed(31);
     for (uint64_t i = 0; i < count; i++) {
         int dense = i >= count / 2; // half of the points in a patch of 4 m at the far corner, to the millimetre
-        world[3 * i] = dense ? 7990.0 + floor(pcg_between(&random, 0, 4000)) * 0.001
-                             : pcg_between(&random, -8000, 8000);
-        world[3 * i + 1] = dense ? 7990.0 + floor(pcg_between(&random, 0, 4000)) * 0.001
-                                 : pcg_between(&random, -8000, 8000);
+        world[3 * i] = dense ? 7990.0 + floor(pcg_between(&random, 0, 4000)) * 0.001 : pcg_between(&random, -8000, 8000);
+        world[3 * i + 1] = dense ? 7990.0 + floor(pcg_between(&random, 0, 4000)) * 0.001 : pcg_between(&random, -8000, 8000);
         world[3 * i + 2] = dense ? floor(pcg_between(&random, 0, 100)) * 0.001 : pcg_between(&random, 0, 40);
     }
     // No view reaches beyond z = 16384: there a float32 holds every other millimetre only.
@@ -184,8 +180,7 @@ static void test_sixteen_kilometres(void **state)
     };
     for (uint32_t i = 0; i < sizeof views / sizeof views[0]; i++) {
         patina_camera camera = views[i].window > 0.0
-                                   ? camera_orthographic(views[i].eye, views[i].target, views[i].window, 512, 512, 0.0,
-                                                         40000.0)
+                                   ? camera_orthographic(views[i].eye, views[i].target, views[i].window, 512, 512, 0.0, 40000.0)
                                    : camera_perspective(views[i].eye, views[i].target, 60.0, 512, 512, 1.0, 16384.0);
         struct measured result = draw(device, world, count, &camera, 512, 512, 0.01, views[i].name);
         assert_true(result.pixels > 100);
@@ -313,12 +308,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_far_from_origin),
-        cmocka_unit_test(test_far_box),
-        cmocka_unit_test(test_sixteen_kilometres),
-        cmocka_unit_test(test_far_over_near),
-        cmocka_unit_test(test_outlier),
-        cmocka_unit_test(test_orthographic_scales),
+        cmocka_unit_test(test_far_from_origin), cmocka_unit_test(test_far_box), cmocka_unit_test(test_sixteen_kilometres),
+        cmocka_unit_test(test_far_over_near),   cmocka_unit_test(test_outlier), cmocka_unit_test(test_orthographic_scales),
         cmocka_unit_test(test_camera_plane),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

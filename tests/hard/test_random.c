@@ -41,8 +41,22 @@ static void place(struct pcg *random, double out[16])
 {
     const double turn = pcg_between(random, 0.0, 6.3), size = pcg_between(random, 0.2, 1.5);
     const double up = once_in(random, 8) ? -size : once_in(random, 16) ? 0.0 : size;
-    const double rows[16] = { size * cos(turn), -size * sin(turn), 0, pcg_between(random, -0.7, 0.7), size * sin(turn), size * cos(turn), 0,
-                              pcg_between(random, -0.7, 0.7), 0, 0, up, pcg_between(random, -0.7, 0.7), 0, 0, 0, 1 };
+    const double rows[16] = {size * cos(turn),
+                             -size * sin(turn),
+                             0,
+                             pcg_between(random, -0.7, 0.7),
+                             size * sin(turn),
+                             size * cos(turn),
+                             0,
+                             pcg_between(random, -0.7, 0.7),
+                             0,
+                             0,
+                             up,
+                             pcg_between(random, -0.7, 0.7),
+                             0,
+                             0,
+                             0,
+                             1};
     memcpy(out, rows, sizeof rows);
 }
 
@@ -54,7 +68,7 @@ static patina_cloud *full_cloud(struct points points, int more, int analysed)
     struct pcg random = pcg_seed(5);
     float *values = malloc(points.count * 3 * sizeof *values);
     uint8_t *classes = malloc(points.count), *stations = malloc(points.count);
-    const double places[6] = { 0, 0, 3, 3, 0, 1 };
+    const double places[6] = {0, 0, 3, 3, 0, 1};
     for (uint64_t i = 0; i < points.count; i++) {
         values[3 * i] = once_in(&random, 50) ? NAN : points.position[3 * i];
         values[3 * i + 1] = between(&random, 0.0, 1.2);
@@ -63,16 +77,19 @@ static patina_cloud *full_cloud(struct points points, int more, int analysed)
         stations[i] = (uint8_t)(i % 2);
     }
     patina_cloud_desc desc = points_desc(&points);
-    desc.scalar = (patina_array){ values, PATINA_FLOAT32, 1, 12 };
-    desc.classes = (patina_array){ classes, PATINA_UINT8, 1, 0 };
+    desc.scalar = (patina_array){values, PATINA_FLOAT32, 1, 12};
+    desc.classes = (patina_array){classes, PATINA_UINT8, 1, 0};
     if (more) {
-        desc.opacity = (patina_array){ values + 1, PATINA_FLOAT32, 1, 12 };
-        desc.radius = (patina_array){ values + 2, PATINA_FLOAT32, 1, 12 };
+        desc.opacity = (patina_array){values + 1, PATINA_FLOAT32, 1, 12};
+        desc.radius = (patina_array){values + 2, PATINA_FLOAT32, 1, 12};
     }
     patina_cloud *cloud = NULL;
     CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
-    const patina_analysis_desc analysis = { .struct_size = sizeof analysis, .station_count = 2, .stations = places,
-                                            .station = { stations, PATINA_UINT8, 1, 0 }, .free_space = 1 };
+    const patina_analysis_desc analysis = {.struct_size = sizeof analysis,
+                                           .station_count = 2,
+                                           .stations = places,
+                                           .station = {stations, PATINA_UINT8, 1, 0},
+                                           .free_space = 1};
     if (analysed)
         CHECK(patina_cloud_analyse(cloud, &analysis, NULL), cloud);
     points_free(&points);
@@ -91,15 +108,19 @@ static patina_cloud *bare_cloud(struct points points)
 
 static patina_mesh *mesh(int more, uint64_t triangles)
 {
-    static const float corners[] = { -1, -1, 0, 1, -1, 0.2f, 1, 1, 0, -1, 1, -0.2f, 0, 0, 1.5f, NAN, 0, 0 };
-    static const float up[] = { 0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1, 0, 0, 0, 0, 0, 1 }, uv[] = { 0, 0, 3, 0, 3, 2, 0, 2, -4, 0.5f, 0, 0 };
-    static const uint32_t indices[] = { 0, 1, 2, 0, 2, 3, 0, 1, 4, 2, 2, 4, 5, 0, 1 }; // one is flat, one nowhere
-    patina_mesh_desc desc = { .struct_size = sizeof desc, .vertex_count = 6, .position = { corners, PATINA_FLOAT32, 3, 0 },
-                              .triangle_count = triangles, .indices = indices };
+    static const float corners[] = {-1, -1, 0, 1, -1, 0.2f, 1, 1, 0, -1, 1, -0.2f, 0, 0, 1.5f, NAN, 0, 0};
+    static const float up[] = {0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1, 0, 0, 0, 0, 0, 1},
+                       uv[] = {0, 0, 3, 0, 3, 2, 0, 2, -4, 0.5f, 0, 0};
+    static const uint32_t indices[] = {0, 1, 2, 0, 2, 3, 0, 1, 4, 2, 2, 4, 5, 0, 1}; // one is flat, one nowhere
+    patina_mesh_desc desc = {.struct_size = sizeof desc,
+                             .vertex_count = 6,
+                             .position = {corners, PATINA_FLOAT32, 3, 0},
+                             .triangle_count = triangles,
+                             .indices = indices};
     if (more) {
-        desc.normal = (patina_array){ up, PATINA_FLOAT32, 3, 0 };
-        desc.color = (patina_array){ up, PATINA_FLOAT32, 3, 0 };
-        desc.uv = (patina_array){ uv, PATINA_FLOAT32, 2, 0 };
+        desc.normal = (patina_array){up, PATINA_FLOAT32, 3, 0};
+        desc.color = (patina_array){up, PATINA_FLOAT32, 3, 0};
+        desc.uv = (patina_array){uv, PATINA_FLOAT32, 2, 0};
     }
     patina_mesh *made = NULL;
     CHECK(patina_mesh_create(&desc, &made), NULL);
@@ -108,9 +129,14 @@ static patina_mesh *mesh(int more, uint64_t triangles)
 
 static patina_texture *texture(uint32_t wrap)
 {
-    static const uint8_t texels[] = { 255, 0, 0, 255, 0, 255, 0, 0, 9, 9, 99, 128, 255, 255, 255, 90, 1, 2, 3, 200, 30, 60, 90, 255 };
-    const patina_texture_desc desc = { .struct_size = sizeof desc, .width = 3, .height = 2, .wrap = wrap, .nearest = wrap > 0,
-                                       .pixels = { texels, PATINA_UINT8, 4, 0 } };
+    static const uint8_t texels[] = {255, 0,   0,   255, 0, 255, 0, 0,   9,  9,  99, 128,
+                                     255, 255, 255, 90,  1, 2,   3, 200, 30, 60, 90, 255};
+    const patina_texture_desc desc = {.struct_size = sizeof desc,
+                                      .width = 3,
+                                      .height = 2,
+                                      .wrap = wrap,
+                                      .nearest = wrap > 0,
+                                      .pixels = {texels, PATINA_UINT8, 4, 0}};
     patina_texture *made = NULL;
     CHECK(patina_texture_create(&desc, &made), NULL);
     return made;
@@ -118,7 +144,8 @@ static patina_texture *texture(uint32_t wrap)
 
 static void set_up(void)
 {
-    struct points one = points_grid(1, 1, 1.0, POINTS_ALL), same = points_create(40, POINTS_PLAIN), none = points_create(0, POINTS_PLAIN);
+    struct points one = points_grid(1, 1, 1.0, POINTS_ALL), same = points_create(40, POINTS_PLAIN),
+                  none = points_create(0, POINTS_PLAIN);
     stock.clouds[0] = bare_cloud(points_torus(3000, 1.0, 0.4, POINTS_ALL, 1));
     stock.clouds[1] = bare_cloud(points_sphere(700, 0.8, POINTS_PLAIN, 2));
     stock.clouds[2] = full_cloud(points_torus(2000, 0.8, 0.3, POINTS_ALL, 3), 1, 0);
@@ -147,8 +174,8 @@ static void tear_down(void)
 
 static void add_cloud(struct pcg *random, patina_scene *scene)
 {
-    static const float ramp[] = { 0, 0, 1, 0, 1, 0, 1, 0, 0 };
-    patina_cloud_style style = { .struct_size = sizeof style, .lighting = below(random, 3), .cull_back = below(random, 2) };
+    static const float ramp[] = {0, 0, 1, 0, 1, 0, 1, 0, 0};
+    patina_cloud_style style = {.struct_size = sizeof style, .lighting = below(random, 3), .cull_back = below(random, 2)};
     place(random, style.world_from_object);
     style.d_min = once_in(random, 4) ? between(random, 0.0, 0.3) : 0.0f;
     style.transparency = once_in(random, 3) ? between(random, 0.0, 1.0) : 0.0f;
@@ -172,8 +199,11 @@ static void add_cloud(struct pcg *random, patina_scene *scene)
 static void add_mesh(struct pcg *random, patina_scene *scene)
 {
     const uint32_t which = below(random, MESHES);
-    patina_mesh_style style = { .struct_size = sizeof style, .shadow_off = once_in(random, 3) ? below(random, 4) : 0, .unlit = once_in(random, 4),
-                                .alpha = below(random, 3), .alpha_least = between(random, 0.0, 1.0) };
+    patina_mesh_style style = {.struct_size = sizeof style,
+                               .shadow_off = once_in(random, 3) ? below(random, 4) : 0,
+                               .unlit = once_in(random, 4),
+                               .alpha = below(random, 3),
+                               .alpha_least = between(random, 0.0, 1.0)};
     place(random, style.world_from_object);
     style.texture = which && once_in(random, 2) ? stock.textures[below(random, TEXTURES)] : NULL;
     patina_scene_add_mesh(scene, stock.meshes[which], &style);
@@ -181,8 +211,11 @@ static void add_mesh(struct pcg *random, patina_scene *scene)
 
 static void add_light(struct pcg *random, patina_scene *scene)
 {
-    patina_light_desc light = { .struct_size = sizeof light, .type = 1 + below(random, 4), .power = between(random, 0.0, 30.0),
-                                .shape = below(random, 2), .shadows = once_in(random, 2) };
+    patina_light_desc light = {.struct_size = sizeof light,
+                               .type = 1 + below(random, 4),
+                               .power = between(random, 0.0, 30.0),
+                               .shape = below(random, 2),
+                               .shadows = once_in(random, 2)};
     direction(random, light.direction);
     direction(random, light.position);
     direction(random, light.side);
@@ -199,8 +232,11 @@ static void add_light(struct pcg *random, patina_scene *scene)
 
 static void add_clip(struct pcg *random, patina_scene *scene)
 {
-    patina_clip clip = { .struct_size = sizeof clip, .shape = below(random, 2), .cut = below(random, 2),
-                         .tint_strength = once_in(random, 2) ? between(random, 0.0, 1.0) : 0.0f, .tint_width = between(random, 0.0, 0.3) };
+    patina_clip clip = {.struct_size = sizeof clip,
+                        .shape = below(random, 2),
+                        .cut = below(random, 2),
+                        .tint_strength = once_in(random, 2) ? between(random, 0.0, 1.0) : 0.0f,
+                        .tint_width = between(random, 0.0, 0.3)};
     place(random, clip.world_from_clip);
     color(random, clip.tint);
     patina_scene_add_clip(scene, &clip);
@@ -208,7 +244,7 @@ static void add_clip(struct pcg *random, patina_scene *scene)
 
 static void set_effects(struct pcg *random, patina_scene *scene)
 {
-    patina_effects effects = { .struct_size = sizeof effects };
+    patina_effects effects = {.struct_size = sizeof effects};
     effects.edl_strength = once_in(random, 3) ? between(random, 0.0, 3.0) : 0.0f;
     effects.edl_radius = once_in(random, 2) ? between(random, 1.0, 16.0) : 0.0f;
     effects.obscurance_strength = once_in(random, 3) ? between(random, 0.0, 3.0) : 0.0f;
@@ -230,9 +266,13 @@ static void set_effects(struct pcg *random, patina_scene *scene)
 
 static void set_lines(struct pcg *random, patina_scene *scene)
 {
-    patina_lines lines = { .struct_size = sizeof lines, .width = between(random, 0.1, 16.0), .world = once_in(random, 4), .source = below(random, 3),
-                           .transparency = once_in(random, 2) ? between(random, 0.0, 1.0) : 0.0f,
-                           .soft = once_in(random, 2) ? between(random, 0.0, 1.0) : 0.0f, .surface = below(random, 3) };
+    patina_lines lines = {.struct_size = sizeof lines,
+                          .width = between(random, 0.1, 16.0),
+                          .world = once_in(random, 4),
+                          .source = below(random, 3),
+                          .transparency = once_in(random, 2) ? between(random, 0.0, 1.0) : 0.0f,
+                          .soft = once_in(random, 2) ? between(random, 0.0, 1.0) : 0.0f,
+                          .surface = below(random, 3)};
     lines.offset = once_in(random, 2) ? between(random, 0.0, 0.3) : 0.0f;
     color(random, lines.color);
     patina_scene_set_lines(scene, &lines);
@@ -240,10 +280,18 @@ static void set_lines(struct pcg *random, patina_scene *scene)
 
 static void set_settings(struct pcg *random, patina_scene *scene)
 {
-    patina_settings settings = { .struct_size = sizeof settings, .width = 1 + below(random, WIDTH), .height = 1 + below(random, HEIGHT),
-                                 .quality = below(random, 2), .fill = below(random, 3), .fill_iterations = once_in(random, 4) ? below(random, 9) : 0,
-                                 .smooth = below(random, 4), .antialias = below(random, 3), .film_transparent = below(random, 2),
-                                 .surface = below(random, 3), .depth = below(random, 2), .average = once_in(random, 4) };
+    patina_settings settings = {.struct_size = sizeof settings,
+                                .width = 1 + below(random, WIDTH),
+                                .height = 1 + below(random, HEIGHT),
+                                .quality = below(random, 2),
+                                .fill = below(random, 3),
+                                .fill_iterations = once_in(random, 4) ? below(random, 9) : 0,
+                                .smooth = below(random, 4),
+                                .antialias = below(random, 3),
+                                .film_transparent = below(random, 2),
+                                .surface = below(random, 3),
+                                .depth = below(random, 2),
+                                .average = once_in(random, 4)};
     if (once_in(random, 3)) {
         settings.region[0] = below(random, settings.width);
         settings.region[1] = below(random, settings.height);
@@ -277,9 +325,10 @@ static void set_camera(struct pcg *random, patina_scene *scene)
         eye[k] *= far;
         target[k] *= 0.3;
     }
-    const patina_camera camera = once_in(random, 3)
-        ? camera_orthographic(eye, target, pcg_between(random, 0.5, 4.0), WIDTH, HEIGHT, once_in(random, 2) ? -2.0 : 0.0, 20.0)
-        : camera_perspective(eye, target, pcg_between(random, 10.0, 120.0), WIDTH, HEIGHT, once_in(random, 4) ? 1.0 : 0.01, 20.0);
+    const patina_camera camera = once_in(random, 3) ? camera_orthographic(eye, target, pcg_between(random, 0.5, 4.0), WIDTH,
+                                                                          HEIGHT, once_in(random, 2) ? -2.0 : 0.0, 20.0)
+                                                    : camera_perspective(eye, target, pcg_between(random, 10.0, 120.0), WIDTH,
+                                                                         HEIGHT, once_in(random, 4) ? 1.0 : 0.01, 20.0);
     patina_scene_set_camera(scene, &camera);
 }
 
@@ -321,7 +370,7 @@ static void read_all(const patina_frame *frame, float *pixels, uint64_t *keys)
         PATINA_PASSES(X)
 #undef X
     };
-    patina_frame_stats stats = { .struct_size = sizeof stats };
+    patina_frame_stats stats = {.struct_size = sizeof stats};
     CHECK(patina_frame_get_stats(frame, &stats), frame);
     const size_t size = (size_t)stats.width * stats.height;
     for (uint32_t pass = 0; pass < PATINA_PASS_COUNT; pass++) {
@@ -339,9 +388,9 @@ static void read_all(const patina_frame *frame, float *pixels, uint64_t *keys)
 static int draw(patina_frame *used, patina_frame *fresh, const patina_scene *scene, uint32_t seed)
 {
     enum { ROOM = WIDTH * HEIGHT * (32 + 4 * PATINA_MAX_LAYERS) };
-    float *pixels[2] = { calloc(ROOM, sizeof(float)), calloc(ROOM, sizeof(float)) };
-    uint64_t *keys[2] = { calloc(WIDTH * HEIGHT, sizeof(uint64_t)), calloc(WIDTH * HEIGHT, sizeof(uint64_t)) };
-    const int codes[2] = { patina_frame_render(used, scene), patina_frame_render(fresh, scene) };
+    float *pixels[2] = {calloc(ROOM, sizeof(float)), calloc(ROOM, sizeof(float))};
+    uint64_t *keys[2] = {calloc(WIDTH * HEIGHT, sizeof(uint64_t)), calloc(WIDTH * HEIGHT, sizeof(uint64_t))};
+    const int codes[2] = {patina_frame_render(used, scene), patina_frame_render(fresh, scene)};
     if (codes[0] != codes[1])
         fail_msg("scene %u: %s, and %s in a fresh frame", seed, patina_error_text(codes[0]), patina_error_text(codes[1]));
     if (codes[0] == PATINA_OK) {
@@ -373,7 +422,7 @@ static void test_random_scenes(void **state)
     if (getenv("PATINA_RANDOM_SCENES"))
         assert_int_equal(sscanf(getenv("PATINA_RANDOM_SCENES"), "%u %u", &first, &count), 2);
     const char *name = support_device_name(0);
-    patina_device *devices[2] = { support_device_open(name, 3, 0), support_device_open(name, 1, 0) };
+    patina_device *devices[2] = {support_device_open(name, 3, 0), support_device_open(name, 1, 0)};
     if (!devices[0] || !devices[1])
         skip();
     set_up();
@@ -401,6 +450,6 @@ static void test_random_scenes(void **state)
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = { cmocka_unit_test(test_random_scenes) };
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_random_scenes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,7 +52,8 @@ void discs_shape(struct harness *h, struct rng *rng, struct disc_scene *scene, u
     uint32_t *words = harness_alloc(h, 4 * (size_t)cloud->slots);
     scene->radii[instance] = words;
     for (uint32_t i = 0; i < cloud->slots; i++) // ratios up to 4 are the most
-        words[i] = ((uint32_t)rng_next(rng) & ~(15u << PT_SHAPE_RATIO_SHIFT)) | rng_below(rng, i % 4 ? 9 : 16) << PT_SHAPE_RATIO_SHIFT;
+        words[i] = ((uint32_t)rng_next(rng) & ~(15u << PT_SHAPE_RATIO_SHIFT)) | rng_below(rng, i % 4 ? 9 : 16)
+                                                                                    << PT_SHAPE_RATIO_SHIFT;
 }
 
 struct view_args discs_window(uint32_t width, uint32_t height, int perspective, double focal)

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-void effect_check(struct harness *h, const struct effect *effect, const void *args, size_t size,
-                  const struct picture *picture, const float *albedo)
+void effect_check(struct harness *h, const struct effect *effect, const void *args, size_t size, const struct picture *picture,
+                  const float *albedo)
 {
     size_t count = picture->count, open = 0;
     float *before = harness_alloc(h, count * 16);
@@ -46,8 +46,7 @@ struct picture effect_picture(struct harness *h, uint64_t seed, uint32_t width, 
                               enum picture_kind kind, int translucent)
 {
     struct rng rng = {seed};
-    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind,
-                                            kind % 2 ? 0.9 : 0.5);
+    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind, kind % 2 ? 0.9 : 0.5);
     picture_invent(&picture, &rng, 0.5, 4);
     for (size_t i = 0; i < picture.count && translucent; i++) {
         float opacity = rng_below(&rng, 2) ? 0.3f : (float)rng_below(&rng, 2);

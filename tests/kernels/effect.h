@@ -14,8 +14,8 @@ struct effect {
 };
 
 // albedo may be NULL. Colours of empty pixels are NaN before and must stay so.
-void effect_check(struct harness *h, const struct effect *effect, const void *args, size_t size,
-                  const struct picture *picture, const float *albedo);
+void effect_check(struct harness *h, const struct effect *effect, const void *args, size_t size, const struct picture *picture,
+                  const float *albedo);
 // A picture of this kind with filled pixels and, with `translucent`, opacities.
 struct picture effect_picture(struct harness *h, uint64_t seed, uint32_t width, uint32_t height, int perspective,
                               enum picture_kind kind, int translucent);

@@ -22,7 +22,7 @@ static const struct device_choice {
 #if defined(__aarch64__)
     {"cpu-neon", 7, 3, 1},
 #else
-    {"cpu-sse42", 2, 0, 0},  {"cpu-avx2", 7, 3, 1}, {"cpu-avx512", 1, 0, 0},
+    {"cpu-sse42", 2, 0, 0},  {"cpu-avx2", 7, 3, 1},  {"cpu-avx512", 1, 0, 0},
 #endif
     {"gl-egl", 0, 0, 0},     {"gl-osmesa", 0, 0, 0},
 };
@@ -88,10 +88,7 @@ void harness_note(struct harness *h, const char *format, ...)
     va_end(list);
 }
 
-int harness_failures(const struct harness *h)
-{
-    return h->failures;
-}
+int harness_failures(const struct harness *h) { return h->failures; }
 
 static void must(struct harness *h, int ok, const char *what)
 {
@@ -128,8 +125,8 @@ void *harness_read(struct harness *h, const struct pt_buffer *buffer)
     return data;
 }
 
-void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size,
-                 struct pt_buffer *const *buffers, uint32_t count)
+void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size, struct pt_buffer *const *buffers,
+                 uint32_t count)
 {
     static struct pt_buffer none;
     const struct pt_kernel_row *row = &pt_kernels[kernel];
@@ -145,8 +142,8 @@ void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments
     must(h, result == PATINA_OK, pt_kernels[kernel].name);
 }
 
-void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element,
-                  size_t per_pixel, uint32_t width)
+void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element, size_t per_pixel,
+                  uint32_t width)
 {
     int at = h->compared++;
     must(h, at < MOST_SAVED, "one more comparison");

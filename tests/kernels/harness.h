@@ -29,10 +29,10 @@ void *harness_alloc(struct harness *h, size_t size); // zeroed
 struct pt_buffer *harness_buffer(struct harness *h, const void *data, size_t size);
 void *harness_read(struct harness *h, const struct pt_buffer *buffer);
 // buffers: as kernels.def lists them; NULL where one may be missing and is.
-void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size,
-                 struct pt_buffer *const *buffers, uint32_t count);
-#define HARNESS_RUN(h, name, arguments, ...)                                                                           \
-    harness_run(h, PT_KERNEL_##name, arguments, sizeof *(arguments), (struct pt_buffer *const[]){__VA_ARGS__},         \
+void harness_run(struct harness *h, enum pt_kernel kernel, const void *arguments, size_t size, struct pt_buffer *const *buffers,
+                 uint32_t count);
+#define HARNESS_RUN(h, name, arguments, ...)                                                                                   \
+    harness_run(h, PT_KERNEL_##name, arguments, sizeof *(arguments), (struct pt_buffer *const[]){__VA_ARGS__},                 \
                 sizeof((struct pt_buffer *const[]){__VA_ARGS__}) / sizeof(struct pt_buffer *))
 
 // Prints "DEVICE: case: label pixel (x, y): message"; the case fails at its end. Says so only a few times a case.
@@ -41,15 +41,15 @@ void harness_fail(struct harness *h, const char *label, int x, int y, const char
 void harness_note(struct harness *h, const char *format, ...) __attribute__((format(printf, 2, 3)));
 int harness_failures(const struct harness *h);
 // A condition that is no pixel's.
-#define HARNESS_CHECK(h, condition)                                                                                    \
-    do {                                                                                                               \
-        if (!(condition))                                                                                              \
-            harness_fail(h, "check", __LINE__, 0, "%s", #condition);                                                   \
+#define HARNESS_CHECK(h, condition)                                                                                            \
+    do {                                                                                                                       \
+        if (!(condition))                                                                                                      \
+            harness_fail(h, "check", __LINE__, 0, "%s", #condition);                                                           \
     } while (0)
 
 // Bits must equal what the first device gave under this label. element: 4 or 8 bytes; per_pixel: elements a pixel.
-void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element,
-                  size_t per_pixel, uint32_t width);
+void harness_same(struct harness *h, const char *label, const void *data, size_t count, size_t element, size_t per_pixel,
+                  uint32_t width);
 // |got - expected| <= error; NaN never is.
 int harness_near(double got, double expected, double error);
 // At most this share of the pixels (TOL_UNSURE_SHARE, TOL_UNSURE_HARD) may have been left open by the reference.

@@ -15,20 +15,11 @@ uint64_t rng_next(struct rng *rng) // splitmix64
     return z ^ z >> 31;
 }
 
-double rng_unit(struct rng *rng)
-{
-    return (double)(rng_next(rng) >> 11) * 0x1p-53;
-}
+double rng_unit(struct rng *rng) { return (double)(rng_next(rng) >> 11) * 0x1p-53; }
 
-double rng_range(struct rng *rng, double lo, double hi)
-{
-    return lo + (hi - lo) * rng_unit(rng);
-}
+double rng_range(struct rng *rng, double lo, double hi) { return lo + (hi - lo) * rng_unit(rng); }
 
-uint32_t rng_below(struct rng *rng, uint32_t n)
-{
-    return (uint32_t)(rng_unit(rng) * n);
-}
+uint32_t rng_below(struct rng *rng, uint32_t n) { return (uint32_t)(rng_unit(rng) * n); }
 
 void rng_direction(struct rng *rng, float out[3])
 {
@@ -102,8 +93,7 @@ static struct point make(struct rng *rng, const struct view_args *view, enum pic
     struct point point = {5.0, {0.0f, 0.0f, 1.0f}, 1.0};
     double lean;
     switch (kind) {
-    case PICTURE_SURFACES:
-        return surfaces(rng, view, ray);
+    case PICTURE_SURFACES: return surfaces(rng, view, ray);
     case PICTURE_NOISE:
         point.z = 2.0 + rng_below(rng, 3) * 0.5 + rng_range(rng, 0.0, 0.05);
         point.loose = exp(rng_range(rng, 0.0, 4.0));
@@ -119,14 +109,12 @@ static struct point make(struct rng *rng, const struct view_args *view, enum pic
         point.z = view->z_near * pow(10.0, rng_range(rng, 0.0, 7.0));
         rng_direction(rng, point.n);
         break;
-    default:
-        break;
+    default: break;
     }
     return point;
 }
 
-struct picture picture_random(struct harness *h, struct rng *rng, struct view_args view, enum picture_kind kind,
-                              double density)
+struct picture picture_random(struct harness *h, struct rng *rng, struct view_args view, enum picture_kind kind, double density)
 {
     size_t count = (size_t)view.width * view.height;
     struct picture out = {.view = view, .kind = kind, .count = count, .id_base = (uint32_t)(0xFFFFFFFEu - count)};
@@ -210,8 +198,7 @@ void picture_pull(struct harness *h, struct view_args *view, uint64_t **keys, ui
     uint64_t *coarse_keys = harness_alloc(h, count * 8);
     uint32_t *coarse_from = harness_alloc(h, count * 4);
     for (size_t i = 0; i < count; i++)
-        ref_pull(&args, *keys, *from, (int)(i % args.view.width), (int)(i / args.view.width), &coarse_keys[i],
-                 &coarse_from[i]);
+        ref_pull(&args, *keys, *from, (int)(i % args.view.width), (int)(i / args.view.width), &coarse_keys[i], &coarse_from[i]);
     *keys = coarse_keys;
     *from = coarse_from;
     *view = args.view;

@@ -98,7 +98,8 @@ static void sanity(struct harness *h)
 {
     const uint64_t keys[2] = {ref_key(5.0f, 7), REF_EMPTY_KEY};
     const uint32_t shape = 12u << PT_SHAPE_CERTAINTY_SHIFT | 3u << PT_SHAPE_SIGMA_SHIFT | PT_SHAPE_SEEN_THROUGH | 63u;
-    struct assess_args args = {.view = {.width = 2, .height = 1}, .instance = {.id_base = 7, .id_count = 1}, .sigma_scale = 0.25f};
+    struct assess_args args = {
+        .view = {.width = 2, .height = 1}, .instance = {.id_base = 7, .id_count = 1}, .sigma_scale = 0.25f};
     const struct ref_planes planes = {.keys = keys};
     args.instance.spacing[3] = 2.0f;
     struct ref_assess out = ref_assess(&args, &planes, &shape, 0, 0);

@@ -25,8 +25,14 @@ static struct setup look_at(struct harness *h, struct rng *rng, uint32_t width, 
     struct instance_args *instance = &s.args.instance;
     s.args.view = s.scene.view;
     s.args.normals = (uint32_t)normals;
-    *instance = (struct instance_args){.id_base = 7000, .id_count = cloud->slots, .has_normals = 1, .color_format = format,
-                                       .opacity = 1.0f, .color = {0.2f, 0.7f, 3.0f}, .axis_scale = 1.0f, .d_min = 0.02f};
+    *instance = (struct instance_args){.id_base = 7000,
+                                       .id_count = cloud->slots,
+                                       .has_normals = 1,
+                                       .color_format = format,
+                                       .opacity = 1.0f,
+                                       .color = {0.2f, 0.7f, 3.0f},
+                                       .axis_scale = 1.0f,
+                                       .d_min = 0.02f};
     for (int k = 0; k < 9; k++)
         instance->normal_matrix[k] = (float)camera.rotation[k];
     for (uint32_t k = 0; k < PT_SPACINGS; k++) // from below a pixel to above the widest
@@ -55,7 +61,8 @@ static void invent(struct rng *rng, const struct view_args *view, struct planes 
     uint64_t *keys = planes->keys;
     for (int i = 0; i < width * height; i++) {
         const int x = i % width + (int)rng_below(rng, 5) - 2, y = i / width + (int)rng_below(rng, 5) - 2, q = y * width + x;
-        if (keys[i] != REF_EMPTY_KEY || rng_below(rng, 2) || x < 0 || y < 0 || x >= width || y >= height || keys[q] == REF_EMPTY_KEY)
+        if (keys[i] != REF_EMPTY_KEY || rng_below(rng, 2) || x < 0 || y < 0 || x >= width || y >= height ||
+            keys[q] == REF_EMPTY_KEY)
             continue;
         keys[i] = keys[q];
         planes->from[i] = planes->from[q];
@@ -96,9 +103,9 @@ static void hold_against(struct harness *h, const struct setup *s, const struct 
         uint32_t nearest = 0;
         while (nearest < count && tents[nearest].id != ref_key_id(planes->keys[p]))
             nearest++;
-        const struct ref_average expected =
-            ref_average(&s->args, tents, looks, count, nearest, (float)ref_key_z(planes->keys[p]), planes->deff[planes->from[p]], before,
-                        planes->from[p] == p, x, y);
+        const struct ref_average expected = ref_average(&s->args, tents, looks, count, nearest,
+                                                        (float)ref_key_z(planes->keys[p]), planes->deff[planes->from[p]],
+                                                        before, planes->from[p] == p, x, y);
         shown++;
         unsure += expected.unsure != 0;
         if (got[3] != 1.0f || n[3] != before[3])
@@ -114,7 +121,8 @@ static void hold_against(struct harness *h, const struct setup *s, const struct 
         const double n_of[3] = {expected.n.x, expected.n.y, expected.n.z};
         for (int k = 0; k < 3; k++)
             if (!harness_near(n[k], n_of[k], expected.normal_error))
-                harness_fail(h, "normal", x, y, "axis %d: got %.9g, expected %.9g +- %.2g", k, n[k], n_of[k], expected.normal_error);
+                harness_fail(h, "normal", x, y, "axis %d: got %.9g, expected %.9g +- %.2g", k, n[k], n_of[k],
+                             expected.normal_error);
     }
     harness_note(h, "%zu pixels, %zu open", shown, unsure);
     HARNESS_CHECK(h, shown > 0);
@@ -155,8 +163,8 @@ static struct planes run(struct harness *h, struct rng *rng, struct setup *s, do
     invent(rng, &scene->view, &planes);
     keys = harness_buffer(h, planes.keys, pixels * 8);
     from = harness_buffer(h, planes.from, pixels * 4);
-    struct pt_buffer *const buffers[] = {keys, from, deff, normal, albedo, chunks, positions, surface, colors,
-                                         s->args.sifted ? drawn : NULL};
+    struct pt_buffer *const buffers[] = {keys,   from,      deff,    normal, albedo,
+                                         chunks, positions, surface, colors, s->args.sifted ? drawn : NULL};
     harness_run(h, PT_KERNEL_average, &s->args, sizeof s->args, buffers, 10);
     planes.normal = harness_read(h, normal);
     planes.albedo = harness_read(h, albedo);
@@ -231,7 +239,8 @@ static void overflow(struct harness *h)
             continue;
         const float *got = planes.albedo + 4 * p;
         shown++;
-        HARNESS_CHECK(h, harness_near(got[0], 4000.0, 0.1) && got[1] >= -3000.5f && got[1] <= 1000.5f && harness_near(got[2], 1e-3, 1e-5));
+        HARNESS_CHECK(h, harness_near(got[0], 4000.0, 0.1) && got[1] >= -3000.5f && got[1] <= 1000.5f &&
+                             harness_near(got[2], 1e-3, 1e-5));
     }
     HARNESS_CHECK(h, shown > 0);
 }
@@ -292,7 +301,8 @@ static void sanity(struct harness *h)
     const struct ref_look looks[2] = {{{1.0, 0.0, 0.0}, 1.0}, {{0.0, 1.0, 0.0}, 1.0}};
     const float n[3] = {0.0f, 0.0f, 1.0f};
     const struct ref_average both = ref_average(&args, tents, looks, 2, 0, 2.0f, 0.5f, n, 1, 4, 4);
-    HARNESS_CHECK(h, !both.unsure && harness_near(both.color[0], 2.0 / 3.0, 1e-9) && harness_near(both.color[1], 1.0 / 3.0, 1e-9));
+    HARNESS_CHECK(h,
+                  !both.unsure && harness_near(both.color[0], 2.0 / 3.0, 1e-9) && harness_near(both.color[1], 1.0 / 3.0, 1e-9));
     tents[1].place.z = (struct ref_range){2.6, 2.6};
     HARNESS_CHECK(h, ref_average(&args, tents, looks, 2, 0, 2.0f, 0.5f, n, 1, 4, 4).color[0] == 1.0);
 }

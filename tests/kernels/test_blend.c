@@ -64,7 +64,8 @@ static struct ref_look look_of(const struct disc_scene *scene, const struct pain
 }
 
 // open: share of the pixels that float32 may leave open. depths: means of depth too.
-static struct planes run_hard(struct harness *h, struct disc_scene *scene, const struct paint *paint, double open, uint32_t depths)
+static struct planes run_hard(struct harness *h, struct disc_scene *scene, const struct paint *paint, double open,
+                              uint32_t depths)
 {
     const struct scene *points = &scene->points;
     const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct blend_args);
@@ -131,27 +132,29 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
         HARNESS_CHECK(h, nearest != NULL);
         if (!nearest)
             continue;
-        const struct ref_blend expected =
-            ref_blend(&points->view, discs, looks, count, (uint32_t)(nearest - discs), (float)ref_key_z(out.keys[p]), out.deff[p],
-                      before + 4 * p, x, y);
+        const struct ref_blend expected = ref_blend(&points->view, discs, looks, count, (uint32_t)(nearest - discs),
+                                                    (float)ref_key_z(out.keys[p]), out.deff[p], before + 4 * p, x, y);
         shown++;
         // whatever float32 cannot decide, a mean lies between what is blended
         for (int k = 0; k < 4; k++) {
             double least = INFINITY, most = -INFINITY;
             for (uint32_t i = 0; i < count; i++) {
-                const double term = k == 3 ? looks[i].opacity : fmax(fmin(looks[i].color[k], (double)PT_SUM_BRIGHTEST), -(double)PT_SUM_BRIGHTEST);
+                const double term = k == 3 ? looks[i].opacity
+                                           : fmax(fmin(looks[i].color[k], (double)PT_SUM_BRIGHTEST), -(double)PT_SUM_BRIGHTEST);
                 least = fmin(least, term);
                 most = fmax(most, term);
             }
             const double got = out.albedo[4 * p + (size_t)k], slack = 1e-3 + 1e-3 * (fabs(least) + fabs(most));
             if (!(got >= fmin(least, 0.0) - slack && got <= fmax(most, 0.0) + slack))
-                harness_fail(h, "albedo", x, y, "channel %d: got %.9g, all there is lies from %.9g to %.9g", k, got, least, most);
+                harness_fail(h, "albedo", x, y, "channel %d: got %.9g, all there is lies from %.9g to %.9g", k, got, least,
+                             most);
         }
         const float *mean = out.normal + 4 * p;
         if (!(sqrt((double)mean[0] * mean[0] + (double)mean[1] * mean[1] + (double)mean[2] * mean[2]) < 1.0 + 1e-5))
             harness_fail(h, "normal", x, y, "got %.9g %.9g %.9g", mean[0], mean[1], mean[2]);
         if (depths && !expected.unsure_offset && !harness_near(out.offset[p], expected.offset, expected.offset_error))
-            harness_fail(h, "offset", x, y, "got %.9g, expected %.9g +- %.2g", out.offset[p], expected.offset, expected.offset_error);
+            harness_fail(h, "offset", x, y, "got %.9g, expected %.9g +- %.2g", out.offset[p], expected.offset,
+                         expected.offset_error);
         unsure_depth += expected.unsure_offset != 0;
         unsure += expected.unsure != 0;
         if (expected.unsure)
@@ -195,20 +198,11 @@ static void random_discs(struct harness *h, int perspective, uint32_t seed, doub
     run(h, &scene, &colors);
 }
 
-static void perspective(struct harness *h)
-{
-    random_discs(h, 1, 1, 0.2, 1);
-}
+static void perspective(struct harness *h) { random_discs(h, 1, 1, 0.2, 1); }
 
-static void orthographic(struct harness *h)
-{
-    random_discs(h, 0, 2, 0.2, 1);
-}
+static void orthographic(struct harness *h) { random_discs(h, 0, 2, 0.2, 1); }
 
-static void no_normals(struct harness *h)
-{
-    random_discs(h, 1, 3, 0.2, 0);
-}
+static void no_normals(struct harness *h) { random_discs(h, 1, 3, 0.2, 0); }
 
 static void ellipses(struct harness *h)
 {
@@ -218,7 +212,8 @@ static void ellipses(struct harness *h)
         struct disc_scene scene = {.points = {.view = discs_window(67, 45, p, focal)}};
         for (uint32_t i = 0; i < 2; i++) {
             struct camera camera = points_look(&rng, &scene.points.view, focal, 4.0);
-            points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, i * 5000), i ? 1.8 : 1.0);
+            points_scatter_about(&rng, points_add_cloud(h, &rng, &scene.points, &camera, sizes, SIZES, 0, i * 5000),
+                                 i ? 1.8 : 1.0);
             discs_describe(h, &rng, &scene, i, &camera, 0.0f, 0.2, 1);
             discs_shape(h, &rng, &scene, i, &camera, NULL);
         }
@@ -310,7 +305,8 @@ static void overflow(struct harness *h)
             continue;
         shown++;
         const float *got = planes.albedo + 4 * p;
-        HARNESS_CHECK(h, harness_near(got[0], 4000.0, 0.01) && harness_near(got[1], -1000.0, 0.01) && harness_near(got[2], 1e-3, 1e-5));
+        HARNESS_CHECK(h, harness_near(got[0], 4000.0, 0.01) && harness_near(got[1], -1000.0, 0.01) &&
+                             harness_near(got[2], 1e-3, 1e-5));
     }
     HARNESS_CHECK(h, shown > 0);
 }
@@ -330,7 +326,8 @@ static void plane_sizes(struct harness *h)
 static void sanity(struct harness *h)
 {
     const struct view_args view = discs_window(64, 64, 0, 10.0);
-    struct ref_disc discs[2] = {{.id = 0, .possible = 1, .definite = 1, .n = {0, 0, 1}, .has_normal = 1, .has_normals = 1, .radius = 1.0}};
+    struct ref_disc discs[2] = {
+        {.id = 0, .possible = 1, .definite = 1, .n = {0, 0, 1}, .has_normal = 1, .has_normals = 1, .radius = 1.0}};
     discs[0].place = (struct ref_place){1, {48.5, 48.5}, {40.5, 40.5}, {2.0, 2.0}};
     discs[1] = discs[0];
     discs[1].id = 1;

@@ -73,7 +73,8 @@ static void check_scene(struct harness *h, struct rng *rng, struct scene *scene)
     random_surfaces(h, rng, pixels, &normal, &deff);
     for (size_t i = 0; i < pixels; i++)
         unset[i] = UNTOUCHED;
-    struct pt_buffer *normal_buffer = harness_buffer(h, normal, pixels * 16), *deff_buffer = harness_buffer(h, deff, pixels * 4);
+    struct pt_buffer *normal_buffer = harness_buffer(h, normal, pixels * 16),
+                     *deff_buffer = harness_buffer(h, deff, pixels * 4);
     struct pt_buffer *offset_buffer = harness_buffer(h, unset, pixels * 4);
     const struct center_args args = {.view = scene->view};
     for (uint32_t i = 0; i + 1 < scene->count || i == 0; i++) // the last of several keeps out
@@ -107,7 +108,8 @@ static void random_clouds(struct harness *h, int perspective, uint32_t seed)
     struct scene scene = {.view = points_window(67, 45, perspective, perspective ? 60.0 : 20.0)};
     for (uint32_t i = 0; i < 3; i++) {
         struct camera camera = points_look(&rng, &scene.view, 1.0 / (double)scene.view.ray_xs, 4.0);
-        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i == 1, i * 5000), i == 0 ? 1.0 : 3.0);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i == 1, i * 5000),
+                             i == 0 ? 1.0 : 3.0);
     }
     check_scene(h, &rng, &scene);
 }

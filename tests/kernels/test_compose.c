@@ -26,8 +26,8 @@ static void check(struct harness *h, const struct picture *picture, const uint32
         struct ref_color expected = ref_compose(&args, &planes, x, y);
         for (int c = 0; c < 4; c++)
             if (!harness_near(got[4 * i + (size_t)c], expected.color[c], expected.error[c]))
-                harness_fail(h, "combined", x, y, "channel %d: got %.9g, expected %.9g +- %.2g", c,
-                             got[4 * i + (size_t)c], expected.color[c], expected.error[c]);
+                harness_fail(h, "combined", x, y, "channel %d: got %.9g, expected %.9g +- %.2g", c, got[4 * i + (size_t)c],
+                             expected.color[c], expected.error[c]);
     }
 }
 
@@ -42,8 +42,7 @@ static void backgrounds(struct harness *h)
             for (size_t i = 0; i < picture.count; i++) { // edges: premultiplied by what they cover; empty: anything
                 float alpha = rng_below(&rng, 3) ? 1.0f : (float)rng_unit(&rng);
                 for (size_t k = 0; k < 4; k++)
-                    picture.color[4 * i + k] = picture.keys[i] == REF_EMPTY_KEY ? NAN
-                                                                                : picture.color[4 * i + k] * alpha;
+                    picture.color[4 * i + k] = picture.keys[i] == REF_EMPTY_KEY ? NAN : picture.color[4 * i + k] * alpha;
             }
             check(h, &picture, crops[c], colors[b], 0);
             for (size_t i = 0; i < 4 * picture.count; i++)

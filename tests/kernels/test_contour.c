@@ -44,7 +44,8 @@ static void kinds(struct harness *h)
             if (kind == PICTURE_RANGE)
                 continue; // lines at depths of 1e4 are finer than their places
             struct picture picture = effect_picture(h, (uint64_t)kind, 67, 45, p, (enum picture_kind)kind, kind % 2);
-            struct contour_args args = args_of(&picture.view, intervals[kind % 3], 0.4f + 0.8f * (float)kind, 1 + (uint32_t)kind % 2);
+            struct contour_args args = args_of(&picture.view, intervals[kind % 3], 0.4f + 0.8f * (float)kind,
+                                               1 + (uint32_t)kind % 2);
             effect_check(h, &contour, &args, sizeof args, &picture, NULL);
         }
 }
@@ -75,8 +76,10 @@ static void hard(struct harness *h)
                         harness_buffer(h, picture.normal, picture.count * 16), color);
             const float *got = harness_read(h, color);
             for (size_t k = 0; k < 4 * picture.count; k++)
-                if (picture.keys[k / 4] != REF_EMPTY_KEY && k % 4 < 3 && !(got[k] >= 0.0f && got[k] <= fmaxf(picture.color[k], 0.3f) * 1.001f))
-                    harness_fail(h, "color", (int)(k / 4 % 67), (int)(k / 4 / 67), "got %.9g of %.9g", (double)got[k], (double)picture.color[k]);
+                if (picture.keys[k / 4] != REF_EMPTY_KEY && k % 4 < 3 &&
+                    !(got[k] >= 0.0f && got[k] <= fmaxf(picture.color[k], 0.3f) * 1.001f))
+                    harness_fail(h, "color", (int)(k / 4 % 67), (int)(k / 4 / 67), "got %.9g of %.9g", (double)got[k],
+                                 (double)picture.color[k]);
         }
 }
 

@@ -46,7 +46,8 @@ static void make(struct harness *h, struct rng *rng, struct scene *s, int perspe
     s->limit = harness_alloc(h, s->picture.count * 4);
     for (size_t i = 0; i < s->picture.count; i++) {
         float z = rng_below(rng, 8) ? (float)rng_range(rng, 0.5, 8.0) : (float)ref_key_z(s->picture.keys[i]);
-        s->mesh_keys[i] = rng_below(rng, 4) && isfinite(z) ? ref_key(z, mesh->id_base + rng_below(rng, TRIANGLES + 3)) : REF_EMPTY_KEY;
+        s->mesh_keys[i] = rng_below(rng, 4) && isfinite(z) ? ref_key(z, mesh->id_base + rng_below(rng, TRIANGLES + 3))
+                                                           : REF_EMPTY_KEY;
         s->limit[i] = (float)rng_range(rng, 0.5, 8.0);
     }
 }
@@ -55,8 +56,8 @@ static void near3(struct harness *h, const char *label, int x, int y, const floa
 {
     if (!harness_near(got[0], expected.x, error) || !harness_near(got[1], expected.y, error) ||
         !harness_near(got[2], expected.z, error))
-        harness_fail(h, label, x, y, "got (%g %g %g), expected (%g %g %g) +- %.2g", got[0], got[1], got[2], expected.x, expected.y,
-                     expected.z, error);
+        harness_fail(h, label, x, y, "got (%g %g %g), expected (%g %g %g) +- %.2g", got[0], got[1], got[2], expected.x,
+                     expected.y, expected.z, error);
 }
 
 static void check(struct harness *h, struct scene *s)
@@ -66,8 +67,10 @@ static void check(struct harness *h, struct scene *s)
     uint64_t *empty = harness_alloc(h, count * 8);
     for (size_t i = 0; i < count; i++)
         empty[i] = REF_EMPTY_KEY;
-    struct pt_buffer *keys = harness_buffer(h, s->picture.keys, count * 8), *from = harness_buffer(h, s->picture.from, count * 4);
-    struct pt_buffer *normal = harness_buffer(h, s->picture.normal, count * 16), *deff = harness_buffer(h, s->picture.deff, count * 4);
+    struct pt_buffer *keys = harness_buffer(h, s->picture.keys, count * 8),
+                     *from = harness_buffer(h, s->picture.from, count * 4);
+    struct pt_buffer *normal = harness_buffer(h, s->picture.normal, count * 16),
+                     *deff = harness_buffer(h, s->picture.deff, count * 4);
     struct pt_buffer *shown = harness_buffer(h, empty, count * 8), *smooth = harness_buffer(h, s->picture.normal, count * 16);
     struct pt_buffer *albedo = harness_buffer(h, harness_alloc(h, count * 16), count * 16);
     HARNESS_RUN(h, cover, &s->args, keys, from, normal, deff, harness_buffer(h, s->mesh_keys, count * 8),
@@ -87,7 +90,8 @@ static void check(struct harness *h, struct scene *s)
     harness_same(h, "albedo", got_albedo, count * 4, 4, 4, width);
     for (size_t i = 0; i < count; i++) {
         int x = (int)(i % width), y = (int)(i / width);
-        struct ref_cover e = ref_cover(&s->args, s->vertices, s->indices, s->picture.keys[i], s->mesh_keys[i], s->limit[i], x, y);
+        struct ref_cover e = ref_cover(&s->args, s->vertices, s->indices, s->picture.keys[i], s->mesh_keys[i], s->limit[i], x,
+                                       y);
         if (!e.front) {
             if (got_keys[i] != s->picture.keys[i] || got_from[i] != s->picture.from[i] || got_shown[i] != REF_EMPTY_KEY ||
                 memcmp(got_normal + 4 * i, s->picture.normal + 4 * i, 16) || memcmp(&got_deff[i], &s->picture.deff[i], 4))
@@ -107,7 +111,8 @@ static void check(struct harness *h, struct scene *s)
         if (!measured)
             near3(h, "normal", x, y, got_normal + 4 * i, e.n, e.plane_error);
         near3(h, "smooth", x, y, got_smooth + 4 * i, e.smooth, e.smooth_error);
-        if (!harness_near(got_smooth[4 * i + 3], e.inverse, e.inverse_error) || !harness_near(got_deff[i], e.deff, e.deff_error))
+        if (!harness_near(got_smooth[4 * i + 3], e.inverse, e.inverse_error) ||
+            !harness_near(got_deff[i], e.deff, e.deff_error))
             harness_fail(h, "deff", x, y, "got %.9g, expected %.9g +- %.2g", got_deff[i], e.deff, e.deff_error);
         near3(h, "albedo", x, y, got_albedo + 4 * i, ref_vec(e.albedo[0], e.albedo[1], e.albedo[2]), e.albedo_error);
     }

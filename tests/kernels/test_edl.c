@@ -78,15 +78,14 @@ static void sanity(struct harness *h)
     struct ref_planes planes = picture_planes(&picture);
     double whole = picture.color[4 * 12];
     HARNESS_CHECK(h, ref_edl(&args, &planes, 2, 2).color[0] == whole);
-    HARNESS_CHECK(h, ref_edl(&args, &planes, 0, 0).color[0] ==
-                         (double)picture.color[0]); // beyond the plane nothing is known
+    HARNESS_CHECK(h, ref_edl(&args, &planes, 0, 0).color[0] == (double)picture.color[0]); // beyond the plane nothing is known
     picture.keys[12] = ref_key(5.005f, 1);
     HARNESS_CHECK(h, fabs(ref_edl(&args, &planes, 2, 2).color[0] / whole - exp2(-0.8 * 300.0 * log2(1.001))) < 1e-5);
     picture.keys[12] = ref_key(4.995f, 1);
     HARNESS_CHECK(h, ref_edl(&args, &planes, 2, 2).color[0] == whole);
     picture.keys[13] = REF_EMPTY_KEY; // one of eight is a silhouette
-    HARNESS_CHECK(h, fabs(ref_edl(&args, &planes, 2, 2).color[0] / whole -
-                          exp2(-(double)args.gain * (double)PT_EDL_STEP)) < 1e-9);
+    HARNESS_CHECK(h,
+                  fabs(ref_edl(&args, &planes, 2, 2).color[0] / whole - exp2(-(double)args.gain * (double)PT_EDL_STEP)) < 1e-9);
 }
 
 int main(int argc, char **argv)

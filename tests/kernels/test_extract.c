@@ -62,12 +62,9 @@ static void check(struct harness *h, const struct picture *picture, const float 
         struct ref_extract expected = ref_extract(&args, &planes, x, y);
         compare(h, "depth", x, y, got_depth[i], args.depth ? expected.depth : -77.0, 0.0);
         compare(h, "normal.x", x, y, got_normal[3 * i], args.normal ? expected.normal.x : -77.0, expected.normal_error);
-        compare(h, "normal.y", x, y, got_normal[3 * i + 1], args.normal ? expected.normal.y : -77.0,
-                expected.normal_error);
-        compare(h, "normal.z", x, y, got_normal[3 * i + 2], args.normal ? expected.normal.z : -77.0,
-                expected.normal_error);
-        compare(h, "source", x, y, got_source[i], args.source ? expected.source : -77.0,
-                TOL_DISTANCE * fabs(expected.source));
+        compare(h, "normal.y", x, y, got_normal[3 * i + 1], args.normal ? expected.normal.y : -77.0, expected.normal_error);
+        compare(h, "normal.z", x, y, got_normal[3 * i + 2], args.normal ? expected.normal.z : -77.0, expected.normal_error);
+        compare(h, "source", x, y, got_source[i], args.source ? expected.source : -77.0, TOL_DISTANCE * fabs(expected.source));
         compare(h, "shadow", x, y, got_shadow[i], args.shadow ? expected.shadow : -77.0, 0.0);
     }
     harness_same(h, "depth", got_depth, inside, 4, 1, crop[2]);
@@ -80,8 +77,7 @@ static void passes(struct harness *h)
     for (int kind = 0; kind < PICTURE_KINDS; kind++)
         for (uint32_t wanted = 1; wanted < 16; wanted++) {
             struct rng rng = {(uint64_t)kind};
-            struct picture picture = picture_random(h, &rng, picture_view(67, 45, kind % 2), (enum picture_kind)kind,
-                                                    0.5);
+            struct picture picture = picture_random(h, &rng, picture_view(67, 45, kind % 2), (enum picture_kind)kind, 0.5);
             picture_invent(&picture, &rng, 0.5, 30);
             float matrix[9], *shading = harness_alloc(h, picture.count * 16);
             for (int k = 0; k < 3; k++)

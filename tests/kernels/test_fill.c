@@ -10,8 +10,8 @@ struct planes {
     uint32_t *from;
 };
 
-static struct planes run(struct harness *h, const struct picture *picture, const struct fill_args *args,
-                         const uint64_t *keys, const uint32_t *from)
+static struct planes run(struct harness *h, const struct picture *picture, const struct fill_args *args, const uint64_t *keys,
+                         const uint32_t *from)
 {
     size_t count = (size_t)args->view.width * args->view.height;
     struct pt_buffer *keys_buffer = harness_buffer(h, keys, count * 8);
@@ -30,8 +30,8 @@ static struct planes run(struct harness *h, const struct picture *picture, const
 }
 
 // Runs one phase on the device and in the reference; the device's planes are the next phase's input.
-static struct planes check(struct harness *h, const struct picture *picture, const struct fill_args *args,
-                           const uint64_t *keys, const uint32_t *from, double most_open)
+static struct planes check(struct harness *h, const struct picture *picture, const struct fill_args *args, const uint64_t *keys,
+                           const uint32_t *from, double most_open)
 {
     size_t count = (size_t)args->view.width * args->view.height, open = 0;
     struct planes got = run(h, picture, args, keys, from);
@@ -48,9 +48,8 @@ static struct planes check(struct harness *h, const struct picture *picture, con
         int same = pixels[i].id == ref_key_id(got.keys[i]) && z >= pixels[i].z.lo && z <= pixels[i].z.hi;
         if (!same)
             harness_fail(h, args->phases & PT_FILL_OCCLUDED ? "occluded" : "background", x, y,
-                         "got z %.9g id %u, expected z %.9g to %.9g id %u (before: z %.9g id %u)", z,
-                         ref_key_id(got.keys[i]), pixels[i].z.lo, pixels[i].z.hi, pixels[i].id, ref_key_z(keys[i]),
-                         ref_key_id(keys[i]));
+                         "got z %.9g id %u, expected z %.9g to %.9g id %u (before: z %.9g id %u)", z, ref_key_id(got.keys[i]),
+                         pixels[i].z.lo, pixels[i].z.hi, pixels[i].id, ref_key_z(keys[i]), ref_key_id(keys[i]));
         else if (got.keys[i] != REF_EMPTY_KEY && got.from[i] != pixels[i].from)
             harness_fail(h, "from", x, y, "got %u, expected %u", got.from[i], pixels[i].from);
     }
@@ -93,8 +92,8 @@ static void both_phases_within(struct harness *h, struct picture *picture, uint3
 }
 
 // As far as may be, and no farther than points reach; with strays and without.
-static void both_phases(struct harness *h, struct picture *picture, uint32_t level, uint32_t iterations,
-                        uint32_t unfills, uint32_t refined)
+static void both_phases(struct harness *h, struct picture *picture, uint32_t level, uint32_t iterations, uint32_t unfills,
+                        uint32_t refined)
 {
     struct picture same = *picture;
     both_phases_within(h, &same, level, iterations, unfills, refined, 0.0f, 0);
@@ -109,8 +108,8 @@ static void kinds(struct harness *h)
     for (int kind = 0; kind < PICTURE_KINDS; kind++)
         for (size_t d = 0; d < 3; d++) {
             struct rng rng = {(uint64_t)kind * 10 + d};
-            struct picture picture = picture_random(h, &rng, picture_view(67, 45, (kind + (int)d) % 2),
-                                                    (enum picture_kind)kind, densities[d]);
+            struct picture picture = picture_random(h, &rng, picture_view(67, 45, (kind + (int)d) % 2), (enum picture_kind)kind,
+                                                    densities[d]);
             both_phases(h, &picture, 0, 1, 0, 0);
             uint32_t n = kind == PICTURE_SURFACES || kind == PICTURE_NOISE ? 4 : 2;
             both_phases(h, &picture, 0, n, n, 1);
@@ -135,8 +134,7 @@ static void levels(struct harness *h)
         for (int p = 0; p < 2; p++)
             for (int kind = 0; kind < PICTURE_KINDS; kind++) {
                 struct rng rng = {level * 100 + (uint64_t)kind};
-                struct picture picture = picture_random(h, &rng, picture_view(133, 90, p), (enum picture_kind)kind,
-                                                        0.08);
+                struct picture picture = picture_random(h, &rng, picture_view(133, 90, p), (enum picture_kind)kind, 0.08);
                 both_phases(h, &picture, level, 2, 2, p ? 1 : 0);
             }
 }
@@ -191,7 +189,10 @@ static void every_ring(struct harness *h)
             if (occluded)
                 picture.keys[centre] = ref_key(9.0f, picture.id_base + (uint32_t)centre);
         }
-        struct fill_args args = {.view = picture.view, .phases = occluded ? PT_FILL_OCCLUDED : PT_FILL_BACKGROUND, .iterations = 1, .from_width = width};
+        struct fill_args args = {.view = picture.view,
+                                 .phases = occluded ? PT_FILL_OCCLUDED : PT_FILL_BACKGROUND,
+                                 .iterations = 1,
+                                 .from_width = width};
         struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
         for (int ring = 0; ring < 256; ring++) {
             size_t centre = (size_t)(ring / SIDE * STEP + 2) * width + (size_t)(ring % SIDE * STEP + 2);
@@ -213,7 +214,8 @@ static void disc(struct harness *h)
         if (x * x + y * y > 60 * 60)
             picture.keys[i] = REF_EMPTY_KEY;
     }
-    struct fill_args args = {.view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 6, .unfills = 6, .from_width = 141};
+    struct fill_args args = {
+        .view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 6, .unfills = 6, .from_width = 141};
     struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
     size_t grown = 0;
     for (size_t i = 0; i < picture.count; i++)
@@ -262,7 +264,8 @@ static void strays(struct harness *h)
             const size_t at = (size_t)(70.5 + 63.5 * sin(angle)) * 141 + (size_t)(70.5 + 63.5 * cos(angle));
             picture.keys[at] = ref_key(5.0f, picture.id_base + (uint32_t)at);
         }
-        struct fill_args args = {.view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 4, .unfills = 4, .from_width = 141, .alone = 1};
+        struct fill_args args = {
+            .view = picture.view, .phases = PT_FILL_BACKGROUND, .iterations = 4, .unfills = 4, .from_width = 141, .alone = 1};
         struct planes got = check(h, &picture, &args, picture.keys, picture.from, 0.0);
         for (size_t i = 0; i < picture.count; i++)
             grown[sparse] += got.keys[i] != picture.keys[i];

@@ -29,8 +29,7 @@ static void check(struct harness *h, const struct picture *picture, const struct
         for (size_t c = 0; c < 4 && picture->keys[i] == REF_EMPTY_KEY; c++)
             colors[4 * i + c] = NAN;
     struct pt_buffer *out = harness_buffer(h, NULL, inside * 16);
-    HARNESS_RUN(h, focus, args, harness_buffer(h, picture->keys, count * 8), harness_buffer(h, colors, count * 16),
-                out);
+    HARNESS_RUN(h, focus, args, harness_buffer(h, picture->keys, count * 8), harness_buffer(h, colors, count * 16), out);
     const float *got = harness_read(h, out);
     struct ref_planes planes = picture_planes(picture);
     for (size_t i = 0; i < inside; i++) {
@@ -38,8 +37,8 @@ static void check(struct harness *h, const struct picture *picture, const struct
         struct ref_color expected = ref_focus(args, &planes, x, y);
         for (int c = 0; c < 4; c++)
             if (!harness_near(got[4 * i + (size_t)c], expected.color[c], expected.error[c]))
-                harness_fail(h, "combined", x, y, "channel %d: got %.9g, expected %.9g +- %.2g", c,
-                             got[4 * i + (size_t)c], expected.color[c], expected.error[c]);
+                harness_fail(h, "combined", x, y, "channel %d: got %.9g, expected %.9g +- %.2g", c, got[4 * i + (size_t)c],
+                             expected.color[c], expected.error[c]);
     }
 }
 
@@ -47,8 +46,7 @@ static struct picture random_picture(struct harness *h, uint64_t seed, uint32_t 
                                      enum picture_kind kind)
 {
     struct rng rng = {seed};
-    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind,
-                                            kind % 2 ? 0.9 : 0.5);
+    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind, kind % 2 ? 0.9 : 0.5);
     picture_invent(&picture, &rng, 0.5, 4);
     for (size_t i = 0; i < picture.count; i++) {
         float alpha = rng_below(&rng, 3) ? 1.0f : (float)rng_unit(&rng);
@@ -96,8 +94,7 @@ static void sanity(struct harness *h)
     struct ref_planes planes = picture_planes(&picture);
     const uint32_t whole[4] = {0, 0, 33, 33};
     struct focus_args args = args_of(&picture.view, whole, 5.0f, 6.0f);
-    HARNESS_CHECK(h,
-                  fabs(ref_focus(&args, &planes, 16, 16).color[0] - (double)picture.color[4 * (16 * 33 + 16)]) < 1e-6);
+    HARNESS_CHECK(h, fabs(ref_focus(&args, &planes, 16, 16).color[0] - (double)picture.color[4 * (16 * 33 + 16)]) < 1e-6);
     args.distance = 8.0f;
     for (size_t i = 0; i < picture.count; i++)
         for (size_t c = 0; c < 4; c++)
@@ -114,7 +111,6 @@ static void sanity(struct harness *h)
 
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {
-        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
+    static const struct harness_case cases[] = {{"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

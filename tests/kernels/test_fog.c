@@ -13,11 +13,8 @@ static const struct effect fog = {PT_KERNEL_fog, reference, "kc"};
 
 static struct fog_args args_of(const struct view_args *view, float start, float end, float density)
 {
-    return (struct fog_args){.view = *view,
-                             .start = start,
-                             .inverse = 1.0f / (end - start),
-                             .density = density,
-                             .color = {0.6f, 0.7f, 40.0f}};
+    return (struct fog_args){
+        .view = *view, .start = start, .inverse = 1.0f / (end - start), .density = density, .color = {0.6f, 0.7f, 40.0f}};
 }
 
 static void kinds(struct harness *h)
@@ -66,7 +63,6 @@ static void sanity(struct harness *h)
 
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {
-        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
+    static const struct harness_case cases[] = {{"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

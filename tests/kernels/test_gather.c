@@ -45,7 +45,8 @@ static void set_lights(struct rng *rng, struct shade_args *args, uint32_t count)
 }
 
 // Points about a camera's view at this distance, a third of them solid, with balls from `narrow` to `wide`.
-static struct setup make(struct harness *h, struct rng *rng, int perspective, uint32_t format, double distance, double narrow, double wide)
+static struct setup make(struct harness *h, struct rng *rng, int perspective, uint32_t format, double distance, double narrow,
+                         double wide)
 {
     struct setup s = {.scene = {.view = points_window(67, 45, perspective, perspective ? 60.0 : 20.0)}};
     struct view_args *view = &s.scene.view;
@@ -53,11 +54,23 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, ui
     struct cloud *cloud = points_add_cloud(h, rng, &s.scene, &camera, sizes, SIZES, 0, 70);
     struct instance_args *instance = &s.args.shade.instance;
     points_scatter_about(rng, cloud, 1.5);
-    s.args = (struct gather_args){.shade = {.view = *view, .eye_z = perspective ? 0.0f : (float)camera.near_clip}, .threshold = 20000,
-                                  .radius_scale = 1.25f, .opacity = 0.8f, .within = 1};
+    s.args = (struct gather_args){.shade = {.view = *view, .eye_z = perspective ? 0.0f : (float)camera.near_clip},
+                                  .threshold = 20000,
+                                  .radius_scale = 1.25f,
+                                  .opacity = 0.8f,
+                                  .within = 1};
     s.args.shade.world[0] = s.args.shade.world[1] = s.args.shade.world[2] = 0.5f;
-    *instance = (struct instance_args){.id_base = 70, .id_count = cloud->slots, .has_normals = 1, .color_format = format, .lit = 1, .shininess = 16,
-                                       .ambient = 0.7f, .diffuse = 0.9f, .specular = 0.5f, .color = {0.2f, 0.9f, 0.4f}, .opacity = 0.9f};
+    *instance = (struct instance_args){.id_base = 70,
+                                       .id_count = cloud->slots,
+                                       .has_normals = 1,
+                                       .color_format = format,
+                                       .lit = 1,
+                                       .shininess = 16,
+                                       .ambient = 0.7f,
+                                       .diffuse = 0.9f,
+                                       .specular = 0.5f,
+                                       .color = {0.2f, 0.9f, 0.4f},
+                                       .opacity = 0.9f};
     for (int k = 0; k < 9; k++)
         instance->normal_matrix[k] = (float)camera.rotation[k];
     s.field = harness_alloc(h, 4 * (size_t)cloud->slots);
@@ -104,19 +117,23 @@ static void check_record(struct harness *h, const struct ref_record *wanted, con
     if (wanted->drawn == REF_UNSURE && !drawn)
         return;
     if (drawn != (wanted->drawn != REF_NO)) {
-        harness_fail(h, "drawn", (int)slot, 0, "is %d; z %g, radius %g, opacity %g", drawn, wanted->place[2], wanted->radius, wanted->opacity);
+        harness_fail(h, "drawn", (int)slot, 0, "is %d; z %g, radius %g, opacity %g", drawn, wanted->place[2], wanted->radius,
+                     wanted->opacity);
         return;
     }
     for (int k = 0; k < 3 && drawn; k++) {
         if (!harness_near(got[k], wanted->place[k], wanted->place_error[k] + 1e-30))
             harness_fail(h, "place", (int)slot, k, "got %.9g, expected %.9g", (double)got[k], wanted->place[k]);
-        if (wanted->singular ? !isfinite(got[4 + k]) : !wanted->unsure && !harness_near(got[4 + k], wanted->color[k], wanted->color_error[k] + 1e-7))
-            harness_fail(h, "color", (int)slot, k, "got %.9g, expected %.9g within %.3g", (double)got[4 + k], wanted->color[k], wanted->color_error[k]);
+        if (wanted->singular ? !isfinite(got[4 + k])
+                             : !wanted->unsure && !harness_near(got[4 + k], wanted->color[k], wanted->color_error[k] + 1e-7))
+            harness_fail(h, "color", (int)slot, k, "got %.9g, expected %.9g within %.3g", (double)got[4 + k], wanted->color[k],
+                         wanted->color_error[k]);
     }
     if (drawn && !harness_near(got[3], wanted->radius, wanted->radius_error))
         harness_fail(h, "radius", (int)slot, 0, "got %.9g, expected %.9g", (double)got[3], wanted->radius);
     if (drawn && !harness_near((word >> PT_SOFT_SHIFT) / (double)PT_SOFT_STEPS, wanted->opacity, wanted->opacity_error))
-        harness_fail(h, "opacity", (int)slot, 0, "got %.9g, expected %.9g", (word >> PT_SOFT_SHIFT) / (double)PT_SOFT_STEPS, wanted->opacity);
+        harness_fail(h, "opacity", (int)slot, 0, "got %.9g, expected %.9g", (word >> PT_SOFT_SHIFT) / (double)PT_SOFT_STEPS,
+                     wanted->opacity);
     if (drawn && !harness_near((word & 255u) / 255.0, wanted->weight, 0.51 / 255.0))
         harness_fail(h, "weight", (int)slot, 0, "got %u of 255, expected %.9g", word & 255u, wanted->weight);
 }
@@ -130,17 +147,20 @@ static uint32_t run(struct harness *h, const struct setup *s)
     uint32_t drawn = 0;
     struct pt_buffer *points = harness_buffer(h, harness_alloc(h, size), size);
     HARNESS_RUN(h, gather, &s->args, points, harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
-                harness_buffer(h, cloud->positions, 12 * slots), harness_buffer(h, cloud->surface, 4 * slots), harness_buffer(h, s->field, 4 * slots),
+                harness_buffer(h, cloud->positions, 12 * slots), harness_buffer(h, cloud->surface, 4 * slots),
+                harness_buffer(h, s->field, 4 * slots),
                 instance->color_format ? harness_buffer(h, s->colors, s->colors_size) : NULL,
-                instance->has_opacities ? harness_buffer(h, s->opacities, (slots + 3) / 4 * 4) : NULL, harness_buffer(h, s->shadows, 8 * slots),
-                s->drawn ? harness_buffer(h, s->drawn, slots) : NULL);
+                instance->has_opacities ? harness_buffer(h, s->opacities, (slots + 3) / 4 * 4) : NULL,
+                harness_buffer(h, s->shadows, 8 * slots), s->drawn ? harness_buffer(h, s->drawn, slots) : NULL);
     const float *got = harness_read(h, points);
     harness_same(h, "records", got, (size_t)PT_SOFT_WORDS * s->records, 4, PT_SOFT_WORDS, s->records);
-    const struct ref_planes planes = {.surface = cloud->surface, .colors = s->colors, .opacities = s->opacities, .shadows = s->shadows};
+    const struct ref_planes planes = {
+        .surface = cloud->surface, .colors = s->colors, .opacities = s->opacities, .shadows = s->shadows};
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         for (uint32_t i = 0; i < cloud->chunks[c].padded; i++) {
             const float *record = got + PT_SOFT_WORDS * (size_t)(cloud->chunks[c].record + i);
-            const struct ref_record wanted = ref_gather(&s->args, &cloud->chunks[c], cloud->positions, s->field, s->drawn, &planes, i);
+            const struct ref_record wanted = ref_gather(&s->args, &cloud->chunks[c], cloud->positions, s->field, s->drawn,
+                                                        &planes, i);
             check_record(h, &wanted, record, cloud->chunks[c].first + i);
             drawn += record[2] < INFINITY;
         }

@@ -95,7 +95,6 @@ static void sanity(struct harness *h)
 
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {
-        {"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
+    static const struct harness_case cases[] = {{"sanity", sanity, 1}, {"pictures of all kinds", kinds, 0}, {"hard", hard, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

@@ -5,7 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-static void check(struct harness *h, const struct picture *picture, const uint8_t *opacities, uint32_t loss, const uint32_t rect[4])
+static void check(struct harness *h, const struct picture *picture, const uint8_t *opacities, uint32_t loss,
+                  const uint32_t rect[4])
 {
     struct limit_args args = {.view = picture->view, .caster = picture->id_base, .loss = loss};
     uint32_t none = 0, some = 0;
@@ -40,7 +41,8 @@ static void pictures(struct harness *h)
     for (size_t s = 0; s < 4; s++)
         for (int kind = 0; kind < PICTURE_KINDS; kind++) {
             struct rng rng = {s};
-            struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], kind % 2), (enum picture_kind)kind, 0.5);
+            struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], kind % 2),
+                                                    (enum picture_kind)kind, 0.5);
             picture_invent(&picture, &rng, 0.5, 5);
             uint8_t *opacities = harness_alloc(h, picture.count + 4);
             for (size_t i = 0; i < picture.count; i++)

@@ -168,9 +168,10 @@ static void smooth_surfaces(struct harness *h)
                 struct lines_args args = args_of(&picture, &way);
                 struct pt_buffer *line = harness_buffer(h, NULL, picture.count * 4);
                 HARNESS_RUN(h, lines, &args, harness_buffer(h, picture.keys, picture.count * 8),
-                            harness_buffer(h, picture.from, picture.count * 4), harness_buffer(h, picture.normal, picture.count * 16),
-                            harness_buffer(h, picture.deff, picture.count * 4), line, harness_buffer(h, NULL, picture.count * 4),
-                            NULL, NULL);
+                            harness_buffer(h, picture.from, picture.count * 4),
+                            harness_buffer(h, picture.normal, picture.count * 16),
+                            harness_buffer(h, picture.deff, picture.count * 4), line,
+                            harness_buffer(h, NULL, picture.count * 4), NULL, NULL);
                 const float *got = harness_read(h, line);
                 size_t wrong = 0;
                 for (size_t i = 0; i < picture.count; i++)
@@ -223,12 +224,8 @@ static void sanity(struct harness *h)
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"kinds of pictures", kinds, 0},
-        {"shapes of planes", shapes, 0},
-        {"rectangles", rectangle, 0},
-        {"nothing and everything", extremes, 0},
-        {"smooth surfaces", smooth_surfaces, 0},
-        {"the reference itself", sanity, 1},
+        {"kinds of pictures", kinds, 0},         {"shapes of planes", shapes, 0},         {"rectangles", rectangle, 0},
+        {"nothing and everything", extremes, 0}, {"smooth surfaces", smooth_surfaces, 0}, {"the reference itself", sanity, 1},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

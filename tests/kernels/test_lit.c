@@ -33,7 +33,8 @@ static void set_chunk(const struct view_args *view, struct chunk_view *chunk)
 static void place(struct rng *rng, struct setup *s, uint32_t chunk, uint32_t slot)
 {
     const struct view_args *view = &s->map.view;
-    double x = rng_range(rng, -2.0, view->width + 2.0), y = rng_range(rng, -2.0, view->height + 2.0), z = rng_range(rng, 0.5, 12.0);
+    double x = rng_range(rng, -2.0, view->width + 2.0), y = rng_range(rng, -2.0, view->height + 2.0),
+           z = rng_range(rng, 0.5, 12.0);
     double inside_x = fmin(fmax(x, 0.0), view->width - 1.0), inside_y = fmin(fmax(y, 0.0), view->height - 1.0);
     size_t pixel = (size_t)inside_y * view->width + (size_t)inside_x;
     if (s->map.keys[pixel] != REF_EMPTY_KEY && rng_below(rng, 8))
@@ -117,7 +118,8 @@ static void check(struct harness *h, const struct setup *s, uint32_t base, doubl
             }
             uint32_t dark = ref_shadow_word(&own, word, 1), light = ref_shadow_word(&own, word, 0), now = got[base + id];
             int undone = !args.alone && !args.close; // what the sample lost so far is in the upper bits
-            expected_differs |= (args.alone || args.close) && (now & PT_SHADOW_SUM) != args.samples * (now - (word & PT_SHADOW_SUM));
+            expected_differs |= (args.alone || args.close) &&
+                                (now & PT_SHADOW_SUM) != args.samples * (now - (word & PT_SHADOW_SUM));
             open += truth == REF_UNSURE;
             if ((truth == REF_UNSURE && now != dark && now != light) || (truth == REF_YES && now != dark) ||
                 (truth == REF_NO && now != light))
@@ -220,8 +222,12 @@ static void sanity(struct harness *h)
     uint64_t keys[9];
     uint32_t from[9], surface = PT_NORMAL_NONE;
     float deff[9], positions[3 * 16] = {0};
-    struct lit_args args = {.view = {.width = 3, .height = 3, .ray_x0 = -1.5f, .ray_xs = 1.0f, .ray_y0 = -1.5f, .ray_ys = 1.0f, .footprint = 1e-3f},
-                            .loss = 255, .alone = 1, .window = {0, 0, 3, 3}, .samples = 1};
+    struct lit_args args = {
+        .view = {.width = 3, .height = 3, .ray_x0 = -1.5f, .ray_xs = 1.0f, .ray_y0 = -1.5f, .ray_ys = 1.0f, .footprint = 1e-3f},
+        .loss = 255,
+        .alone = 1,
+        .window = {0, 0, 3, 3},
+        .samples = 1};
     struct chunk_view chunk = {.count = 1, .padded = 16};
     for (uint32_t i = 0; i < 9; i++) {
         keys[i] = ref_key(2.0f, i);
@@ -306,7 +312,8 @@ static void two_ways(struct harness *h)
                             marked[id] = 1; // outside the map: lit
                             continue;
                         }
-                        uint64_t key = ref_key((float)fmax(0.5 * (place.z.lo + place.z.hi), 0.0), id), *at = &nearest[(size_t)(y * s.args.view.width + x)];
+                        uint64_t key = ref_key((float)fmax(0.5 * (place.z.lo + place.z.hi), 0.0), id),
+                                 *at = &nearest[(size_t)(y * s.args.view.width + x)];
                         *at = key < *at ? key : *at;
                     }
                 for (size_t i = 0; i < s.map.count; i++)
@@ -321,7 +328,8 @@ static void two_ways(struct harness *h)
                     lit += (uint32_t)is_lit;
                     dark += (uint32_t)!is_lit;
                     if (place.known && is_lit != marked[id])
-                        harness_fail(h, "ways", (int)id, (int)c, "tested %s, marked %s", is_lit ? "lit" : "dark", marked[id] ? "lit" : "dark");
+                        harness_fail(h, "ways", (int)id, (int)c, "tested %s, marked %s", is_lit ? "lit" : "dark",
+                                     marked[id] ? "lit" : "dark");
                 }
             HARNESS_CHECK(h, rounds > 3 && lit > POINTS / 10 && dark > POINTS / 10);
         }

@@ -55,7 +55,8 @@ static struct ref_vec decode(uint32_t word)
 
 static int near3(const float *places, size_t width, struct ref_vec p, double error)
 {
-    return harness_near(places[0], p.x, error) && harness_near(places[width], p.y, error) && harness_near(places[2 * width], p.z, error);
+    return harness_near(places[0], p.x, error) && harness_near(places[width], p.y, error) &&
+           harness_near(places[2 * width], p.z, error);
 }
 
 static void check(struct harness *h, struct scene *s)
@@ -86,8 +87,8 @@ static void check(struct harness *h, struct scene *s)
         }
         ours++;
         if (!near3(at, width, e.p, e.error))
-            harness_fail(h, "place", x, y, "got (%g %g %g), expected (%g %g %g) +- %.2g", at[0], at[width], at[2 * width], e.p.x,
-                         e.p.y, e.p.z, e.error);
+            harness_fail(h, "place", x, y, "got (%g %g %g), expected (%g %g %g) +- %.2g", at[0], at[width], at[2 * width],
+                         e.p.x, e.p.y, e.p.z, e.error);
         if (got_words[i] >> 26 || (got_words[i] & PT_NORMAL_BITS) == PT_NORMAL_NONE)
             harness_fail(h, "word", x, y, "got %08x", got_words[i]);
         if (e.normal_error > 0.05) {

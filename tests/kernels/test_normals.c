@@ -11,8 +11,7 @@ static struct normals_args arguments(const struct picture *picture, uint32_t rad
 {
     struct normals_args args = {.view = picture->view, .radius = radius, .steep = steep};
     args.instance.id_base = picture->id_base;
-    args.instance.id_count = (uint32_t)(picture->count * 3 /
-                                        4); // the rest belongs to somebody else, and counts as neighbour
+    args.instance.id_count = (uint32_t)(picture->count * 3 / 4); // the rest belongs to somebody else, and counts as neighbour
     for (int i = 0; i < PT_SPACINGS; i++)
         args.instance.spacing[i] = (float)(1e-4 * pow(1.2, i));
     return args;
@@ -26,12 +25,11 @@ static uint32_t *words_without(struct harness *h, struct rng *rng, size_t count)
     return words;
 }
 
-static float *run(struct harness *h, const struct picture *picture, const struct normals_args *args,
-                  const uint32_t *words, const float *before)
+static float *run(struct harness *h, const struct picture *picture, const struct normals_args *args, const uint32_t *words,
+                  const float *before)
 {
     struct pt_buffer *keys = harness_buffer(h, picture->keys, picture->count * 8);
-    struct pt_buffer *surface = harness_buffer(h, words,
-                                               (size_t)(args->instance.id_count + !args->instance.id_count) * 4);
+    struct pt_buffer *surface = harness_buffer(h, words, (size_t)(args->instance.id_count + !args->instance.id_count) * 4);
     struct pt_buffer *normal = harness_buffer(h, before, picture->count * 16);
     HARNESS_RUN(h, normals, args, keys, surface, normal);
     float *got = harness_read(h, normal);
@@ -39,8 +37,7 @@ static float *run(struct harness *h, const struct picture *picture, const struct
     return got;
 }
 
-static void check(struct harness *h, const struct picture *picture, const struct normals_args *args,
-                  const uint32_t *words)
+static void check(struct harness *h, const struct picture *picture, const struct normals_args *args, const uint32_t *words)
 {
     size_t open = 0, rough = 0, seen = 0;
     float *before = harness_alloc(h, picture->count * 16);
@@ -71,8 +68,8 @@ static void check(struct harness *h, const struct picture *picture, const struct
             continue;
         }
         if (!harness_near(length, 1.0, TOL_NORMAL))
-            harness_fail(h, "normal", x, y, "got (%g %g %g) of length %.9g, expected (%g %g %g)", n[0], n[1], n[2],
-                         length, expected.n.x, expected.n.y, expected.n.z);
+            harness_fail(h, "normal", x, y, "got (%g %g %g) of length %.9g, expected (%g %g %g)", n[0], n[1], n[2], length,
+                         expected.n.x, expected.n.y, expected.n.z);
         if (expected.error > TOL_FIT_LIMIT) {
             rough++;
             continue;
@@ -108,8 +105,7 @@ static void shapes(struct harness *h)
     static const uint32_t sizes[][2] = {{1, 1}, {1, 40}, {2000, 1}, {2, 2}, {64, 3}};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; s++) {
         struct rng rng = {s};
-        struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES,
-                                                0.9);
+        struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES, 0.9);
         struct normals_args args = arguments(&picture, 16);
         args.instance.id_count = (uint32_t)picture.count;
         check(h, &picture, &args, words_without(h, &rng, picture.count));
@@ -126,8 +122,8 @@ static void lines(struct harness *h)
         for (int y = 0; y < 32; y++)
             for (int x = 0; x < 32; x++) {
                 int on = (x - 16) * slopes[s][1] == (y - 16) * slopes[s][0];
-                picture.keys[y * 32 + x] =
-                    on ? ref_key((float)(5.0 + 0.001 * x), picture.id_base + (uint32_t)(y * 32 + x)) : REF_EMPTY_KEY;
+                picture.keys[y * 32 + x] = on ? ref_key((float)(5.0 + 0.001 * x), picture.id_base + (uint32_t)(y * 32 + x))
+                                              : REF_EMPTY_KEY;
             }
         struct normals_args args = arguments(&picture, 16);
         args.instance.id_count = (uint32_t)picture.count;
@@ -149,8 +145,7 @@ static void analytic(struct harness *h)
                 struct ref_vec n = {sin(angle) * 0.6, sin(angle) * 0.8, cos(angle)};
                 for (size_t i = 0; i < picture.count; i++) {
                     struct ref_ray ray = ref_ray(&picture.view, (int)(i % 45), (int)(i / 45));
-                    double z = p ? z0 * n.z / (n.z - n.x * ray.u - n.y * ray.v)
-                                 : z0 + 40.0 + (n.x * ray.u + n.y * ray.v) / n.z;
+                    double z = p ? z0 * n.z / (n.z - n.x * ray.u - n.y * ray.v) : z0 + 40.0 + (n.x * ray.u + n.y * ray.v) / n.z;
                     picture.keys[i] = z > 0.0 && rng_below(&rng, 3) ? ref_key((float)z, picture.id_base + (uint32_t)i)
                                                                     : REF_EMPTY_KEY;
                 }
@@ -223,12 +218,8 @@ static void steeply(struct harness *h)
 int main(int argc, char **argv)
 {
     static const struct harness_case cases[] = {
-        {"pictures of all kinds", kinds, 0},
-        {"shapes of planes", shapes, 0},
-        {"points on a line", lines, 0},
-        {"planes of known slope", analytic, 0},
-        {"a steep plane", steep_plane, 0},
-        {"all of these, steep", steeply, 0},
+        {"pictures of all kinds", kinds, 0},    {"shapes of planes", shapes, 0},   {"points on a line", lines, 0},
+        {"planes of known slope", analytic, 0}, {"a steep plane", steep_plane, 0}, {"all of these, steep", steeply, 0},
     };
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

@@ -68,8 +68,7 @@ static struct picture random_picture(struct harness *h, uint64_t seed, uint32_t 
                                      enum picture_kind kind)
 {
     struct rng rng = {seed};
-    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind,
-                                            kind % 2 ? 0.9 : 0.5);
+    struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind, kind % 2 ? 0.9 : 0.5);
     picture_invent(&picture, &rng, 0.5, 4);
     return picture;
 }

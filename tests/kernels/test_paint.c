@@ -17,7 +17,8 @@ struct scene {
     size_t count;
 };
 
-static void make_image(struct harness *h, struct rng *rng, struct texture_args *image, uint32_t width, uint32_t height, struct scene *s)
+static void make_image(struct harness *h, struct rng *rng, struct texture_args *image, uint32_t width, uint32_t height,
+                       struct scene *s)
 {
     uint32_t count = 0;
     for (image->levels = 0;; width = width > 1 ? width / 2 : 1, height = height > 1 ? height / 2 : 1) {
@@ -42,8 +43,8 @@ static void make_image(struct harness *h, struct rng *rng, struct texture_args *
 }
 
 // uv: how many images a triangle spans.
-static struct scene make(struct harness *h, struct rng *rng, int perspective, struct texture_args image, uint32_t width, uint32_t height,
-                         double uv)
+static struct scene make(struct harness *h, struct rng *rng, int perspective, struct texture_args image, uint32_t width,
+                         uint32_t height, double uv)
 {
     struct scene s = {.args = {.view = picture_view(WIDTH, HEIGHT, perspective)}};
     struct mesh_args *mesh = &s.args.mesh;
@@ -61,7 +62,8 @@ static struct scene make(struct harness *h, struct rng *rng, int perspective, st
     for (uint32_t i = 0; i < TRIANGLES * 3; i++) {
         s.indices[i] = i;
         float *v = s.vertices + 5 * i;
-        double z = rng_range(rng, 1.0, 6.0), turn = 6.283 * (i % 3 + rng_range(rng, -0.15, 0.15)) / 3.0, far = rng_range(rng, 60.0, 400.0);
+        double z = rng_range(rng, 1.0, 6.0), turn = 6.283 * (i % 3 + rng_range(rng, -0.15, 0.15)) / 3.0,
+               far = rng_range(rng, 60.0, 400.0);
         double x = s.args.view.origin_x + 30 + far * cos(turn), y = s.args.view.origin_y + 20 + far * sin(turn);
         v[0] = (float)(x * (perspective ? z : 1.0));
         v[1] = (float)(y * (perspective ? z : 1.0));
@@ -117,7 +119,8 @@ static size_t check(struct harness *h, struct scene *s, size_t *open)
         for (int k = 0; k < 4; k++) {
             double weight = k < 3 && s->args.mesh.texture.blend ? e.color[3] : 1.0; // what shows
             if (!harness_near(c[k] * weight, e.color[k] * weight, e.error))
-                harness_fail(h, "colour", x, y, "channel %d: got %g, expected %g +- %.2g", k, c[k], e.color[k], e.error / weight);
+                harness_fail(h, "colour", x, y, "channel %d: got %g, expected %g +- %.2g", k, c[k], e.color[k],
+                             e.error / weight);
         }
     }
     return compared;
@@ -188,7 +191,7 @@ static void hard(struct harness *h)
 
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {{"wraps, formats, filters", kinds, 0}, {"shapes of images", shapes, 0},
-                                                {"hard cases", hard, 0}};
+    static const struct harness_case cases[] = {
+        {"wraps, formats, filters", kinds, 0}, {"shapes of images", shapes, 0}, {"hard cases", hard, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

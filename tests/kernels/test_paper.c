@@ -25,9 +25,8 @@ static void check(struct harness *h, uint32_t width, uint32_t height, uint32_t x
         struct ref_color expected = ref_paper(&args, before, (int)(i % width), (int)(i / width));
         for (int c = 0; c < 4; c++)
             if (!harness_near(got[4 * i + (size_t)c], expected.color[c], expected.error[c]))
-                harness_fail(h, "combined", (int)(i % width), (int)(i / width),
-                             "channel %d: got %.9g, expected %.9g +- %.2g", c, got[4 * i + (size_t)c],
-                             expected.color[c], expected.error[c]);
+                harness_fail(h, "combined", (int)(i % width), (int)(i / width), "channel %d: got %.9g, expected %.9g +- %.2g",
+                             c, got[4 * i + (size_t)c], expected.color[c], expected.error[c]);
     }
 }
 

@@ -37,7 +37,7 @@ static struct setup make(struct harness *h, struct rng *rng, struct picture pict
             picture.from[i] |= rng_below(rng, 8) ? 0u : PT_FROM_MIXED;
         }
         uint32_t kind = rng_below(rng, 6);
-        s.limit[i] = first        ? NAN
+        s.limit[i] = first       ? NAN
                      : kind == 0 ? INFINITY
                      : kind == 1 ? z
                      : kind == 2 ? float_step(z, (int)rng_below(rng, 17) - 8)
@@ -68,8 +68,8 @@ static void check_tiles(struct harness *h, const struct setup *s, const float *l
             const uint32_t *tile = tiles + 2 * ((size_t)ty * columns + tx);
             memcpy(&got, tile, 4);
             if (got != least || tile[1] != count)
-                harness_fail(h, "tile", (int)tx, (int)ty, "got %.9g and %u pixels, expected %.9g and %u", got, tile[1],
-                             least, count);
+                harness_fail(h, "tile", (int)tx, (int)ty, "got %.9g and %u pixels, expected %.9g and %u", got, tile[1], least,
+                             count);
         }
 }
 

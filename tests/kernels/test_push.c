@@ -11,8 +11,8 @@ struct level {
 };
 
 // Returns how many pixels took their parent's surface.
-static size_t check(struct harness *h, const struct picture *picture, const struct level *fine,
-                    const struct level *coarse, uint32_t refined, uint32_t background)
+static size_t check(struct harness *h, const struct picture *picture, const struct level *fine, const struct level *coarse,
+                    uint32_t refined, uint32_t background)
 {
     struct push_args args = {.view = fine->view,
                              .coarse_width = coarse->view.width,
@@ -59,8 +59,8 @@ static size_t check(struct harness *h, const struct picture *picture, const stru
     return taken;
 }
 
-static void pyramid(struct harness *h, uint32_t width, uint32_t height, int perspective, enum picture_kind kind,
-                    double density, uint32_t refined)
+static void pyramid(struct harness *h, uint32_t width, uint32_t height, int perspective, enum picture_kind kind, double density,
+                    uint32_t refined)
 {
     struct rng rng = {width * 1000u + (uint64_t)kind * 10 + refined};
     struct picture picture = picture_random(h, &rng, picture_view(width, height, perspective), kind, density);

@@ -143,12 +143,24 @@ static void degenerate(struct harness *h)
         switch (t % 8) {
         case 0: v[rng_below(&rng, 9)] = (float)NAN; break;
         case 1: v[rng_below(&rng, 9)] = (float)INFINITY; break;
-        case 2: memcpy(v + 3, v, 12); break;                 // two corners in one
-        case 3: memcpy(v + 3, v, 12); memcpy(v + 6, v, 12); break;
+        case 2: memcpy(v + 3, v, 12); break; // two corners in one
+        case 3:
+            memcpy(v + 3, v, 12);
+            memcpy(v + 6, v, 12);
+            break;
         case 4: v[rng_below(&rng, 9)] = 1e30f; break;
-        case 5: for (int k = 0; k < 3; k++) v[6 + k] = 0.5f * (v[k] + v[3 + k]); break; // on one line
-        case 6: for (int k = 0; k < 3; k++) v[3 * k + 2] = 50.0f; break;                // behind the eye
-        default: for (int k = 0; k < 3; k++) v[3 * k + 1] += 1e4f; break;               // beside the picture
+        case 5:
+            for (int k = 0; k < 3; k++)
+                v[6 + k] = 0.5f * (v[k] + v[3 + k]);
+            break; // on one line
+        case 6:
+            for (int k = 0; k < 3; k++)
+                v[3 * k + 2] = 50.0f;
+            break; // behind the eye
+        default:
+            for (int k = 0; k < 3; k++)
+                v[3 * k + 1] += 1e4f;
+            break; // beside the picture
         }
     }
     check(h, &s, NULL, TOL_UNSURE_HARD);
@@ -204,8 +216,9 @@ static void t_junction(struct harness *h)
 {
     struct view_args view = picture_view(40, 40, 0);
     struct soup s = soup(h, view, 1);
-    static const float corners[3][3][2] = {
-        {{2.5f, 3.5f}, {34.5f, 19.5f}, {4.5f, 35.5f}}, {{2.5f, 3.5f}, {30.5f, 4.5f}, {18.5f, 11.5f}}, {{18.5f, 11.5f}, {30.5f, 4.5f}, {34.5f, 19.5f}}};
+    static const float corners[3][3][2] = {{{2.5f, 3.5f}, {34.5f, 19.5f}, {4.5f, 35.5f}},
+                                           {{2.5f, 3.5f}, {30.5f, 4.5f}, {18.5f, 11.5f}},
+                                           {{18.5f, 11.5f}, {30.5f, 4.5f}, {34.5f, 19.5f}}};
     uint32_t times[1600] = {0};
     memset(s.args.mesh.row, 0, sizeof s.args.mesh.row);
     s.args.mesh.row[0] = s.args.mesh.row[4] = s.args.mesh.row[8] = 1.0f;

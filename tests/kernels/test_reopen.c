@@ -49,8 +49,12 @@ static struct setup make(struct harness *h, struct rng *rng, enum picture_kind k
     s.away = harness_alloc(h, count * 4);
     s.color = harness_alloc(h, count * 16);
     s.kept = harness_alloc(h, count * 8);
-    s.all.args = (struct reopen_args){.view = s.picture.view, .id_base = s.picture.id_base + (uint32_t)count / 8,
-                                      .id_count = (uint32_t)count / 2, .first = 1, .stations = STATIONS, .discs = rng_below(rng, 2),
+    s.all.args = (struct reopen_args){.view = s.picture.view,
+                                      .id_base = s.picture.id_base + (uint32_t)count / 8,
+                                      .id_count = (uint32_t)count / 2,
+                                      .first = 1,
+                                      .stations = STATIONS,
+                                      .discs = rng_below(rng, 2),
                                       .eye_z = perspective ? 0.0f : 0.3f};
     random_rows(rng, s.all.args.rows);
     for (uint32_t i = 0; i < STATIONS * CELLS / 2; i++)
@@ -60,15 +64,17 @@ static struct setup make(struct harness *h, struct rng *rng, enum picture_kind k
             s.words[i] |= value << 16 * k;
         }
     for (uint32_t i = 0; i < STATIONS; i++) {
-        s.all.stations[i] = (struct station_args){.grow = 1.0201f, .first = i * CELLS, .across = ACROSS, .base = bits_of(0x1p-5f)};
+        s.all.stations[i] = (struct station_args){
+            .grow = 1.0201f, .first = i * CELLS, .across = ACROSS, .base = bits_of(0x1p-5f)};
         for (int k = 0; k < 3; k++)
             s.all.stations[i].eye[k] = i ? (float)rng_range(rng, -8.0, 8.0) : 0.0f; // the first stands where the camera does
     }
     s.all.stations[1].across = 7;
     for (size_t i = 0; i < count; i++) {
         s.away[i] = (float)rng_range(rng, 0.0, 8.0);
-        s.kept[i] = rng_below(rng, 3) ? ref_key((float)rng_range(rng, 0.5, 50.0), s.picture.id_base + rng_below(rng, (uint32_t)count))
-                                      : REF_EMPTY_KEY;
+        s.kept[i] = rng_below(rng, 3)
+                        ? ref_key((float)rng_range(rng, 0.5, 50.0), s.picture.id_base + rng_below(rng, (uint32_t)count))
+                        : REF_EMPTY_KEY;
         for (int k = 0; k < 4; k++)
             s.color[4 * i + (size_t)k] = (float)rng_unit(rng);
     }
@@ -87,10 +93,14 @@ static struct drawn run(struct harness *h, const struct setup *s)
     float *unset = harness_alloc(h, count * 4);
     for (size_t i = 0; i < count; i++)
         unset[i] = -7.0f;
-    struct pt_buffer *buffers[8] = {harness_buffer(h, s->picture.keys, count * 8), harness_buffer(h, s->picture.from, count * 4),
-                                    harness_buffer(h, s->picture.deff, count * 4), harness_buffer(h, s->away, count * 4),
-                                    harness_buffer(h, s->words, STATIONS * CELLS / 2 * 4), harness_buffer(h, unset, count * 4),
-                                    harness_buffer(h, s->kept, count * 8), harness_buffer(h, s->color, count * 16)};
+    struct pt_buffer *buffers[8] = {harness_buffer(h, s->picture.keys, count * 8),
+                                    harness_buffer(h, s->picture.from, count * 4),
+                                    harness_buffer(h, s->picture.deff, count * 4),
+                                    harness_buffer(h, s->away, count * 4),
+                                    harness_buffer(h, s->words, STATIONS * CELLS / 2 * 4),
+                                    harness_buffer(h, unset, count * 4),
+                                    harness_buffer(h, s->kept, count * 8),
+                                    harness_buffer(h, s->color, count * 16)};
     harness_run(h, PT_KERNEL_reopen, &s->all, sizeof s->all, buffers, 8);
     struct drawn out = {harness_read(h, buffers[0]), harness_read(h, buffers[6]), harness_read(h, buffers[1]),
                         harness_read(h, buffers[5]), harness_read(h, buffers[7])};
@@ -133,7 +143,8 @@ static size_t check(struct harness *h, struct setup *s, size_t *unsure)
     planes.away = s->away;
     const struct drawn got = run(h, s);
     const struct reopen_args *args = &s->all.args;
-    const int finds = args->phase == PT_REOPEN_FIND, takes = args->phase == PT_REOPEN_TAKE, shows = args->phase == PT_REOPEN_SHOW;
+    const int finds = args->phase == PT_REOPEN_FIND, takes = args->phase == PT_REOPEN_TAKE,
+              shows = args->phase == PT_REOPEN_SHOW;
     size_t found = 0;
     for (int y = 0; y < (int)args->view.height; y++)
         for (int x = 0; x < (int)args->view.width; x++) {
@@ -156,8 +167,9 @@ static size_t check(struct harness *h, struct setup *s, size_t *unsure)
             expect(h, "from", x, y, got.from[at] == (taken ? at : s->picture.from[at]), "is another");
             expect(h, "limit", x, y, got.limit[at] == limit, "is another");
             expect(h, "kept", x, y, got.kept[at] == (args->phase == PT_REOPEN_KEEP ? key : s->kept[at]), "is another");
-            expect(h, "color", x, y, got.color[4 * at] == red && got.color[4 * at + 1] == green &&
-                   got.color[4 * at + 3] == s->color[4 * at + 3], "is another");
+            expect(h, "color", x, y,
+                   got.color[4 * at] == red && got.color[4 * at + 1] == green && got.color[4 * at + 3] == s->color[4 * at + 3],
+                   "is another");
         }
     return found;
 }
@@ -206,7 +218,8 @@ static void hard(struct harness *h)
 static void sanity(struct harness *h)
 {
     static uint32_t words[CELLS / 2];
-    struct reopen_args args = {.view = {.width = 1, .height = 1, .perspective = 1}, .stations = 1, .rows = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    struct reopen_args args = {
+        .view = {.width = 1, .height = 1, .perspective = 1}, .stations = 1, .rows = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     const struct station_args station = {.eye = {0, 0, -1}, .grow = 1.0201f, .across = ACROSS, .base = bits_of(0x1p-5f)};
     const uint32_t cell = 5 * ACROSS * ACROSS + ACROSS / 2 * ACROSS + ACROSS / 2; // down -z
     args.view.ray_x0 = args.view.ray_y0 = 0.01f;

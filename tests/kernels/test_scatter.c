@@ -77,8 +77,7 @@ static uint64_t *check_scene(struct harness *h, struct scene *scene)
         double z = ref_key_z(keys[i]);
         covered += keys[i] != REF_EMPTY_KEY;
         if (z > farthest[i])
-            harness_fail(h, "keys", x, y, "got z %.9g id %u, expected at most z %.9g", z, ref_key_id(keys[i]),
-                         farthest[i]);
+            harness_fail(h, "keys", x, y, "got z %.9g id %u, expected at most z %.9g", z, ref_key_id(keys[i]), farthest[i]);
         if (keys[i] == REF_EMPTY_KEY)
             continue;
         if (scene->limit && !(z > scene->limit[i]))
@@ -88,11 +87,10 @@ static uint64_t *check_scene(struct harness *h, struct scene *scene)
         if (!splat)
             harness_fail(h, "keys", x, y, "got id %u, which no point has", wanted.id);
         else if (!splat->possible || x < splat->x0 || x > splat->x1 || y < splat->y0 || y > splat->y1)
-            harness_fail(h, "keys", x, y, "got id %u, expected it at (%d..%d, %d..%d), possible %d", wanted.id,
-                         splat->x0, splat->x1, splat->y0, splat->y1, splat->possible);
+            harness_fail(h, "keys", x, y, "got id %u, expected it at (%d..%d, %d..%d), possible %d", wanted.id, splat->x0,
+                         splat->x1, splat->y0, splat->y1, splat->possible);
         else if (!(z >= splat->z.lo && z <= splat->z.hi))
-            harness_fail(h, "keys", x, y, "got id %u at z %.9g, expected %.9g to %.9g", wanted.id, z, splat->z.lo,
-                         splat->z.hi);
+            harness_fail(h, "keys", x, y, "got id %u at z %.9g, expected %.9g to %.9g", wanted.id, z, splat->z.lo, splat->z.hi);
     }
     if (n > 1000 && open > 0.05 * n)
         harness_fail(h, "reference", 0, 0, "leaves %u of %u points open", open, n);
@@ -112,7 +110,8 @@ static void random_clouds(struct harness *h, int perspective, uint32_t seed)
         // The second is mirrored, the third squeezed.
         for (int k = 0; k < 9; k++)
             camera.rotation[k] *= i == 1 ? -1.0 : i == 2 && k % 3 == 0 ? 0.05 : 1.0;
-        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i != 1, i * 5000), i == 0 ? 1.0 : 5.0);
+        points_scatter_about(&rng, points_add_cloud(h, &rng, &scene, &camera, sizes, SIZES, i != 1, i * 5000),
+                             i == 0 ? 1.0 : 5.0);
     }
     check_scene(h, &scene);
 }
@@ -136,7 +135,8 @@ static void sifted(struct harness *h)
             scene.drawn[k] = k % 5 ? (uint32_t)rng_next(&rng) & 0xFFFFu : k % 2 ? 0xFFFFu : 0;
         for (uint32_t k = 0; k < 2 * SIZES; k++) { // padding is drawn as the point that it repeats
             const struct chunk_view *chunk = &scene.clouds[k / SIZES].chunks[k % SIZES];
-            uint32_t last = (chunk->count - 1) % PT_SLOTS_A_WORD, *word = scene.drawn + chunk->sifted + (chunk->padded / PT_SLOTS_A_WORD) - 2;
+            uint32_t last = (chunk->count - 1) % PT_SLOTS_A_WORD,
+                     *word = scene.drawn + chunk->sifted + (chunk->padded / PT_SLOTS_A_WORD) - 2;
             if (chunk->sifted)
                 *word = (*word & ((2u << last) - 1u)) | (*word >> last & 1u ? 0xFFFFu << last & 0xFFFFu : 0u);
         }
@@ -148,15 +148,9 @@ static void sifted(struct harness *h)
     }
 }
 
-static void perspective(struct harness *h)
-{
-    random_clouds(h, 1, 1);
-}
+static void perspective(struct harness *h) { random_clouds(h, 1, 1); }
 
-static void orthographic(struct harness *h)
-{
-    random_clouds(h, 0, 2);
-}
+static void orthographic(struct harness *h) { random_clouds(h, 0, 2); }
 
 static void plane_sizes(struct harness *h)
 {
@@ -236,9 +230,8 @@ static void exact_borders(struct harness *h)
             int exact = !p || i % 4 == 0, drawn = i != 1 && i != 3;
             uint64_t expected = drawn ? ref_key(z[i], i) : REF_EMPTY_KEY;
             if ((!p || i < 4) && exact && keys[i] != expected)
-                harness_fail(h, p ? "perspective" : "orthographic", (int)(i % 4), (int)(i / 4),
-                             "got %016llx, expected %016llx", (unsigned long long)keys[i],
-                             (unsigned long long)expected);
+                harness_fail(h, p ? "perspective" : "orthographic", (int)(i % 4), (int)(i / 4), "got %016llx, expected %016llx",
+                             (unsigned long long)keys[i], (unsigned long long)expected);
         }
         check_scene(h, &scene);
     }
@@ -288,8 +281,7 @@ static void coincident(struct harness *h)
         keys = check_scene(h, &scene);
         for (size_t i = 0; i < (size_t)scene.view.width * scene.view.height; i++)
             if (keys[i] != REF_EMPTY_KEY && ref_key_id(keys[i]) != bases[0])
-                harness_fail(h, "keys", (int)(i % 67), (int)(i / 67), "got id %u, expected %u", ref_key_id(keys[i]),
-                             bases[0]);
+                harness_fail(h, "keys", (int)(i % 67), (int)(i / 67), "got id %u, expected %u", ref_key_id(keys[i]), bases[0]);
     }
 }
 
@@ -310,7 +302,7 @@ static void depth_range(struct harness *h) // far / near = 10^7
             v[2] = -z;
             for (int a = 0; a < 3; a++)
                 *points_coordinate(cloud, c, i, a) = (float)(camera.rotation[a] * v[0] + camera.rotation[3 + a] * v[1] +
-                                                      camera.rotation[6 + a] * v[2]);
+                                                             camera.rotation[6 + a] * v[2]);
         }
     check_scene(h, &scene);
 }

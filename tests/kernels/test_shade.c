@@ -12,7 +12,7 @@ struct setup {
     size_t colors_size;
     uint8_t *opacities;
     uint32_t *shadows; // two lights
-    float *shading; // before
+    float *shading;    // before
 };
 
 static struct setup make(struct harness *h, struct rng *rng, int perspective, enum picture_kind kind, uint32_t format)
@@ -290,7 +290,8 @@ static void ramps(struct harness *h)
         for (uint32_t i = 0; i < 6; i++) {
             struct rng rng = {source * 10 + i};
             const int scalar = source == PT_RAMP_SCALAR;
-            struct setup s = make(h, &rng, i % 2, i < 3 ? PICTURE_SURFACES : PICTURE_NOISE, scalar || source > 1 ? 0 : 1 + i % 2);
+            struct setup s = make(h, &rng, i % 2, i < 3 ? PICTURE_SURFACES : PICTURE_NOISE,
+                                  scalar || source > 1 ? 0 : 1 + i % 2);
             struct recolor_args *recolor = &s.args.recolor;
             s.args.instance.color_format = scalar ? PT_COLOR_OF_SCALAR : source > 1 ? 0 : s.args.instance.color_format;
             s.args.instance.lit = i % 3 == 0;
@@ -305,10 +306,10 @@ static void ramps(struct harness *h)
             for (uint32_t k = 0; k < 3 * recolor->entries; k++)
                 recolor->ramp[k] = (float)rng_unit(&rng);
             for (uint32_t k = 0; k < s.args.instance.id_count && scalar; k++)
-                ((float *)s.colors)[k] = k % 50 == 7    ? NAN
-                                         : k % 50 == 8  ? INFINITY
-                                         : k % 50 == 9  ? -INFINITY
-                                                        : (float)rng_range(&rng, -6.0, 3.0);
+                ((float *)s.colors)[k] = k % 50 == 7   ? NAN
+                                         : k % 50 == 8 ? INFINITY
+                                         : k % 50 == 9 ? -INFINITY
+                                                       : (float)rng_range(&rng, -6.0, 3.0);
             check(h, &s, TOL_UNSURE_SHARE);
         }
 }
@@ -320,9 +321,15 @@ static void ramp_sanity(struct harness *h)
     uint32_t from = 0;
     float normal[4] = {0, 0, 1, 1}, deff = 0.1f, scalar = 3.0f;
     struct shade_args args = {.view = {.width = 1, .height = 1}};
-    args.instance = (struct instance_args){.id_count = 1, .opacity = 1.0f, .color_format = PT_COLOR_OF_SCALAR, .color = {0.9f, 0.1f, 0.1f}};
-    args.recolor = (struct recolor_args){
-        .source = PT_RAMP_SCALAR, .along = {0.5f}, .zero = 2.0f, .entries = 2, .gain = 1.0f, .contrast = 1.0f, .ramp = {0, 0, 0, 1, 1, 1}};
+    args.instance = (struct instance_args){
+        .id_count = 1, .opacity = 1.0f, .color_format = PT_COLOR_OF_SCALAR, .color = {0.9f, 0.1f, 0.1f}};
+    args.recolor = (struct recolor_args){.source = PT_RAMP_SCALAR,
+                                         .along = {0.5f},
+                                         .zero = 2.0f,
+                                         .entries = 2,
+                                         .gain = 1.0f,
+                                         .contrast = 1.0f,
+                                         .ramp = {0, 0, 0, 1, 1, 1}};
     struct ref_planes planes = {.keys = &key, .from = &from, .normal = normal, .deff = &deff, .colors = &scalar};
     HARNESS_CHECK(h, fabs(ref_shade(&args, &planes, 0, 0).color[0] - 0.5) < 1e-6);
     args.recolor.graded = 1;

@@ -88,7 +88,8 @@ static void check(struct harness *h, const struct setup *s)
     struct pt_buffer *classes = harness_buffer(h, s->classes, (s->slots + 3) / 4 * 4);
     struct pt_buffer *clips = harness_buffer(h, s->clips, (s->clip_count ? s->clip_count : 1) * sizeof *s->clips);
     struct pt_buffer *drawn = harness_buffer(h, before, 4 * (size_t)(s->words + 1));
-    struct pt_buffer *shapes = harness_buffer(h, s->shapes, 4 * (size_t)s->slots), *mask = harness_buffer(h, s->mask, s->slots / 4);
+    struct pt_buffer *shapes = harness_buffer(h, s->shapes, 4 * (size_t)s->slots),
+                     *mask = harness_buffer(h, s->mask, s->slots / 4);
     struct pt_buffer *field = harness_buffer(h, s->field, 4 * (size_t)s->slots);
     HARNESS_RUN(h, sift, &s->args, chunks, positions, classes, clips, drawn, shapes, mask, field);
     uint32_t *got = harness_read(h, drawn);
@@ -97,7 +98,8 @@ static void check(struct harness *h, const struct setup *s)
         const struct chunk_view *chunk = &s->chunks[c];
         for (uint32_t i = 0; i < chunk->count && chunk->sifted; i++, points++) {
             int bit = got[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u;
-            enum ref_truth expected = ref_sift(&s->args, chunk, s->positions, s->classes, s->shapes, s->mask, s->field, s->clips, i);
+            enum ref_truth expected = ref_sift(&s->args, chunk, s->positions, s->classes, s->shapes, s->mask, s->field,
+                                               s->clips, i);
             open += expected == REF_UNSURE;
             kept += (size_t)bit;
             if (expected != REF_UNSURE && bit != (expected == REF_YES))
@@ -227,7 +229,8 @@ static void extremes(struct harness *h)
         struct pt_buffer *buffers[8] = {harness_buffer(h, s.chunks, sizeof s.chunks),
                                         harness_buffer(h, s.positions, 12 * (size_t)s.slots),
                                         harness_buffer(h, s.classes, (s.slots + 3) / 4 * 4),
-                                        harness_buffer(h, s.clips, sizeof s.clips), harness_buffer(h, NULL, 0),
+                                        harness_buffer(h, s.clips, sizeof s.clips),
+                                        harness_buffer(h, NULL, 0),
                                         harness_buffer(h, s.shapes, 4 * (size_t)s.slots),
                                         harness_buffer(h, s.mask, s.slots / 4),
                                         harness_buffer(h, s.field, 4 * (size_t)s.slots)};
@@ -273,8 +276,12 @@ static void sanity(struct harness *h)
 
 int main(int argc, char **argv)
 {
-    static const struct harness_case cases[] = {
-        {"sanity", sanity, 1}, {"boxes and planes", shapes, 0}, {"hidden classes", classes, 0},
-        {"hidden shapes", shape_words, 0}, {"masks", masks, 0}, {"fields", fields, 0}, {"extreme sizes", extremes, 0}};
+    static const struct harness_case cases[] = {{"sanity", sanity, 1},
+                                                {"boxes and planes", shapes, 0},
+                                                {"hidden classes", classes, 0},
+                                                {"hidden shapes", shape_words, 0},
+                                                {"masks", masks, 0},
+                                                {"fields", fields, 0},
+                                                {"extreme sizes", extremes, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

@@ -78,8 +78,7 @@ static void shapes(struct harness *h)
     static const uint32_t sizes[][2] = {{1, 1}, {16384, 1}, {1, 70}, {64, 64}, {2, 2}};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; s++) {
         struct rng rng = {s};
-        struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES,
-                                                0.9);
+        struct picture picture = picture_random(h, &rng, picture_view(sizes[s][0], sizes[s][1], 1), PICTURE_SURFACES, 0.9);
         check(h, &picture, 16.0f, 2.0f, 1.0f);
     }
 }

@@ -78,7 +78,8 @@ static void hold(struct harness *h, const char *what, const struct place *balls,
 {
     const double ray[3] = {0.0, 0.0, 1.0};
     const struct ref_soft expected = march(balls, count, ray, from, to), got = exactly(balls, count, ray, from, to, &base, 1);
-    if (!harness_near(got.through, expected.through, 1e-4) || !harness_near(got.density, expected.density, 1e-4 * expected.density + 1e-9))
+    if (!harness_near(got.through, expected.through, 1e-4) ||
+        !harness_near(got.density, expected.density, 1e-4 * expected.density + 1e-9))
         harness_fail(h, what, 0, 0, "through %.9g, density %.9g; quadrature has %.9g, %.9g", got.through, got.density,
                      expected.through, expected.density);
     for (int c = 0; c < 3; c++)
@@ -102,7 +103,9 @@ static void quadrature(struct harness *h)
             hold(h, "two balls", two, 2, 1.5 * r, 5.5 * r);
         }
         for (int i = 0; i < 10; i++)
-            chain[i] = (struct place){{0.3 * r * sin(i), 0.3 * r * cos(2.0 * i), (2.0 + 0.6 * i) * r}, (0.7 + 0.05 * i) * r, 0.05 + 0.09 * i,
+            chain[i] = (struct place){{0.3 * r * sin(i), 0.3 * r * cos(2.0 * i), (2.0 + 0.6 * i) * r},
+                                      (0.7 + 0.05 * i) * r,
+                                      0.05 + 0.09 * i,
                                       {i % 2, i % 3, i % 5}};
         hold(h, "a chain of ten", chain, 10, 0.5 * r, 10.0 * r);
     }
@@ -115,10 +118,12 @@ static void ends(struct harness *h)
     HARNESS_CHECK(h, ref_soft_integral(1.0, 0.0, 0.0) == 0.0);
     HARNESS_CHECK(h, ref_soft_integral(0.3, 0.2, 0.2) == 0.0);
     HARNESS_CHECK(h, harness_near(ref_soft_integral(1e-12, -1.0, 1.0), 1.0, 1e-12));
-    const struct place solid = {{0.0, 0.0, 1.0}, 1e-30, 0.5, {1.0, 1.0, 1.0}}, clear = {{0.0, 0.0, 1.0}, 1.0, 0.0, {1.0, 1.0, 1.0}};
+    const struct place solid = {{0.0, 0.0, 1.0}, 1e-30, 0.5, {1.0, 1.0, 1.0}},
+                       clear = {{0.0, 0.0, 1.0}, 1.0, 0.0, {1.0, 1.0, 1.0}};
     const double ray[3] = {0.0, 0.0, 1.0};
-    HARNESS_CHECK(h, harness_near(exactly(&solid, 1, ray, 0.0, 2.0, &base, 1).through, 1.0, 1e-4) ||
-                         harness_near(exactly(&solid, 1, ray, 0.0, 2.0, &base, 1).through, 0.5, 1e-4)); // narrower than s resolves
+    HARNESS_CHECK(h,
+                  harness_near(exactly(&solid, 1, ray, 0.0, 2.0, &base, 1).through, 1.0, 1e-4) ||
+                      harness_near(exactly(&solid, 1, ray, 0.0, 2.0, &base, 1).through, 0.5, 1e-4)); // narrower than s resolves
     HARNESS_CHECK(h, exactly(&clear, 1, ray, 0.0, 2.0, &base, 1).through == 1.0);
 }
 
@@ -170,17 +175,24 @@ struct setup {
 static void put(struct setup *s, uint32_t i, double x, double y, double z, double r, double a, double w, const double color[3])
 {
     const double scale = s->args.view.perspective ? z : 1.0;
-    const float numbers[7] = {(float)(x * scale), (float)(y * scale), (float)z, (float)r, (float)color[0], (float)color[1], (float)color[2]};
+    const float numbers[7] = {(float)(x * scale), (float)(y * scale), (float)z,       (float)r,
+                              (float)color[0],    (float)color[1],    (float)color[2]};
     memcpy(s->records + PT_SOFT_WORDS * i, numbers, sizeof numbers);
-    s->records[PT_SOFT_WORDS * i + 7] = (uint32_t)(a * (double)PT_SOFT_STEPS + 0.5) << PT_SOFT_SHIFT | (uint32_t)(w * 255.0 + 0.5);
+    s->records[PT_SOFT_WORDS * i + 7] = (uint32_t)(a * (double)PT_SOFT_STEPS + 0.5) << PT_SOFT_SHIFT |
+                                        (uint32_t)(w * 255.0 + 0.5);
 }
 
 // Balls of 1 to 30 pixels about a window of a larger picture, solid surfaces here and there behind and between.
-static struct setup look_at(struct harness *h, struct rng *rng, uint32_t width, uint32_t height, int perspective, uint32_t model,
-                            uint32_t records)
+static struct setup look_at(struct harness *h, struct rng *rng, uint32_t width, uint32_t height, int perspective,
+                            uint32_t model, uint32_t records)
 {
-    struct setup s = {.args = {.view = picture_view(width, height, perspective), .records = (records + 15) / 16 * 16, .model = model,
-                               .z_from = -1.0f, .z_to = INFINITY, .crop_width = width, .density = 1}};
+    struct setup s = {.args = {.view = picture_view(width, height, perspective),
+                               .records = (records + 15) / 16 * 16,
+                               .model = model,
+                               .z_from = -1.0f,
+                               .z_to = INFINITY,
+                               .crop_width = width,
+                               .density = 1}};
     struct view_args *view = &s.args.view;
     s.pixels = (size_t)width * height;
     s.args.view.rect[2] = width;
@@ -238,8 +250,10 @@ static void run(struct harness *h, struct setup *s, enum check check)
     struct pt_buffer *keys = harness_buffer(h, s->keys, 8 * s->pixels);
     struct pt_buffer *records = harness_buffer(h, s->records, 4 * PT_SOFT_WORDS * (size_t)s->args.records);
     const size_t room = 64 + (16 + (s->lists ? s->lists : 16)) * (size_t)s->args.records;
-    struct pt_buffer *bins = harness_buffer(h, harness_alloc(h, room), room), *before = harness_buffer(h, reached, 4 * s->pixels);
-    struct pt_buffer *into = harness_buffer(h, target, 16 * s->pixels), *density = harness_buffer(h, harness_alloc(h, 4 * s->pixels), 4 * s->pixels);
+    struct pt_buffer *bins = harness_buffer(h, harness_alloc(h, room), room),
+                     *before = harness_buffer(h, reached, 4 * s->pixels);
+    struct pt_buffer *into = harness_buffer(h, target, 16 * s->pixels),
+                     *density = harness_buffer(h, harness_alloc(h, 4 * s->pixels), 4 * s->pixels);
     HARNESS_RUN(h, soft, &s->args, keys, records, bins, before, into, density);
     const float *got = harness_read(h, into), *sums = harness_read(h, density), *went = harness_read(h, before);
     double worst = 0.0;
@@ -255,7 +269,8 @@ static void run(struct harness *h, struct setup *s, enum check check)
             const double wanted = s->args.layered ? old + left * own : own + expected.through * old;
             worst = fmax(worst, fabs((double)got[4 * i + k] - wanted));
             if (!harness_near(got[4 * i + k], wanted, k < 3 ? 1e-3 : 3e-4)) // 2^-12 of light may be left
-                harness_fail(h, "target", x, y, "channel %d: got %.9g, expected %.9g, %u fragments", k, got[4 * i + k], wanted, expected.fragments);
+                harness_fail(h, "target", x, y, "channel %d: got %.9g, expected %.9g, %u fragments", k, got[4 * i + k], wanted,
+                             expected.fragments);
         }
         if (s->args.layered && s->args.last && went[i] != (float)z)
             harness_fail(h, "reached", x, y, "got %.9g, expected %.9g", went[i], z);
@@ -289,7 +304,8 @@ static void many(struct harness *h)
         struct setup s = look_at(h, &rng, 2, 1, 1, models[k], count);
         for (uint32_t i = 0; i < count; i++) {
             const double color[3] = {rng_unit(&rng), rng_unit(&rng), 1.0}, z = rng_range(&rng, 2.0, 8.0);
-            put(&s, i, s.args.view.origin_x + 1.0, s.args.view.origin_y + 0.5, z, 0.7 * ref_footprint(&s.args.view, z), 4e-4, 1.0, color);
+            put(&s, i, s.args.view.origin_x + 1.0, s.args.view.origin_y + 0.5, z, 0.7 * ref_footprint(&s.args.view, z), 4e-4,
+                1.0, color);
         }
         s.keys[0] = s.keys[1] = REF_EMPTY_KEY;
         s.args.shells = k == 1 ? 1 : 3; // OpenGL in software takes half a minute for 3 of each
@@ -326,7 +342,8 @@ static void empty_tiles(struct harness *h)
             s.records[PT_SOFT_WORDS * i + 2] = PT_KEY_EMPTY_Z;
         run(h, &s, EVERYTHING);
         const double white[3] = {1.0, 1.0, 1.0};
-        put(&s, 5, s.args.view.origin_x + 40.0, s.args.view.origin_y + 20.0, 3.0, 3.0 * ref_footprint(&s.args.view, 3.0), 0.5, 1.0, white);
+        put(&s, 5, s.args.view.origin_x + 40.0, s.args.view.origin_y + 20.0, 3.0, 3.0 * ref_footprint(&s.args.view, 3.0), 0.5,
+            1.0, white);
         run(h, &s, EVERYTHING);
     }
 }

@@ -67,15 +67,9 @@ static void random_discs(struct harness *h, int perspective, uint32_t seed, doub
     check_scene(h, &scene);
 }
 
-static void perspective(struct harness *h)
-{
-    random_discs(h, 1, 1, 0.3, 0.1f);
-}
+static void perspective(struct harness *h) { random_discs(h, 1, 1, 0.3, 0.1f); }
 
-static void orthographic(struct harness *h)
-{
-    random_discs(h, 0, 2, 0.3, 0.1f);
-}
+static void orthographic(struct harness *h) { random_discs(h, 0, 2, 0.3, 0.1f); }
 
 // Ellipses: as they are, mirrored and cut off, of an object that is stretched.
 static void ellipses(struct harness *h)
@@ -149,7 +143,8 @@ static void points(struct harness *h)
             empty[i] = REF_EMPTY_KEY;
         struct pt_buffer *plane = harness_buffer(h, empty, pixels * 8);
         const struct scatter_args args = {.view = scene.points.view, .instances = 1};
-        HARNESS_RUN(h, scatter, &args, plane, NULL, NULL, harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
+        HARNESS_RUN(h, scatter, &args, plane, NULL, NULL,
+                    harness_buffer(h, cloud->chunks, cloud->chunk_count * sizeof *cloud->chunks),
                     harness_buffer(h, cloud->positions, 12 * (size_t)cloud->slots),
                     harness_buffer(h, cloud->surface, 4 * (size_t)cloud->slots));
         const uint64_t *scattered = harness_read(h, plane);

@@ -54,7 +54,8 @@ static void check_shapes(struct harness *h, const struct picture *picture, const
     struct pt_buffer *from_buffer = harness_buffer(h, from, count * 4);
     struct pt_buffer *shapes_buffer = harness_buffer(h, shapes ? shapes : words, (size_t)args->instance.id_count * 4);
     struct pt_buffer *span_buffer = harness_buffer(h, span, count * 4);
-    HARNESS_RUN(h, surface, args, keys_buffer, words_buffer, normal_buffer, deff_buffer, from_buffer, shapes_buffer, span_buffer);
+    HARNESS_RUN(h, surface, args, keys_buffer, words_buffer, normal_buffer, deff_buffer, from_buffer, shapes_buffer,
+                span_buffer);
     const float *got_normal = harness_read(h, normal_buffer), *got_deff = harness_read(h, deff_buffer);
     const float *got_span = harness_read(h, span_buffer);
     const uint32_t *got_from = harness_read(h, from_buffer);
@@ -90,8 +91,8 @@ static void check_shapes(struct harness *h, const struct picture *picture, const
     }
 }
 
-static void check(struct harness *h, const struct picture *picture, const struct surface_args *args,
-                  const uint32_t *words, const float *estimate)
+static void check(struct harness *h, const struct picture *picture, const struct surface_args *args, const uint32_t *words,
+                  const float *estimate)
 {
     check_shapes(h, picture, args, words, NULL, estimate);
 }

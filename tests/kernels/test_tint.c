@@ -89,9 +89,14 @@ static void sanity(struct harness *h)
 {
     uint64_t key = ref_key(5.0f, 0);
     float color[4] = {0.2f, 0.4f, 0.6f, 0.5f};
-    struct clip_view clip = {.row = {0, 0, 0, 0, 0, 0, 0, 0, 1}, .hi = {0, 0, 4}, .shape = PT_CLIP_PLANE, .tint = {1, 0, 0},
-                             .strength = 1.0f, .width = 2.0f};
-    struct tint_args args = {.view = {.width = 1, .height = 1, .perspective = 1, .footprint = 0.001f}, .id_count = 1, .clip_count = 1};
+    struct clip_view clip = {.row = {0, 0, 0, 0, 0, 0, 0, 0, 1},
+                             .hi = {0, 0, 4},
+                             .shape = PT_CLIP_PLANE,
+                             .tint = {1, 0, 0},
+                             .strength = 1.0f,
+                             .width = 2.0f};
+    struct tint_args args = {
+        .view = {.width = 1, .height = 1, .perspective = 1, .footprint = 0.001f}, .id_count = 1, .clip_count = 1};
     struct ref_planes planes = {.keys = &key, .color = color};
     struct ref_color out = ref_tint(&args, &planes, &clip, 0, 0);
     HARNESS_CHECK(h, fabs(out.color[0] - 0.5) < 1e-6 && fabs(out.color[1]) < 1e-6 && out.color[3] == 0.5);

@@ -72,8 +72,7 @@ static void sanity(struct harness *h)
             picture.color[c] = albedo[c] * (k ? 0.34f : 0.28f);
         shown[k] = ref_toon(&args, &planes, 0, 0).color[0];
     }
-    HARNESS_CHECK(h, fabs(shown[0] - shown[1]) < 1e-6 &&
-                         fabs(shown[0] / (double)albedo[0] - 0.36) < 1e-5); // (1.5 / 2.5)^2
+    HARNESS_CHECK(h, fabs(shown[0] - shown[1]) < 1e-6 && fabs(shown[0] / (double)albedo[0] - 0.36) < 1e-5); // (1.5 / 2.5)^2
 }
 
 int main(int argc, char **argv)

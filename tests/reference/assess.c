@@ -3,7 +3,8 @@
 #include "reference.h"
 #include "tolerances.h"
 
-struct ref_assess ref_assess(const struct assess_args *args, const struct ref_planes *planes, const uint32_t *shapes, int x, int y)
+struct ref_assess ref_assess(const struct assess_args *args, const struct ref_planes *planes, const uint32_t *shapes, int x,
+                             int y)
 {
     const uint64_t key = planes->keys[(size_t)y * args->view.width + (size_t)x];
     struct ref_assess out = {.written = args->first != 0};

@@ -23,7 +23,8 @@ struct ref_tent ref_tent(const struct average_args *args, const struct chunk_vie
         tent.definite = 0;
         return tent;
     }
-    const double pixels = (double)PT_AVERAGE_TENT * instance->spacing[word >> PT_SPACING_SHIFT] / ref_footprint(view, middle(tent.place.z));
+    const double pixels = (double)PT_AVERAGE_TENT * instance->spacing[word >> PT_SPACING_SHIFT] /
+                          ref_footprint(view, middle(tent.place.z));
     tent.half = fmax(fmin(pixels, (double)PT_AVERAGE_WIDEST), 1.0);
     const double z = middle(tent.place.z), off = (tent.place.z.hi - tent.place.z.lo) / fmax(z, 1e-30);
     tent.half_error = tent.half * (4.0 * TOL_QUOTIENT + off);
@@ -42,7 +43,8 @@ struct ref_tent ref_tent(const struct average_args *args, const struct chunk_vie
     n = ref_unit(n);
     struct ref_vec ray = {0.0, 0.0, -1.0};
     if (view->perspective)
-        ray = ref_vec(view->ray_x0 + (double)view->ray_xs * middle(tent.place.x), view->ray_y0 + (double)view->ray_ys * middle(tent.place.y), -1.0);
+        ray = ref_vec(view->ray_x0 + (double)view->ray_xs * middle(tent.place.x),
+                      view->ray_y0 + (double)view->ray_ys * middle(tent.place.y), -1.0);
     const double facing = ref_dot(n, ray);
     tent.across = fabs(facing) < 1e-4;
     tent.n = facing > 0.0 ? ref_scale(n, -1.0) : n;
@@ -58,7 +60,8 @@ static double side(struct ref_range place, double center, const struct ref_tent 
 }
 
 struct ref_average ref_average(const struct average_args *args, const struct ref_tent *tents, const struct ref_look *looks,
-                               uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int measured, int x, int y)
+                               uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int measured, int x,
+                               int y)
 {
     const struct view_args *view = &args->view;
     const double slack = 2.0 * TOL_UNIT * (z + (double)deff), cut = 1.0 / (double)PT_SUM_SCALE;
@@ -78,7 +81,8 @@ struct ref_average ref_average(const struct average_args *args, const struct ref
         const double tall = side(tent->place.y, view->origin_y + y + 0.5, tent, &error_y);
         if (wide + error_x <= 0.0 || tall + error_y <= 0.0)
             continue;
-        const int sure = tent->definite && tent->place.z.lo >= z - (double)deff + slack && tent->place.z.hi <= z + (double)deff - slack;
+        const int sure = tent->definite && tent->place.z.lo >= z - (double)deff + slack &&
+                         tent->place.z.hi <= z + (double)deff - slack;
         const double w = fmax(wide, 0.0) * fmax(tall, 0.0);
         double error = fabs(wide) * error_y + fabs(tall) * error_x + error_x * error_y;
         if (!sure) // it may be left out
@@ -98,7 +102,9 @@ struct ref_average ref_average(const struct average_args *args, const struct ref
     out.unsure |= weights < 8.0 * weights_error && weights + weights_error > cut; // as good as none, or none
     for (int k = 0; k < 3; k++) {
         out.color[k] = weights > cut ? color[k] / weights : looks[nearest].color[k];
-        out.color_error[k] = weights > cut ? (color_error[k] + fabs(out.color[k]) * weights_error) / fmax(weights - weights_error, 1e-12) : 0.0;
+        out.color_error[k] = weights > cut
+                                 ? (color_error[k] + fabs(out.color[k]) * weights_error) / fmax(weights - weights_error, 1e-12)
+                                 : 0.0;
         out.color_error[k] += 1e-6 * fabs(out.color[k]) + 1e-9;
     }
     out.n = ref_vec_of(n);

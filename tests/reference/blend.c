@@ -26,8 +26,8 @@ static double weight_of(const struct view_args *view, const struct ref_disc *dis
 }
 
 // The mean of how far the discs within PT_DISC_DEPTHS d_eff lie behind z.
-static void mean_depth(const struct view_args *view, const struct ref_disc *discs, uint32_t count, uint32_t nearest, double z, double deff,
-                       int x, int y, struct ref_blend *out)
+static void mean_depth(const struct view_args *view, const struct ref_disc *discs, uint32_t count, uint32_t nearest, double z,
+                       double deff, int x, int y, struct ref_blend *out)
 {
     const double reach = fmax(fmin((double)PT_DISC_DEPTHS * deff, (double)PT_DISC_MOST), (double)PT_DISC_LEAST);
     const double farthest = z + reach, slack = 2.0 * TOL_UNIT * farthest;
@@ -76,7 +76,8 @@ struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *
         opaque += w * looks[i].opacity;
         opaque_error += error * looks[i].opacity + 1.0 / (double)PT_SUM_SCALE;
         for (int k = 0; k < 3; k++) {
-            const double c = fmax(fmin(looks[i].color[k], (double)PT_SUM_BRIGHTEST), -(double)PT_SUM_BRIGHTEST) * looks[i].opacity;
+            const double c = fmax(fmin(looks[i].color[k], (double)PT_SUM_BRIGHTEST), -(double)PT_SUM_BRIGHTEST) *
+                             looks[i].opacity;
             color[k] += w * c;
             color_error[k] += error * fabs(c) + 1.0 / (double)PT_SUM_SCALE + 8.0 * TOL_UNIT * fabs(c);
         }
@@ -88,7 +89,8 @@ struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *
     }
     for (int k = 0; k < 3 && opaque > 0.0; k++) {
         out.color[k] = color[k] / opaque;
-        out.color_error[k] = (color_error[k] + fabs(out.color[k]) * opaque_error) / fmax(opaque - opaque_error, 1e-12) + 1e-6 * fabs(out.color[k]);
+        out.color_error[k] = (color_error[k] + fabs(out.color[k]) * opaque_error) / fmax(opaque - opaque_error, 1e-12) +
+                             1e-6 * fabs(out.color[k]);
     }
     out.color[3] = opaque / weights;
     out.color_error[3] = (opaque_error + out.color[3] * weights_error) / fmax(weights - weights_error, 1e-12) + 1e-6;

@@ -12,30 +12,15 @@ struct ref_vec ref_vec(double x, double y, double z)
     return v;
 }
 
-struct ref_vec ref_vec_of(const float v[3])
-{
-    return ref_vec(v[0], v[1], v[2]);
-}
+struct ref_vec ref_vec_of(const float v[3]) { return ref_vec(v[0], v[1], v[2]); }
 
-struct ref_vec ref_scale(struct ref_vec a, double s)
-{
-    return ref_vec(a.x * s, a.y * s, a.z * s);
-}
+struct ref_vec ref_scale(struct ref_vec a, double s) { return ref_vec(a.x * s, a.y * s, a.z * s); }
 
-struct ref_vec ref_add(struct ref_vec a, struct ref_vec b)
-{
-    return ref_vec(a.x + b.x, a.y + b.y, a.z + b.z);
-}
+struct ref_vec ref_add(struct ref_vec a, struct ref_vec b) { return ref_vec(a.x + b.x, a.y + b.y, a.z + b.z); }
 
-double ref_dot(struct ref_vec a, struct ref_vec b)
-{
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+double ref_dot(struct ref_vec a, struct ref_vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-double ref_length(struct ref_vec a)
-{
-    return sqrt(ref_dot(a, a));
-}
+double ref_length(struct ref_vec a) { return sqrt(ref_dot(a, a)); }
 
 struct ref_vec ref_unit(struct ref_vec a)
 {
@@ -51,10 +36,7 @@ double ref_key_z(uint64_t key)
     return z;
 }
 
-uint32_t ref_key_id(uint64_t key)
-{
-    return (uint32_t)key;
-}
+uint32_t ref_key_id(uint64_t key) { return (uint32_t)key; }
 
 uint64_t ref_key(float z, uint32_t id)
 {
@@ -141,7 +123,8 @@ double ref_layer_minimum(const struct view_args *view, double d_min, double spac
 
 double ref_sure_minimum(const struct view_args *view, double d_min, double sigma, double spacing, double z)
 {
-    const double thick = fmin(fmax((double)PT_SIGMAS * sigma, (double)PT_SPACING_SURE * spacing), (double)PT_SPACING_FACTOR * spacing);
+    const double thick = fmin(fmax((double)PT_SIGMAS * sigma, (double)PT_SPACING_SURE * spacing),
+                              (double)PT_SPACING_FACTOR * spacing);
     return fmax(fmax(fmax(d_min, thick), (double)PT_FOOTPRINT_SURE * ref_footprint(view, z)), ref_ulp4(z));
 }
 
@@ -188,8 +171,7 @@ static struct ref_range quotient(double a, double error_a, double b, double erro
     return range;
 }
 
-static struct ref_range perspective_plane(const float n[3], struct ref_ray q, struct ref_range z, struct ref_ray p,
-                                          int *open)
+static struct ref_range perspective_plane(const float n[3], struct ref_ray q, struct ref_range z, struct ref_ray p, int *open)
 {
     double dq = n[0] * q.u + n[1] * q.v - n[2], dp = n[0] * p.u + n[1] * p.v - n[2];
     double eq = TOL_DOT * (fabs(n[0] * q.u) + fabs(n[1] * q.v) + fabs((double)n[2])) + fabs(n[0] * q.error_u) +
@@ -205,8 +187,7 @@ static struct ref_range perspective_plane(const float n[3], struct ref_ray q, st
     return depth;
 }
 
-static struct ref_range orthographic_plane(const float n[3], struct ref_ray q, struct ref_range z, struct ref_ray p,
-                                           int *open)
+static struct ref_range orthographic_plane(const float n[3], struct ref_ray q, struct ref_range z, struct ref_ray p, int *open)
 {
     double du = p.u - q.u, dv = p.v - q.v;
     double error = 2.0 * TOL_DOT * (fabs(n[0] * du) + fabs(n[1] * dv)) + fabs((double)n[0]) * (p.error_u + q.error_u) +
@@ -233,8 +214,8 @@ struct ref_range ref_farthest(struct ref_range measured, double span, double inv
     return (struct ref_range){(measured.lo + way - error) * (1.0 - TOL_SUM), (measured.hi + way + error) * (1.0 + TOL_SUM)};
 }
 
-struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q,
-                                 struct ref_range z, struct ref_ray p, struct ref_range limit)
+struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q, struct ref_range z,
+                                 struct ref_ray p, struct ref_range limit)
 {
     int open = 0;
     struct ref_range depth = view->perspective ? perspective_plane(normal, q, z, p, &open)
@@ -256,10 +237,11 @@ struct ref_range ref_plane_depth(const struct view_args *view, const float norma
     return kept;
 }
 
-struct ref_range ref_within(struct ref_range z, struct ref_range plane, struct ref_range farthest, const struct ref_range *beside,
-                            int count)
+struct ref_range ref_within(struct ref_range z, struct ref_range plane, struct ref_range farthest,
+                            const struct ref_range *beside, int count)
 {
-    const double least = (2.0 * plane.lo - z.hi) * (1.0 - 2.0 * TOL_SUM), most = (2.0 * plane.hi - z.lo) * (1.0 + 2.0 * TOL_SUM);
+    const double least = (2.0 * plane.lo - z.hi) * (1.0 - 2.0 * TOL_SUM),
+                 most = (2.0 * plane.hi - z.lo) * (1.0 + 2.0 * TOL_SUM);
     for (int i = 0; i < count; i++) {
         if (beside[i].hi <= least)
             farthest.lo = fmax(farthest.lo, beside[i].lo);

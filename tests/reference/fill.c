@@ -25,10 +25,7 @@ struct ref_pixel ref_pixel(uint64_t key, uint32_t from)
     return pixel;
 }
 
-static int is_empty(const struct ref_pixel *pixel)
-{
-    return isinf(pixel->z.lo) && isinf(pixel->z.hi);
-}
+static int is_empty(const struct ref_pixel *pixel) { return isinf(pixel->z.lo) && isinf(pixel->z.hi); }
 
 static struct ref_pixel at(const struct fill_args *args, const struct ref_pixel *pixels, int x, int y)
 {
@@ -56,7 +53,8 @@ static enum ref_truth is_stray(const struct phase *phase, const struct ref_pixel
     const struct fill_args *args = phase->args;
     const struct ref_pixel pixel = at(args, pixels, x, y);
     const uint32_t *rect = args->view.rect;
-    if (!args->alone || phase->occluded || is_empty(&pixel) || x < (int)rect[0] || y < (int)rect[1] || x >= (int)rect[2] || y >= (int)rect[3])
+    if (!args->alone || phase->occluded || is_empty(&pixel) || x < (int)rect[0] || y < (int)rect[1] || x >= (int)rect[2] ||
+        y >= (int)rect[3])
         return REF_NO;
     int unsure = pixel.unsure;
     for (int i = 0; i < 8; i++) {
@@ -67,7 +65,8 @@ static enum ref_truth is_stray(const struct phase *phase, const struct ref_pixel
     }
     if (unsure)
         return REF_UNSURE;
-    const double limit = (double)PT_DENSE * ref_footprint(&args->view, pixel.z.lo) * (double)phase->normal[4 * (size_t)pixel.from + 3];
+    const double limit = (double)PT_DENSE * ref_footprint(&args->view, pixel.z.lo) *
+                         (double)phase->normal[4 * (size_t)pixel.from + 3];
     const double span = (double)phase->span[pixel.from];
     if (fabs(span - limit) <= (TOL_LEVEL + TOL_UNIT) * limit)
         return REF_UNSURE;
@@ -75,8 +74,8 @@ static enum ref_truth is_stray(const struct phase *phase, const struct ref_pixel
 }
 
 // Are `run` consecutive ring neighbours all white? Strays of `alone` are.
-static enum ref_truth has_white_run(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel *alone, int x, int y,
-                                    struct ref_range threshold, int run)
+static enum ref_truth has_white_run(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel *alone,
+                                    int x, int y, struct ref_range threshold, int run)
 {
     enum ref_truth white[8], found = REF_NO;
     for (int i = 0; i < 8; i++) {
@@ -115,15 +114,15 @@ static struct ref_range farthest_of(const struct phase *phase, const struct ref_
 }
 
 // The neighbour's surface as this pixel would see it.
-static struct ref_range taken_depth(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel *source, int qx,
-                                    int qy, int x, int y)
+static struct ref_range taken_depth(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel *source,
+                                    int qx, int qy, int x, int y)
 {
     const struct view_args *view = &phase->args->view;
     if (!phase->args->refined)
         return source->z;
     const struct ref_range limit = ref_level_distance(view, phase->normal, phase->span, source->from, source->z);
-    const struct ref_range plane = ref_plane_depth(view, phase->normal + 4 * (size_t)source->from, ref_ray(view, qx, qy), source->z,
-                                                   ref_ray(view, x, y), limit);
+    const struct ref_range plane = ref_plane_depth(view, phase->normal + 4 * (size_t)source->from, ref_ray(view, qx, qy),
+                                                   source->z, ref_ray(view, x, y), limit);
     struct ref_range beside[8];
     for (int i = 0; i < 8; i++)
         beside[i] = at(phase->args, pixels, x + ring_x[i], y + ring_y[i]).z;
@@ -140,16 +139,19 @@ static enum ref_truth reaches(const struct phase *phase, const struct ref_pixel 
     const struct ref_ray ray = ref_ray(view, x, y);
     const double stretch = view->perspective ? fmax(fmax(fabs(ray.u), fabs(ray.v)), 1.0) : 1.0;
     const double d = (double)phase->span[neighbour->from] * share * stretch / ((double)view->footprint * inverse);
-    const double slack = (double)PT_FILL_SLACK * scale, sx = neighbour->from % args->from_width, sy = neighbour->from / args->from_width;
+    const double slack = (double)PT_FILL_SLACK * scale, sx = neighbour->from % args->from_width,
+                 sy = neighbour->from / args->from_width;
     const double way = hypot((x + 0.5) * scale - (sx + 0.5), (y + 0.5) * scale - (sy + 0.5));
-    const double least = d / (view->perspective ? neighbour->z.hi : 1.0), most = d / (view->perspective ? neighbour->z.lo : 1.0);
+    const double least = d / (view->perspective ? neighbour->z.hi : 1.0),
+                 most = d / (view->perspective ? neighbour->z.lo : 1.0);
     if (way <= (least + slack) * (1.0 - TOL_LEVEL))
         return REF_YES;
     return way > (most + slack) * (1.0 + TOL_LEVEL) ? REF_NO : REF_UNSURE;
 }
 
 // Leaves of the ring what hides the pixel and reaches it. REF_UNSURE where that cannot be told of what might be taken.
-static enum ref_truth leave_reaching(const struct phase *phase, const struct ref_pixel *pixel, int x, int y, struct ref_pixel ring[8])
+static enum ref_truth leave_reaching(const struct phase *phase, const struct ref_pixel *pixel, int x, int y,
+                                     struct ref_pixel ring[8])
 {
     const struct ref_range threshold = threshold_of(phase, pixel);
     enum ref_truth some = REF_NO, taken[8];
@@ -176,8 +178,8 @@ static enum ref_truth leave_reaching(const struct phase *phase, const struct ref
 
 // Takes the least key among the neighbours. Neighbours that share it to the last bit show the same point, but as seen
 // from different pixels: the first of the ring is taken, anticlockwise from the right.
-static struct ref_pixel take_least(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel ring[8], int x,
-                                   int y)
+static struct ref_pixel take_least(const struct phase *phase, const struct ref_pixel *pixels, const struct ref_pixel ring[8],
+                                   int x, int y)
 {
     struct ref_pixel least = ref_pixel(REF_EMPTY_KEY, 0);
     double bound = INFINITY;

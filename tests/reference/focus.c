@@ -22,10 +22,7 @@ static double circle_of(const struct focus_args *args, uint64_t key, double *err
     return fmin(radius, args->most);
 }
 
-static double density_of(double circle)
-{
-    return 1.0 / fmax(3.14159265358979 * circle * circle, 1.0);
-}
+static double density_of(double circle) { return 1.0 / fmax(3.14159265358979 * circle * circle, 1.0); }
 
 struct ref_color ref_focus(const struct focus_args *args, const struct ref_planes *planes, int x, int y)
 {

@@ -41,15 +41,16 @@ static void light(const struct gather_args *args, const struct ref_planes *point
     float normal[4] = {0.0f, 0.0f, 1.0f, 1.0f}, far_off = 1e30f;
     if (ref_decode_normal(word, &n)) {
         const float *m = shade.instance.normal_matrix;
-        const struct ref_vec turned = ref_unit(ref_vec(m[0] * n.x + m[1] * n.y + m[2] * n.z, m[3] * n.x + m[4] * n.y + m[5] * n.z,
-                                                       m[6] * n.x + m[7] * n.y + m[8] * n.z));
+        const struct ref_vec turned = ref_unit(ref_vec(
+            m[0] * n.x + m[1] * n.y + m[2] * n.z, m[3] * n.x + m[4] * n.y + m[5] * n.z, m[6] * n.x + m[7] * n.y + m[8] * n.z));
         normal[0] = (float)turned.x;
         normal[1] = (float)turned.y;
         normal[2] = (float)turned.z;
         if (!(ref_length(turned) > 0.0))
             normal[2] = 1.0f;
     }
-    *view = (struct view_args){.width = 1, .height = 1, .rect = {0, 0, 1, 1}, .perspective = view->perspective, .footprint = view->footprint};
+    *view = (struct view_args){
+        .width = 1, .height = 1, .rect = {0, 0, 1, 1}, .perspective = view->perspective, .footprint = view->footprint};
     const struct view_args *own = &args->shade.view;
     if (before > (double)PT_SOFT_BEFORE) {
         view->ray_x0 = (float)((double)own->ray_x0 + (double)own->ray_xs * out->place[0] / before);
@@ -73,8 +74,8 @@ static void light(const struct gather_args *args, const struct ref_planes *point
     }
 }
 
-struct ref_record ref_gather(const struct gather_args *args, const struct chunk_view *chunk, const float *positions, const uint32_t *field,
-                             const uint32_t *drawn, const struct ref_planes *points, uint32_t slot)
+struct ref_record ref_gather(const struct gather_args *args, const struct chunk_view *chunk, const float *positions,
+                             const uint32_t *field, const uint32_t *drawn, const struct ref_planes *points, uint32_t slot)
 {
     const struct view_args *view = &args->shade.view;
     const struct instance_args *instance = &args->shade.instance;
@@ -93,12 +94,14 @@ struct ref_record ref_gather(const struct gather_args *args, const struct chunk_
     const double own = fmin(field_radius(field[id]) * (double)args->radius_scale, (double)PT_SOFT_WIDEST);
     const double least = fmax(ref_footprint(view, out.place[2]) * (double)PT_SOFT_LEAST, -1.0);
     out.radius = fmax(own, least);
-    out.radius_error = 4.0 * TOL_UNIT * fabs(out.radius) + (view->perspective ? (double)view->footprint * out.place_error[2] : 0.0);
+    out.radius_error = 4.0 * TOL_UNIT * fabs(out.radius) +
+                       (view->perspective ? (double)view->footprint * out.place_error[2] : 0.0);
     // 2. whether it shows
     if (!(fabs(out.place[0]) <= (double)PT_SOFT_FARTHEST && fabs(out.place[1]) <= (double)PT_SOFT_FARTHEST))
         return out; // NaN too
     const double reach = args->within ? out.radius : 0.0, off = out.place_error[2] + (args->within ? out.radius_error : 0.0);
-    const double farther = out.place[2] + reach, nearer = out.place[2] - reach, slack = off + TOL_SUM * (fabs(farther) + fabs(nearer));
+    const double farther = out.place[2] + reach, nearer = out.place[2] - reach,
+                 slack = off + TOL_SUM * (fabs(farther) + fabs(nearer));
     out.drawn = both(ref_less_equal(ref_exactly(view->z_near), (struct ref_range){farther - slack, farther + slack}),
                      ref_less_equal((struct ref_range){nearer - slack, nearer + slack}, ref_exactly(view->z_far)));
     if (!(out.radius > 0.0) || !(out.place[2] + slack > -1e37))

@@ -22,8 +22,7 @@ static double stroke(const struct hatch_args *args, int level, const struct pixe
     double gx = p->xs * (axis.x - turn * p->n.x), gy = p->ys * (axis.y - turn * p->n.y);
     double rate = sqrt(fmax(gx * gx + gy * gy, 1e-30));
     // each term of the rate is rounded a few times; where they cancel, their sum is off by more
-    double rate_error = 24.0 * TOL_UNIT * (fabs(p->xs) + fabs(p->ys)) * (1.0 + fabs(turn)) *
-                        (1.0 + ref_length(p->ray)) / rate;
+    double rate_error = 24.0 * TOL_UNIT * (fabs(p->xs) + fabs(p->ys)) * (1.0 + fabs(turn)) * (1.0 + ref_length(p->ray)) / rate;
     double wanted = rate * args->spacing, period = exp2(floor(log2(wanted))), fade = wanted / period - 1.0;
     double fade_error = 2.0 * (rate_error + 2.0 * TOL_UNIT);
     double at = along / period, line = floor(at + 0.5), off = fabs(at - line) * period / rate;

@@ -105,7 +105,8 @@ static int beyond(const struct scene *scene, int x, int y, double v)
     for (int dy = -1; dy <= 1; dy++)
         for (int dx = -1; dx <= 1; dx++)
             if ((dx || dy) && is_ground(scene, x + dx, y + dy))
-                count += !is_surface(scene, x + dx, y + dy) || ref_key_z(scene->planes->keys[index_of(scene, x + dx, y + dy)]) > v;
+                count += !is_surface(scene, x + dx, y + dy) ||
+                         ref_key_z(scene->planes->keys[index_of(scene, x + dx, y + dy)]) > v;
     return count;
 }
 

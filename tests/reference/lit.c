@@ -6,7 +6,8 @@
 #include <math.h>
 
 // d_eff of the point: its own spacing and slope; the texel PT_TEXEL_SLACK wider.
-static struct ref_range layer_distance(const struct lit_args *args, const struct ref_place *place, uint32_t word, int *has_normal)
+static struct ref_range layer_distance(const struct lit_args *args, const struct ref_place *place, uint32_t word,
+                                       int *has_normal)
 {
     const struct instance_args *instance = &args->instance;
     struct view_args view = args->view;
@@ -25,8 +26,9 @@ static struct ref_range layer_distance(const struct lit_args *args, const struct
         *has_normal = ref_length(n) > 0.0;
         along = *has_normal ? terms / ref_length(n) : 1.0;
         // the ray's own error: the position on screen, a product and a sum
-        double off = TOL_RAY * (fabs((double)view.ray_x0) + fabs((double)view.ray_y0) + fabs(view.ray_xs * x) + fabs(view.ray_ys * y)) +
-                     fabs((double)view.ray_xs) * (place->x.hi - place->x.lo) + fabs((double)view.ray_ys) * (place->y.hi - place->y.lo);
+        double off =
+            TOL_RAY * (fabs((double)view.ray_x0) + fabs((double)view.ray_y0) + fabs(view.ray_xs * x) + fabs(view.ray_ys * y)) +
+            fabs((double)view.ray_xs) * (place->x.hi - place->x.lo) + fabs((double)view.ray_ys) * (place->y.hi - place->y.lo);
         error = 2.0 * (TOL_NORMAL * along + (view.perspective ? off : 0.0));
         cosine = *has_normal ? fabs(ref_dot(ref_unit(n), viewer)) : 1.0;
     }
@@ -113,7 +115,8 @@ enum ref_truth ref_lit(const struct lit_args *args, const struct ref_planes *pla
             struct ref_range far = {(map + d.lo) * (1.0 - TOL_SUM), (map + d.hi) * (1.0 + TOL_SUM)};
             enum ref_truth behind = isfinite(map) && before != REF_YES ? ref_less(far, place.z) : REF_NO;
             if (behind != REF_NO) {
-                enum ref_truth same = supported(view, planes->keys, (int)px - view->origin_x, (int)py - view->origin_y, d, place.z);
+                enum ref_truth same = supported(view, planes->keys, (int)px - view->origin_x, (int)py - view->origin_y, d,
+                                                place.z);
                 behind = same == REF_NO ? REF_NO : same == REF_YES ? behind : REF_UNSURE;
             }
             unsure |= behind == REF_UNSURE;

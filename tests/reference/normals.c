@@ -17,10 +17,7 @@ struct samples {
     double centre, greatest; // f at the centre; greatest |f| of all
 };
 
-static double linear(const struct view_args *view, double z)
-{
-    return view->perspective ? 1.0 / z : z;
-}
+static double linear(const struct view_args *view, double z) { return view->perspective ? 1.0 / z : z; }
 
 static double depth_at(const struct view_args *view, const struct ref_planes *planes, int x, int y)
 {

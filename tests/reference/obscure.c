@@ -11,8 +11,7 @@ static struct ref_vec point_of(const struct view_args *view, int x, int y, doubl
     return view->perspective ? ref_vec(ray.u * z, ray.v * z, -z) : ref_vec(ray.u, ray.v, -z);
 }
 
-double ref_obscured(const struct obscure_args *args, const struct ref_planes *planes, int x, int y, double *error,
-                    int *unsure)
+double ref_obscured(const struct obscure_args *args, const struct ref_planes *planes, int x, int y, double *error, int *unsure)
 {
     const struct view_args *view = &args->view;
     size_t pixel = (size_t)y * view->width + (size_t)x;
@@ -23,8 +22,7 @@ double ref_obscured(const struct obscure_args *args, const struct ref_planes *pl
     double toward = ref_dot(n, viewer);
     *unsure |= fabs(toward) < 1e-5 && ref_length(n) > 0.0; // edge-on: either side may be seen
     n = toward < 0.0 ? ref_scale(n, -1.0) : n;
-    int turn = (int)(((uint32_t)view->origin_x + (uint32_t)x) & 3u) +
-               4 * (int)(((uint32_t)view->origin_y + (uint32_t)y) & 3u);
+    int turn = (int)(((uint32_t)view->origin_x + (uint32_t)x) & 3u) + 4 * (int)(((uint32_t)view->origin_y + (uint32_t)y) & 3u);
     double c = args->turns[2 * turn], s = args->turns[2 * turn + 1];
     *error = 0.0;
     for (int i = 0; i < PT_OBSCURE_TAPS; i++) {
@@ -81,8 +79,7 @@ struct ref_color ref_obscure(const struct obscure_args *args, const struct ref_p
     double light = fmax(1.0 - args->strength * sum / total, 0.0);
     for (int c = 0; c < 4; c++) {
         out.color[c] = planes->color[4 * pixel + (size_t)c] * (c < 3 ? light : 1.0);
-        out.error[c] = c < 3 ? TOL_COLOR * fabs((double)planes->color[4 * pixel + (size_t)c]) * (1.0 + args->strength)
-                             : 0.0;
+        out.error[c] = c < 3 ? TOL_COLOR * fabs((double)planes->color[4 * pixel + (size_t)c]) * (1.0 + args->strength) : 0.0;
     }
     return out;
 }

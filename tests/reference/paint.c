@@ -14,8 +14,8 @@ struct spot {
 static double area(const double a[2], const double b[2]) { return a[0] * b[1] - b[0] * a[1]; }
 
 // Where the centre (cx, cy) lies; 0 beyond the plane's horizon. *least: the sum of areas over the largest of them.
-static int place(const double corner[3][3], const double uv[3][2], const struct view_args *view, double cx, double cy, double out[2],
-                 double *least)
+static int place(const double corner[3][3], const double uv[3][2], const struct view_args *view, double cx, double cy,
+                 double out[2], double *least)
 {
     double away[3][2], f[3], sum = 0.0, most = 0.0;
     for (int i = 0; i < 3; i++) {
@@ -64,15 +64,16 @@ static void add(const double c[4], double weight, double sum[4])
     sum[3] += c[3] * weight;
 }
 
-static void add_level(const struct texture_args *image, const uint32_t *texels, uint32_t level, const double at[2], double weight,
-                      double sum[4])
+static void add_level(const struct texture_args *image, const uint32_t *texels, uint32_t level, const double at[2],
+                      double weight, double sum[4])
 {
     double x = at[0] * image->sizes[3 * level] - 0.5, y = at[1] * image->sizes[3 * level + 1] - 0.5;
     for (int j = 0; j < 2; j++)
         for (int i = 0; i < 2; i++) {
             double c[4], u = x - floor(x), v = y - floor(y);
             long column = (long)floor(x) + i, row = (long)floor(y) + j;
-            if (image->wrap == PT_WRAP_CLIP && (column < 0 || row < 0 || column >= image->sizes[3 * level] || row >= image->sizes[3 * level + 1]))
+            if (image->wrap == PT_WRAP_CLIP &&
+                (column < 0 || row < 0 || column >= image->sizes[3 * level] || row >= image->sizes[3 * level + 1]))
                 continue;
             texel(image, texels, level, column, row, c);
             add(c, weight * (i ? u : 1.0 - u) * (j ? v : 1.0 - v), sum);
@@ -122,7 +123,8 @@ static void probe(const struct texture_args *image, const uint32_t *texels, cons
         if (sharp) {
             double c[4], u = at[0] * image->sizes[0], v = at[1] * image->sizes[1];
             out->open |= fabs(u - round(u)) <= spot->error * size || fabs(v - round(v)) <= spot->error * size;
-            texel(image, texels, 0, (long)fmin(floor(u), image->sizes[0] - 1.0), (long)fmin(floor(v), image->sizes[1] - 1.0), c);
+            texel(image, texels, 0, (long)fmin(floor(u), image->sizes[0] - 1.0), (long)fmin(floor(v), image->sizes[1] - 1.0),
+                  c);
             add(c, 1.0, sum);
             continue;
         }
@@ -138,8 +140,8 @@ static void probe(const struct texture_args *image, const uint32_t *texels, cons
     out->error = moved + (level > 0.0 || major > 0.9 ? 2.0 * spot->side_error : 0.0) + 2.0 * TOL_COLOR;
 }
 
-struct ref_paint ref_paint(const struct paint_args *args, const float *vertices, const uint32_t *indices, const uint32_t *texels,
-                           uint64_t shown, uint64_t mesh_key, int x, int y)
+struct ref_paint ref_paint(const struct paint_args *args, const float *vertices, const uint32_t *indices,
+                           const uint32_t *texels, uint64_t shown, uint64_t mesh_key, int x, int y)
 {
     const struct view_args *view = &args->view;
     const struct mesh_args *mesh = &args->mesh;

@@ -2,8 +2,8 @@
 // SPEC 2.2: a scatter at half the resolution is the least key of 2 x 2 pixels.
 #include "reference.h"
 
-void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y,
-              uint64_t *key, uint32_t *from)
+void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y, uint64_t *key,
+              uint32_t *from)
 {
     *key = REF_EMPTY_KEY;
     *from = 0;

@@ -47,15 +47,15 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
     if (pixel.id != PT_KEY_EMPTY_ID || !isinf(pixel.z.lo)) {
         if (args->background)
             return pixel;
-        threshold = ref_difference(pixel.z,
-                                   ref_level_distance(view, planes->normal, planes->deff, pixel.from, pixel.z));
+        threshold = ref_difference(pixel.z, ref_level_distance(view, planes->normal, planes->deff, pixel.from, pixel.z));
     }
     int px = x >> 1, py = y >> 1, sx = x & 1 ? 1 : -1, sy = y & 1 ? 1 : -1;
     if (px >= (int)args->coarse_width || py >= (int)args->coarse_height)
         return pixel;
     struct ref_range parent = coarse_depth(args, coarse_keys, px, py);
     enum ref_truth parent_before = ref_less(parent, threshold);
-    const struct ref_range beside[3] = {coarse_depth(args, coarse_keys, px + sx, py), coarse_depth(args, coarse_keys, px, py + sy),
+    const struct ref_range beside[3] = {coarse_depth(args, coarse_keys, px + sx, py),
+                                        coarse_depth(args, coarse_keys, px, py + sy),
                                         coarse_depth(args, coarse_keys, px + sx, py + sy)};
     enum ref_truth before[3];
     for (int i = 0; i < 3; i++)
@@ -81,9 +81,11 @@ struct ref_pixel ref_push(const struct push_args *args, const uint64_t *coarse_k
         const size_t cell = ref_cell_of(taken.from, args->from_width, above.level, args->coarse_width);
         const struct ref_range measured = ref_exactly(ref_key_z(coarse_keys[cell]));
         const struct ref_range farthest = coarse_from[cell] != taken.from
-            ? taken.z : ref_farthest(measured, planes->span[taken.from], planes->normal[4 * (size_t)taken.from + 3]);
-        const struct ref_range plane = ref_plane_depth(view, planes->normal + 4 * (size_t)taken.from, ref_ray(&above, px, py), taken.z,
-                                                       ref_ray(view, x, y), limit);
+                                              ? taken.z
+                                              : ref_farthest(measured, planes->span[taken.from],
+                                                             planes->normal[4 * (size_t)taken.from + 3]);
+        const struct ref_range plane = ref_plane_depth(view, planes->normal + 4 * (size_t)taken.from, ref_ray(&above, px, py),
+                                                       taken.z, ref_ray(view, x, y), limit);
         taken.z = ref_within(taken.z, plane, farthest, beside, 3);
     }
     return taken;

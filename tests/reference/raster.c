@@ -79,7 +79,7 @@ struct ref_hit ref_raster(const struct view_args *view, const struct mesh_args *
     double volume = f[0] * c[0].z + f[1] * c[1].z + f[2] * c[2].z; // perspective: the same at every centre
     double z = sum != 0.0 ? volume / sum : z_least;
     hit.z = (struct ref_range){z_least, z_most}; // of thin triangles no more is known
-    if (isinf(least)) // a single place
+    if (isinf(least))                            // a single place
         return hit;
     hit.definite = least > margin;
     hit.possible = !(least < -margin);

@@ -66,11 +66,12 @@ int ref_decode_normal(uint32_t word, struct ref_vec *normal);
 double ref_srgb(uint8_t value); // sRGB to linear
 
 // Depth at ray p of the plane with this normal through the point at ray q and depth z, kept in [z, z + limit].
-struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q,
-                                 struct ref_range z, struct ref_ray p, struct ref_range limit);
+struct ref_range ref_plane_depth(const struct view_args *view, const float normal[3], struct ref_ray q, struct ref_range z,
+                                 struct ref_ray p, struct ref_range limit);
 // That depth, `plane`, kept before `farthest`, or before what lies beside the pixel and no farther from it than z is: `beside`,
 // `count` depths.
-struct ref_range ref_within(struct ref_range z, struct ref_range plane, struct ref_range farthest, const struct ref_range *beside, int count);
+struct ref_range ref_within(struct ref_range z, struct ref_range plane, struct ref_range farthest,
+                            const struct ref_range *beside, int count);
 // How far z of a filled surface goes at most: beyond `measured`, its z in the cell that holds `from`, as far as its span reaches along it.
 struct ref_range ref_farthest(struct ref_range measured, double span, double inverse);
 // The cell of a level that holds a pixel of level 0.
@@ -95,8 +96,7 @@ struct ref_place {
     int known; // 0: behind the eye, or not finite
     struct ref_range x, y, z;
 };
-struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
-                           uint32_t slot);
+struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions, uint32_t slot);
 
 // What a measured point's offset to the middle of its pixel may be.
 struct ref_center {
@@ -131,16 +131,15 @@ struct ref_disc {
     uint32_t id;
     int possible, definite; // may be drawn; is drawn
     struct ref_place place;
-    struct ref_vec n;       // unit, towards the viewer; without a normal: of the picture
+    struct ref_vec n;            // unit, towards the viewer; without a normal: of the picture
     int has_normal, has_normals; // of the point; of its cloud
-    int edge_on;            // so much that float32 may draw its pixel alone
+    int edge_on;                 // so much that float32 may draw its pixel alone
     double normal_error, radius; // radius: of the major half axis
     struct ref_vec axes[2];      // of a shape: what an offset in the plane times them is in half axes, times the radius
     int shaped;
 };
 struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
-                         const float *positions, const uint32_t *surface, const void *radii,
-                         uint32_t slot);
+                         const float *positions, const uint32_t *surface, const void *radii, uint32_t slot);
 // Whether it covers a pixel of the plane, how deep, and at which squared share of its radius from its middle.
 struct ref_met {
     enum ref_truth covered;
@@ -170,15 +169,15 @@ struct ref_planes {
     const uint64_t *keys;
     const uint32_t *from;
     const float *normal, *deff, *span, *color, *shading;
-    const uint32_t *surface; // by id - id_base
-    const uint32_t *shapes;  // likewise
-    const void *colors;      // by id - id_base
+    const uint32_t *surface;  // by id - id_base
+    const uint32_t *shapes;   // likewise
+    const void *colors;       // by id - id_base
     const uint8_t *opacities; // by id - id_base
-    const float *through;    // light that earlier layers let through
+    const float *through;     // light that earlier layers let through
     const float *arrived, *away;
     const float *offset; // of measured pixels
     const float *obscured;
-    const float *albedo; // colours without light
+    const float *albedo;     // colours without light
     const uint32_t *shadows; // words, by light and id - id_base
 };
 
@@ -215,7 +214,8 @@ struct ref_average {
 };
 // A pixel at z, deff that of its source, n its normal; nearest: the point of its key. looks: of the points, as they lie in tents.
 struct ref_average ref_average(const struct average_args *args, const struct ref_tent *tents, const struct ref_look *looks,
-                               uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int measured, int x, int y);
+                               uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int measured, int x,
+                               int y);
 
 struct ref_surface {
     struct ref_vec n;
@@ -254,11 +254,11 @@ struct ref_paint {
     int ours;
     int open; // float32 may take another number of probes, another texel, or the other side of a clipped border
 };
-struct ref_paint ref_paint(const struct paint_args *args, const float *vertices, const uint32_t *indices, const uint32_t *texels,
-                           uint64_t shown, uint64_t mesh_key, int x, int y);
+struct ref_paint ref_paint(const struct paint_args *args, const float *vertices, const uint32_t *indices,
+                           const uint32_t *texels, uint64_t shown, uint64_t mesh_key, int x, int y);
 
-void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y,
-              uint64_t *key, uint32_t *from);
+void ref_pull(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, int x, int y, uint64_t *key,
+              uint32_t *from);
 
 // A pixel between measured and filled: its depth may be a range, its surface may be open.
 struct ref_pixel {
@@ -294,9 +294,9 @@ struct ref_shade {
     double color[4], color_error[4]; // premultiplied
     double opacity;
     double shadow; // mean share of the casting lights that arrives
-    int written;  // the pixel belongs to the instance
-    int unsure;   // float32 may decide otherwise
-    int singular; // a light within rounding of the surface: only finite colours are asked for
+    int written;   // the pixel belongs to the instance
+    int unsure;    // float32 may decide otherwise
+    int singular;  // a light within rounding of the surface: only finite colours are asked for
 };
 struct ref_shade ref_shade(const struct shade_args *args, const struct ref_planes *planes, int x, int y);
 
@@ -360,22 +360,23 @@ struct ref_assess {
     int written; // 0: the pixel stays as it is
 };
 // x, y: in the planes, within view.rect; shapes: by id - id_base.
-struct ref_assess ref_assess(const struct assess_args *args, const struct ref_planes *planes, const uint32_t *shapes, int x, int y);
+struct ref_assess ref_assess(const struct assess_args *args, const struct ref_planes *planes, const uint32_t *shapes, int x,
+                             int y);
 
 // Whether some station looked through the place at z on the pixel's ray; and whether the pixel is the instance's and was closed.
-enum ref_truth ref_seen_through(const struct reopen_args *args, const struct station_args *stations, const uint32_t *words, int x,
-                                int y, double z);
+enum ref_truth ref_seen_through(const struct reopen_args *args, const struct station_args *stations, const uint32_t *words,
+                                int x, int y, double z);
 int ref_closed(const struct reopen_args *args, const struct ref_planes *planes, int x, int y);
 
 // ---- soft.c: balls along a ray [S] ------------------------------------------------------------------------------------------
 
 struct ref_ball {
-    double z, r;       // of the centre; world units
-    double d, along;   // from the ray, in radii; where along it that is, world units
-    double square;     // Express: of the distance from the middle of its disc, in radii
+    double z, r;     // of the centre; world units
+    double d, along; // from the ray, in radii; where along it that is, world units
+    double square;   // Express: of the distance from the middle of its disc, in radii
     double color[3];
-    double a, w;       // opacity at the centre; W of [S Eq. 22], 1: as it is
-    uint32_t shells;   // Concentric
+    double a, w;     // opacity at the centre; W of [S Eq. 22], 1: as it is
+    uint32_t shells; // Concentric
     uint32_t record;
 };
 
@@ -393,9 +394,10 @@ struct ref_soft {
 double ref_soft_integral(double d, double from, double to);
 double ref_soft_shells(uint32_t mu, uint32_t shells, double d, double from, double to);
 double ref_soft_factor(const struct ref_ball *ball, const struct ref_soft_model *model); // m of [S Eq. 22]
-double ref_soft_disc(double square, double a, double w); // [S Eq. 19, 22]
+double ref_soft_disc(double square, double a, double w);                                 // [S Eq. 19, 22]
 // Base and Concentric between two places along the ray; Express, sorting the balls.
-struct ref_soft ref_soft_ray(const struct ref_ball *balls, uint32_t count, const struct ref_soft_model *model, double from, double to);
+struct ref_soft ref_soft_ray(const struct ref_ball *balls, uint32_t count, const struct ref_soft_model *model, double from,
+                             double to);
 struct ref_soft ref_soft_discs(struct ref_ball *balls, uint32_t count, double from, double to);
 
 struct ref_ball ref_ball_at(const struct soft_args *args, const uint32_t *records, uint32_t index, int x, int y);
@@ -412,7 +414,7 @@ struct ref_record {
     int unsure, singular;                  // as of ref_shade
 };
 // points: surface, colors, opacities, shadows by slot.
-struct ref_record ref_gather(const struct gather_args *args, const struct chunk_view *chunk, const float *positions, const uint32_t *field,
-                             const uint32_t *drawn, const struct ref_planes *points, uint32_t slot);
+struct ref_record ref_gather(const struct gather_args *args, const struct chunk_view *chunk, const float *positions,
+                             const uint32_t *field, const uint32_t *drawn, const struct ref_planes *points, uint32_t slot);
 
 #endif

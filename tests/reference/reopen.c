@@ -37,7 +37,7 @@ static enum ref_truth on_face(const struct station_args *station, const uint32_t
         const double y = (1.25 * v - 0.25 * v * v * v + 1.0) * half + (k / 2 ? slack : -slack);
         const double range = range_of(station, words, (uint32_t)(2 * axis + (q[axis] < 0.0)), x, y);
         const double most = length * sqrt((double)station->grow);
-        const enum ref_truth here = isinf(range) && length < 1e18      ? REF_YES
+        const enum ref_truth here = isinf(range) && length < 1e18       ? REF_YES
                                     : !(range > most * (1 - TOL_SIGHT)) ? REF_NO
                                     : range > most * (1 + TOL_SIGHT)    ? REF_YES
                                                                         : REF_UNSURE;
@@ -62,8 +62,8 @@ static enum ref_truth by_station(const struct station_args *station, const uint3
     return found;
 }
 
-enum ref_truth ref_seen_through(const struct reopen_args *args, const struct station_args *stations, const uint32_t *words, int x,
-                                int y, double z)
+enum ref_truth ref_seen_through(const struct reopen_args *args, const struct station_args *stations, const uint32_t *words,
+                                int x, int y, double z)
 {
     const struct ref_ray ray = ref_ray(&args->view, x, y);
     const double depth = args->view.perspective ? z : 1.0, back = args->view.perspective ? z : z + (double)args->eye_z;
@@ -71,8 +71,8 @@ enum ref_truth ref_seen_through(const struct reopen_args *args, const struct sta
     for (uint32_t s = 0; s < args->stations; s++) {
         double q[3], cancelled = 0.0, size = 0.0;
         for (int k = 0; k < 3; k++) {
-            const double terms[4] = {stations[s].eye[k], args->rows[3 * k] * ray.u * depth, args->rows[3 * k + 1] * ray.v * depth,
-                                     -args->rows[3 * k + 2] * back};
+            const double terms[4] = {stations[s].eye[k], args->rows[3 * k] * ray.u * depth,
+                                     args->rows[3 * k + 1] * ray.v * depth, -args->rows[3 * k + 2] * back};
             q[k] = terms[0] + terms[1] + terms[2] + terms[3];
             for (int i = 0; i < 4; i++)
                 cancelled = fmax(cancelled, fabs(terms[i]));

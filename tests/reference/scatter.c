@@ -55,8 +55,7 @@ static int pixels(struct ref_range screen, int origin, uint32_t size, int *first
     return 1;
 }
 
-struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions,
-                           uint32_t slot)
+struct ref_place ref_place(const struct view_args *view, const struct chunk_view *chunk, const float *positions, uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
     double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]}, error[3];

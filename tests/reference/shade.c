@@ -75,7 +75,8 @@ static double steepest(const struct recolor_args *recolor, int channel)
 {
     double most = 0.0;
     for (uint32_t i = 0; i + 1 < recolor->entries; i++)
-        most = fmax(most, fabs((double)recolor->ramp[3 * i + 3 + (uint32_t)channel] - recolor->ramp[3 * i + (uint32_t)channel]));
+        most = fmax(most,
+                    fabs((double)recolor->ramp[3 * i + 3 + (uint32_t)channel] - recolor->ramp[3 * i + (uint32_t)channel]));
     return most;
 }
 
@@ -105,7 +106,8 @@ static void recolor(const struct shade_args *args, const struct ref_planes *plan
         double value = graded(recolor, albedo[c]), more = graded(recolor, albedo[c] + errors[c]);
         double less = graded(recolor, albedo[c] - errors[c]);
         double stops = albedo[c] > 0.0 ? fabs(log2(recolor->gain * albedo[c] / (double)PT_MID_GREY)) : 0.0;
-        errors[c] = fmax(more - value, value - less) + fabs(value) * (TOL_POWER + TOL_LOG * recolor->contrast + TOL_STOPS * (1.0 + recolor->contrast * stops));
+        errors[c] = fmax(more - value, value - less) +
+                    fabs(value) * (TOL_POWER + TOL_LOG * recolor->contrast + TOL_STOPS * (1.0 + recolor->contrast * stops));
         albedo[c] = value;
     }
 }
@@ -121,8 +123,7 @@ static int blend_radius(const struct view_args *view, double z, double deff, int
 }
 
 // Blends the normals of the surfaces that the pixels of the same layer around a filled one show.
-static void blend(const struct view_args *view, const struct ref_planes *planes, int most, int x, int y,
-                  struct ref_shade *out)
+static void blend(const struct view_args *view, const struct ref_planes *planes, int most, int x, int y, struct ref_shade *out)
 {
     size_t pixel = (size_t)y * view->width + (size_t)x;
     uint32_t from = planes->from[pixel];
@@ -160,8 +161,7 @@ static void blend(const struct view_args *view, const struct ref_planes *planes,
 }
 
 // Clouds without normals have their estimates in the normal plane, like any other.
-static void normal_of(const struct shade_args *args, const struct ref_planes *planes, int x, int y,
-                      struct ref_shade *out)
+static void normal_of(const struct shade_args *args, const struct ref_planes *planes, int x, int y, struct ref_shade *out)
 {
     size_t pixel = (size_t)y * args->view.width + (size_t)x, from = planes->from[pixel];
     out->n = ref_vec_of(planes->normal + 4 * from);
@@ -226,8 +226,7 @@ static void add_light(struct lighting *s, const struct light_args *light, struct
     struct ref_vec reflected = ref_add(ref_scale(s->n, 2.0 * cosine), ref_scale(l, -1.0));
     double shine = fmax(ref_dot(reflected, s->viewer), 0.0), off = TOL_REFLECT + 3.0 * error;
     double highlight = cosine > 0.0 ? instance->specular * pow(shine, instance->shininess) : 0.0;
-    double steep = instance->specular * instance->shininess *
-                   pow(fmin(shine + off, 1.0), instance->shininess - 1.0);
+    double steep = instance->specular * instance->shininess * pow(fmin(shine + off, 1.0), instance->shininess - 1.0);
     // At the terminator the highlight is switched on or off by the last bit.
     if (fabs(cosine) <= error + TOL_NORMAL && instance->specular * pow(shine + off, instance->shininess) > 1e-7)
         out->unsure = 1;
@@ -285,14 +284,15 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
     if (facing < 0.0)
         n = ref_scale(n, -1.0);
     out.unsure |= fabs(facing) <= out.normal_error + TOL_NORMAL && (args->light_count > 0 || args->directed);
-    struct ref_vec position = view->perspective ? ref_vec(ray.u * z, ray.v * z, -z)
-                                                : ref_vec(ray.u, ray.v, -z - args->eye_z);
+    struct ref_vec position = view->perspective ? ref_vec(ray.u * z, ray.v * z, -z) : ref_vec(ray.u, ray.v, -z - args->eye_z);
     double position_error = 4.0 * TOL_UNIT *
                                 (fabs(position.x) + fabs(position.y) + fabs(position.z) + fabs((double)args->eye_z)) +
                             (ray.error_u + ray.error_v) * (view->perspective ? z : 1.0);
-    struct lighting s = {.instance = instance, .n = n, .viewer = viewer, .position = position, .position_error = position_error};
+    struct lighting s = {
+        .instance = instance, .n = n, .viewer = viewer, .position = position, .position_error = position_error};
     for (int c = 0; c < 3; c++) {
-        double off = 0.0, ambient = args->directed ? ambient_of(args->ambient + 9 * c, n, out.normal_error, &off) : args->world[c];
+        double off = 0.0,
+               ambient = args->directed ? ambient_of(args->ambient + 9 * c, n, out.normal_error, &off) : args->world[c];
         s.light[c] = instance->ambient * ambient;
         s.loose[c] = TOL_COLOR * fabs(s.light[c]) + instance->ambient * off;
     }

@@ -13,10 +13,7 @@ static double primitive(double d, double t)
     return t - 0.5 * (t * q + (d > 0.0 ? d * d * asinh(t / d) : 0.0));
 }
 
-double ref_soft_integral(double d, double from, double to)
-{
-    return primitive(d, to) - primitive(d, from);
-}
+double ref_soft_integral(double d, double from, double to) { return primitive(d, to) - primitive(d, from); }
 
 static double shell_mu(uint32_t mu, double d, double radius, uint32_t shells)
 {
@@ -47,7 +44,8 @@ static double ball_lambda(const struct ref_ball *ball) { return -log1p(-fmin(bal
 
 double ref_soft_factor(const struct ref_ball *ball, const struct ref_soft_model *model)
 {
-    const double half = sqrt(fmax(1.0 - ball->d * ball->d, 0.0)), whole = ball_lambda(ball) * depth_of(ball, model, -half, half);
+    const double half = sqrt(fmax(1.0 - ball->d * ball->d, 0.0)),
+                 whole = ball_lambda(ball) * depth_of(ball, model, -half, half);
     if (ball->w >= 1.0 || !(whole > 0.0))
         return 1.0;
     const double opacity = fmin(ball->a, (double)PT_SOFT_FULLEST) * (1.0 - ball->d) * (1.0 - ball->w) - expm1(-whole) * ball->w;
@@ -60,7 +58,8 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-struct ref_soft ref_soft_ray(const struct ref_ball *balls, uint32_t count, const struct ref_soft_model *model, double from, double to)
+struct ref_soft ref_soft_ray(const struct ref_ball *balls, uint32_t count, const struct ref_soft_model *model, double from,
+                             double to)
 {
     struct ref_soft out = {.through = 1.0};
     double *ends = malloc((2 * (size_t)count + 1) * sizeof *ends);
@@ -74,7 +73,8 @@ struct ref_soft ref_soft_ray(const struct ref_ball *balls, uint32_t count, const
         ends[places++] = end;
         out.fragments++;
         out.density += (double)PT_SOFT_BALL / (balls[i].r * balls[i].r) *
-                       ref_soft_integral(balls[i].d, (begin - balls[i].along) / balls[i].r, (end - balls[i].along) / balls[i].r);
+                       ref_soft_integral(balls[i].d, (begin - balls[i].along) / balls[i].r,
+                                         (end - balls[i].along) / balls[i].r);
     }
     qsort(ends, places, sizeof *ends, compare);
     for (uint32_t k = 0; k + 1 < places; k++) {
@@ -140,14 +140,16 @@ struct ref_ball ref_ball_at(const struct soft_args *args, const uint32_t *record
     } words[PT_SOFT_WORDS];
     for (uint32_t k = 0; k < PT_SOFT_WORDS; k++)
         words[k].word = records[PT_SOFT_WORDS * index + k];
-    struct ref_ball ball = {.record = index, .z = (double)words[2].number, .r = (double)words[3].number, .d = 2.0, .square = 2.0};
+    struct ref_ball ball = {
+        .record = index, .z = (double)words[2].number, .r = (double)words[3].number, .d = 2.0, .square = 2.0};
     if (!(ball.z <= FLT_MAX))
         return ball;
     for (int k = 0; k < 3; k++)
         ball.color[k] = (double)words[4 + k].number;
     ball.a = (double)(words[7].word >> PT_SOFT_SHIFT) / (double)PT_SOFT_STEPS;
     ball.w = (double)(words[7].word & 255u) / 255.0;
-    const double px = view->origin_x + x + 0.5, py = view->origin_y + y + 0.5, xs = (double)view->ray_xs, ys = (double)view->ray_ys;
+    const double px = view->origin_x + x + 0.5, py = view->origin_y + y + 0.5, xs = (double)view->ray_xs,
+                 ys = (double)view->ray_ys;
     double u = 0.0, v = 0.0, scale = 1.0;
     if (view->perspective) {
         u = (double)view->ray_x0 + xs * px;
@@ -163,12 +165,14 @@ struct ref_ball ref_ball_at(const struct soft_args *args, const uint32_t *record
     // 2. the disc
     if (ball.z > 0.0 || !view->perspective) {
         const double X = (double)words[0].number / scale, Y = (double)words[1].number / scale;
-        const double cu = view->perspective ? (double)view->ray_x0 + xs * X : 0.0, cv = view->perspective ? (double)view->ray_y0 + ys * Y : 0.0;
+        const double cu = view->perspective ? (double)view->ray_x0 + xs * X : 0.0,
+                     cv = view->perspective ? (double)view->ray_y0 + ys * Y : 0.0;
         const double dx = (X - px) * xs, dy = (Y - py) * ys, slant = dx * cu + dy * cv;
         ball.square = (dx * dx + dy * dy - slant * slant / (1.0 + cu * cu + cv * cv)) * (scale / ball.r) * (scale / ball.r);
     }
     const double pixels = ball.z > 0.0 ? ball.r / ref_footprint(view, ball.z) : 1e9;
-    ball.shells = args->shells ? args->shells : (uint32_t)fmax(fmin(ceil(pixels / (double)PT_SOFT_RING), (double)PT_SOFT_SHELLS), 1.0);
+    ball.shells = args->shells ? args->shells
+                               : (uint32_t)fmax(fmin(ceil(pixels / (double)PT_SOFT_RING), (double)PT_SOFT_SHELLS), 1.0);
     return ball;
 }
 

@@ -56,8 +56,7 @@ static void set_axes(const struct disc_args *args, uint32_t shape, double radius
 }
 
 struct ref_disc ref_disc(const struct view_args *view, const struct disc_args *args, const struct chunk_view *chunk,
-                         const float *positions, const uint32_t *surface, const void *radii,
-                         uint32_t slot)
+                         const float *positions, const uint32_t *surface, const void *radii, uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
     const double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]};
@@ -121,14 +120,16 @@ static struct ref_met meet(const struct view_args *view, const struct ref_disc *
     const double z = middle(disc->place.z), px = middle(disc->place.x), py = middle(disc->place.y);
     const struct ref_ray pixel = ref_ray(view, x, y);
     const struct ref_vec own = ray_of(view, px, py);
-    const double du = pixel.u - (view->ray_x0 + (double)view->ray_xs * px), dv = pixel.v - (view->ray_y0 + (double)view->ray_ys * py);
+    const double du = pixel.u - (view->ray_x0 + (double)view->ray_xs * px),
+                 dv = pixel.v - (view->ray_y0 + (double)view->ray_ys * py);
     struct ref_vec ray = view->perspective ? ref_vec(pixel.u, pixel.v, -1.0) : own, offset = {du, dv, 0.0};
     double depth, scale = view->perspective ? z : 1.0;
     struct ref_met out = {.covered = REF_NO, .square = {2.0, 2.0}};
     if (!(disc->radius > 0.0))
         return out;
     // a ray that passes the disc's ball meets no disc, however its plane lies
-    const struct ref_vec middle_of = ref_add(ref_scale(own, scale), view->perspective ? ref_vec(0, 0, 0) : ref_vec(-du, -dv, 1.0));
+    const struct ref_vec middle_of = ref_add(ref_scale(own, scale),
+                                             view->perspective ? ref_vec(0, 0, 0) : ref_vec(-du, -dv, 1.0));
     const double along = view->perspective ? ref_dot(middle_of, ray) / ref_dot(ray, ray) : 0.0;
     if (ref_length(ref_add(middle_of, ref_scale(ray, -along))) > 1.001 * disc->radius + 1e-5 * z)
         return out;
@@ -142,7 +143,8 @@ static struct ref_met meet(const struct view_args *view, const struct ref_disc *
     const double cosine = fmin(fabs(ref_dot(disc->n, own)) / ref_length(own), fabs(ref_dot(disc->n, ray)) / ref_length(ray));
     const double distance = ref_length(offset);
     // what float32 may move the middle and the ray by, carried along the plane; the ellipse's own cancellation
-    double error = half_width(disc->place.z) + scale * (view->ray_xs * half_width(disc->place.x) + view->ray_ys * half_width(disc->place.y)) +
+    double error = half_width(disc->place.z) +
+                   scale * (view->ray_xs * half_width(disc->place.x) + view->ray_ys * half_width(disc->place.y)) +
                    scale * (pixel.error_u + pixel.error_v) + 4.0 * TOL_UNIT * z;
     error = 2.0 * (error + distance * disc->normal_error) / cosine + distance * 32.0 * TOL_UNIT / (cosine * cosine) +
             4.0 * TOL_UNIT * disc->radius;

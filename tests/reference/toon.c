@@ -6,10 +6,7 @@
 
 #include <math.h>
 
-static double luminance(const float *c)
-{
-    return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
-}
+static double luminance(const float *c) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; }
 
 struct ref_color ref_toon(const struct toon_args *args, const struct ref_planes *planes, int x, int y)
 {
@@ -23,8 +20,7 @@ struct ref_color ref_toon(const struct toon_args *args, const struct ref_planes 
     if (!(own > dark))
         return out;
     // luminances 4 each, reciprocal 4, product; the root 5 of half of that; product and sum
-    double root = light / sqrt(fmax(light, dark)), at = root * args->bands + 0.5,
-           at_error = 16.0 * TOL_UNIT * (at + 1.0);
+    double root = light / sqrt(fmax(light, dark)), at = root * args->bands + 0.5, at_error = 16.0 * TOL_UNIT * (at + 1.0);
     double whole = floor(at), ramp = (at - whole - 0.5) * args->steepness + 0.5;
     double edge = fmin(fmax(ramp, 0.0), 1.0), level = fmax(whole - 0.5 + edge * edge * (3.0 - 2.0 * edge), 0.5);
     double level_error = 1.5 * args->steepness * at_error + 8.0 * TOL_UNIT * level;

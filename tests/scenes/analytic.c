@@ -11,10 +11,7 @@ struct analytic_shape analytic_shape(enum analytic_kind kind, double a, double b
     return shape;
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Distance to the torus; its gradient is the normal.
 static double torus_distance(const struct analytic_shape *shape, const double p[3], double normal[3])
@@ -102,8 +99,7 @@ struct analytic_hit *analytic_picture(const struct analytic_shape *shape, const 
 // ---- comparison --------------------------------------------------------------------------------------------------
 
 // How many of the 3 x 3 centres around lie in the truth; outside the picture counts as the pixel itself does.
-static uint32_t covered_around(const struct analytic_hit *truth, uint32_t width, uint32_t height, uint32_t x,
-                               uint32_t y)
+static uint32_t covered_around(const struct analytic_hit *truth, uint32_t width, uint32_t height, uint32_t x, uint32_t y)
 {
     uint32_t covered = 0;
     for (int dy = -1; dy <= 1; dy++)
@@ -176,11 +172,9 @@ struct analytic_error analytic_compare(const struct picture *picture, const stru
             depth[inner] = fabs((double)picture->depth[i] - truth[i].z) / spacing;
             angle[inner] = normal_angle(picture->normal + 3 * i, truth[i].normal);
             angle_sum += angle[inner];
-            double light = white > 0.0 ? fmax(dot(truth[i].normal, sun), 0.0) : 0.0,
-                   alpha = picture->combined[4 * i + 3];
-            color[inner] = white > 0.0
-                               ? fabs((double)picture->combined[4 * i] / (alpha > 0.0 ? alpha : 1.0) / white - light)
-                               : 0.0;
+            double light = white > 0.0 ? fmax(dot(truth[i].normal, sun), 0.0) : 0.0, alpha = picture->combined[4 * i + 3];
+            color[inner] = white > 0.0 ? fabs((double)picture->combined[4 * i] / (alpha > 0.0 ? alpha : 1.0) / white - light)
+                                       : 0.0;
             inner++;
         }
     double scale = area ? 1.0 / (double)area : 0.0;
@@ -261,8 +255,7 @@ struct silhouette polygon_compare(const struct polygon *polygon, const struct pi
     struct silhouette result = {.area = polygon_area(polygon)};
     for (uint32_t y = 0; y < picture->height; y++) {
         // A convex shape: the squares it touches are one run, those within it another.
-        struct span touched = band(polygon, y, y + 1.0), low = band(polygon, y, y),
-                    high = band(polygon, y + 1.0, y + 1.0);
+        struct span touched = band(polygon, y, y + 1.0), low = band(polygon, y, y), high = band(polygon, y + 1.0, y + 1.0);
         double left = fmax(low.low, high.low), right = fmin(low.high, high.high);
         for (uint32_t x = 0; x < picture->width; x++) {
             int shown = picture->keys[(size_t)y * picture->width + x] != KEY_EMPTY;

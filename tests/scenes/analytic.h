@@ -21,8 +21,7 @@ struct analytic_hit {
 
 struct analytic_shape analytic_shape(enum analytic_kind kind, double a, double b);
 // First hit of the ray origin + z direction, z > 0.
-struct analytic_hit analytic_cast(const struct analytic_shape *shape, const double origin[3],
-                                  const double direction[3]);
+struct analytic_hit analytic_cast(const struct analytic_shape *shape, const double origin[3], const double direction[3]);
 // One hit per pixel centre, row 0 at the bottom; the caller frees.
 struct analytic_hit *analytic_picture(const struct analytic_shape *shape, const patina_camera *camera, uint32_t width,
                                       uint32_t height);

@@ -28,10 +28,11 @@ if __name__ == "__main__":
     os.environ["PATINA_LIBRARY"] = sys.argv[1]
     sys.path[:0] = [sys.argv[2], str(Path(__file__).resolve().parents[1])]
 
-import native  # noqa: E402
 from builds_shapes import CLOUDS, meshes, texture  # noqa: E402
-from native import points  # noqa: E402
 from truth.camera import orbit, parallel  # noqa: E402
+
+import native  # noqa: E402
+from native import points  # noqa: E402
 
 Planes = dict[str, np.ndarray]
 STATS = ("width", "height", "points", "points_scattered", "triangles", "chunks", "chunks_culled", "layers", "spacing_px", "shadow_maps", "shadow_width",

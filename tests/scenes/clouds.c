@@ -30,10 +30,7 @@ double pcg_unit(struct pcg *random)
     return (double)(high << 26 | low) * 0x1p-53;
 }
 
-double pcg_between(struct pcg *random, double low, double high)
-{
-    return low + (high - low) * pcg_unit(random);
-}
+double pcg_between(struct pcg *random, double low, double high) { return low + (high - low) * pcg_unit(random); }
 
 static void *reserve(uint64_t count, size_t size)
 {
@@ -174,15 +171,9 @@ struct points points_grid(uint32_t columns_x, uint32_t rows_y, double pitch, uns
     return points;
 }
 
-double area_sphere(double radius)
-{
-    return 4.0 * M_PI * radius * radius;
-}
+double area_sphere(double radius) { return 4.0 * M_PI * radius * radius; }
 
-double area_torus(double ring, double tube)
-{
-    return 4.0 * M_PI * M_PI * ring * tube;
-}
+double area_torus(double ring, double tube) { return 4.0 * M_PI * M_PI * ring * tube; }
 
 void points_transform(struct points *points, const double matrix[9], const double move[3])
 {

@@ -31,7 +31,7 @@ void points_free(struct points *points);
 
 struct points points_sphere(uint64_t count, double radius, unsigned columns, uint64_t seed);
 struct points points_torus(uint64_t count, double ring, double tube, unsigned columns, uint64_t seed); // around z
-struct points points_disc(uint64_t count, double radius, unsigned columns, uint64_t seed); // z = 0, normal +z
+struct points points_disc(uint64_t count, double radius, unsigned columns, uint64_t seed);             // z = 0, normal +z
 struct points points_rectangle(uint64_t count, double width, double height, unsigned columns, uint64_t seed);
 struct points points_triangle(uint64_t count, const double corner[3][2], unsigned columns, uint64_t seed); // z = 0
 struct points points_box(uint64_t count, const double half[3], unsigned columns, uint64_t seed);

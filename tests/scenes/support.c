@@ -9,8 +9,7 @@
 #if defined(__aarch64__)
 static const char *const all_devices[] = {"cpu", "cpu-scalar", "cpu-neon", "gl-egl", "gl-osmesa"};
 #else
-static const char *const all_devices[] = {"cpu",        "cpu-scalar", "cpu-sse42", "cpu-avx2",
-                                          "cpu-avx512", "gl-egl",     "gl-osmesa"};
+static const char *const all_devices[] = {"cpu", "cpu-scalar", "cpu-sse42", "cpu-avx2", "cpu-avx512", "gl-egl", "gl-osmesa"};
 #endif
 enum { ALL_DEVICES = sizeof all_devices / sizeof all_devices[0], MAX_DEVICES = 16 };
 
@@ -66,18 +65,9 @@ void support_arguments(int argc, char **argv)
     }
 }
 
-uint32_t support_device_count(void)
-{
-    return chosen_count;
-}
-const char *support_device_name(uint32_t i)
-{
-    return chosen[i];
-}
-int support_is_gl(const char *name)
-{
-    return !strncmp(name, "gl", 2);
-}
+uint32_t support_device_count(void) { return chosen_count; }
+const char *support_device_name(uint32_t i) { return chosen[i]; }
+int support_is_gl(const char *name) { return !strncmp(name, "gl", 2); }
 
 patina_device *support_device_open(const char *name, uint32_t threads, uint32_t batch)
 {
@@ -116,8 +106,8 @@ static void cross(const double a[3], const double b[3], double out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static patina_camera look(const double eye[3], const double target[3], double half_height, uint32_t width,
-                          uint32_t height, double near_clip, double far_clip)
+static patina_camera look(const double eye[3], const double target[3], double half_height, uint32_t width, uint32_t height,
+                          double near_clip, double far_clip)
 {
     double back[3] = {eye[0] - target[0], eye[1] - target[1], eye[2] - target[2]}, right[3], up[3];
     normalise(back);
@@ -156,8 +146,8 @@ patina_camera camera_orthographic(const double eye[3], const double target[3], d
     return camera;
 }
 
-void camera_project(const patina_camera *camera, uint32_t width, uint32_t height, const double world[3], double *x,
-                    double *y, double *z)
+void camera_project(const patina_camera *camera, uint32_t width, uint32_t height, const double world[3], double *x, double *y,
+                    double *z)
 {
     const double *m = camera->world_from_camera;
     double d[3] = {world[0] - m[3], world[1] - m[7], world[2] - m[11]}, v[3];
@@ -197,10 +187,7 @@ float key_z(uint64_t key)
     return z;
 }
 
-uint32_t key_id(uint64_t key)
-{
-    return (uint32_t)key;
-}
+uint32_t key_id(uint64_t key) { return (uint32_t)key; }
 
 patina_settings settings_default(uint32_t width, uint32_t height)
 {
@@ -256,11 +243,12 @@ void picture_read_layers(struct picture *picture, const patina_frame *frame, con
     if (!picture->layer_combined || !picture->layer_depth || !picture->layer_normal)
         support_die("out of memory");
     for (uint32_t k = 0; k < picture->layers; k++) {
-        CHECK(patina_frame_read_layer(frame, k + 1, PATINA_PASS_COMBINED, picture->layer_combined + 4 * k * pixels,
-                                      pixels * 16), frame);
+        CHECK(
+            patina_frame_read_layer(frame, k + 1, PATINA_PASS_COMBINED, picture->layer_combined + 4 * k * pixels, pixels * 16),
+            frame);
         CHECK(patina_frame_read_layer(frame, k + 1, PATINA_PASS_DEPTH, picture->layer_depth + k * pixels, pixels * 4), frame);
-        CHECK(patina_frame_read_layer(frame, k + 1, PATINA_PASS_NORMAL, picture->layer_normal + 3 * k * pixels,
-                                      pixels * 12), frame);
+        CHECK(patina_frame_read_layer(frame, k + 1, PATINA_PASS_NORMAL, picture->layer_normal + 3 * k * pixels, pixels * 12),
+              frame);
     }
 }
 
@@ -313,15 +301,14 @@ static void assert_same_bytes(const void *part, const void *whole, size_t pixel_
         while (!memcmp(a + x * pixel_size, b + x * pixel_size, pixel_size))
             x++;
         size_t at = (size_t)y * crop->width + x, from = (size_t)(y + y0) * full->width + x0 + x;
-        support_die("%s: %s differs at (%u, %u) of %ux%u: source %g against %g, depth %.9g against %.9g, ids %u and %u",
-                    what, pass, x, y, crop->width, crop->height, (double)crop->source[at], (double)full->source[from],
+        support_die("%s: %s differs at (%u, %u) of %ux%u: source %g against %g, depth %.9g against %.9g, ids %u and %u", what,
+                    pass, x, y, crop->width, crop->height, (double)crop->source[at], (double)full->source[from],
                     (double)crop->depth[at], (double)full->depth[from], crop->keys ? key_id(crop->keys[at]) : 0,
                     full->keys ? key_id(full->keys[from]) : 0);
     }
 }
 
-void picture_assert_identical(const struct picture *part, const struct picture *whole, uint32_t x, uint32_t y,
-                              const char *what)
+void picture_assert_identical(const struct picture *part, const struct picture *whole, uint32_t x, uint32_t y, const char *what)
 {
     assert_true(x + part->width <= whole->width && y + part->height <= whole->height);
     if (part->keys && whole->keys)

@@ -48,8 +48,8 @@ patina_camera camera_perspective(const double eye[3], const double target[3], do
 patina_camera camera_orthographic(const double eye[3], const double target[3], double window_height, uint32_t width,
                                   uint32_t height, double near_clip, double far_clip);
 // World point -> pixel coordinates (float) and z as the passes have it, in float64.
-void camera_project(const patina_camera *camera, uint32_t width, uint32_t height, const double world[3], double *x,
-                    double *y, double *z);
+void camera_project(const patina_camera *camera, uint32_t width, uint32_t height, const double world[3], double *x, double *y,
+                    double *z);
 // Ray through a point of the picture: origin + z * direction is at pass depth z.
 void camera_ray(const patina_camera *camera, uint32_t width, uint32_t height, double x, double y, double origin[3],
                 double direction[3]);

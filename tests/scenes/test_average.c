@@ -101,8 +101,8 @@ static void test_truer_and_steadier(void **state)
             flicker[average] = 255.0 * root_mean_square(off[1], off[0], count);
         }
         picture_free(&plain);
-        print_message("  %4.1f points a pixel: off by %.2f, flickers by %.2f levels; averages %.2f, %.2f\n", cases[i].density, error[0],
-                      flicker[0], error[1], flicker[1]);
+        print_message("  %4.1f points a pixel: off by %.2f, flickers by %.2f levels; averages %.2f, %.2f\n", cases[i].density,
+                      error[0], flicker[0], error[1], flicker[1]);
         assert_true(error[1] < cases[i].error * error[0]);
         assert_true(flicker[1] < cases[i].flicker * flicker[0]);
         assert_true(flicker[1] < 0.5 || cases[i].density < 2.0);

@@ -22,18 +22,18 @@ struct stage {
 
 static struct stage set_stage(void)
 {
-    static const double eye[3] = { 0.5, -4.0, 1.5 }, target[3] = { 0.0, 0.0, 0.0 };
-    struct stage stage = { .points = points_torus(COUNT, 1.0, 0.45, POINTS_ALL, 5),
-                           .classes = malloc(COUNT),
-                           .scalars = malloc(COUNT * sizeof(float)) };
+    static const double eye[3] = {0.5, -4.0, 1.5}, target[3] = {0.0, 0.0, 0.0};
+    struct stage stage = {.points = points_torus(COUNT, 1.0, 0.45, POINTS_ALL, 5),
+                          .classes = malloc(COUNT),
+                          .scalars = malloc(COUNT * sizeof(float))};
     for (int i = 0; i < COUNT; i++) {
         const float *p = stage.points.position + 3 * i;
         stage.classes[i] = p[0] > 0.3f ? 5 : i % 3 ? 2 : 200; // a side of its own, and two mixed
         stage.scalars[i] = p[2];
     }
     patina_cloud_desc desc = points_desc(&stage.points);
-    desc.classes = (patina_array){ stage.classes, PATINA_UINT8, 1, 0 };
-    desc.scalar = (patina_array){ stage.scalars, PATINA_FLOAT32, 1, 0 };
+    desc.classes = (patina_array){stage.classes, PATINA_UINT8, 1, 0};
+    desc.scalar = (patina_array){stage.scalars, PATINA_FLOAT32, 1, 0};
     CHECK(patina_cloud_create(&desc, NULL, &stage.cloud), NULL);
     stage.camera = camera_perspective(eye, target, 40.0, WIDTH, HEIGHT, 0.1, 100.0);
     stage.settings = settings_default(WIDTH, HEIGHT);
@@ -54,10 +54,10 @@ static patina_clip clip_at(uint32_t shape, uint32_t cut, double mx, double my, d
                            double turn)
 {
     const double c = cos(turn), s = sin(turn);
-    return (patina_clip){ .struct_size = sizeof(patina_clip),
-                          .world_from_clip = { hx * c, -hy * s, 0, mx, hx * s, hy * c, 0, my, 0, 0, hz, mz, 0, 0, 0, 1 },
-                          .shape = shape,
-                          .cut = cut };
+    return (patina_clip){.struct_size = sizeof(patina_clip),
+                         .world_from_clip = {hx * c, -hy * s, 0, mx, hx * s, hy * c, 0, my, 0, 0, hz, mz, 0, 0, 0, 1},
+                         .shape = shape,
+                         .cut = cut};
 }
 
 // -1: too close to the cut to tell.
@@ -66,7 +66,7 @@ static int is_left(const patina_clip *clips, uint32_t count, const float p[3])
     int keeping = 0, kept = 0, near = 0;
     for (uint32_t i = 0; i < count; i++) {
         const double *m = clips[i].world_from_clip;
-        double d[3] = { p[0] - m[3], p[1] - m[7], p[2] - m[11] }, out = -INFINITY;
+        double d[3] = {p[0] - m[3], p[1] - m[7], p[2] - m[11]}, out = -INFINITY;
         for (int k = 0; k < 3; k++) { // columns are at right angles
             double square = m[k] * m[k] + m[4 + k] * m[4 + k] + m[8 + k] * m[8 + k];
             double q = (d[0] * m[k] + d[1] * m[4 + k] + d[2] * m[8 + k]) / square;
@@ -86,7 +86,8 @@ static int is_left(const patina_clip *clips, uint32_t count, const float p[3])
     return near ? -1 : kept || !keeping;
 }
 
-static patina_scene *scene_with(const struct stage *stage, const patina_clip *clips, uint32_t count, const patina_cloud_style *style)
+static patina_scene *scene_with(const struct stage *stage, const patina_clip *clips, uint32_t count,
+                                const patina_cloud_style *style)
 {
     patina_scene *scene = scene_of(stage->cloud, style);
     for (uint32_t i = 0; i < count; i++)
@@ -135,13 +136,15 @@ static uint64_t check_clips(const struct stage *stage, const patina_clip *clips,
 static void test_shapes(void **state)
 {
     struct stage stage = set_stage();
-    const patina_clip box = clip_at(0, 0, 0.6, 0, 0, 0.7, 0.8, 0.3, 0.4), other = clip_at(0, 0, -0.9, -0.5, 0, 0.4, 0.5, 1, -0.3);
+    const patina_clip box = clip_at(0, 0, 0.6, 0, 0, 0.7, 0.8, 0.3, 0.4),
+                      other = clip_at(0, 0, -0.9, -0.5, 0, 0.4, 0.5, 1, -0.3);
     const patina_clip hole = clip_at(0, 1, 0.5, -0.9, 0.2, 0.3, 0.4, 0.5, 0.9), plane = clip_at(1, 0, 0, 0, 0.1, 2, 3, 1, 0);
     const patina_clip above = clip_at(1, 1, 0, 0, 0.1, 2, 3, 1, 0), mirrored = clip_at(0, 0, 0.6, 0, 0, -0.7, 0.8, -0.3, 0.4);
-    const patina_clip sets[][MOST_CLIPS] = { { box },      { hole },         { plane },    { above },
-                                             { box, other }, { mirrored }, { box, hole }, { box, other, hole, plane } };
-    static const uint32_t counts[] = { 1, 1, 1, 1, 2, 1, 2, 4 };
-    static const char *const names[] = { "box", "hole", "plane", "turned plane", "two boxes", "mirrored box", "box and hole", "all" };
+    const patina_clip sets[][MOST_CLIPS] = {{box},        {hole},     {plane},     {above},
+                                            {box, other}, {mirrored}, {box, hole}, {box, other, hole, plane}};
+    static const uint32_t counts[] = {1, 1, 1, 1, 2, 1, 2, 4};
+    static const char *const names[] = {"box",       "hole",         "plane",        "turned plane",
+                                        "two boxes", "mirrored box", "box and hole", "all"};
     (void)state;
     uint64_t pixels[8];
     for (int i = 0; i < 8; i++)
@@ -215,7 +218,7 @@ static void test_chunks(void **state)
 {
     struct stage stage = set_stage();
     const patina_clip box = clip_at(0, 0, 0.6, 0, 0, 0.7, 0.8, 0.3, 0.4);
-    const patina_cloud_style spared = { .struct_size = sizeof spared, .clip_off = 1 };
+    const patina_cloud_style spared = {.struct_size = sizeof spared, .clip_off = 1};
     (void)state;
     patina_device *device = support_device_first();
     patina_scene *whole = scene_with(&stage, NULL, 0, NULL), *cut = scene_with(&stage, &box, 1, NULL);
@@ -224,7 +227,7 @@ static void test_chunks(void **state)
     struct picture b = picture_render(device, out, &stage.camera, &stage.settings);
     picture_assert_identical(&b, &a, 0, 0, "a cloud that clips leave alone");
     patina_frame *frame;
-    patina_frame_stats stats = { .struct_size = sizeof stats };
+    patina_frame_stats stats = {.struct_size = sizeof stats};
     char text[8192];
     CHECK(patina_scene_set_camera(cut, &stage.camera), cut);
     CHECK(patina_scene_set_settings(cut, &stage.settings), cut);
@@ -258,7 +261,7 @@ static void test_chunks(void **state)
 static void test_classes(void **state)
 {
     struct stage stage = set_stage();
-    patina_cloud_style style = { .struct_size = sizeof style };
+    patina_cloud_style style = {.struct_size = sizeof style};
     (void)state;
     style.hidden_classes[0] = 1u << 2;
     style.hidden_classes[200 / 32] = 1u << 200 % 32;
@@ -282,7 +285,7 @@ static void test_classes(void **state)
         patina_scene_destroy(whole);
         patina_device_destroy(device);
     }
-    patina_cloud_info info = { .struct_size = sizeof info };
+    patina_cloud_info info = {.struct_size = sizeof info};
     CHECK(patina_cloud_get_info(stage.cloud, &info), stage.cloud);
     assert_int_equal(info.class_bits[0], 1u << 2 | 1u << 5);
     assert_int_equal(info.class_bits[6], 1u << 200 % 32);
@@ -307,17 +310,17 @@ static double shade_of_wall(patina_device *device, const patina_clip *clip, uint
         classes[i] = i < FLOOR ? 2 : 6;
     }
     patina_cloud_desc desc = points_desc(&points);
-    desc.classes = (patina_array){ classes, PATINA_UINT8, 1, 0 };
+    desc.classes = (patina_array){classes, PATINA_UINT8, 1, 0};
     patina_cloud *cloud;
     CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
-    patina_cloud_style style = { .struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT };
+    patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT};
     style.hidden_classes[0] = hide ? 1u << 6 : 0;
     patina_scene *scene = scene_of(cloud, &style);
-    patina_light_desc sun = { .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 1.0f, .shadows = 1 };
+    patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 1.0f, .shadows = 1};
     CHECK(patina_scene_add_light(scene, &sun), scene);
     if (clip)
         CHECK(patina_scene_add_clip(scene, clip), scene);
-    static const double eye[3] = { 0.0, -5.0, 0.5 }, target[3] = { 0.0, 0.0, 0.0 }; // under the wall
+    static const double eye[3] = {0.0, -5.0, 0.5}, target[3] = {0.0, 0.0, 0.0}; // under the wall
     patina_camera camera = camera_perspective(eye, target, 10.0, SIDE, SIDE, 0.1, 20.0);
     patina_settings settings = settings_default(SIDE, SIDE);
     settings.shadow_uncut = uncut;
@@ -398,7 +401,7 @@ static void test_tint(void **state)
 static void test_ramps(void **state)
 {
     struct stage stage = set_stage();
-    static const uint32_t sources[] = { PATINA_COLOR_SCALAR, PATINA_COLOR_HEIGHT, PATINA_COLOR_OBJECT_HEIGHT };
+    static const uint32_t sources[] = {PATINA_COLOR_SCALAR, PATINA_COLOR_HEIGHT, PATINA_COLOR_OBJECT_HEIGHT};
     stage.settings.smooth = PATINA_SMOOTH_OFF;
     stage.settings.antialias = PATINA_ANTIALIAS_OFF;
     (void)state;
@@ -408,7 +411,7 @@ static void test_ramps(void **state)
     CHECK(patina_cloud_scalar_range(stage.cloud, 0.25, range), stage.cloud);
     assert_true(range[0] > -0.4f && range[0] < -0.2f && range[1] < 0.4f && range[1] > 0.2f);
     for (int i = 0; i < 3; i++) {
-        patina_cloud_style style = { .struct_size = sizeof style, .color_source = sources[i], .lighting = PATINA_LIGHTING_UNLIT };
+        patina_cloud_style style = {.struct_size = sizeof style, .color_source = sources[i], .lighting = PATINA_LIGHTING_UNLIT};
         style.world_from_object[0] = style.world_from_object[5] = style.world_from_object[15] = 1.0;
         style.world_from_object[10] = i ? 2.0 : 1.0;
         style.world_from_object[11] = i ? 0.5 : 0.0;
@@ -430,12 +433,12 @@ static void test_ramps(void **state)
         patina_scene_destroy(scene);
         patina_device_destroy(device);
     }
-    patina_cloud_style wrong = { .struct_size = sizeof wrong, .color_source = 9 };
+    patina_cloud_style wrong = {.struct_size = sizeof wrong, .color_source = 9};
     patina_scene *scene;
     CHECK(patina_scene_create(&scene), NULL);
     assert_int_equal(patina_scene_add_cloud(scene, stage.cloud, &wrong), PATINA_ERROR_ARGUMENT);
-    wrong = (patina_cloud_style){ .struct_size = sizeof wrong, .color_source = PATINA_COLOR_SCALAR };
-    CHECK(patina_cloud_set_scalars(stage.cloud, &(patina_array){ 0 }), stage.cloud);
+    wrong = (patina_cloud_style){.struct_size = sizeof wrong, .color_source = PATINA_COLOR_SCALAR};
+    CHECK(patina_cloud_set_scalars(stage.cloud, &(patina_array){0}), stage.cloud);
     assert_int_equal(patina_scene_add_cloud(scene, stage.cloud, &wrong), PATINA_ERROR_ARGUMENT);
     assert_non_null(strstr(support_message(scene), "scalars"));
     assert_int_equal(patina_cloud_scalar_range(stage.cloud, 0.0, range), PATINA_ERROR_EMPTY);
@@ -446,26 +449,26 @@ static void test_ramps(void **state)
 // Scalars of every type; a saved cloud has scalars and classes as before; ramps by name.
 static void test_values(void **state)
 {
-    static const float positions[4][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 }, { NAN, 0, 0 } };
-    static const float f32[4] = { -1.5f, 7.0f, NAN, INFINITY };
-    static const double f64[4] = { -1.5, 7.0, 2.0, 3.0 };
-    static const uint8_t u8[4] = { 1, 255, 3, 200 };
-    static const uint16_t u16[4] = { 1, 65535, 3, 4 };
-    static const uint32_t u32[4] = { 1, 4000000000u, 3, 4 };
-    static const int8_t i8[4] = { -128, 127, 0, 1 };
-    static const int16_t i16[4] = { -32768, 32767, 0, 1 };
-    static const int32_t i32[4] = { -2000000000, 2000000000, 0, 1 };
+    static const float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {NAN, 0, 0}};
+    static const float f32[4] = {-1.5f, 7.0f, NAN, INFINITY};
+    static const double f64[4] = {-1.5, 7.0, 2.0, 3.0};
+    static const uint8_t u8[4] = {1, 255, 3, 200};
+    static const uint16_t u16[4] = {1, 65535, 3, 4};
+    static const uint32_t u32[4] = {1, 4000000000u, 3, 4};
+    static const int8_t i8[4] = {-128, 127, 0, 1};
+    static const int16_t i16[4] = {-32768, 32767, 0, 1};
+    static const int32_t i32[4] = {-2000000000, 2000000000, 0, 1};
     static const struct {
         patina_array array;
         float least, most;
-    } known[] = { { { f32, PATINA_FLOAT32, 1, 0 }, -1.5f, 7.0f },  { { f64, PATINA_FLOAT64, 1, 0 }, -1.5f, 7.0f },
-                  { { u8, PATINA_UINT8, 1, 0 }, 1.0f, 255.0f },    { { u16, PATINA_UINT16, 1, 0 }, 1.0f, 65535.0f },
-                  { { u32, PATINA_UINT32, 1, 0 }, 1.0f, 4e9f },    { { i8, PATINA_INT8, 1, 0 }, -128.0f, 127.0f },
-                  { { i16, PATINA_INT16, 1, 0 }, -32768.0f, 32767.0f }, { { i32, PATINA_INT32, 1, 0 }, -2e9f, 2e9f } };
-    patina_cloud_desc desc = { .struct_size = sizeof desc, .count = 4, .position = { positions, PATINA_FLOAT32, 3, 0 } };
-    desc.classes = (patina_array){ u8, PATINA_UINT8, 1, 0 };
+    } known[] = {{{f32, PATINA_FLOAT32, 1, 0}, -1.5f, 7.0f},       {{f64, PATINA_FLOAT64, 1, 0}, -1.5f, 7.0f},
+                 {{u8, PATINA_UINT8, 1, 0}, 1.0f, 255.0f},         {{u16, PATINA_UINT16, 1, 0}, 1.0f, 65535.0f},
+                 {{u32, PATINA_UINT32, 1, 0}, 1.0f, 4e9f},         {{i8, PATINA_INT8, 1, 0}, -128.0f, 127.0f},
+                 {{i16, PATINA_INT16, 1, 0}, -32768.0f, 32767.0f}, {{i32, PATINA_INT32, 1, 0}, -2e9f, 2e9f}};
+    patina_cloud_desc desc = {.struct_size = sizeof desc, .count = 4, .position = {positions, PATINA_FLOAT32, 3, 0}};
+    desc.classes = (patina_array){u8, PATINA_UINT8, 1, 0};
     patina_cloud *cloud;
-    patina_cloud_info info = { .struct_size = sizeof info };
+    patina_cloud_info info = {.struct_size = sizeof info};
     char path[] = "/tmp/patina-test-XXXXXX";
     (void)state;
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
@@ -489,7 +492,7 @@ static void test_values(void **state)
     CHECK(patina_cloud_save(stage.cloud, path), stage.cloud);
     CHECK(patina_cloud_open(path, &opened), NULL);
     unlink(path);
-    patina_cloud_style style = { .struct_size = sizeof style, .color_source = PATINA_COLOR_SCALAR, .hidden_classes = { 1u << 2 } };
+    patina_cloud_style style = {.struct_size = sizeof style, .color_source = PATINA_COLOR_SCALAR, .hidden_classes = {1u << 2}};
     patina_device *device = support_device_first();
     patina_scene *a = scene_of(stage.cloud, &style), *b = scene_of(opened, &style);
     struct picture first = picture_render(device, a, &stage.camera, &stage.settings);
@@ -502,7 +505,7 @@ static void test_values(void **state)
     patina_cloud_destroy(opened);
     patina_device_destroy(device);
     clear_stage(&stage);
-    static const char *const names[] = { "grey", "viridis", "heat", "spectrum", "relief", "diverging", "classes" };
+    static const char *const names[] = {"grey", "viridis", "heat", "spectrum", "relief", "diverging", "classes"};
     static float ramp[PATINA_MAX_RAMP][3];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         CHECK(patina_ramp(names[i], ramp), NULL);
@@ -515,11 +518,10 @@ static void test_values(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest tests[] = { cmocka_unit_test(test_shapes),   cmocka_unit_test(test_hard_shapes),
-                                        cmocka_unit_test(test_refusals), cmocka_unit_test(test_chunks),
-                                        cmocka_unit_test(test_classes),  cmocka_unit_test(test_shadows),
-                                        cmocka_unit_test(test_tint),     cmocka_unit_test(test_ramps),
-                                        cmocka_unit_test(test_values) };
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_shapes), cmocka_unit_test(test_hard_shapes), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_chunks), cmocka_unit_test(test_classes),     cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_tint),   cmocka_unit_test(test_ramps),       cmocka_unit_test(test_values)};
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

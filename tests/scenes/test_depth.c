@@ -35,7 +35,8 @@ static double depth_error(const struct picture *picture, double spacing, double 
             const double u = 3.0 * (x + 0.5) / SIZE - 1.5, v = 3.0 * (y + 0.5) / SIZE - 1.5, square = u * u + v * v;
             if (square > 0.7)
                 continue;
-            const double off = ((double)picture->depth[y * SIZE + x] - (4.9 - sqrt(1.0 - square))) / spacing; // z is from the near plane on
+            const double off = ((double)picture->depth[y * SIZE + x] - (4.9 - sqrt(1.0 - square))) /
+                               spacing; // z is from the near plane on
             sum += off;
             squares += off * off;
             count += 1.0;
@@ -62,8 +63,8 @@ static void test_bias(void **state)
             picture_free(&picture);
             stage_free(&stage);
         }
-        print_message("  %4.1f points a pixel: points %+.3f, rms %.3f; surfaces %+.4f, rms %.3f spacings\n", densities[i], bias[0],
-                      rms[0], bias[1], rms[1]);
+        print_message("  %4.1f points a pixel: points %+.3f, rms %.3f; surfaces %+.4f, rms %.3f spacings\n", densities[i],
+                      bias[0], rms[0], bias[1], rms[1]);
         assert_true(fabs(bias[1]) <= 0.03);
         assert_true(rms[1] < 0.2 * rms[0]);
     }
@@ -110,8 +111,9 @@ static void test_discs(void **state)
         double bias[2], rms[2];
         for (uint32_t depth = 0; depth < 2; depth++)
             rms[depth] = noisy_discs(device, densities[i / 3], noises[i % 3], depth, &bias[depth]);
-        print_message("  discs, %4.1f points a pixel, noise of %.1f spacings: nearest %+.3f, rms %.3f; mean %+.4f, rms %.3f spacings\n",
-                      densities[i / 3], noises[i % 3], bias[0], rms[0], bias[1], rms[1]);
+        print_message(
+            "  discs, %4.1f points a pixel, noise of %.1f spacings: nearest %+.3f, rms %.3f; mean %+.4f, rms %.3f spacings\n",
+            densities[i / 3], noises[i % 3], bias[0], rms[0], bias[1], rms[1]);
         assert_true(fabs(bias[1]) <= (noises[i % 3] > 0.0 ? 0.08 : 0.03));
         assert_true(rms[1] < 0.7);
     }
@@ -180,7 +182,8 @@ static void test_within_the_cloud(void **state)
     patina_device *device = support_device_first();
     for (int kind = 0; kind < 16; kind++) {
         const uint64_t count = counts[kind / 4];
-        struct points points = kind & 1 ? points_torus(count, 1.0, 0.4, POINTS_NORMALS, 3) : points_sphere(count, 1.0, POINTS_NORMALS, 3);
+        struct points points = kind & 1 ? points_torus(count, 1.0, 0.4, POINTS_NORMALS, 3)
+                                        : points_sphere(count, 1.0, POINTS_NORMALS, 3);
         patina_cloud_style style = {.struct_size = sizeof style};
         patina_cloud_info info = {.struct_size = sizeof info};
         struct stage stage = {.cloud = points_upload(&points), .settings = settings_default(SIZE, SIZE)};
@@ -204,7 +207,7 @@ static void test_within_the_cloud(void **state)
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bias), cmocka_unit_test(test_discs), cmocka_unit_test(test_parity_and_regions),
-                                       cmocka_unit_test(test_within_the_cloud)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bias), cmocka_unit_test(test_discs),
+                                       cmocka_unit_test(test_parity_and_regions), cmocka_unit_test(test_within_the_cloud)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -15,7 +15,8 @@ static struct picture render(patina_device *device, const struct points *points,
 {
     const double target[3] = {0};
     const patina_camera camera = camera_orthographic(eye, target, 2.0 * half, SIZE, SIZE, 0.1, 20.0);
-    const patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .transparency = 0.5f, .radius = radius};
+    const patina_cloud_style style = {
+        .struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .transparency = 0.5f, .radius = radius};
     patina_settings settings = settings_default(SIZE, SIZE);
     settings.surface = PATINA_SURFACE_SPLATS;
     settings.film_transparent = 1;
@@ -55,8 +56,8 @@ static void test_tilted(void **state)
             continue;
         for (double degrees = 0.0; degrees <= 75.0; degrees += 15.0) {
             const double own = blended_twice(device, degrees, 0.0f), wide = blended_twice(device, degrees, 0.08f);
-            printf("  %s: %2.0f degrees: %.2f %% of pixels blend twice, %.2f %% with a radius\n", support_device_name(i), degrees,
-                   100.0 * own, 100.0 * wide);
+            printf("  %s: %2.0f degrees: %.2f %% of pixels blend twice, %.2f %% with a radius\n", support_device_name(i),
+                   degrees, 100.0 * own, 100.0 * wide);
             assert_true(own <= 0.01);
             assert_true(wide <= 0.01);
         }
@@ -71,7 +72,8 @@ static double right(patina_device *device, double density, unsigned columns)
     const double pixel = 2.0 * half / SIZE, eye[3] = {0.0, -4.0, 0.0};
     struct points sphere[2];
     for (int k = 0; k < 2; k++)
-        sphere[k] = points_sphere((uint64_t)(density * area_sphere(radius[k]) / (pixel * pixel)), radius[k], columns, 3 + (uint64_t)k);
+        sphere[k] = points_sphere((uint64_t)(density * area_sphere(radius[k]) / (pixel * pixel)), radius[k], columns,
+                                  3 + (uint64_t)k);
     struct points both = points_create(sphere[0].count + sphere[1].count, columns);
     for (int k = 0; k < 2; k++) {
         const uint64_t first = k ? sphere[0].count : 0;

@@ -17,17 +17,11 @@ static const struct {
     {"eye-dome lighting", {.edl_strength = 1.0f}, 0.0f},
     {"eye-dome lighting, wide", {.edl_strength = 0.7f, .edl_radius = 16.0f}, 0.0f},
     {"obscurance", {.obscurance_strength = 1.0f}, 0.0f},
-    {"obscurance and eye-dome lighting",
-     {.obscurance_strength = 2.0f, .obscurance_radius = 0.5f, .edl_strength = 0.5f},
-     0.0f},
-    {"toon",
-     {.toon_bands = 3, .toon_softness = 0.4f, .edl_strength = 1.0f},
-     0.01f},                                                        // an edge is 1/0.4 as steep as the light
-    {"hatching", {.hatch_levels = 3, .hatch_ground = 0.5f}, 0.05f}, // strokes' edges are a pixel wide
-    {"contour lines", {.contour_opacity = 1.0f, .contour_interval = 0.1f}, 0.05f}, // as strokes
-    {"fog",
-     {.fog_start = 2.0f, .fog_end = 4.0f, .fog_density = 0.9f, .fog_fixed = 1, .fog_color = {0.2f, 0.5f, 1.0f}},
-     0.0f},
+    {"obscurance and eye-dome lighting", {.obscurance_strength = 2.0f, .obscurance_radius = 0.5f, .edl_strength = 0.5f}, 0.0f},
+    {"toon", {.toon_bands = 3, .toon_softness = 0.4f, .edl_strength = 1.0f}, 0.01f}, // an edge is 1/0.4 as steep as the light
+    {"hatching", {.hatch_levels = 3, .hatch_ground = 0.5f}, 0.05f},                  // strokes' edges are a pixel wide
+    {"contour lines", {.contour_opacity = 1.0f, .contour_interval = 0.1f}, 0.05f},   // as strokes
+    {"fog", {.fog_start = 2.0f, .fog_end = 4.0f, .fog_density = 0.9f, .fog_fixed = 1, .fog_color = {0.2f, 0.5f, 1.0f}}, 0.0f},
     {"depth of field", {.focus_aperture = 1.2f, .focus_distance = 2.2f}, 1e-3f}, // circles' rims are a pixel wide
     {"depth of field, wide", {.focus_aperture = 3.0f, .focus_distance = 2.4f}, 1e-3f},
     {"paper", {.paper_color = {0.9f, 0.8f, 0.6f}, .paper_grain = 0.5f}, 0.0f},
@@ -53,10 +47,7 @@ static const uint32_t chosen[] = {2, 5, 8, 10, 11, 18, 19, 20, 21};
 enum { CHOSEN = sizeof chosen / sizeof chosen[0], ONE_LAYERED = 5 };
 
 // Every show in the two smallest scenes, then a third of them, and all at once everywhere.
-static int pairs(uint32_t stage, uint32_t show)
-{
-    return stage < 2 || show == SHOWS - 1 || (stage + show) % 3 == 0;
-}
+static int pairs(uint32_t stage, uint32_t show) { return stage < 2 || show == SHOWS - 1 || (stage + show) % 3 == 0; }
 
 static struct stage build(uint32_t stage, uint32_t show)
 {
@@ -229,8 +220,8 @@ static void test_devices(void **state)
             double limit = shows[show].noise > 0.0f ? (double)shows[show].noise : TOL_COLOR * brightest(&truth);
             double off = worst(picture.combined, truth.combined, 4 * pixels);
             if (!(off <= limit) || memcmp(picture.keys, truth.keys, 8 * pixels) != 0)
-                support_die("%s, %s, %s: colours %.3g off, at most %.3g allowed", name,
-                            stagings[chosen[s / SHOWS]].name, shows[show].name, off, limit);
+                support_die("%s, %s, %s: colours %.3g off, at most %.3g allowed", name, stagings[chosen[s / SHOWS]].name,
+                            shows[show].name, off, limit);
             picture_free(&picture);
         }
         picture_free(&truth);
@@ -255,8 +246,7 @@ static void test_nothing_else_changes(void **state)
         picture_assert_identical(&without, &never, 0, 0, "effects taken away");
         uint64_t pixels = (uint64_t)with.width * with.height;
         assert_memory_equal(with.keys, without.keys, 8 * pixels);
-        assert_true(worst(with.depth, without.depth, pixels) == 0.0 &&
-                    worst(with.normal, without.normal, 3 * pixels) == 0.0);
+        assert_true(worst(with.depth, without.depth, pixels) == 0.0 && worst(with.normal, without.normal, 3 * pixels) == 0.0);
         assert_true(worst(with.source, without.source, pixels) == 0.0);
         if (!(worst(with.combined, without.combined, 4 * pixels) > 0.01))
             support_die("%s, %s: nothing to be seen", stagings[chosen[s / SHOWS]].name, shows[s % SHOWS].name);
@@ -314,9 +304,9 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_regions),  cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_devices),  cmocka_unit_test(test_nothing_else_changes),
-        cmocka_unit_test(test_refusals), cmocka_unit_test(test_one_by_one),
+        cmocka_unit_test(test_regions),          cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_devices),          cmocka_unit_test(test_nothing_else_changes),
+        cmocka_unit_test(test_refusals),         cmocka_unit_test(test_one_by_one),
         cmocka_unit_test(test_passes_asked_for),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

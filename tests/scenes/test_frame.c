@@ -84,10 +84,7 @@ static void test_view_after_view(void **state)
 
 static const char *json_value(const char *at);
 
-static const char *json_space(const char *at)
-{
-    return at + strspn(at, " \t\r\n");
-}
+static const char *json_space(const char *at) { return at + strspn(at, " \t\r\n"); }
 
 static const char *json_string(const char *at)
 {
@@ -305,7 +302,7 @@ static void test_statistics(void **state)
         }
         assert_true(sum <= stats.ms * 1.01 + 0.1);
         assert_true(json_member(full, "skipped", "normals") != NULL); // the cloud has normals
-        assert_true(json_member(full, "skipped", "peel") != NULL); // everything is opaque
+        assert_true(json_member(full, "skipped", "peel") != NULL);    // everything is opaque
         assert_true(strstr(full, "\"layers\":[{\"points\":1800,\"pixels\":0}]") != NULL && stats.layers == 1);
         free(full);
 
@@ -448,9 +445,8 @@ static void test_cancel_keeps_the_picture(void **state)
         uint64_t *keys = malloc((size_t)before.width * before.height * sizeof *keys);
         assert_non_null(keys);
         int code = patina_frame_read_keys(frame, keys, (size_t)before.width * before.height * sizeof *keys);
-        assert_true(
-            code == PATINA_ERROR_EMPTY ||
-            (code == PATINA_OK && !memcmp(keys, before.keys, (size_t)before.width * before.height * sizeof *keys)));
+        assert_true(code == PATINA_ERROR_EMPTY ||
+                    (code == PATINA_OK && !memcmp(keys, before.keys, (size_t)before.width * before.height * sizeof *keys)));
         free(keys);
 
         CHECK(patina_frame_render(frame, stage.scene), frame); // the cancel is spent

@@ -18,8 +18,8 @@ struct row {
 };
 
 static const struct row rows[] = {
-    {0.1, 1.4, 0.15},  {0.2, 0.6, 0.15},  {0.3, 0.5, 0.15}, {0.4, 0.1, 0.15}, {0.5, 0.1, 0.15}, {0.75, 0.05, 0.05}, {1.0, 0.02, 0.01},
-    {2.0, 0.01, 0.01}, {4.0, 0.01, 0.01}, {8.0, 0.0, 0.01}, {16.0, 0.0, 0.01}, {30.0, 0.0, 0.01},
+    {0.1, 1.4, 0.15},  {0.2, 0.6, 0.15},  {0.3, 0.5, 0.15},  {0.4, 0.1, 0.15}, {0.5, 0.1, 0.15},  {0.75, 0.05, 0.05},
+    {1.0, 0.02, 0.01}, {2.0, 0.01, 0.01}, {4.0, 0.01, 0.01}, {8.0, 0.0, 0.01}, {16.0, 0.0, 0.01}, {30.0, 0.0, 0.01},
 };
 
 struct share {
@@ -137,8 +137,8 @@ static void test_stray(void **state)
     for (int analysed = 0; analysed < 2; analysed++)
         for (uint32_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
             const double without = covered(device, counts[i], 0, analysed), with = covered(device, counts[i], 1, analysed);
-            print_message("  %s%4u points: %.1f %% covered, %.1f %% with a stray\n", analysed ? "analysed, " : "", (unsigned)counts[i],
-                          100.0 * without, 100.0 * with);
+            print_message("  %s%4u points: %.1f %% covered, %.1f %% with a stray\n", analysed ? "analysed, " : "",
+                          (unsigned)counts[i], 100.0 * without, 100.0 * with);
             assert_true(without > 0.4 && fabs(with / without - 1.0) < 0.05);
         }
     patina_device_destroy(device);
@@ -189,6 +189,7 @@ static void test_strays_beside(void **state)
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_density), cmocka_unit_test(test_stray), cmocka_unit_test(test_strays_beside)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_density), cmocka_unit_test(test_stray),
+                                       cmocka_unit_test(test_strays_beside)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

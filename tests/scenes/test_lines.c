@@ -138,10 +138,10 @@ static float *render_lines(patina_device *device, patina_scene *scene, const pat
 // ---- the contour ---------------------------------------------------------------------------------------------------------
 
 struct found {
-    double width;    // as if the line's whole area lay along the true line
-    uint32_t away;   // pixels with a line, of which no part lies within the width and two pixels of a contour: filling may carry
-                     // a surface a pixel or two too far in corners
-    uint32_t inside; // of them, those that show the shape
+    double width;  // as if the line's whole area lay along the true line
+    uint32_t away; // pixels with a line, of which no part lies within the width and two pixels of a contour: filling may carry
+                   // a surface a pixel or two too far in corners
+    uint32_t inside;         // of them, those that show the shape
     uint32_t whole, missing; // pixels wholly in the true line of which a line covers less than 45 %
 };
 
@@ -194,7 +194,8 @@ static void test_contours(void **state)
                 struct found found = compare((enum shape)shape, line, depth, z, (double)widths[w]);
                 printf("  %g: %.2f, %u, %u, %u", (double)widths[w], found.width, found.away, found.inside, found.missing);
                 fflush(stdout);
-                if (!plain && (fabs(found.width - (double)widths[w]) > 0.5 || found.away || 100 * found.missing > most * found.whole))
+                if (!plain &&
+                    (fabs(found.width - (double)widths[w]) > 0.5 || found.away || 100 * found.missing > most * found.whole))
                     support_die("%s: a line %g wide was found %.2f wide, with %u pixels away from the contour and %u missing",
                                 shape_names[shape], (double)widths[w], found.width, found.away, found.missing);
                 free(line);
@@ -214,7 +215,8 @@ static uint32_t count_on_slope(patina_device *device, int tilt, double density, 
     static const double target[3] = {0.0, 0.0, 0.0};
     const double angle = tilt * M_PI / 180.0, from[3] = {0.0, -3.0 * sin(angle), 3.0 * cos(angle)}, window = 1.4, side = 1.8;
     patina_camera camera = camera_orthographic(from, target, window, SIZE, SIZE, -100.0, 100.0);
-    struct points points = points_rectangle((uint64_t)(density * pow(side / window * SIZE, 2.0)), side, side / cos(angle), columns, 3);
+    struct points points = points_rectangle((uint64_t)(density * pow(side / window * SIZE, 2.0)), side, side / cos(angle),
+                                            columns, 3);
     patina_cloud *cloud = points_upload(&points);
     patina_scene *scene = scene_of(cloud, NULL);
     patina_lines lines = {.struct_size = sizeof lines, .width = 6.0f};
@@ -324,7 +326,8 @@ static void free_result(struct result *result)
 static void test_regions(void **state)
 {
     (void)state;
-    static const uint32_t regions[][4] = {{0, 0, SIZE, SIZE}, {0, 0, 70, 40}, {53, 41, 150, 147}, {96, 20, 97, 21}, {0, 90, SIZE, 91}};
+    static const uint32_t regions[][4] = {
+        {0, 0, SIZE, SIZE}, {0, 0, 70, 40}, {53, 41, 150, 147}, {96, 20, 97, 21}, {0, 90, SIZE, 91}};
     patina_device *device = support_device_first();
     for (uint32_t look = 0; look < LOOKS; look++) {
         struct result whole = draw(device, look, NULL);
@@ -408,7 +411,7 @@ static void test_extremes(void **state)
         uint64_t count;
         uint32_t width, height;
         double near_clip, far_clip;
-    } cases[] = {{one, 0, 64, 48, 0.1, 10},  {one, 1, 64, 48, 0.1, 10},     {one, 1, 1, 1, 0.1, 10},
+    } cases[] = {{one, 0, 64, 48, 0.1, 10},      {one, 1, 64, 48, 0.1, 10},      {one, 1, 1, 1, 0.1, 10},
                  {spread, 5, 64, 48, 1e-3, 1e4}, {spread, 5, 16384, 1, 0.1, 10}, {spread, 5, 1, 300, 0.1, 10}};
     patina_device *device = support_device_first();
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
@@ -421,8 +424,9 @@ static void test_extremes(void **state)
             patina_cloud_style style = {.struct_size = sizeof style, .transparency = way >> 1 ? 0.5f : 0.0f};
             patina_scene *scene = scene_of(cloud, &style);
             const uint32_t w = cases[i].width, h = cases[i].height;
-            patina_camera camera = way & 1 ? camera_orthographic(from, target, 2.0, w, h, -cases[i].far_clip, cases[i].far_clip)
-                                           : camera_perspective(from, target, 50.0, w, h, cases[i].near_clip, cases[i].far_clip);
+            patina_camera camera = way & 1
+                                       ? camera_orthographic(from, target, 2.0, w, h, -cases[i].far_clip, cases[i].far_clip)
+                                       : camera_perspective(from, target, 50.0, w, h, cases[i].near_clip, cases[i].far_clip);
             patina_lines lines = {.struct_size = sizeof lines, .width = way & 1 ? 16.0f : 1e6f, .world = !(way & 1)};
             float *line = render_lines(device, scene, &camera, settings_default(w, h), &lines, NULL);
             for (size_t k = 0; k < (size_t)w * h; k++)
@@ -441,9 +445,9 @@ static void test_refusals(void **state)
     static const struct {
         patina_lines lines;
         const char *says;
-    } bad[] = {{{.width = -1.0f}, "0 or more"},     {{.width = NAN}, "finite"},          {{.width = 17.0f}, "the most is 16"},
-               {{.world = 1}, "above 0"},           {{.transparency = 2.0f}, "between"}, {{.soft = -0.5f}, "between"},
-               {{.source = 3}, "no such"},          {{.surface = 3}, "no such"},         {{.offset = -1.0f}, "0 or more"},
+    } bad[] = {{{.width = -1.0f}, "0 or more"},   {{.width = NAN}, "finite"},          {{.width = 17.0f}, "the most is 16"},
+               {{.world = 1}, "above 0"},         {{.transparency = 2.0f}, "between"}, {{.soft = -0.5f}, "between"},
+               {{.source = 3}, "no such"},        {{.surface = 3}, "no such"},         {{.offset = -1.0f}, "0 or more"},
                {{.color = {NAN, 0, 0}}, "finite"}};
     patina_scene *scene = NULL;
     CHECK(patina_scene_create(&scene), NULL);

@@ -17,8 +17,8 @@ static patina_camera the_camera(void) { return camera_perspective(eye, target, 4
 
 static void add_sun(patina_scene *scene, uint32_t shadows)
 {
-    const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f,
-                                   .direction = {-0.6, 0.2, -1.0}, .shadows = shadows};
+    const patina_light_desc sun = {
+        .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {-0.6, 0.2, -1.0}, .shadows = shadows};
     CHECK(patina_scene_add_light(scene, &sun), scene);
 }
 
@@ -88,8 +88,8 @@ static void box_is_exact(void **state)
             assert_true(picture.source[i] == 1.0f || picture.source[i] == -1.0f);
             assert_true(key_id(picture.keys[i]) < 12);
         }
-        printf("%s: box: %u of %u centres on the wrong side of the outline, depth off by %.2g at most\n", support_device_name(d),
-               wrong, covered, worst);
+        printf("%s: box: %u of %u centres on the wrong side of the outline, depth off by %.2g at most\n",
+               support_device_name(d), wrong, covered, worst);
         assert_true(covered > 10000 && wrong <= 8 && worst < 1e-4); // wrong: corners are rounded to 1/256 pixel
         picture_free(&picture);
         patina_scene_destroy(scene);
@@ -163,13 +163,15 @@ static void lit_as_points(void **state)
         if (!isfinite(edge))
             continue;
         for (int k = 0; k < 3; k++) {
-            double off = fabs((double)pictures[0].combined[4 * i + (uint32_t)k] - (double)pictures[1].combined[4 * i + (uint32_t)k]);
+            double off = fabs((double)pictures[0].combined[4 * i + (uint32_t)k] -
+                              (double)pictures[1].combined[4 * i + (uint32_t)k]);
             worst = fmax(worst, off);
             sum += off;
         }
         count++;
     }
-    printf("ball of points and ball of triangles: colours differ by %.4f on average, %.3f at most\n", sum / (3.0 * count), worst);
+    printf("ball of points and ball of triangles: colours differ by %.4f on average, %.3f at most\n", sum / (3.0 * count),
+           worst);
     assert_true(count > 10000 && sum / (3.0 * count) < 0.002 && worst < 0.05);
     for (int k = 0; k < 2; k++) {
         picture_free(&pictures[k]);
@@ -203,7 +205,8 @@ static void casts_on_points(void **state)
     for (uint32_t i = 0; i < 60000; i++) {
         // up along the sun's way, to the middle of the slab; its borders are left out by a texel
         double x = (double)points.position[3 * i] + 0.6, y = (double)points.position[3 * i + 1] - 0.2, slack = 0.08;
-        int inside = fabs(x) < half[0] - slack && fabs(y) < half[1] - slack, outside = fabs(x) > half[0] + slack || fabs(y) > half[1] + slack;
+        int inside = fabs(x) < half[0] - slack && fabs(y)<half[1] - slack, outside = fabs(x)> half[0] + slack ||
+                     fabs(y) > half[1] + slack;
         wrong += (inside && arrives[i] > 0.5f) || (outside && arrives[i] < 0.5f);
         dark += inside != 0;
     }
@@ -235,9 +238,10 @@ static void through_glass(void **state)
     settings.world_color[0] = settings.world_color[1] = settings.world_color[2] = 1.0f; // ambient light alone
     settings.film_transparent = 1;
     struct picture picture = picture_render(device, scene, &camera, &settings);
-    const float *at = picture.combined + 4 * (SIZE / 2 * SIZE + SIZE / 2), *beside = picture.combined + 4 * (SIZE / 2 * SIZE + SIZE / 6);
-    printf("through glass: %.3f %.3f %.3f %.3f, beside: %.3f %.3f\n", (double)at[0], (double)at[1], (double)at[2], (double)at[3],
-           (double)beside[0], (double)beside[3]);
+    const float *at = picture.combined + 4 * (SIZE / 2 * SIZE + SIZE / 2),
+                *beside = picture.combined + 4 * (SIZE / 2 * SIZE + SIZE / 6);
+    printf("through glass: %.3f %.3f %.3f %.3f, beside: %.3f %.3f\n", (double)at[0], (double)at[1], (double)at[2],
+           (double)at[3], (double)beside[0], (double)beside[3]);
     assert_true(fabs((double)at[0] - (0.5 * 0.8 + 0.5)) < 0.02 && fabs((double)at[1] - 0.4) < 0.02 && at[3] > 0.99f);
     assert_true(fabs((double)beside[0] - 0.4) < 0.02 && fabs((double)beside[3] - 0.5) < 0.02);
     picture_free(&picture);
@@ -280,7 +284,10 @@ static void refuses(void **state)
 {
     const float p[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     const uint32_t bad[3] = {0, 1, 3};
-    patina_mesh_desc desc = {.struct_size = sizeof desc, .vertex_count = 3, .triangle_count = 1, .indices = bad,
+    patina_mesh_desc desc = {.struct_size = sizeof desc,
+                             .vertex_count = 3,
+                             .triangle_count = 1,
+                             .indices = bad,
                              .position = {.data = p, .type = PATINA_FLOAT32, .components = 3}};
     patina_mesh *mesh = NULL;
     (void)state;

@@ -204,8 +204,8 @@ static const struct {
     {"point", {.type = PATINA_LIGHT_POINT, .position = {1.2, -0.5, 3.0}}},
     {"soft point", {.type = PATINA_LIGHT_POINT, .position = {1.2, -0.5, 3.0}, .radius = 0.3f}},
     {"spot", {.type = PATINA_LIGHT_SPOT, .position = {1.2, -0.5, 3.0}, .direction = {-0.4, 0.17, -1.0}, .cone = 2.0f}},
-    {"soft spot", {.type = PATINA_LIGHT_SPOT, .position = {1.2, -0.5, 3.0}, .direction = {-0.4, 0.17, -1.0}, .cone = 2.0f,
-                   .radius = 0.3f}},
+    {"soft spot",
+     {.type = PATINA_LIGHT_SPOT, .position = {1.2, -0.5, 3.0}, .direction = {-0.4, 0.17, -1.0}, .cone = 2.0f, .radius = 0.3f}},
     {"panel", {.type = PATINA_LIGHT_AREA, .position = {0.8, -0.4, 3.0}, .direction = {0.0, 0.0, -1.0}, .size = {0.8f, 0.8f}}},
 };
 
@@ -224,8 +224,8 @@ static void against_rays(enum who who, double border)
         for (int k = 0; k < 3 && length > 0.0; k++)
             light.direction[k] /= sqrt(length);
         struct outcome o = measure(device, &s, &light, border);
-        printf("%s, %s: %u of %u wrong, %u dark; %u in the penumbra off by %.4f, %+.4f on average\n", whose[who], lights[i].name,
-               o.wrong, o.tested, o.dark, o.between, o.error, o.bias);
+        printf("%s, %s: %u of %u wrong, %u dark; %u in the penumbra off by %.4f, %+.4f on average\n", whose[who],
+               lights[i].name, o.wrong, o.tested, o.dark, o.between, o.error, o.bias);
         assert_true(o.tested > 10000 && o.dark > 400 && o.wrong <= o.tested / 2000);
         assert_true(o.error < 0.05 && fabs(o.bias) < 0.02);
         destroy(&s);
@@ -255,7 +255,9 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_on_triangles), cmocka_unit_test(triangles_on_triangles), cmocka_unit_test(triangles_on_points),
+        cmocka_unit_test(points_on_triangles),
+        cmocka_unit_test(triangles_on_triangles),
+        cmocka_unit_test(triangles_on_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

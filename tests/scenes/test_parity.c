@@ -40,13 +40,12 @@ static void compare(const struct picture *picture, const struct picture *truth, 
     assert_int_equal(picture->height, truth->height);
     for (uint64_t i = 0; i < pixels; i++)
         if (picture->keys[i] != truth->keys[i])
-            support_die("%s, %s: key at (%u, %u) is %016llx (source %g), the first device has %016llx (source %g)",
-                        name, scene, (unsigned)(i % truth->width), (unsigned)(i / truth->width),
-                        (unsigned long long)picture->keys[i], (double)picture->source[i],
-                        (unsigned long long)truth->keys[i], (double)truth->source[i]);
+            support_die("%s, %s: key at (%u, %u) is %016llx (source %g), the first device has %016llx (source %g)", name, scene,
+                        (unsigned)(i % truth->width), (unsigned)(i / truth->width), (unsigned long long)picture->keys[i],
+                        (double)picture->source[i], (unsigned long long)truth->keys[i], (double)truth->source[i]);
     if (farthest(picture->depth, truth->depth, pixels, &where) > 0.0)
-        support_die("%s, %s: depth at pixel %llu is %.9g, the first device has %.9g", name, scene,
-                    (unsigned long long)where, (double)picture->depth[where], (double)truth->depth[where]);
+        support_die("%s, %s: depth at pixel %llu is %.9g, the first device has %.9g", name, scene, (unsigned long long)where,
+                    (double)picture->depth[where], (double)truth->depth[where]);
     if (farthest(picture->normal, truth->normal, 3 * pixels, &where) > 0.0)
         support_die("%s, %s: normal at pixel %llu is %.9g, the first device has %.9g", name, scene,
                     (unsigned long long)where / 3, (double)picture->normal[where], (double)truth->normal[where]);
@@ -59,28 +58,28 @@ static void compare(const struct picture *picture, const struct picture *truth, 
     // A distance of filled pixels may differ as drivers' sqrt() does.
     for (uint64_t i = 0; i < pixels; i++)
         if (fabs((double)picture->source[i] - (double)truth->source[i]) > TOL_DISTANCE * fabs((double)truth->source[i]))
-            support_die("%s, %s: source at pixel %llu is %.9g, the first device has %.9g", name, scene,
-                        (unsigned long long)i, (double)picture->source[i], (double)truth->source[i]);
+            support_die("%s, %s: source at pixel %llu is %.9g, the first device has %.9g", name, scene, (unsigned long long)i,
+                        (double)picture->source[i], (double)truth->source[i]);
     for (uint32_t k = 0; k < truth->layers; k++) {
         const float *a = picture->layer_depth + k * pixels, *b = truth->layer_depth + k * pixels;
         if (farthest(a, b, pixels, &where) > 0.0)
-            support_die(LAYER_DIFFERS, name, scene, "depth", k + 1, (unsigned long long)where,
-                        (double)a[where], (double)b[where]);
+            support_die(LAYER_DIFFERS, name, scene, "depth", k + 1, (unsigned long long)where, (double)a[where],
+                        (double)b[where]);
         a = picture->layer_normal + 3 * k * pixels;
         b = truth->layer_normal + 3 * k * pixels;
         if (farthest(a, b, 3 * pixels, &where) > 0.0)
-            support_die(LAYER_DIFFERS, name, scene, "normal", k + 1, (unsigned long long)where,
-                        (double)a[where], (double)b[where]);
+            support_die(LAYER_DIFFERS, name, scene, "normal", k + 1, (unsigned long long)where, (double)a[where],
+                        (double)b[where]);
         a = picture->layer_combined + 4 * k * pixels;
         b = truth->layer_combined + 4 * k * pixels;
         if (farthest(a, b, 4 * pixels, &where) > TOL_COLOR * color_scale(truth))
-            support_die(LAYER_DIFFERS, name, scene, "colour", k + 1, (unsigned long long)where,
-                        (double)a[where], (double)b[where]);
+            support_die(LAYER_DIFFERS, name, scene, "colour", k + 1, (unsigned long long)where, (double)a[where],
+                        (double)b[where]);
     }
     double colors = farthest(picture->combined, truth->combined, 4 * pixels, &where), scale = color_scale(truth);
     if (colors > TOL_COLOR * scale)
-        support_die("%s, %s: colour at pixel %llu is off by %g (allowed %g)", name, scene,
-                    (unsigned long long)where / 4, colors, TOL_COLOR * scale);
+        support_die("%s, %s: colour at pixel %llu is off by %g (allowed %g)", name, scene, (unsigned long long)where / 4,
+                    colors, TOL_COLOR * scale);
     printf("  %-40s %-12s keys equal, colours within %.1e of %.1e\n", scene, name, colors, TOL_COLOR * scale);
 }
 

@@ -102,8 +102,8 @@ static void test_steps(void **state)
                 picture = picture_read(frame);
                 last = pending && steps == 1 ? off(&picture, &whole) : last; // of four samples or five
             }
-            print_message("  kind %d, %u samples: %u steps, off by %.2f at first, %.2f after two\n", kind, samples[s], steps, first,
-                          last);
+            print_message("  kind %d, %u samples: %u steps, off by %.2f at first, %.2f after two\n", kind, samples[s], steps,
+                          first, last);
             assert_true(steps < 3 || last < 0.7 * first);
             assert_true(patina_frame_progress(frame) > 0.999f);
             picture_assert_identical(&picture, &whole, 0, 0, "steps and one go");
@@ -350,8 +350,9 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_steps),   cmocka_unit_test(test_devices), cmocka_unit_test(test_bands),  cmocka_unit_test(test_cut_off),
-        cmocka_unit_test(test_refusals), cmocka_unit_test(test_noise),   cmocka_unit_test(test_target), cmocka_unit_test(test_shadows),
+        cmocka_unit_test(test_steps),   cmocka_unit_test(test_devices),  cmocka_unit_test(test_bands),
+        cmocka_unit_test(test_cut_off), cmocka_unit_test(test_refusals), cmocka_unit_test(test_noise),
+        cmocka_unit_test(test_target),  cmocka_unit_test(test_shadows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -63,10 +63,7 @@ static void test_regions(void **state)
             if (support_is_gl(name) && stagings[i].width > 500)
                 continue;
             struct stage stage = stage_build(&stagings[i]);
-            compare_places(device, &stage, stagings[i].name,
-                           stagings[i].width > 500 ? 4
-                           : support_is_gl(name)   ? 2
-                                                   : 24);
+            compare_places(device, &stage, stagings[i].name, stagings[i].width > 500 ? 4 : support_is_gl(name) ? 2 : 24);
             stage_free(&stage);
         }
         patina_device_destroy(device);

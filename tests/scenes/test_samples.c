@@ -27,7 +27,8 @@ static void test_regions(void **state)
     (void)state;
     static const uint32_t some[] = {2, 9}; // shifts; finer pixels where points lie as dense or are discs
     for (uint32_t k = 0; k < support_device_count(); k++) {
-        patina_device *device = strncmp(support_device_name(k), "cpu-", 4) ? support_device_open(support_device_name(k), 0, 0) : NULL;
+        patina_device *device = strncmp(support_device_name(k), "cpu-", 4) ? support_device_open(support_device_name(k), 0, 0)
+                                                                           : NULL;
         for (uint32_t i = 0; device && i < staging_count; i++) {
             if (stagings[i].width > 203 || (support_is_gl(support_device_name(k)) && i % 5 != 3))
                 continue;
@@ -37,7 +38,8 @@ static void test_regions(void **state)
                 patina_settings settings = stage.settings;
                 settings.pixel_samples = some[s];
                 struct picture whole = picture_render(device, stage.scene, &stage.camera, &settings);
-                compare_region(device, &stage, &settings, &whole, (uint32_t[4]){w / 3, h / 4, w - w / 5, h - h / 3}, stagings[i].name);
+                compare_region(device, &stage, &settings, &whole, (uint32_t[4]){w / 3, h / 4, w - w / 5, h - h / 3},
+                               stagings[i].name);
                 compare_region(device, &stage, &settings, &whole, (uint32_t[4]){0, h / 2, w, h / 2 + 1}, stagings[i].name);
                 picture_free(&whole);
             }
@@ -134,7 +136,8 @@ static void test_outline(void **state)
             stage.settings.pixel_samples = samples;
             struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
             const double error = alpha_error(&picture, 128 / 3.0);
-            print_message("  %s, %u samples: alpha off by %.3f rms along the outline\n", i ? "discs" : "filled", samples, error);
+            print_message("  %s, %u samples: alpha off by %.3f rms along the outline\n", i ? "discs" : "filled", samples,
+                          error);
             assert_true(error < last * 1.05);
             assert_true(samples < 16 || error < 0.10);
             last = error;
@@ -291,9 +294,9 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_regions), cmocka_unit_test(test_bands),    cmocka_unit_test(test_threads),
-        cmocka_unit_test(test_outline), cmocka_unit_test(test_meshes), cmocka_unit_test(test_looks),    cmocka_unit_test(test_failures),
-        cmocka_unit_test(test_cut_off),
+        cmocka_unit_test(test_regions),  cmocka_unit_test(test_bands),   cmocka_unit_test(test_threads),
+        cmocka_unit_test(test_outline),  cmocka_unit_test(test_meshes),  cmocka_unit_test(test_looks),
+        cmocka_unit_test(test_failures), cmocka_unit_test(test_cut_off),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

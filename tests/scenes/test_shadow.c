@@ -50,8 +50,8 @@ static double leaves_ball(const double p[3], const double d[3], double *miss)
 }
 
 struct truth {
-    double lit;     // 1 or 0
-    int near;       // so close to a border or a contact that a map's texel and d_eff decide
+    double lit; // 1 or 0
+    int near;   // so close to a border or a contact that a map's texel and d_eff decide
 };
 
 // What a light in unit direction d does to point i; texel: width of the map's there. rim: cosines below it are near the
@@ -97,8 +97,8 @@ static patina_light_desc sun_at(double height_degrees, double turn_degrees)
                                .shadows = 1};
 }
 
-static float *bake(patina_device *device, patina_scene *scene, const patina_light_desc *light, uint32_t samples,
-                   uint64_t count, patina_frame **keep)
+static float *bake(patina_device *device, patina_scene *scene, const patina_light_desc *light, uint32_t samples, uint64_t count,
+                   patina_frame **keep)
 {
     patina_settings settings = settings_default(64, 64);
     settings.shadow_samples = samples;
@@ -140,8 +140,8 @@ static void test_sun_heights(void **state)
                 acne += bad && !truth.near && truth.lit > 0.5;
                 leaks += bad && !truth.near && truth.lit < 0.5;
             }
-            printf("  %4.0f %s  %.3f  %llu %llu\n", heights[h], columns ? "with   " : "without", 100.0 * (double)wrong / (double)points.count,
-                   (unsigned long long)acne, (unsigned long long)leaks);
+            printf("  %4.0f %s  %.3f  %llu %llu\n", heights[h], columns ? "with   " : "without",
+                   100.0 * (double)wrong / (double)points.count, (unsigned long long)acne, (unsigned long long)leaks);
             assert_int_equal(acne, 0);
             assert_int_equal(leaks, 0);
             assert_true((double)wrong <= 0.01 * (double)points.count);
@@ -200,7 +200,8 @@ static void test_soft_converges(void **state)
         bias += (truth[i] - seen) * (truth[i] - seen);
         penumbra += seen > 0.0 && seen < 1.0;
     }
-    printf("  %.0f of %d points in the penumbra; rms of 4096 samples against the truth %.4f\n", penumbra, FEW, sqrt(bias / FEW));
+    printf("  %.0f of %d points in the penumbra; rms of 4096 samples against the truth %.4f\n", penumbra, FEW,
+           sqrt(bias / FEW));
     assert_true(sqrt(bias / FEW) < 0.05);
     for (int step = 0; step < STEPS; step++) {
         double square = 0;
@@ -294,17 +295,16 @@ static void test_near_lights(void **state)
         uint32_t type;
         double at[3];
     } lights[] = {
-        {PATINA_LIGHT_POINT, {3, 2, 4}},      // one perspective view
+        {PATINA_LIGHT_POINT, {3, 2, 4}},       // one perspective view
         {PATINA_LIGHT_POINT, {1.2, 0.3, 0.9}}, // a cube: the plane is all around
-        {PATINA_LIGHT_POINT, {0, 0, 1.6}},
-        {PATINA_LIGHT_SPOT, {-2.5, 0, 2.5}},
-        {PATINA_LIGHT_AREA, {0.4, -2.0, 2.2}},
+        {PATINA_LIGHT_POINT, {0, 0, 1.6}},     {PATINA_LIGHT_SPOT, {-2.5, 0, 2.5}}, {PATINA_LIGHT_AREA, {0.4, -2.0, 2.2}},
     };
     patina_device *device = support_device_first();
     struct points points = ball_on_plane(PLANE, BALL, POINTS_NORMALS);
     patina_cloud *cloud = points_upload(&points);
     for (size_t l = 0; l < sizeof lights / sizeof *lights; l++) {
-        patina_light_desc light = {.struct_size = sizeof light, .type = lights[l].type, .power = 10, .shadows = 1, .cone = 2.0f};
+        patina_light_desc light = {
+            .struct_size = sizeof light, .type = lights[l].type, .power = 10, .shadows = 1, .cone = 2.0f};
         memcpy(light.position, lights[l].at, sizeof light.position);
         light.size[0] = light.size[1] = 1e-6f;
         patina_scene *scene = scene_of(cloud, NULL);
@@ -324,8 +324,8 @@ static void test_near_lights(void **state)
             acne += bad && !truth.near && truth.lit > 0.5;
             leaks += bad && !truth.near && truth.lit < 0.5 && !turned_away(&points, i, d);
         }
-        printf("  light %zu: %.3f%% wrong, %llu acne, %llu leaks\n", l, 100.0 * (double)wrong / (double)points.count, (unsigned long long)acne,
-               (unsigned long long)leaks);
+        printf("  light %zu: %.3f%% wrong, %llu acne, %llu leaks\n", l, 100.0 * (double)wrong / (double)points.count,
+               (unsigned long long)acne, (unsigned long long)leaks);
         assert_int_equal(acne, 0);
         assert_int_equal(leaks, 0);
         free(values);
@@ -349,10 +349,12 @@ static void test_umbra(void **state)
     for (int fine = 0; fine < 2; fine++)
         for (int way = BARE; way <= ANALYSED; way++) {
             const double apart = fine ? 0.01 : 0.02, height = 1.2, side = 4.0;
-            const uint64_t floor = (uint64_t)(side * side / (apart * apart) + 0.5), plate = (uint64_t)(1.0 / (apart * apart) + 0.5);
+            const uint64_t floor = (uint64_t)(side * side / (apart * apart) + 0.5),
+                           plate = (uint64_t)(1.0 / (apart * apart) + 0.5);
             const unsigned columns = way == NORMALS ? POINTS_NORMALS : 0;
             struct points points = points_create(floor + plate, columns);
-            struct points below = points_rectangle(floor, side, side, columns, 21), above = points_rectangle(plate, 1.0, 1.0, columns, 22);
+            struct points below = points_rectangle(floor, side, side, columns, 21),
+                          above = points_rectangle(plate, 1.0, 1.0, columns, 22);
             static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, up[3] = {0, 0, 0.6};
             points_transform(&above, unit, up);
             memcpy(points.position, below.position, floor * 12);
@@ -367,7 +369,8 @@ static void test_umbra(void **state)
             if (way == ANALYSED)
                 CHECK(patina_cloud_analyse(cloud, NULL, NULL), NULL);
             for (size_t l = 0; l < sizeof types / sizeof *types; l++) {
-                patina_light_desc light = {.struct_size = sizeof light, .type = types[l], .power = 10, .shadows = 1, .size = {0.3f, 0.3f}};
+                patina_light_desc light = {
+                    .struct_size = sizeof light, .type = types[l], .power = 10, .shadows = 1, .size = {0.3f, 0.3f}};
                 light.position[2] = height;
                 light.direction[2] = -1.0;
                 light.side[0] = 1.0;
@@ -385,8 +388,9 @@ static void test_umbra(void **state)
                     open += off > 1.5;
                     dark += off > 1.5 ? 1.0 - (double)values[i] : 0.0;
                 }
-                printf("  spacing %.2f, %-5s %-15s: %.2f%% of the umbra lit, %.2f%% inside of it; %.2f%% of the light outside lost\n", apart, names[l],
-                       ways[way], 100.0 * lit / all, 100.0 * leaks / inner, 100.0 * dark / open);
+                printf("  spacing %.2f, %-5s %-15s: %.2f%% of the umbra lit, %.2f%% inside of it; %.2f%% of the light outside "
+                       "lost\n",
+                       apart, names[l], ways[way], 100.0 * lit / all, 100.0 * leaks / inner, 100.0 * dark / open);
                 assert_true(leaks <= 0.01 * inner);
                 assert_true(way == BARE || lit <= 0.02 * all); // the border itself, where the plate has its last random points
                 assert_true(dark <= 0.001 * open);
@@ -403,11 +407,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sun_heights),
-        cmocka_unit_test(test_near_lights),
-        cmocka_unit_test(test_umbra),
-        cmocka_unit_test(test_soft_converges),
-        cmocka_unit_test(test_error_target),
+        cmocka_unit_test(test_sun_heights),    cmocka_unit_test(test_near_lights),  cmocka_unit_test(test_umbra),
+        cmocka_unit_test(test_soft_converges), cmocka_unit_test(test_error_target),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

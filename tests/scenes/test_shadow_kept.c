@@ -39,8 +39,10 @@ static patina_light_desc light_of(uint32_t type, uint32_t shadows)
 static struct stage stage_of(const patina_cloud_style *torus_style, const patina_cloud_style *floor_style)
 {
     struct stage stage = {.settings = settings_default(SIZE, SIZE)};
-    struct points torus = points_torus(TORUS, 0.6, 0.25, POINTS_NORMALS, 3), floor = points_rectangle(FLOOR, 4, 4, POINTS_NORMALS, 4);
-    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, up[3] = {0, 0, 0.6}, eye[3] = {1.5, -3.0, 2.5}, target[3] = {0, 0, 0.2};
+    struct points torus = points_torus(TORUS, 0.6, 0.25, POINTS_NORMALS, 3),
+                  floor = points_rectangle(FLOOR, 4, 4, POINTS_NORMALS, 4);
+    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, up[3] = {0, 0, 0.6}, eye[3] = {1.5, -3.0, 2.5},
+                        target[3] = {0, 0, 0.2};
     points_transform(&torus, unit, up);
     stage.torus = points_upload(&torus);
     stage.floor = points_upload(&floor);
@@ -120,7 +122,8 @@ static void test_devices_and_threads_agree(void **state)
             CHECK(patina_frame_bake_shadows(frame, stage.scene), frame);
             float *values = read_all(frame, 3);
             if (truth && memcmp(truth, values, 3 * (TORUS + FLOOR) * sizeof *values))
-                support_die("%s with %u threads: other shadows than %s", support_device_name(d), ways[w][0], support_device_name(0));
+                support_die("%s with %u threads: other shadows than %s", support_device_name(d), ways[w][0],
+                            support_device_name(0));
             if (truth)
                 free(values);
             else
@@ -144,7 +147,8 @@ static void test_lazy_is_whole(void **state)
         patina_frame *frame = frame_on(device), *lazy = frame_on(device);
         patina_frame_stats stats = render(frame, &stage);
         assert_true(stats.shadow_maps > 3 * 3 && stats.shadow_width > 16);
-        assert_in_range(stats.shadow_bytes, 3 * 4 * (TORUS + FLOOR), 3 * 4 * 1.01 * (TORUS + FLOOR)); // chunks end with a vector
+        assert_in_range(stats.shadow_bytes, 3 * 4 * (TORUS + FLOOR),
+                        3 * 4 * 1.01 * (TORUS + FLOOR)); // chunks end with a vector
         struct picture first = picture_read(frame);
         assert_int_equal(render(frame, &stage).shadow_maps, 0);
         struct picture kept = picture_read(frame);
@@ -252,7 +256,8 @@ static void test_error_target(void **state)
         patina_frame *frame = frame_on(device), *slow = frame_on(device);
         stage.settings.shadow_lazy = d % 2;
         patina_frame_stats stats = render(frame, &stage), last = {0};
-        assert_true(stats.shadow_samples >= 4 && stats.shadow_samples < 32 && stats.shadow_error > 0.0f && stats.shadow_error <= 0.25f);
+        assert_true(stats.shadow_samples >= 4 && stats.shadow_samples < 32 && stats.shadow_error > 0.0f &&
+                    stats.shadow_error <= 0.25f);
         stage.settings.shadow_lazy = 0;
         stage.settings.shadow_progressive = 1;
         for (last.shadow_pending = 1; last.shadow_pending;)
@@ -273,7 +278,8 @@ static void test_error_target(void **state)
         CHECK(patina_frame_save_shadows(frame, path), frame);
         CHECK(patina_frame_load_shadows(slow, stage.scene, path), slow);
         last = render(slow, &stage);
-        assert_true(!last.shadow_maps && last.shadow_error == stats.shadow_error && last.shadow_samples == stats.shadow_samples);
+        assert_true(!last.shadow_maps && last.shadow_error == stats.shadow_error &&
+                    last.shadow_samples == stats.shadow_samples);
         stage.settings.shadow_error = 0.4f;
         assert_true(render(frame, &stage).shadow_maps > 0);
         assert_int_equal(patina_frame_load_shadows(slow, stage.scene, path), PATINA_ERROR_FORMAT);
@@ -371,8 +377,10 @@ static void test_opacities_of_points(void **state)
     (void)state;
     enum { SHEET = 20000, BELOW = 10000 };
     static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, top[3] = {0, 0, 1}, middle[3] = {0, 0.5, 0.5};
-    struct points sheet = points_rectangle(SHEET, 2, 2, POINTS_NORMALS, 8), below = points_rectangle(BELOW, 2, 1, POINTS_NORMALS, 9);
-    struct points both = points_create(SHEET + BELOW, POINTS_NORMALS), ground = points_rectangle(FLOOR, 2, 2, POINTS_NORMALS, 4);
+    struct points sheet = points_rectangle(SHEET, 2, 2, POINTS_NORMALS, 8),
+                  below = points_rectangle(BELOW, 2, 1, POINTS_NORMALS, 9);
+    struct points both = points_create(SHEET + BELOW, POINTS_NORMALS),
+                  ground = points_rectangle(FLOOR, 2, 2, POINTS_NORMALS, 4);
     uint8_t *opacity = malloc(SHEET + BELOW);
     points_transform(&sheet, unit, top);
     points_transform(&below, unit, middle);
@@ -388,7 +396,8 @@ static void test_opacities_of_points(void **state)
     CHECK(patina_cloud_create(&desc, NULL, &glass_cloud), NULL);
     patina_scene *scene = scene_of(glass_cloud, NULL);
     CHECK(patina_scene_add_cloud(scene, ground_cloud, NULL), scene);
-    patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 1, .direction = {0, 0, -1}, .shadows = 1};
+    patina_light_desc sun = {
+        .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 1, .direction = {0, 0, -1}, .shadows = 1};
     CHECK(patina_scene_add_light(scene, &sun), scene);
     float *truth = NULL, *values = malloc((SHEET + BELOW + FLOOR) * sizeof *values), *under = values + SHEET + BELOW;
     for (uint32_t d = 0; d < support_device_count(); d++) {
@@ -549,7 +558,8 @@ static void test_hard_lights(void **state)
     static const double places[][3] = {{0, 0, 0}, {0.6, 0, 0}, {0, 0, 1e-9}, {0, 0, -50}, {1e7, 0, 0}, {0.6, 0, 0.2500001}};
     static const double ways[][3] = {{1, 0, 0}, {1, 0, -1e-9}, {0, 0, 1}, {1e-200, 0, 0}, {0, 1, -1e-3}};
     patina_device *device = support_device_first();
-    struct points torus = points_torus(5000, 0.6, 0.25, POINTS_NORMALS, 3), flat = points_rectangle(5000, 2, 2, POINTS_PLAIN, 4);
+    struct points torus = points_torus(5000, 0.6, 0.25, POINTS_NORMALS, 3),
+                  flat = points_rectangle(5000, 2, 2, POINTS_PLAIN, 4);
     struct points one = points_rectangle(1, 2, 2, POINTS_NORMALS, 5), same = points_create(100, POINTS_PLAIN);
     const struct points *all[] = {&torus, &flat, &one, &same};
     for (size_t c = 0; c < 4; c++) {

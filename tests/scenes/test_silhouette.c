@@ -21,24 +21,18 @@ static double kind_area(enum kind kind)
 {
     const double(*c)[2] = triangle_corners;
     switch (kind) {
-    case DISC:
-        return M_PI;
-    case SQUARE:
-        return 1.5 * 1.5;
-    default:
-        return 0.5 * fabs((c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[2][0] - c[0][0]) * (c[1][1] - c[0][1]));
+    case DISC: return M_PI;
+    case SQUARE: return 1.5 * 1.5;
+    default: return 0.5 * fabs((c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[2][0] - c[0][0]) * (c[1][1] - c[0][1]));
     }
 }
 
 static struct points sample(enum kind kind, uint64_t count, uint64_t seed)
 {
     switch (kind) {
-    case DISC:
-        return points_disc(count, 1.0, POINTS_NORMALS, seed);
-    case SQUARE:
-        return points_rectangle(count, 1.5, 1.5, POINTS_NORMALS, seed);
-    default:
-        return points_triangle(count, triangle_corners, POINTS_NORMALS, seed);
+    case DISC: return points_disc(count, 1.0, POINTS_NORMALS, seed);
+    case SQUARE: return points_rectangle(count, 1.5, 1.5, POINTS_NORMALS, seed);
+    default: return points_triangle(count, triangle_corners, POINTS_NORMALS, seed);
     }
 }
 
@@ -90,8 +84,8 @@ static patina_cloud *shape_cloud(enum kind kind, double tilt, double density)
     return cloud;
 }
 
-static struct growth measure(patina_device *device, const patina_cloud *cloud, enum kind kind, double tilt,
-                             int orthographic, uint32_t fill, uint32_t iterations)
+static struct growth measure(patina_device *device, const patina_cloud *cloud, enum kind kind, double tilt, int orthographic,
+                             uint32_t fill, uint32_t iterations)
 {
     const double eye[3] = {0.0, 0.0, 8.0}, target[3] = {0.0, 0.0, 0.0};
     double window = SIZE / unit, fov = 2.0 * atan(0.5 * window / 8.0) * 180.0 / M_PI;
@@ -133,13 +127,12 @@ static void test_convex_shapes(void **state)
             double tilt = tilts[i / 5] * M_PI / 180.0, density = densities[i % 5];
             patina_cloud *cloud = shape_cloud((enum kind)kind, tilt, density);
             for (int orthographic = 1; orthographic >= 0; orthographic--) {
-                struct growth closed = measure(device, cloud, (enum kind)kind, tilt, orthographic, PATINA_FILL_CLOSED,
-                                               0);
+                struct growth closed = measure(device, cloud, (enum kind)kind, tilt, orthographic, PATINA_FILL_CLOSED, 0);
                 struct growth paper = measure(device, cloud, (enum kind)kind, tilt, orthographic, PATINA_FILL_PAPER, 0);
                 printf("  %-9s %-5s %4.0f  %9g | %6.3f (%6.3f)  %6.3f (%6.3f) | %6.3f (%6.3f)  %6.3f (%6.3f)\n",
                        kind_names[kind], orthographic ? "ortho" : "persp", tilts[i / 5], density, closed.grown_mean,
-                       closed.grown_worst, closed.missing_mean, closed.missing_worst, paper.grown_mean,
-                       paper.grown_worst, paper.missing_mean, paper.missing_worst);
+                       closed.grown_worst, closed.missing_mean, closed.missing_worst, paper.grown_mean, paper.grown_worst,
+                       paper.missing_mean, paper.missing_worst);
                 if (density < 1.0)
                     sparse = fmax(sparse, closed.grown_worst);
                 else

@@ -39,7 +39,9 @@ static struct scene scene_at(int which)
         scene.name = "ten";
         scene.count = BALLS;
         for (int i = 0; i < BALLS; i++)
-            scene.balls[i] = (struct ball){{0.4 * sin(i), -1.6 + 0.4 * i, 0.4 * cos(2.0 * i)}, 0.5 + 0.0625 * i, 0.05 + 0.09 * i,
+            scene.balls[i] = (struct ball){{0.4 * sin(i), -1.6 + 0.4 * i, 0.4 * cos(2.0 * i)},
+                                           0.5 + 0.0625 * i,
+                                           0.05 + 0.09 * i,
                                            {(float)(i % 2), 0.5f * (float)(i % 3), 0.25f * (float)(i % 5)}};
     } else if (which == 3) {
         scene.name = "the eye inside";
@@ -119,7 +121,8 @@ static struct ref_soft march(const struct scene *scene, const double origin[3], 
             }
             if (square >= b->r * b->r)
                 continue;
-            const double a = fmin(kept_opacity(b->a), (double)PT_SOFT_FULLEST), weight = (1.0 - sqrt(fmax(apart - along * along, 0.0)) / b->r) * a;
+            const double a = fmin(kept_opacity(b->a), (double)PT_SOFT_FULLEST),
+                         weight = (1.0 - sqrt(fmax(apart - along * along, 0.0)) / b->r) * a;
             lost += -log1p(-a) * (1.0 - sqrt(square) / b->r) * step / b->r;
             weights += weight;
             for (int c = 0; c < 3; c++)
@@ -133,8 +136,8 @@ static struct ref_soft march(const struct scene *scene, const double origin[3], 
 }
 
 // As the references take the balls.
-static struct ref_soft exactly(const struct scene *scene, const patina_camera *camera, const double origin[3], const double ray[3],
-                               uint32_t model, uint32_t shells, double w, double to)
+static struct ref_soft exactly(const struct scene *scene, const patina_camera *camera, const double origin[3],
+                               const double ray[3], uint32_t model, uint32_t shells, double w, double to)
 {
     struct ref_ball balls[BALLS] = {{0}};
     const double *m = camera->world_from_camera, length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]);
@@ -185,7 +188,8 @@ static patina_camera camera_of(const struct scene *scene, int parallel, double s
                     : camera_perspective(scene->eye, target, 50.0, WIDTH, HEIGHT, 0.01 * s, 50.0 * s);
 }
 
-static void hold(patina_device *device, const char *device_name, int which, int parallel, uint32_t model, double s, float modulation)
+static void hold(patina_device *device, const char *device_name, int which, int parallel, uint32_t model, double s,
+                 float modulation)
 {
     struct scene scene = scene_at(which);
     const float behind[4] = {background[0], background[1], background[2], 1.0f};
@@ -211,8 +215,8 @@ static void hold(patina_device *device, const char *device_name, int which, int 
         const struct ref_soft sum = march(&scene, origin, ray, (parallel ? 0.0 : 0.01 * s) * length, 8.0 * s * length);
         marched = fmax(marched, check_pixel(&sum, picture.combined + 4 * i, behind));
     }
-    printf("  %s, %s%s, model %u, scale %g, modulation %g: %.2g from the reference, %.2g from quadrature\n", device_name, scene.name,
-           parallel ? ", parallel" : "", model, s, (double)modulation, worst, marched);
+    printf("  %s, %s%s, model %u, scale %g, modulation %g: %.2g from the reference, %.2g from quadrature\n", device_name,
+           scene.name, parallel ? ", parallel" : "", model, s, (double)modulation, worst, marched);
     assert_true(worst <= 1e-4);
     assert_true(marched <= 1e-4);
     assert_int_equal(picture_count(&picture), 0); // keys tell of what is opaque
@@ -278,7 +282,8 @@ static struct mixed mix(uint64_t count, uint32_t model, double move)
     style.soft_radius = 0.05f;
     style.lighting = PATINA_LIGHTING_LIT;
     CHECK(patina_scene_add_cloud(mixed.scene, mixed.soft, &style), mixed.scene);
-    const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {0.4, 0.5, -1.0}, .shadows = 1};
+    const patina_light_desc sun = {
+        .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {0.4, 0.5, -1.0}, .shadows = 1};
     CHECK(patina_scene_add_light(mixed.scene, &sun), mixed.scene);
     CHECK(patina_scene_add_light(mixed.bare, &sun), mixed.bare);
     const double eye[3] = {0.2, -4.0, 1.0}, target[3] = {0};
@@ -322,8 +327,8 @@ static void stand(patina_device *device, const char *name)
             changed += (uint32_t)(covered && other);
             beside += (uint32_t)(!covered && other);
         }
-        printf("  %s, soft points %s the wall: %u of %u pixels of it changed, %u beside it\n", name, before ? "before" : "behind", changed,
-               wall, beside);
+        printf("  %s, soft points %s the wall: %u of %u pixels of it changed, %u beside it\n", name,
+               before ? "before" : "behind", changed, wall, beside);
         assert_true(wall > WIDTH * HEIGHT / 4 && beside > 150);
         assert_true(before ? changed > 300 : changed == 0);
         picture_free(&with);
@@ -351,7 +356,8 @@ static void cut(patina_device *device, const char *name)
     CHECK(patina_scene_add_cloud(drawn, cloud, &style), drawn);
     const patina_camera camera = camera_of(&scene, 0, 1.0);
     const patina_settings settings = plain_settings();
-    struct picture with = picture_render(device, drawn, &camera, &settings), without = picture_render(device, bare, &camera, &settings);
+    struct picture with = picture_render(device, drawn, &camera, &settings),
+                   without = picture_render(device, bare, &camera, &settings);
     double worst = 0.0;
     uint32_t checked = 0;
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
@@ -627,11 +633,13 @@ static void sifted(patina_device *device, const char *name)
         clip.world_from_clip[5 * k] = 0.2;
     clip.world_from_clip[15] = 1.0;
     CHECK(patina_scene_add_clip(c, &clip), c);
-    struct picture first = picture_render(device, a, &camera, &settings), second = picture_render(device, b, &camera, &settings);
+    struct picture first = picture_render(device, a, &camera, &settings),
+                   second = picture_render(device, b, &camera, &settings);
     struct picture third = picture_render(device, c, &camera, &settings);
     double worst = 0.0;
     for (uint32_t i = 0; i < 4 * WIDTH * HEIGHT; i++)
-        worst = fmax(worst, fmax(fabs((double)first.combined[i] - (double)second.combined[i]), fabs((double)third.combined[i] - (double)second.combined[i])));
+        worst = fmax(worst, fmax(fabs((double)first.combined[i] - (double)second.combined[i]),
+                                 fabs((double)third.combined[i] - (double)second.combined[i])));
     printf("  %s, masked and clipped: %.2g\n", name, worst);
     assert_true(worst <= 1e-5);
     picture_free(&first);
@@ -692,8 +700,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_quadrature), cmocka_unit_test(test_wall),    cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_threads),    cmocka_unit_test(test_regions), cmocka_unit_test(test_devices),
+        cmocka_unit_test(test_quadrature), cmocka_unit_test(test_wall),     cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_threads),    cmocka_unit_test(test_regions),  cmocka_unit_test(test_devices),
         cmocka_unit_test(test_parts),      cmocka_unit_test(test_refusals), cmocka_unit_test(test_sifted),
         cmocka_unit_test(test_units),
     };

@@ -30,7 +30,8 @@ static int field_of(const patina_cloud *cloud, const float *values, uint64_t cou
 static struct room room_make(float threshold)
 {
     struct room room = {.threshold = threshold, .settings = settings_default(WIDTH, HEIGHT)};
-    struct points torus = points_torus(POINTS, 1.0, 0.4, POINTS_ALL, 6), floor = points_rectangle(10000, 4.0, 4.0, POINTS_ALL, 5);
+    struct points torus = points_torus(POINTS, 1.0, 0.4, POINTS_ALL, 6),
+                  floor = points_rectangle(10000, 4.0, 4.0, POINTS_ALL, 5);
     const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, below[3] = {0.0, 0.0, -0.6};
     float *values = calloc(POINTS, sizeof *values);
     uint8_t *bits[2] = {calloc(POINTS / 8, 1), calloc(POINTS / 8, 1)};
@@ -41,7 +42,7 @@ static struct room room_make(float threshold)
         bits[values[i] > threshold][i / 8] |= (uint8_t)(1u << i % 8);
     }
     values[5] = NAN; // is 0
-    bits[1][0] &= (uint8_t)~(1u << 5);
+    bits[1][0] &= (uint8_t) ~(1u << 5);
     bits[0][0] |= 1u << 5;
     points_transform(&floor, same, below);
     room.torus = points_upload(&torus);
@@ -90,7 +91,8 @@ static patina_cloud_style field_style(const struct room *room, uint32_t model)
 // The floor, the styles of the torus that are given, and a sun.
 static patina_scene *scene_with(const struct room *room, const patina_cloud_style *first, const patina_cloud_style *second)
 {
-    const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {0.4, 0.5, -1.0}, .shadows = 1};
+    const patina_light_desc sun = {
+        .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {0.4, 0.5, -1.0}, .shadows = 1};
     patina_cloud_style lit = PATINA_CLOUD_STYLE_INIT;
     lit.lighting = PATINA_LIGHTING_LIT;
     patina_scene *scene = scene_of(room->torus, first);
@@ -101,7 +103,8 @@ static patina_scene *scene_with(const struct room *room, const patina_cloud_styl
     return scene;
 }
 
-static struct picture draw(patina_device *device, const struct room *room, const patina_cloud_style *first, const patina_cloud_style *second)
+static struct picture draw(patina_device *device, const struct room *room, const patina_cloud_style *first,
+                           const patina_cloud_style *second)
 {
     patina_scene *scene = scene_with(room, first, second);
     struct picture picture = picture_render(device, scene, &room->camera, &room->settings);
@@ -111,8 +114,8 @@ static struct picture draw(patina_device *device, const struct room *room, const
 
 static void assert_same(const struct picture *a, const struct picture *b, const char *what)
 {
-    if (memcmp(a->combined, b->combined, (size_t)WIDTH * HEIGHT * 16) || memcmp(a->depth, b->depth, (size_t)WIDTH * HEIGHT * 4) ||
-        memcmp(a->normal, b->normal, (size_t)WIDTH * HEIGHT * 12))
+    if (memcmp(a->combined, b->combined, (size_t)WIDTH * HEIGHT * 16) ||
+        memcmp(a->depth, b->depth, (size_t)WIDTH * HEIGHT * 4) || memcmp(a->normal, b->normal, (size_t)WIDTH * HEIGHT * 12))
         fail_msg("%s: another picture", what);
 }
 
@@ -140,7 +143,8 @@ static void divide(patina_device *device, const char *name)
     static const float thresholds[] = {0.5f, 0.3f, 0.9f};
     for (uint32_t model = 0; model < 3; model++) {
         struct room room = room_make(thresholds[model]);
-        patina_cloud_style style = field_style(&room, model), solid = style_of(PATINA_SOFT_OFF, 0), soft = style_of(PATINA_SOFT_ALL, model);
+        patina_cloud_style style = field_style(&room, model), solid = style_of(PATINA_SOFT_OFF, 0),
+                           soft = style_of(PATINA_SOFT_ALL, model);
         solid.mask = room.solid;
         soft.mask = room.soft;
         if (model == 1) // the points' own radii
@@ -209,7 +213,8 @@ static void modulate(patina_device *device, const char *name)
     patina_field *even = NULL;
     CHECK(field_of(room.torus, values, POINTS, &even), NULL);
     for (int k = 0; k < 2; k++) {
-        patina_cloud_style style = field_style(&room, PATINA_SOFT_EXPRESS), all = style_of(PATINA_SOFT_ALL, PATINA_SOFT_EXPRESS);
+        patina_cloud_style style = field_style(&room, PATINA_SOFT_EXPRESS),
+                           all = style_of(PATINA_SOFT_ALL, PATINA_SOFT_EXPRESS);
         style.field = even;
         style.soft_threshold = 0.25f;
         style.soft_modulation = k ? 0.1f : 0.4f;
@@ -243,7 +248,8 @@ static void test_modulation(void **state)
 static void test_sources(void **state)
 {
     (void)state;
-    static const char *const names[] = {"from a point", "from a plane", "from an axis", "luminance", "uncertainty", "any range"};
+    static const char *const names[] = {"from a point", "from a plane", "from an axis",
+                                        "luminance",    "uncertainty",  "any range"};
     patina_device *device = support_device_first();
     struct room room = room_make(0.5f);
     struct points torus = points_torus(POINTS, 1.0, 0.4, POINTS_ALL, 6);
@@ -252,9 +258,13 @@ static void test_sources(void **state)
     for (uint32_t k = 0; k < 6; k++) {
         patina_field_desc desc = {.struct_size = sizeof desc, .range = {0.3, 1.7}};
         const double at[3] = {0.4, -0.3, 0.2}, twice[16] = {2, 0, 0, 0.1, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1};
-        const double tilted[16] = {3, 0, 0, at[0], 0, 1.2, -1.6, at[1], 0, 1.6, 1.2, at[2], 0, 0, 0, 1}; // z of 2 along (0, -0.8, 0.6)
+        const double tilted[16] = {3, 0,   0,   at[0], 0, 1.2, -1.6, at[1],
+                                   0, 1.6, 1.2, at[2], 0, 0,   0,    1}; // z of 2 along (0, -0.8, 0.6)
         patina_field *found = NULL, *given = NULL;
-        desc.source = k < 3 ? PATINA_FIELD_DISTANCE : k == 3 ? PATINA_FIELD_LUMINANCE : k == 4 ? PATINA_FIELD_UNCERTAINTY : PATINA_FIELD_VALUES;
+        desc.source = k < 3    ? PATINA_FIELD_DISTANCE
+                      : k == 3 ? PATINA_FIELD_LUMINANCE
+                      : k == 4 ? PATINA_FIELD_UNCERTAINTY
+                               : PATINA_FIELD_VALUES;
         desc.shape = k < 3 ? k : 0;
         memcpy(desc.world_from_object, twice, sizeof twice);
         memcpy(desc.world_from_shape, tilted, sizeof tilted);
@@ -357,8 +367,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_divide), cmocka_unit_test(test_threshold), cmocka_unit_test(test_modulation), cmocka_unit_test(test_sources),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_divide),  cmocka_unit_test(test_threshold), cmocka_unit_test(test_modulation),
+        cmocka_unit_test(test_sources), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

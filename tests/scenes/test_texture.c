@@ -128,7 +128,8 @@ static void small_is_even(void **state)
         before = sum / count;
         picture_free(&picture);
     }
-    printf("chequered floor: mean %.4f, changes by %.5f from step to step, pixels differ by %.4f at most\n", before, most, contrast);
+    printf("chequered floor: mean %.4f, changes by %.5f from step to step, pixels differ by %.4f at most\n", before, most,
+           contrast);
     assert_true(fabs(before - 0.5) < 0.01 && most < 0.002 && contrast < 0.02);
     patina_scene_destroy(scene);
     patina_mesh_destroy(mesh);
@@ -184,8 +185,8 @@ static void cut_out(void **state)
     CHECK(patina_scene_create(&scene), NULL);
     add(scene, sheet, texture, PATINA_ALPHA_CLIP, 0);
     mesh_add(scene, floor, 0.0f, 0.0f, 1.0f);
-    const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {0.7, 0, -0.7},
-                                   .shadows = 1};
+    const patina_light_desc sun = {
+        .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {0.7, 0, -0.7}, .shadows = 1};
     CHECK(patina_scene_add_light(scene, &sun), scene);
     const patina_camera camera = camera_orthographic(above, below, 4.0, SIZE, SIZE, 0.1, 10.0); // 32 pixels a unit
     patina_settings settings = settings_default(SIZE, SIZE);
@@ -255,15 +256,20 @@ static void region_is_a_crop(void **state)
     patina_scene *scene = scene_of(cloud, &style);
     add(scene, pane, texture, PATINA_ALPHA_BLEND, 0);
     add(scene, floor, texture, PATINA_ALPHA_NONE, 0);
-    const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {-0.5, 0.2, -1.0},
-                                   .angle = 0.1f, .shadows = 1};
+    const patina_light_desc sun = {.struct_size = sizeof sun,
+                                   .type = PATINA_LIGHT_SUN,
+                                   .power = 3.0f,
+                                   .direction = {-0.5, 0.2, -1.0},
+                                   .angle = 0.1f,
+                                   .shadows = 1};
     CHECK(patina_scene_add_light(scene, &sun), scene);
     const double eye[3] = {1.5, -4.0, 3.0};
     const patina_camera camera = camera_perspective(eye, below, 45.0, SIZE, SIZE, 0.1, 100.0);
     patina_settings settings = settings_default(SIZE, SIZE);
     settings.shadow_samples = 4;
     patina_device *device = support_device_first(), *alone = support_device_open(support_device_name(0), 1, 3);
-    struct picture whole = picture_render(device, scene, &camera, &settings), same = picture_render(alone, scene, &camera, &settings);
+    struct picture whole = picture_render(device, scene, &camera, &settings),
+                   same = picture_render(alone, scene, &camera, &settings);
     picture_assert_identical(&same, &whole, 0, 0, "one thread");
     settings.region[0] = 31;
     settings.region[1] = 40;
@@ -292,13 +298,16 @@ static void shadow_behind_glass(void **state)
     patina_cloud *cloud = points_upload(&points);
     points_free(&points);
     patina_mesh *floor = square(2.0, -0.5, 1.0), *beam = mesh_box(middle, half);
-    const patina_cloud_style style = {.struct_size = sizeof style, .transparency = 0.5f, .lighting = PATINA_LIGHTING_UNLIT,
-                                      .exact = 1, .shadow_off = PATINA_SHADOW_NO_CAST};
+    const patina_cloud_style style = {.struct_size = sizeof style,
+                                      .transparency = 0.5f,
+                                      .lighting = PATINA_LIGHTING_UNLIT,
+                                      .exact = 1,
+                                      .shadow_off = PATINA_SHADOW_NO_CAST};
     patina_scene *scene = scene_of(cloud, &style);
     mesh_add(scene, floor, 1.0f, 1.0f, 1.0f);
     mesh_add(scene, beam, 1.0f, 1.0f, 1.0f);
-    const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.14159265f, .direction = {0.5, 0, -1.0},
-                                   .shadows = 1};
+    const patina_light_desc sun = {
+        .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.14159265f, .direction = {0.5, 0, -1.0}, .shadows = 1};
     CHECK(patina_scene_add_light(scene, &sun), scene);
     patina_device *device = support_device_first();
     const patina_camera camera = camera_orthographic(above, below, 4.0, SIZE, SIZE, 0.1, 10.0);
@@ -326,8 +335,12 @@ static void progressive(void **state)
     CHECK(patina_scene_create(&scene), NULL);
     mesh_add(scene, floor, 1.0f, 1.0f, 1.0f);
     mesh_add(scene, slab, 1.0f, 1.0f, 1.0f);
-    const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 3.0f, .direction = {0.5, 0, -1.0},
-                                   .angle = 0.2f, .shadows = 1};
+    const patina_light_desc sun = {.struct_size = sizeof sun,
+                                   .type = PATINA_LIGHT_SUN,
+                                   .power = 3.0f,
+                                   .direction = {0.5, 0, -1.0},
+                                   .angle = 0.2f,
+                                   .shadows = 1};
     CHECK(patina_scene_add_light(scene, &sun), scene);
     patina_device *device = support_device_first();
     patina_camera camera = camera_orthographic(above, below, 4.0, SIZE, SIZE, 0.1, 10.0);
@@ -417,9 +430,15 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(texel_by_texel),   cmocka_unit_test(small_is_even),       cmocka_unit_test(linear_between),
-        cmocka_unit_test(cut_out),          cmocka_unit_test(blended),             cmocka_unit_test(region_is_a_crop),
-        cmocka_unit_test(shadow_behind_glass), cmocka_unit_test(progressive),      cmocka_unit_test(refuses),
+        cmocka_unit_test(texel_by_texel),
+        cmocka_unit_test(small_is_even),
+        cmocka_unit_test(linear_between),
+        cmocka_unit_test(cut_out),
+        cmocka_unit_test(blended),
+        cmocka_unit_test(region_is_a_crop),
+        cmocka_unit_test(shadow_behind_glass),
+        cmocka_unit_test(progressive),
+        cmocka_unit_test(refuses),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -68,7 +68,8 @@ static void test_through(void **state)
                 continue;
             struct picture picture = picture_render(device, scene, &camera, &settings);
             const double share = through(&picture);
-            printf("  %g points a pixel, %s: the inner sphere shows in %.2f %%\n", densities[d], support_device_name(i), 100.0 * share);
+            printf("  %g points a pixel, %s: the inner sphere shows in %.2f %%\n", densities[d], support_device_name(i),
+                   100.0 * share);
             assert_true(share <= 0.02);
             if (first.keys)
                 assert_memory_equal(first.keys, picture.keys, (size_t)SIZE * SIZE * 8);

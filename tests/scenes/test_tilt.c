@@ -98,10 +98,7 @@ static struct loss measure(patina_device *device, const struct plane *plane, con
     return loss;
 }
 
-static double percent(struct loss loss)
-{
-    return loss.measured ? 100.0 * (double)loss.lost / (double)loss.measured : 0.0;
-}
+static double percent(struct loss loss) { return loss.measured ? 100.0 * (double)loss.lost / (double)loss.measured : 0.0; }
 
 static void test_tilted_planes(void **state)
 {

@@ -222,10 +222,7 @@ static struct layer_tally compare_layer(const struct truth *truth, const struct 
     return tally;
 }
 
-static double percent(uint64_t part, uint64_t whole)
-{
-    return whole ? 100.0 * (double)part / (double)whole : 100.0;
-}
+static double percent(uint64_t part, uint64_t whole) { return whole ? 100.0 * (double)part / (double)whole : 100.0; }
 
 // Six million points, six layers.
 static void test_nested_tori(void **state)
@@ -341,9 +338,8 @@ static const float *middle(const struct picture *picture) { return picture->comb
 // Three sheets of glass blend as the sum says, down to the cap.
 static void blend_sheets(patina_device *device)
 {
-    static const struct sheet sheet[PLANES] = {{0.0, 0.25f, {0.1f, 0.2f, 0.9f}, NULL},
-                                               {2.0, 0.5f, {0.9f, 0.4f, 0.1f}, NULL},
-                                               {1.0, 0.7f, {0.2f, 0.8f, 0.3f}, NULL}};
+    static const struct sheet sheet[PLANES] = {
+        {0.0, 0.25f, {0.1f, 0.2f, 0.9f}, NULL}, {2.0, 0.5f, {0.9f, 0.4f, 0.1f}, NULL}, {1.0, 0.7f, {0.2f, 0.8f, 0.3f}, NULL}};
     static const int order[PLANES] = {1, 2, 0}; // from the eye
     for (uint32_t layers = 0; layers <= PLANES + 1; layers++) {
         patina_frame_stats stats = {.struct_size = sizeof stats};
@@ -507,8 +503,8 @@ static uint64_t *scatter_behind(patina_frame *frame, const struct pt_plan *plan,
     CHECK(device->ops->buffer_fill(device, &keys, 0, keys.size, KEY_EMPTY, 8), device);
     CHECK(pt_residency_take(&frame->residency, device, cloud, &resident), device);
     struct scatter_args args = {.view = plan->view, .instances = 1, .behind = 1};
-    struct pt_buffer none = {0}, *buffers[] = {&keys, &frame->planes.at[PT_PLANE_LIMIT][0], &none, &list,
-                                               &resident->buffers[PT_POSITIONS], &resident->buffers[PT_SURFACE]};
+    struct pt_buffer none = {0}, *buffers[] = {&keys, &frame->planes.at[PT_PLANE_LIMIT][0], &none,
+                                               &list, &resident->buffers[PT_POSITIONS],     &resident->buffers[PT_SURFACE]};
     CHECK(device->ops->run(device, PT_KERNEL_scatter, &args, sizeof args, buffers, 6, NULL), device);
     CHECK(device->ops->buffer_read(device, &keys, 0, out, pixels * 8), device);
     device->ops->buffer_destroy(device, &keys);
@@ -573,12 +569,8 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_nested_tori),
-        cmocka_unit_test(test_sheets),
-        cmocka_unit_test(test_layer_distance),
-        cmocka_unit_test(test_exact_opacities),
-        cmocka_unit_test(test_first_layer),
-        cmocka_unit_test(test_chunks_left_out),
+        cmocka_unit_test(test_nested_tori),     cmocka_unit_test(test_sheets),      cmocka_unit_test(test_layer_distance),
+        cmocka_unit_test(test_exact_opacities), cmocka_unit_test(test_first_layer), cmocka_unit_test(test_chunks_left_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -108,9 +108,9 @@ static struct setting prepare(const struct scenario *scenario)
     double high = sin(elevation * M_PI / 180.0), across = cos(elevation * M_PI / 180.0);
     const double eye[3] = {0.3 * distance * across, -0.9539392 * distance * across, distance * high};
     const double target[3] = {0.0, 0.0, 0.0};
-    set.camera = scenario->orthographic ? camera_orthographic(eye, target, 3.4, SIZE, SIZE, -10.0, 20.0)
-                                        : camera_perspective(eye, target, 2.0 * atan(1.7 / distance) * 180.0 / M_PI,
-                                                             SIZE, SIZE, 0.1, 100.0);
+    set.camera = scenario->orthographic
+                     ? camera_orthographic(eye, target, 3.4, SIZE, SIZE, -10.0, 20.0)
+                     : camera_perspective(eye, target, 2.0 * atan(1.7 / distance) * 180.0 / M_PI, SIZE, SIZE, 0.1, 100.0);
     return set;
 }
 
@@ -155,20 +155,19 @@ static void test_known_shapes(void **state)
     (void)state;
     patina_device *device = support_device_first();
     uint32_t failures = 0;
-    printf(
-        "  %dx%d; holes and growth in %% of the truth's pixels (inner, outer: a pixel away from its border); depth in\n"
-        "  spacings, normals in degrees, colour as a share of white, all where the truth covers the 3x3 around\n"
-        "  shape                   pts/px |    IoU |  holes  inner | growth  outer | depth rms  p99.9 | normal mean  "
-        "p99 | colour rms   p99\n",
-        SIZE, SIZE);
+    printf("  %dx%d; holes and growth in %% of the truth's pixels (inner, outer: a pixel away from its border); depth in\n"
+           "  spacings, normals in degrees, colour as a share of white, all where the truth covers the 3x3 around\n"
+           "  shape                   pts/px |    IoU |  holes  inner | growth  outer | depth rms  p99.9 | normal mean  "
+           "p99 | colour rms   p99\n",
+           SIZE, SIZE);
     for (uint32_t i = 0; i < sizeof scenarios / sizeof scenarios[0]; i++) {
         const struct scenario *scenario = &scenarios[i];
         struct analytic_error error = measure(device, scenario);
         int good = within(&error, &scenario->bounds);
-        printf("  %-23s %6g | %.4f | %6.3f %6.4f | %6.3f %6.4f | %9.4f %6.3f | %11.3f %6.2f | %9.4f %6.4f%s\n",
-               scenario->name, scenario->density, error.iou, 100.0 * error.holes, 100.0 * error.inner_holes,
-               100.0 * error.growth, 100.0 * error.outer_growth, error.depth_rms, error.depth_p999, error.normal_mean,
-               error.normal_p99, error.color_rms, error.color_p99, good ? "" : "  <- beyond its bounds");
+        printf("  %-23s %6g | %.4f | %6.3f %6.4f | %6.3f %6.4f | %9.4f %6.3f | %11.3f %6.2f | %9.4f %6.4f%s\n", scenario->name,
+               scenario->density, error.iou, 100.0 * error.holes, 100.0 * error.inner_holes, 100.0 * error.growth,
+               100.0 * error.outer_growth, error.depth_rms, error.depth_p999, error.normal_mean, error.normal_p99,
+               error.color_rms, error.color_p99, good ? "" : "  <- beyond its bounds");
         failures += (uint32_t)!good;
     }
     assert_int_equal(failures, 0);

@@ -25,14 +25,11 @@ static inline patina_file *open_bytes(const void *data, size_t size)
     return file;
 }
 
-static inline patina_file *open_text(const char *text)
-{
-    return open_bytes(text, strlen(text));
-}
+static inline patina_file *open_text(const char *text) { return open_bytes(text, strlen(text)); }
 
 static inline patina_file_info info_of(const patina_file *file)
 {
-    patina_file_info info = { .struct_size = sizeof info };
+    patina_file_info info = {.struct_size = sizeof info};
     assert_int_equal(patina_file_get_info(file, &info), PATINA_OK);
     return info;
 }
@@ -48,10 +45,7 @@ static inline void refuse_bytes(const void *data, size_t size, int code, const c
         fail_msg("wanted %d '%s', got %d '%s'", code, words, got, message);
 }
 
-static inline void refuse(const char *text, const char *words)
-{
-    refuse_bytes(text, strlen(text), PATINA_ERROR_FORMAT, words);
-}
+static inline void refuse(const char *text, const char *words) { refuse_bytes(text, strlen(text), PATINA_ERROR_FORMAT, words); }
 
 static inline void expect_positions(const patina_file *file, const float *wanted, size_t values)
 {
@@ -66,7 +60,7 @@ static inline void expect_positions(const patina_file *file, const float *wanted
 static inline void expect_one(const char *text, float x, float y, float z)
 {
     patina_file *file = open_text(text);
-    expect_positions(file, (float[]){ x, y, z }, 3);
+    expect_positions(file, (float[]){x, y, z}, 3);
     patina_file_destroy(file);
 }
 

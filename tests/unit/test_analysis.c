@@ -131,10 +131,17 @@ static struct read read_cloud(patina_cloud *cloud)
 {
     patina_cloud_info info = {.struct_size = sizeof info};
     CHECK(patina_cloud_get_info(cloud, &info), cloud);
-    struct read r = {calloc(info.count + 1, 12), calloc(info.count + 1, 4), calloc(info.count + 1, 8), calloc(info.count + 1, 4),
-                     calloc(info.count + 1, 4),  calloc(info.count + 1, 12), calloc(info.count + 1, 1)};
-    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .normal = r.normal, .axis = r.axis, .spacing = r.spacing,
-                                          .half_axes = r.half_axes, .sigma = r.sigma, .certainty = r.certainty, .kind = r.kind};
+    struct read r = {calloc(info.count + 1, 12), calloc(info.count + 1, 4), calloc(info.count + 1, 8),
+                     calloc(info.count + 1, 4),  calloc(info.count + 1, 4), calloc(info.count + 1, 12),
+                     calloc(info.count + 1, 1)};
+    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted,
+                                          .normal = r.normal,
+                                          .axis = r.axis,
+                                          .spacing = r.spacing,
+                                          .half_axes = r.half_axes,
+                                          .sigma = r.sigma,
+                                          .certainty = r.certainty,
+                                          .kind = r.kind};
     CHECK(patina_cloud_neighbourhoods(cloud, &wanted, NULL), cloud);
     return r;
 }
@@ -199,7 +206,10 @@ static void test_sigma(void **state)
             double noise = -6.0;
             for (int k = 0; k < 12; k++)
                 noise += pcg_unit(&random);
-            p[i][2] = kind == 0 ? 0.0 : kind == 1 ? 0.5 * p[i][0] * p[i][0] : kind == 2 ? 0.4 * spacing * noise : 0.05 * spacing * noise;
+            p[i][2] = kind == 0   ? 0.0
+                      : kind == 1 ? 0.5 * p[i][0] * p[i][0]
+                      : kind == 2 ? 0.4 * spacing * noise
+                                  : 0.05 * spacing * noise;
             p[i][2] += i % 2 ? apart : 0.0;
         }
         patina_cloud *cloud = build_doubles(&p[0][0], COUNT);
@@ -209,8 +219,16 @@ static void test_sigma(void **state)
         for (int i = 0; i < COUNT; i++)
             mean += (double)r.sigma[i] / COUNT / spacing;
         printf("  sigma of %s: %.3f spacings\n",
-               kind == 0 ? "a plane" : kind == 1 ? "a bent plane" : kind == 2 ? "noise of 0.4" : kind == 3 ? "two scans 0.7 apart" : "two surfaces 2.1 apart", mean);
-        assert_true(kind < 2 ? mean < 0.03 : kind == 2 ? fabs(mean - 0.4) < 0.08 : kind == 3 ? mean > 0.28 && mean < 0.42 : mean < 0.3);
+               kind == 0   ? "a plane"
+               : kind == 1 ? "a bent plane"
+               : kind == 2 ? "noise of 0.4"
+               : kind == 3 ? "two scans 0.7 apart"
+                           : "two surfaces 2.1 apart",
+               mean);
+        assert_true(kind < 2    ? mean < 0.03
+                    : kind == 2 ? fabs(mean - 0.4) < 0.08
+                    : kind == 3 ? mean > 0.28 && mean < 0.42
+                                : mean < 0.3);
         read_free(&r);
         patina_cloud_destroy(cloud);
     }
@@ -257,8 +275,9 @@ static void test_kinds(void **state)
         line += r.kind[i] == PATINA_KIND_LINE;
     for (uint32_t i = ROWS * COLUMNS + WIRE; i < COUNT; i++)
         stray += r.kind[i] == PATINA_KIND_STRAY && r.half_axes[2 * i] < 10.0f;
-    printf("  rows 1 : 10: %u of %u ellipses across; %u of %u of the rim are border, %u of %d of the wire line, %u of %d strays\n",
-           right, inner, border, rim, line, WIRE, stray, STRAYS);
+    printf(
+        "  rows 1 : 10: %u of %u ellipses across; %u of %u of the rim are border, %u of %d of the wire line, %u of %d strays\n",
+        right, inner, border, rim, line, WIRE, stray, STRAYS);
     assert_true(right > inner * 95 / 100);
     assert_true(border > rim * 90 / 100);
     assert_true(line > WIRE * 95 / 100);
@@ -277,7 +296,8 @@ static void test_far_away(void **state)
     struct pcg random = pcg_seed(8);
     for (int i = 0; i < COUNT; i++) {
         const double u = floor(1024.0 * pcg_unit(&random)), v = floor(1024.0 * pcg_unit(&random));
-        const double place[3] = {u / 1024.0, v / 1024.0, (double)(((int)u ^ (int)v) & 3) / 1024.0}; // millimetres, nearly; exact at both places
+        const double place[3] = {u / 1024.0, v / 1024.0,
+                                 (double)(((int)u ^ (int)v) & 3) / 1024.0}; // millimetres, nearly; exact at both places
         for (int k = 0; k < 3; k++) {
             near[3 * i + k] = place[k];
             far[3 * i + k] = place[k] + 5e6;
@@ -307,7 +327,12 @@ static void test_hard(void **state)
             for (uint64_t i = 0; i < count; i++)
                 for (int k = 0; k < 3; k++) {
                     const double u = pcg_unit(&random);
-                    p[i][k] = kind == 0 ? u : kind == 1 ? 7.0 : kind == 2 ? u * 1e-18 : kind == 3 ? u * 1e15 : kind == 4 ? (double)i : NAN;
+                    p[i][k] = kind == 0   ? u
+                              : kind == 1 ? 7.0
+                              : kind == 2 ? u * 1e-18
+                              : kind == 3 ? u * 1e15
+                              : kind == 4 ? (double)i
+                                          : NAN;
                     if (kind == 0 && i % 7 == 3)
                         p[i][k] = k ? INFINITY : NAN;
                 }
@@ -350,7 +375,10 @@ static void test_words(void **state)
         }
         for (int k = 0; k < 3; k++)
             axis[k] /= sqrt(length);
-        struct pt_neighbourhood in = {.kind = 1u + (uint32_t)i % 5u, .major = exp(pcg_between(&random, 0.0, 9.0)), .certainty = 0.4}, out;
+        struct pt_neighbourhood in = {.kind = 1u + (uint32_t)i % 5u,
+                                      .major = exp(pcg_between(&random, 0.0, 9.0)),
+                                      .certainty = 0.4},
+                                out;
         in.minor = in.major / exp(pcg_between(&random, 0.0, 2.4));
         in.sigma = 0.3;
         memcpy(in.axis, axis, sizeof axis);
@@ -373,7 +401,8 @@ static void test_threads(void **state)
     patina_cloud_desc plain = points_desc(&points);
     plain.normal.data = NULL;
     for (int voted = 1; voted >= 0; voted--) {
-        patina_cloud *one = voted ? build(&plain) : points_upload(&points), *other = voted ? build(&plain) : points_upload(&points);
+        patina_cloud *one = voted ? build(&plain) : points_upload(&points),
+                     *other = voted ? build(&plain) : points_upload(&points);
         analyse(one, 1);
         analyse(other, 3);
         assert_memory_equal(one->shapes, other->shapes, one->slots * 4);
@@ -397,7 +426,8 @@ static void test_orientation(void **state)
         given.normal.data = way < 2 ? desc.normal.data : NULL;
         patina_cloud *cloud = build(&given);
         const double station[3] = {0.0, 0.0, 0.0}; // inside
-        const patina_analysis_desc how = {.struct_size = sizeof how, .keep_normals = way == 0, .station_count = way == 2, .stations = station};
+        const patina_analysis_desc how = {
+            .struct_size = sizeof how, .keep_normals = way == 0, .station_count = way == 2, .stations = station};
         uint32_t *before = malloc(cloud->slots * 4);
         memcpy(before, cloud->surface, cloud->slots * 4);
         CHECK(patina_cloud_analyse(cloud, &how, NULL), cloud);
@@ -520,7 +550,11 @@ static void test_soft(void **state)
     patina_cloud *cloud = points_upload(&points);
     float *radius = calloc(points.count, 4), *uncertainty = calloc(points.count, 4);
     double *distances = calloc(points.count, 24 * 8);
-    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .neighbours = 24, .soft_radius = radius, .uncertainty = uncertainty, .distances = distances};
+    const patina_neighbourhoods wanted = {.struct_size = sizeof wanted,
+                                          .neighbours = 24,
+                                          .soft_radius = radius,
+                                          .uncertainty = uncertainty,
+                                          .distances = distances};
     CHECK(patina_cloud_neighbourhoods(cloud, &wanted, NULL), cloud);
     uint32_t full = 0;
     for (uint64_t i = 0; i < points.count; i++) {
@@ -539,10 +573,11 @@ static void test_soft(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_neighbours), cmocka_unit_test(test_torus),       cmocka_unit_test(test_kinds), cmocka_unit_test(test_sigma),
-        cmocka_unit_test(test_far_away),   cmocka_unit_test(test_hard),        cmocka_unit_test(test_words),
-        cmocka_unit_test(test_threads),    cmocka_unit_test(test_orientation), cmocka_unit_test(test_votes), cmocka_unit_test(test_saved_and_task),
-        cmocka_unit_test(test_cancel_and_refusals), cmocka_unit_test(test_soft),
+        cmocka_unit_test(test_neighbours), cmocka_unit_test(test_torus),          cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_sigma),      cmocka_unit_test(test_far_away),       cmocka_unit_test(test_hard),
+        cmocka_unit_test(test_words),      cmocka_unit_test(test_threads),        cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_votes),      cmocka_unit_test(test_saved_and_task), cmocka_unit_test(test_cancel_and_refusals),
+        cmocka_unit_test(test_soft),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -45,9 +45,8 @@ static struct scan *make_scan(void)
 static patina_cloud *cloud_of(const struct scan *scan)
 {
     patina_cloud *cloud = NULL;
-    const patina_cloud_desc desc = {.struct_size = sizeof desc,
-                                    .count = scan->count,
-                                    .position = {scan->position, PATINA_FLOAT64, 3, 0}};
+    const patina_cloud_desc desc = {
+        .struct_size = sizeof desc, .count = scan->count, .position = {scan->position, PATINA_FLOAT64, 3, 0}};
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
     return cloud;
 }
@@ -167,7 +166,8 @@ static void test_unknown(void **state)
     const double p[3] = {0.0, 0.0, 0.0};
     const struct pt_sample none = {.count = 0};
     struct pt_beam beam = {.place = {0.0, 0.0, 0.0}, .interval = {step, step, 0}};
-    struct pt_neighbourhood hood = {.has_normal = 1, .normal = {0, 0, 1}, .axis = {1, 0, 0}, .major = 2.0, .minor = 1.0, .certainty = 1.0};
+    struct pt_neighbourhood hood = {
+        .has_normal = 1, .normal = {0, 0, 1}, .axis = {1, 0, 0}, .major = 2.0, .minor = 1.0, .certainty = 1.0};
     pt_beam_limit(&beam, p, &none, &hood);
     assert_true(hood.major == 2.0 && hood.minor == 1.0);
     beam.place[0] = 10.0;
@@ -206,12 +206,8 @@ static void test_strays(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_interval),
-        cmocka_unit_test(test_steep),
-        cmocka_unit_test(test_camera),
-        cmocka_unit_test(test_footprints),
-        cmocka_unit_test(test_unknown),
-        cmocka_unit_test(test_strays),
+        cmocka_unit_test(test_interval),   cmocka_unit_test(test_steep),   cmocka_unit_test(test_camera),
+        cmocka_unit_test(test_footprints), cmocka_unit_test(test_unknown), cmocka_unit_test(test_strays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

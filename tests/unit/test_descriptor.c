@@ -72,10 +72,7 @@ static int write_ply(const void *desc)
     return patina_write_ply("/dev/null/no", desc) == PATINA_ERROR_FILE ? PATINA_OK : patina_write_ply("/dev/null/no", desc);
 }
 
-static int analyse(const void *desc)
-{
-    return patina_cloud_analyse(stage.bare, desc, NULL);
-}
+static int analyse(const void *desc) { return patina_cloud_analyse(stage.bare, desc, NULL); }
 
 static int analyse_task(const void *desc)
 {
@@ -84,10 +81,7 @@ static int analyse_task(const void *desc)
     return ended(code, task);
 }
 
-static int neighbourhoods(const void *desc)
-{
-    return patina_cloud_neighbourhoods(stage.cloud, desc, NULL);
-}
+static int neighbourhoods(const void *desc) { return patina_cloud_neighbourhoods(stage.cloud, desc, NULL); }
 
 static int mesh(const void *desc)
 {
@@ -105,10 +99,7 @@ static int texture(const void *desc)
     return code;
 }
 
-static int grid(const void *desc)
-{
-    return patina_grid_normals(desc, NULL, stage.plane[0]);
-}
+static int grid(const void *desc) { return patina_grid_normals(desc, NULL, stage.plane[0]); }
 
 static int grid_task(const void *desc)
 {
@@ -141,25 +132,13 @@ static int add_light(const void *desc)
     return patina_scene_add_light(stage.scene, desc);
 }
 
-static int set_camera(const void *desc)
-{
-    return patina_scene_set_camera(stage.scene, desc);
-}
+static int set_camera(const void *desc) { return patina_scene_set_camera(stage.scene, desc); }
 
-static int set_settings(const void *desc)
-{
-    return patina_scene_set_settings(stage.scene, desc);
-}
+static int set_settings(const void *desc) { return patina_scene_set_settings(stage.scene, desc); }
 
-static int set_effects(const void *desc)
-{
-    return patina_scene_set_effects(stage.scene, desc);
-}
+static int set_effects(const void *desc) { return patina_scene_set_effects(stage.scene, desc); }
 
-static int set_lines(const void *desc)
-{
-    return patina_scene_set_lines(stage.scene, desc);
-}
+static int set_lines(const void *desc) { return patina_scene_set_lines(stage.scene, desc); }
 
 static int panorama_camera(const void *desc)
 {
@@ -229,28 +208,46 @@ static void test_what_is_read(void **state)
     (void)state;
     static float results[3 * POINTS];
     const patina_array position = {stage.points, PATINA_FLOAT32, 3, 0};
-    const patina_device_desc device_desc = {.struct_size = sizeof device_desc, .name = "cpu", .threads = 1, .memory_cap = 1u << 30};
-    const patina_cloud_desc cloud_desc = {.struct_size = sizeof cloud_desc, .count = POINTS, .position = position, .origin = {1, 2, 3}, .threads = 1};
+    const patina_device_desc device_desc = {
+        .struct_size = sizeof device_desc, .name = "cpu", .threads = 1, .memory_cap = 1u << 30};
+    const patina_cloud_desc cloud_desc = {
+        .struct_size = sizeof cloud_desc, .count = POINTS, .position = position, .origin = {1, 2, 3}, .threads = 1};
     const double station[3] = {0, 0, 5};
-    const patina_analysis_desc analysis = {.struct_size = sizeof analysis, .neighbours = 6, .threads = 1, .station_count = 1, .stations = station};
+    const patina_analysis_desc analysis = {
+        .struct_size = sizeof analysis, .neighbours = 6, .threads = 1, .station_count = 1, .stations = station};
     const patina_neighbourhoods wanted = {.struct_size = sizeof wanted, .normal = results, .neighbours = 3, .threads = 1};
-    const patina_mesh_desc mesh_desc = {.struct_size = sizeof mesh_desc, .vertex_count = 6, .position = position, .triangle_count = 2};
-    const patina_texture_desc texture_desc = {.struct_size = sizeof texture_desc, .width = 4, .height = 4,
-                                              .pixels = {stage.pixels, PATINA_FLOAT32, 4, 0}, .raw = 1, .wrap = PATINA_WRAP_CLIP};
-    const patina_grid_desc grid_desc = {.struct_size = sizeof grid_desc, .count = POINTS, .position = stage.points[0], .column = stage.column,
-                                        .row = stage.row, .station = {0, 0, 5}};
+    const patina_mesh_desc mesh_desc = {
+        .struct_size = sizeof mesh_desc, .vertex_count = 6, .position = position, .triangle_count = 2};
+    const patina_texture_desc texture_desc = {.struct_size = sizeof texture_desc,
+                                              .width = 4,
+                                              .height = 4,
+                                              .pixels = {stage.pixels, PATINA_FLOAT32, 4, 0},
+                                              .raw = 1,
+                                              .wrap = PATINA_WRAP_CLIP};
+    const patina_grid_desc grid_desc = {.struct_size = sizeof grid_desc,
+                                        .count = POINTS,
+                                        .position = stage.points[0],
+                                        .column = stage.column,
+                                        .row = stage.row,
+                                        .station = {0, 0, 5}};
     patina_cloud_style cloud_style = PATINA_CLOUD_STYLE_INIT;
     cloud_style.transparency = 0.5f;
     const patina_mesh_style mesh_style = PATINA_MESH_STYLE_INIT;
     const patina_clip clip = {.struct_size = sizeof clip, .cut = 1, .tint = {1, 1, 1}, .tint_strength = 1, .tint_width = 1};
-    const patina_light_desc light = {.struct_size = sizeof light, .type = PATINA_LIGHT_SPOT, .power = 1, .cone = 1, .shadows = 1};
+    const patina_light_desc light = {
+        .struct_size = sizeof light, .type = PATINA_LIGHT_SPOT, .power = 1, .cone = 1, .shadows = 1};
     patina_camera camera = {.struct_size = sizeof camera};
     assert_int_equal(patina_scene_frame_camera(stage.scene, 0, 0, 0, &camera), PATINA_OK);
-    const patina_settings settings = {.struct_size = sizeof settings, .width = 16, .height = 16, .layers = 2, .pixel_noise = 0.5f, .average = 1};
+    const patina_settings settings = {
+        .struct_size = sizeof settings, .width = 16, .height = 16, .layers = 2, .pixel_noise = 0.5f, .average = 1};
     const patina_effects effects = PATINA_EFFECTS_INIT;
     const patina_lines lines = PATINA_LINES_INIT;
-    const patina_panorama panorama = {.struct_size = sizeof panorama, .width = 8, .height = 4, .world_from_camera = {[0] = 1, [5] = 1, [10] = 1, [15] = 1},
-                                      .near_clip = 0.1, .far_clip = 10};
+    const patina_panorama panorama = {.struct_size = sizeof panorama,
+                                      .width = 8,
+                                      .height = 4,
+                                      .world_from_camera = {[0] = 1, [5] = 1, [10] = 1, [15] = 1},
+                                      .near_clip = 0.1,
+                                      .far_clip = 10};
     const patina_pick picked = {.struct_size = sizeof picked, .threads = 1};
     const struct input inputs[] = {
         {"patina_device_create", device, sizeof device_desc, &device_desc},
@@ -282,45 +279,28 @@ static void test_what_is_read(void **state)
 
 // ---- structures that the library writes ------------------------------------------------------------------------------------
 
-static int device_info(void *to)
-{
-    return patina_device_get_info(stage.device, to);
-}
+static int device_info(void *to) { return patina_device_get_info(stage.device, to); }
 
-static int cloud_info(void *to)
-{
-    return patina_cloud_get_info(stage.cloud, to);
-}
+static int cloud_info(void *to) { return patina_cloud_get_info(stage.cloud, to); }
 
-static int mesh_info(void *to)
-{
-    return patina_mesh_get_info(stage.mesh, to);
-}
+static int mesh_info(void *to) { return patina_mesh_get_info(stage.mesh, to); }
 
-static int file_info(void *to)
-{
-    return patina_file_get_info(stage.file, to);
-}
+static int file_info(void *to) { return patina_file_get_info(stage.file, to); }
 
-static int file_attribute(void *to)
-{
-    return patina_file_get_attribute(stage.file, 0, to);
-}
+static int file_attribute(void *to) { return patina_file_get_attribute(stage.file, 0, to); }
 
-static int frame_stats(void *to)
-{
-    return patina_frame_get_stats(stage.frame, to);
-}
+static int frame_stats(void *to) { return patina_frame_get_stats(stage.frame, to); }
 
-static int framed_camera(void *to)
-{
-    return patina_scene_frame_camera(stage.scene, 20, 30, 0, to);
-}
+static int framed_camera(void *to) { return patina_scene_frame_camera(stage.scene, 20, 30, 0, to); }
 
 static int face_camera(void *to)
 {
-    const patina_panorama panorama = {.struct_size = sizeof panorama, .width = 8, .height = 4, .world_from_camera = {[0] = 1, [5] = 1, [10] = 1, [15] = 1},
-                                      .near_clip = 0.1, .far_clip = 10};
+    const patina_panorama panorama = {.struct_size = sizeof panorama,
+                                      .width = 8,
+                                      .height = 4,
+                                      .world_from_camera = {[0] = 1, [5] = 1, [10] = 1, [15] = 1},
+                                      .near_clip = 0.1,
+                                      .far_clip = 10};
     uint32_t side;
     return patina_panorama_camera(&panorama, 1, to, &side);
 }
@@ -439,7 +419,7 @@ static void test_effects_begin_as_the_table_says(void **state)
     const patina_effects begun = PATINA_EFFECTS_INIT;
 #define PATINA_EFFECT_NUMBER(field, when, least, most, zero, ...) assert_true(begun.field == (float)(zero));
 #define PATINA_EFFECT_COUNT(field, when, least, most, zero, ...) assert_int_equal(begun.field, zero);
-#define PATINA_EFFECT_COLOR(field, when, zero, ...) \
+#define PATINA_EFFECT_COLOR(field, when, zero, ...)                                                                            \
     assert_true(begun.field[0] == (float)(zero) && begun.field[1] == (float)(zero) && begun.field[2] == (float)(zero));
 #define PATINA_EFFECT_AXIS(field, ...) assert_true(begun.field[0] == 0.0f && begun.field[1] == 0.0f && begun.field[2] == 1.0f);
 #include "patina/effects.def"
@@ -457,8 +437,11 @@ static int set_up(void **state)
         stage.points[i][1] = (float)(i / 8);
     }
     const patina_device_desc device_desc = {.struct_size = sizeof device_desc, .name = "cpu", .threads = 1};
-    const patina_cloud_desc cloud_desc = {.struct_size = sizeof cloud_desc, .count = POINTS, .position = {stage.points, PATINA_FLOAT32, 3, 0}};
-    const patina_mesh_desc mesh_desc = {.struct_size = sizeof mesh_desc, .vertex_count = 3, .position = {stage.points, PATINA_FLOAT32, 3, 0},
+    const patina_cloud_desc cloud_desc = {
+        .struct_size = sizeof cloud_desc, .count = POINTS, .position = {stage.points, PATINA_FLOAT32, 3, 0}};
+    const patina_mesh_desc mesh_desc = {.struct_size = sizeof mesh_desc,
+                                        .vertex_count = 3,
+                                        .position = {stage.points, PATINA_FLOAT32, 3, 0},
                                         .triangle_count = 1};
     return patina_device_create(&device_desc, &stage.device) || patina_cloud_create(&cloud_desc, NULL, &stage.cloud) ||
            patina_cloud_create(&cloud_desc, NULL, &stage.bare) || patina_mesh_create(&mesh_desc, &stage.mesh) ||

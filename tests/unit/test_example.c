@@ -4,8 +4,8 @@
 #include <patina/patina.h>
 #include <stdio.h>
 
-#define TRY(call)                                                                                                      \
-    if ((call) != PATINA_OK)                                                                                           \
+#define TRY(call)                                                                                                              \
+    if ((call) != PATINA_OK)                                                                                                   \
     return patina_message(NULL, text, sizeof text), fprintf(stderr, "%s: %s\n", #call, text), 1
 
 static float points[20000][3], pixels[64][64][4];

@@ -35,10 +35,11 @@ static void test_beyond_the_curve(void **state)
             assert_true(b.color > a.color && b.color <= 1.0f && b.coverage <= 1.0f && b.depth > a.depth && b.normal <= 90.0f);
             assert_true(b.color >= fminf(1.4f * a.color, 1.0f));
         }
-        static const double unknown[] = { 65.0, 120.0, 1e30, 0.0, -1.0, NAN, INFINITY };
+        static const double unknown[] = {65.0, 120.0, 1e30, 0.0, -1.0, NAN, INFINITY};
         for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
             const patina_expected_error none = pt_expected_error(means, unknown[i]);
-            assert_true(isinf(none.color) && isinf(none.coverage) && isinf(none.depth) && isinf(none.normal) && none.doubt >= 1.0f);
+            assert_true(isinf(none.color) && isinf(none.coverage) && isinf(none.depth) && isinf(none.normal) &&
+                        none.doubt >= 1.0f);
         }
     }
     assert_true(pt_expected_error(PT_MEANS_REFINED, 60.0).color > 0.1f);
@@ -88,16 +89,16 @@ static void test_plan(void **state)
         positions[i][0] = (float)(i % SIDE) / (SIDE / 2) - 1.0f;
         positions[i][1] = (float)(i / SIDE) / (SIDE / 2) - 1.0f;
     }
-    patina_cloud_desc desc = { .struct_size = sizeof desc, .count = SIDE * SIDE, .position = { positions, PATINA_FLOAT32, 3, 0 } };
-    patina_camera camera = { .struct_size = sizeof camera,
-                             .orthographic = 1,
-                             .world_from_camera = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1 },
-                             .left = -1,
-                             .right = 1,
-                             .bottom = -1,
-                             .top = 1,
-                             .near_clip = 0.1,
-                             .far_clip = 10 };
+    patina_cloud_desc desc = {.struct_size = sizeof desc, .count = SIDE * SIDE, .position = {positions, PATINA_FLOAT32, 3, 0}};
+    patina_camera camera = {.struct_size = sizeof camera,
+                            .orthographic = 1,
+                            .world_from_camera = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1},
+                            .left = -1,
+                            .right = 1,
+                            .bottom = -1,
+                            .top = 1,
+                            .near_clip = 0.1,
+                            .far_clip = 10};
     patina_cloud *cloud = NULL;
     patina_scene *scene = NULL;
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
@@ -108,13 +109,13 @@ static void test_plan(void **state)
         uint32_t size;
         float target;
         enum pt_means means;
-    } cases[] = { { 30, 0.02f, PT_MEANS_UNFILLED }, { 400, 1e-6f, PT_MEANS_REFINED }, { 400, 0.0f, PT_MEANS_REFINED } };
+    } cases[] = {{30, 0.02f, PT_MEANS_UNFILLED}, {400, 1e-6f, PT_MEANS_REFINED}, {400, 0.0f, PT_MEANS_REFINED}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        patina_settings settings = { .struct_size = sizeof settings,
-                                     .width = cases[i].size,
-                                     .height = cases[i].size,
-                                     .fill_iterations = 2,
-                                     .error_target = cases[i].target };
+        patina_settings settings = {.struct_size = sizeof settings,
+                                    .width = cases[i].size,
+                                    .height = cases[i].size,
+                                    .fill_iterations = 2,
+                                    .error_target = cases[i].target};
         struct pt_plan plan;
         uint32_t fills = 0;
         assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
@@ -126,7 +127,7 @@ static void test_plan(void **state)
         assert_float_equal(plan.expected.color, pt_expected_error(cases[i].means, plan.spacing_px).color, 0.0f);
         pt_plan_destroy(&plan);
     }
-    patina_settings bad = { .struct_size = sizeof bad, .error_target = -1.0f };
+    patina_settings bad = {.struct_size = sizeof bad, .error_target = -1.0f};
     assert_int_equal(patina_scene_set_settings(scene, &bad), PATINA_ERROR_ARGUMENT);
     bad.error_target = NAN;
     assert_int_equal(patina_scene_set_settings(scene, &bad), PATINA_ERROR_ARGUMENT);
@@ -136,8 +137,8 @@ static void test_plan(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = { cmocka_unit_test(test_every_means_is_measured),
-                                        cmocka_unit_test(test_beyond_the_curve), cmocka_unit_test(test_between_points),
-                                        cmocka_unit_test(test_cheapest_that_meets), cmocka_unit_test(test_plan) };
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_every_means_is_measured), cmocka_unit_test(test_beyond_the_curve),
+                                       cmocka_unit_test(test_between_points), cmocka_unit_test(test_cheapest_that_meets),
+                                       cmocka_unit_test(test_plan)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

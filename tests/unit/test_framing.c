@@ -70,7 +70,8 @@ static void test_without_strays(void **state)
 {
     (void)state;
     for (uint64_t count = 10; count <= 1000000; count *= 10) {
-        struct points sphere = points_sphere(count, 1.0, POINTS_PLAIN, count), torus = points_torus(count, 1.0, 0.4, POINTS_PLAIN, 3);
+        struct points sphere = points_sphere(count, 1.0, POINTS_PLAIN, count),
+                      torus = points_torus(count, 1.0, 0.4, POINTS_PLAIN, 3);
         check_box(copy(&sphere), &sphere, 0.01, "sphere");
         check_box(copy(&torus), &torus, 0.01, "torus");
         points_free(&sphere);
@@ -108,7 +109,7 @@ static void test_small_part(void **state)
 static void test_strays(void **state)
 {
     (void)state;
-    static const uint64_t counts[] = { 300, 500, 2000, 20000, 300000 };
+    static const uint64_t counts[] = {300, 500, 2000, 20000, 300000};
     for (int c = 0; c < 5; c++) {
         struct points sphere = points_sphere(counts[c], 1.0, POINTS_PLAIN, 5);
         check_box(strewn(&sphere, 1, 100.0, 1), &sphere, 0.01, "one stray");
@@ -129,12 +130,13 @@ static double span(const struct points *shown, const struct points *points)
     patina_cloud *cloud = points_upload(points);
     patina_scene *scene = scene_of(cloud, NULL);
     patina_settings settings = settings_default(320, 240);
-    patina_camera camera = { .struct_size = sizeof camera };
+    patina_camera camera = {.struct_size = sizeof camera};
     CHECK(patina_scene_set_settings(scene, &settings), scene);
     CHECK(patina_scene_frame_camera(scene, 30.0, 20.0, 0.0, &camera), scene);
     double most = 0.0;
     for (uint64_t i = 0; i < shown->count; i++) {
-        const double p[3] = { (double)shown->position[3 * i], (double)shown->position[3 * i + 1], (double)shown->position[3 * i + 2] };
+        const double p[3] = {(double)shown->position[3 * i], (double)shown->position[3 * i + 1],
+                             (double)shown->position[3 * i + 2]};
         double x, y, z;
         camera_project(&camera, 320, 240, p, &x, &y, &z);
         most = fmax(most, fmax(fabs(x / 160.0 - 1.0), fabs(y / 120.0 - 1.0)));
@@ -163,9 +165,11 @@ static void test_strays_alone(void **state)
     struct points sphere = points_sphere(2000, 1.0, POINTS_PLAIN, 5), strays = strewn(&sphere, 1, 100.0, 1);
     patina_cloud *cloud = points_upload(&strays);
     patina_scene *scene = scene_of(cloud, NULL);
-    patina_clip cut = { .struct_size = sizeof cut, .shape = PATINA_CLIP_BOX, .cut = 1,
-                        .world_from_clip = { 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1 } };
-    patina_camera camera = { .struct_size = sizeof camera };
+    patina_clip cut = {.struct_size = sizeof cut,
+                       .shape = PATINA_CLIP_BOX,
+                       .cut = 1,
+                       .world_from_clip = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1}};
+    patina_camera camera = {.struct_size = sizeof camera};
     CHECK(patina_scene_add_clip(scene, &cut), scene);
     CHECK(patina_scene_frame_camera(scene, 30.0, 20.0, 0.0, &camera), scene);
     assert_true(isfinite(camera.world_from_camera[3]) && camera.far_clip > camera.near_clip);

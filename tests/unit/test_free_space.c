@@ -51,8 +51,7 @@ static struct scan make_scan(double turn)
     for (uint32_t s = 0; s < STATIONS; s++)
         for (uint32_t row = 0; row < 160; row++)
             for (uint32_t column = 0; column < 360; column++) {
-                const double e = (row - 80.0 + 0.3) * step, a = (column + 0.4 + 0.2 * s) * step,
-                             *eye = stations + 3 * s;
+                const double e = (row - 80.0 + 0.3) * step, a = (column + 0.4 + 0.2 * s) * step, *eye = stations + 3 * s;
                 const double way[3] = {cos(e) * cos(a), cos(e) * sin(a), sin(e)};
                 double t, nearest = INFINITY, p[3];
                 if (meets(eye, way, 10, wall, &t) && !meets(eye, way, 10, window, &t))
@@ -219,14 +218,8 @@ static struct looked look(patina_device *device, const patina_cloud *cloud, cons
 
 static uint8_t kinds[MOST];
 static float certainties[MOST];
-static int is_no_surface(uint32_t id)
-{
-    return kinds[id] != PATINA_KIND_SURFACE;
-}
-static int is_certain(uint32_t id)
-{
-    return certainties[id] >= 0.95f;
-}
+static int is_no_surface(uint32_t id) { return kinds[id] != PATINA_KIND_SURFACE; }
+static int is_certain(uint32_t id) { return certainties[id] >= 0.95f; }
 
 static void test_pictures(void **state)
 {

@@ -88,8 +88,10 @@ static struct pictures draw(const patina_panorama *panorama, const float (*point
     out.color = malloc(all * 16);
     out.depth = malloc(all * 4);
     out.keys = malloc(all * 8);
-    assert_int_equal(patina_panorama_join(panorama, PATINA_PASS_COMBINED, (const float *const *)color, out.color, all * 16), PATINA_OK);
-    assert_int_equal(patina_panorama_join(panorama, PATINA_PASS_DEPTH, (const float *const *)depth, out.depth, all * 4), PATINA_OK);
+    assert_int_equal(patina_panorama_join(panorama, PATINA_PASS_COMBINED, (const float *const *)color, out.color, all * 16),
+                     PATINA_OK);
+    assert_int_equal(patina_panorama_join(panorama, PATINA_PASS_DEPTH, (const float *const *)depth, out.depth, all * 4),
+                     PATINA_OK);
     assert_int_equal(patina_panorama_join_keys(panorama, (const uint64_t *const *)keys, out.keys, all * 8), PATINA_OK);
     for (int face = 0; face < 6; face++) {
         free(color[face]);
@@ -218,7 +220,8 @@ static void test_a_region_is_a_crop(void **state)
     double covered = 0;
     for (uint32_t y = 100; y < 140; y++)
         for (uint32_t x = 200; x < 420; x++) {
-            const float *a = whole.color + 4 * ((size_t)y * WIDTH + x), *b = part.color + 4 * ((size_t)(y - 100) * 220 + x - 200);
+            const float *a = whole.color + 4 * ((size_t)y * WIDTH + x),
+                        *b = part.color + 4 * ((size_t)(y - 100) * 220 + x - 200);
             assert_memory_equal(a, b, 16);
             covered += a[3];
         }

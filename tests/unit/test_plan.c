@@ -26,10 +26,10 @@ static patina_cloud *square(int with_normals)
         positions[i][2] = 0.0f;
         normals[i][2] = 1.0f;
     }
-    patina_cloud_desc desc = { .struct_size = sizeof desc,
-                               .count = COUNT,
-                               .position = { positions, PATINA_FLOAT32, 3, 0 },
-                               .normal = { with_normals ? normals : NULL, PATINA_FLOAT32, 3, 0 } };
+    patina_cloud_desc desc = {.struct_size = sizeof desc,
+                              .count = COUNT,
+                              .position = {positions, PATINA_FLOAT32, 3, 0},
+                              .normal = {with_normals ? normals : NULL, PATINA_FLOAT32, 3, 0}};
     patina_cloud *cloud = NULL;
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
     return cloud;
@@ -39,16 +39,16 @@ static patina_cloud *square(int with_normals)
 static patina_scene *scene_above(const patina_cloud *cloud, double width, double up, int cull_back)
 {
     patina_scene *scene = NULL;
-    patina_cloud_style style = { .struct_size = sizeof style, .cull_back = (uint32_t)cull_back };
-    patina_camera camera = { .struct_size = sizeof camera,
-                             .orthographic = 1,
-                             .world_from_camera = { up, 0, 0, 0, 0, 1, 0, 0, 0, 0, up, 5 * up, 0, 0, 0, 1 },
-                             .left = -width / 2,
-                             .right = width / 2,
-                             .bottom = -width / 2,
-                             .top = width / 2,
-                             .near_clip = 0.1,
-                             .far_clip = 10 };
+    patina_cloud_style style = {.struct_size = sizeof style, .cull_back = (uint32_t)cull_back};
+    patina_camera camera = {.struct_size = sizeof camera,
+                            .orthographic = 1,
+                            .world_from_camera = {up, 0, 0, 0, 0, 1, 0, 0, 0, 0, up, 5 * up, 0, 0, 0, 1},
+                            .left = -width / 2,
+                            .right = width / 2,
+                            .bottom = -width / 2,
+                            .top = width / 2,
+                            .near_clip = 0.1,
+                            .far_clip = 10};
     assert_int_equal(patina_scene_create(&scene), PATINA_OK);
     if (cloud)
         assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
@@ -113,14 +113,14 @@ static void test_settings_leave_passes_out(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
-    patina_settings settings = { .struct_size = sizeof settings,
-                                 .fill = PATINA_FILL_OFF,
-                                 .smooth = PATINA_SMOOTH_OFF,
-                                 .antialias = PATINA_ANTIALIAS_OFF,
-                                 .passes = 1u << PATINA_PASS_COMBINED };
+    patina_settings settings = {.struct_size = sizeof settings,
+                                .fill = PATINA_FILL_OFF,
+                                .smooth = PATINA_SMOOTH_OFF,
+                                .antialias = PATINA_ANTIALIAS_OFF,
+                                .passes = 1u << PATINA_PASS_COMBINED};
     assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
     struct pt_plan plan = plan_of(scene);
-    static const char *const out[] = { "fill", "pull", "push", "smooth", "antialias", "extract" };
+    static const char *const out[] = {"fill", "pull", "push", "smooth", "antialias", "extract"};
     for (size_t i = 0; i < sizeof out / sizeof *out; i++)
         assert_non_null(skipped(&plan, out[i]));
     assert_int_equal(plan.pass_count, 4); // scatter, surface, shade, compose
@@ -143,10 +143,11 @@ static void test_steps_hold_the_whole_plan(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
-    const patina_cloud_style style = { .struct_size = sizeof style, .transparency = 0.5f, .lighting = PATINA_LIGHTING_LIT };
-    const patina_light_desc light = { .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .angle = 0.1f, .shadows = 1 };
-    const patina_settings settings = { .struct_size = sizeof settings, .width = 64, .height = 64, .layers = 3, .shadow_samples = 5,
-                                       .shadow_error = 0.1f };
+    const patina_cloud_style style = {.struct_size = sizeof style, .transparency = 0.5f, .lighting = PATINA_LIGHTING_LIT};
+    const patina_light_desc light = {
+        .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .angle = 0.1f, .shadows = 1};
+    const patina_settings settings = {
+        .struct_size = sizeof settings, .width = 64, .height = 64, .layers = 3, .shadow_samples = 5, .shadow_error = 0.1f};
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
     assert_int_equal(patina_scene_add_light(scene, &light), PATINA_OK);
     assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
@@ -181,14 +182,14 @@ static void test_maps_are_plans(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
-    const patina_cloud_style style = { .struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT };
-    const patina_light_desc light = { .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .shadows = 1 };
+    const patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT};
+    const patina_light_desc light = {.struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 3, .shadows = 1};
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
     assert_int_equal(patina_scene_add_light(scene, &light), PATINA_OK);
     struct pt_plan plan = plan_of(scene), maps[2];
     assert_int_equal(plan.group_count, 1);
     assert_int_equal(pt_plan_light_map(scene, &plan, 0), PATINA_OK);
-    const struct pt_round round = { .points = 1 }, nobody = { 0 };
+    const struct pt_round round = {.points = 1}, nobody = {0};
     for (int i = 0; i < 2; i++)
         assert_int_equal(pt_plan_map(scene, &plan, &round, &maps[i]), PATINA_OK);
     assert_int_equal(passes_of(&maps[0], PT_KERNEL_lit), 1);
@@ -214,11 +215,13 @@ static void test_planes_of_the_picture(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
-    const patina_settings settings = { .struct_size = sizeof settings, .passes = 1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH };
+    const patina_settings settings = {.struct_size = sizeof settings,
+                                      .passes = 1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH};
     for (int all = 0; all < 2; all++) {
         struct pt_plan plan = plan_of(scene);
         for (int p = PT_PLANE_COMBINED; p < PT_PLANE_LAYER_COMBINED; p++) {
-            const int asked = p == PT_PLANE_COMBINED || p == PT_PLANE_DEPTH || (!all && (p == PT_PLANE_NORMALS || p == PT_PLANE_SOURCE));
+            const int asked = p == PT_PLANE_COMBINED || p == PT_PLANE_DEPTH ||
+                              (!all && (p == PT_PLANE_NORMALS || p == PT_PLANE_SOURCE));
             assert_int_equal(pt_plan_writes(&plan, (enum pt_plane)p), asked);
         }
         pt_plan_destroy(&plan);
@@ -234,7 +237,7 @@ static void test_ink_stays_within_lines(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 4.0, 1, 0);
-    const patina_lines lines = { .struct_size = sizeof lines, .width = 2.0f, .source = PATINA_LINE_POINT };
+    const patina_lines lines = {.struct_size = sizeof lines, .width = 2.0f, .source = PATINA_LINE_POINT};
     const uint32_t *rect = NULL;
     uint32_t inks = 0;
     assert_int_equal(patina_scene_set_lines(scene, &lines), PATINA_OK);
@@ -262,8 +265,8 @@ static void test_planes_share_memory(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(NULL, 2.5, 1, 0);
-    const patina_cloud_style style = { .struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT };
-    const patina_effects effects = { .struct_size = sizeof effects, .obscurance_strength = 1.0f };
+    const patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_LIT};
+    const patina_effects effects = {.struct_size = sizeof effects, .obscurance_strength = 1.0f};
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
     assert_int_equal(patina_scene_set_effects(scene, &effects), PATINA_OK);
     uint64_t peaks[2];
@@ -305,7 +308,7 @@ static void test_spacing_chooses_levels(void **state)
     static const struct {
         double width; // of the window, 1024 pixels: points are 0.01 apart
         uint32_t least_levels, most_levels;
-    } cases[] = { { 20.0, 0, 0 }, { 10.0, 0, 0 }, { 3.0, 1, 2 }, { 1.0, 3, 4 }, { 0.1, 5, 5 } };
+    } cases[] = {{20.0, 0, 0}, {10.0, 0, 0}, {3.0, 1, 2}, {1.0, 3, 4}, {0.1, 5, 5}};
     patina_cloud *cloud = square(1);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         patina_scene *scene = scene_above(cloud, cases[i].width, 1, 0);
@@ -337,8 +340,8 @@ static void test_normals_are_blended_where_they_show(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
-    patina_settings settings = { .struct_size = sizeof settings };
-    patina_cloud_style unlit = { .struct_size = sizeof unlit, .lighting = PATINA_LIGHTING_UNLIT };
+    patina_settings settings = {.struct_size = sizeof settings};
+    patina_cloud_style unlit = {.struct_size = sizeof unlit, .lighting = PATINA_LIGHTING_UNLIT};
     assert_true(blend_of(scene) > 0); // lit
     assert_int_equal(patina_scene_clear(scene), PATINA_OK);
     assert_int_equal(patina_scene_add_cloud(scene, cloud, &unlit), PATINA_OK);
@@ -374,7 +377,7 @@ enum { WIDTH = 2048, HEIGHT = 1536 };
 static patina_camera look(patina_scene *scene, const double at[3], const double to[3])
 {
     patina_camera camera = camera_perspective(at, to, 46.8, WIDTH, HEIGHT, 0.001, 10.0);
-    patina_settings settings = { .struct_size = sizeof settings, .width = WIDTH, .height = HEIGHT };
+    patina_settings settings = {.struct_size = sizeof settings, .width = WIDTH, .height = HEIGHT};
     assert_int_equal(patina_scene_set_camera(scene, &camera), PATINA_OK);
     assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
     return camera;
@@ -382,7 +385,7 @@ static patina_camera look(patina_scene *scene, const double at[3], const double 
 
 static int shows(const patina_camera *camera, const float point[3])
 {
-    const double world[3] = { (double)point[0], (double)point[1], (double)point[2] };
+    const double world[3] = {(double)point[0], (double)point[1], (double)point[2]};
     double x, y, z;
     camera_project(camera, WIDTH, HEIGHT, world, &x, &y, &z);
     return z > camera->near_clip && x > 0.0 && x < WIDTH && y > 0.0 && y < HEIGHT;
@@ -429,10 +432,10 @@ static void test_low_parts(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
-    look(scene, (const double[]){ 0.1, -0.5, 0.6 }, (const double[]){ 0.1, 0.4, 0.0 });
+    look(scene, (const double[]){0.1, -0.5, 0.6}, (const double[]){0.1, 0.4, 0.0});
     struct pt_plan plan = plan_of(scene);
     const uint32_t count = plan.instances[0].chunk_count;
-    uint32_t left_over[3] = { 0 };
+    uint32_t left_over[3] = {0};
     for (uint32_t c = 0; c < count; c++)
         for (int k = 0; k < 3; k++) {
             const struct chunk_view *view = &plan.instances[0].chunks[c];
@@ -453,12 +456,12 @@ static void test_spacing_is_of_what_shows(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
-    look(scene, (const double[]){ 0.1, -0.5, 0.6 }, (const double[]){ 0.1, 0.4, 0.0 });
+    look(scene, (const double[]){0.1, -0.5, 0.6}, (const double[]){0.1, 0.4, 0.0});
     struct pt_plan plan = plan_of(scene);
     assert_true(plan.spacing_px > 12.0 && plan.spacing_px < 40.0); // 112 with what lies behind the eye
     pt_plan_destroy(&plan);
     // in the middle of it: as much as the nearest ground that shows, not what lies at the lens
-    look(scene, (const double[]){ 0.0, 0.0, 0.1 }, (const double[]){ 1.0, 0.0, 0.1 });
+    look(scene, (const double[]){0.0, 0.0, 0.1}, (const double[]){1.0, 0.0, 0.1});
     plan = plan_of(scene);
     assert_true(plan.spacing_px > 12.0 && plan.spacing_px < 80.0);
     pt_plan_destroy(&plan);
@@ -472,7 +475,7 @@ static void test_region_decides_as_the_whole(void **state)
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 1.5, 1, 0);
     struct pt_plan whole = plan_of(scene);
-    patina_settings settings = { .struct_size = sizeof settings, .region = { 700, 650, 750, 660 } };
+    patina_settings settings = {.struct_size = sizeof settings, .region = {700, 650, 750, 660}};
     assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
     struct pt_plan region = plan_of(scene);
     assert_int_equal(region.levels, whole.levels);
@@ -495,15 +498,18 @@ static void test_layers(void **state)
     static const struct {
         float transparency;
         uint32_t asked, passes, layers;
-    } cases[] = { { 0.0f, 0, 0, 1 }, { 0.0f, 5, 0, 1 }, { 0.5f, 0, 0, 8 }, { 0.5f, 1, 0, 1 }, { 0.5f, 3, 0, 3 },
-                  { 0.0f, 0, 1u << PATINA_PASS_DEPTH, 8 }, { 0.0f, 2, 1u << PATINA_PASS_COMBINED, 2 } };
+    } cases[] = {{0.0f, 0, 0, 1},
+                 {0.0f, 5, 0, 1},
+                 {0.5f, 0, 0, 8},
+                 {0.5f, 1, 0, 1},
+                 {0.5f, 3, 0, 3},
+                 {0.0f, 0, 1u << PATINA_PASS_DEPTH, 8},
+                 {0.0f, 2, 1u << PATINA_PASS_COMBINED, 2}};
     patina_cloud *cloud = square(1);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
-        patina_cloud_style style = { .struct_size = sizeof style, .transparency = cases[i].transparency };
-        patina_settings settings = { .struct_size = sizeof settings,
-                                     .layers = cases[i].asked,
-                                     .layer_passes = cases[i].passes };
+        patina_cloud_style style = {.struct_size = sizeof style, .transparency = cases[i].transparency};
+        patina_settings settings = {.struct_size = sizeof settings, .layers = cases[i].asked, .layer_passes = cases[i].passes};
         assert_int_equal(patina_scene_clear(scene), PATINA_OK);
         assert_int_equal(patina_scene_add_cloud(scene, cloud, &style), PATINA_OK);
         assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
@@ -515,13 +521,13 @@ static void test_layers(void **state)
         if (cases[i].layers == 1)
             assert_non_null(strstr(skipped(&plan, "peel"), cases[i].transparency > 0.0f ? "settings" : "opaque"));
         for (uint32_t k = 0; k < plan.pass_count; k++)
-            assert_true(plan.passes[k].layer <= plan.layers && (!k || plan.passes[k].layer >= plan.passes[k - 1].layer ||
-                                                                plan.passes[k].layer == 0));
+            assert_true(plan.passes[k].layer <= plan.layers &&
+                        (!k || plan.passes[k].layer >= plan.passes[k - 1].layer || plan.passes[k].layer == 0));
         pt_plan_destroy(&plan);
         patina_scene_destroy(scene);
     }
     patina_scene *behind = scene_above(cloud, 2.5, -1, 1);
-    patina_cloud_style glass = { .struct_size = sizeof glass, .cull_back = 1, .transparency = 0.5f };
+    patina_cloud_style glass = {.struct_size = sizeof glass, .cull_back = 1, .transparency = 0.5f};
     assert_int_equal(patina_scene_clear(behind), PATINA_OK);
     assert_int_equal(patina_scene_add_cloud(behind, cloud, &glass), PATINA_OK);
     struct pt_plan plan = plan_of(behind);
@@ -557,7 +563,7 @@ static void test_lines_are_planned_where_asked_for(void **state)
     (void)state;
     patina_cloud *cloud = square(1);
     patina_scene *scene = scene_above(cloud, 2.5, 1, 0);
-    patina_lines lines = { .struct_size = sizeof lines, .width = 3 };
+    patina_lines lines = {.struct_size = sizeof lines, .width = 3};
     struct pt_plan without = plan_of(scene);
     assert_non_null(skipped(&without, "lines"));
     assert_int_equal(patina_scene_set_lines(scene, &lines), PATINA_OK);
@@ -586,7 +592,7 @@ static void test_lines_are_planned_where_asked_for(void **state)
 static void test_passes_bind_what_their_kernels_list(void **state)
 {
     (void)state;
-    const struct fill_args fill = { .view = { .level = 2 } };
+    const struct fill_args fill = {.view = {.level = 2}};
     const struct pt_ref keys = pt_plane_at(PT_PLANE_KEYS, 2), from = pt_plane_at(PT_PLANE_FROM, 2);
     const struct pt_ref normal = pt_plane_at(PT_PLANE_NORMAL, 0), deff = pt_plane_at(PT_PLANE_DEFF, 0);
     const struct {
@@ -594,37 +600,40 @@ static void test_passes_bind_what_their_kernels_list(void **state)
         struct pt_ref refs[6];
         int right;
     } fills[] = {
-        { 5, { keys, from, normal, deff, deff }, 1 },
-        { 5, { keys, from, normal, deff, pt_plane_at(PT_PLANE_SPAN, 0) }, 1 },
-        { 4, { keys, from, normal, deff }, 0 },
-        { 6, { keys, from, normal, deff, deff, deff }, 0 },
-        { 5, { keys, normal, from, deff, deff }, 0 },                             // formats
-        { 5, { keys, from, normal, deff, pt_buffer_of(PT_SHADOWS, 0) }, 0 },
-        { 5, { pt_plane_at(PT_PLANE_KEYS, 1), from, normal, deff, deff }, 0 },    // another level than the view's
-        { 5, { keys, from, normal, deff, pt_plane_at(PT_PLANE_DEPTH, 0) }, 0 },   // of the crop
-        { 5, { keys, from, normal, deff, pt_nothing() }, 0 },                     // needed
-        { 5, { keys, keys, normal, deff, deff }, 0 },
+        {5, {keys, from, normal, deff, deff}, 1},
+        {5, {keys, from, normal, deff, pt_plane_at(PT_PLANE_SPAN, 0)}, 1},
+        {4, {keys, from, normal, deff}, 0},
+        {6, {keys, from, normal, deff, deff, deff}, 0},
+        {5, {keys, normal, from, deff, deff}, 0}, // formats
+        {5, {keys, from, normal, deff, pt_buffer_of(PT_SHADOWS, 0)}, 0},
+        {5, {pt_plane_at(PT_PLANE_KEYS, 1), from, normal, deff, deff}, 0},  // another level than the view's
+        {5, {keys, from, normal, deff, pt_plane_at(PT_PLANE_DEPTH, 0)}, 0}, // of the crop
+        {5, {keys, from, normal, deff, pt_nothing()}, 0},                   // needed
+        {5, {keys, keys, normal, deff, deff}, 0},
     };
     for (size_t i = 0; i < sizeof fills / sizeof *fills; i++)
         assert_int_equal(pt_check_bindings(PT_KERNEL_fill, &fill, fills[i].refs, fills[i].count) == PATINA_OK, fills[i].right);
 
-    const struct scatter_args scatter = { .instances = 2 };
-    const struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, 0), places = pt_buffer_of(PT_POSITIONS, 0), words = pt_buffer_of(PT_SURFACE, 0);
-    const struct pt_ref two[] = { pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, places, words, chunks, places, words };
-    const struct pt_ref mixed[] = { pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, words, places };
+    const struct scatter_args scatter = {.instances = 2};
+    const struct pt_ref chunks = pt_buffer_of(PT_CHUNKS, 0), places = pt_buffer_of(PT_POSITIONS, 0),
+                        words = pt_buffer_of(PT_SURFACE, 0);
+    const struct pt_ref two[] = {
+        pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, places, words, chunks, places, words};
+    const struct pt_ref mixed[] = {pt_plane_at(PT_PLANE_KEYS, 0), pt_nothing(), pt_nothing(), chunks, words, places};
     assert_int_equal(pt_check_bindings(PT_KERNEL_scatter, &scatter, two, 9), PATINA_OK);
     assert_int_equal(pt_check_bindings(PT_KERNEL_scatter, &scatter, two, 8), PATINA_ERROR_INTERNAL); // half an instance
     assert_int_equal(pt_check_bindings(PT_KERNEL_scatter, &scatter, mixed, 6), PATINA_ERROR_INTERNAL);
 
     // what is written has no other name in the pass: nothing stands in for it
-    const struct surface_args surface = { .with_span = 0 };
-    struct pt_ref refs[] = { pt_plane_at(PT_PLANE_KEYS, 0), words, normal, deff, pt_plane_at(PT_PLANE_FROM, 0), pt_nothing(), deff };
+    const struct surface_args surface = {.with_span = 0};
+    struct pt_ref refs[] = {pt_plane_at(PT_PLANE_KEYS, 0), words,        normal, deff,
+                            pt_plane_at(PT_PLANE_FROM, 0), pt_nothing(), deff};
     assert_int_equal(pt_check_bindings(PT_KERNEL_surface, &surface, refs, 7), PATINA_ERROR_INTERNAL);
     refs[6] = pt_nothing();
     assert_int_equal(pt_check_bindings(PT_KERNEL_surface, &surface, refs, 7), PATINA_OK);
 
-    struct pt_plan plan = { 0 };
-    struct pt_builder builder = { .plan = &plan };
+    struct pt_plan plan = {0};
+    struct pt_builder builder = {.plan = &plan};
     pt_add(&builder, PT_KERNEL_surface, "surface", &surface, sizeof surface, refs, 6);
     assert_int_equal(builder.failed, PATINA_ERROR_INTERNAL);
     pt_plan_destroy(&plan);
@@ -634,15 +643,24 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_lines_are_planned_where_asked_for),
-        cmocka_unit_test(test_every_pass_runs_or_has_a_reason), cmocka_unit_test(test_missing_normals_are_estimated),
-        cmocka_unit_test(test_settings_leave_passes_out),       cmocka_unit_test(test_spacing_chooses_levels),
-        cmocka_unit_test(test_steps_hold_the_whole_plan),       cmocka_unit_test(test_maps_are_plans),
-        cmocka_unit_test(test_planes_of_the_picture),         cmocka_unit_test(test_ink_stays_within_lines),
-        cmocka_unit_test(test_planes_share_memory),             cmocka_unit_test(test_low_parts),
-        cmocka_unit_test(test_chunks_around_the_camera),        cmocka_unit_test(test_spacing_is_of_what_shows),
-        cmocka_unit_test(test_nothing_in_view_is_said),         cmocka_unit_test(test_region_decides_as_the_whole),
-        cmocka_unit_test(test_no_camera_is_an_error),           cmocka_unit_test(test_normals_are_blended_where_they_show),
-        cmocka_unit_test(test_layers),                          cmocka_unit_test(test_passes_bind_what_their_kernels_list),
+        cmocka_unit_test(test_every_pass_runs_or_has_a_reason),
+        cmocka_unit_test(test_missing_normals_are_estimated),
+        cmocka_unit_test(test_settings_leave_passes_out),
+        cmocka_unit_test(test_spacing_chooses_levels),
+        cmocka_unit_test(test_steps_hold_the_whole_plan),
+        cmocka_unit_test(test_maps_are_plans),
+        cmocka_unit_test(test_planes_of_the_picture),
+        cmocka_unit_test(test_ink_stays_within_lines),
+        cmocka_unit_test(test_planes_share_memory),
+        cmocka_unit_test(test_low_parts),
+        cmocka_unit_test(test_chunks_around_the_camera),
+        cmocka_unit_test(test_spacing_is_of_what_shows),
+        cmocka_unit_test(test_nothing_in_view_is_said),
+        cmocka_unit_test(test_region_decides_as_the_whole),
+        cmocka_unit_test(test_no_camera_is_an_error),
+        cmocka_unit_test(test_normals_are_blended_where_they_show),
+        cmocka_unit_test(test_layers),
+        cmocka_unit_test(test_passes_bind_what_their_kernels_list),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

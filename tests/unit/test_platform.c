@@ -125,7 +125,7 @@ static void test_machine(void **state)
 static void test_pages(void **state)
 {
     (void)state;
-    static const size_t sizes[] = { 0, 1, 4096, 4097, 2 << 20, (2 << 20) + 1, 7 << 20 };
+    static const size_t sizes[] = {0, 1, 4096, 4097, 2 << 20, (2 << 20) + 1, 7 << 20};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         unsigned char *pages = pt_pages_alloc(sizes[i]);
         assert_non_null(pages);
@@ -217,7 +217,7 @@ static void test_whole(void **state)
 static void test_decimal(void **state)
 {
     (void)state;
-    static const char *const commas[] = { "de_DE.UTF-8", "fr_FR.UTF-8", "de_DE.utf8", "C" };
+    static const char *const commas[] = {"de_DE.UTF-8", "fr_FR.UTF-8", "de_DE.utf8", "C"};
     for (size_t i = 0; i < sizeof commas / sizeof *commas && !setlocale(LC_NUMERIC, commas[i]); i++)
         ;
     assert_true(pt_decimal("1234.5e-1") == 123.45);
@@ -239,14 +239,14 @@ static void test_library(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_threads), cmocka_unit_test(test_machine), cmocka_unit_test(test_pages),
+        cmocka_unit_test(test_threads), cmocka_unit_test(test_machine),      cmocka_unit_test(test_pages),
         cmocka_unit_test(test_disk),    cmocka_unit_test(test_large_stream), cmocka_unit_test(test_whole),
         cmocka_unit_test(test_decimal), cmocka_unit_test(test_library),
     };
     if (!mkdtemp(folder))
         return 1;
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    for (const char *const *name = (const char *const[]){ "pipe", "été 测试", "large", "kept", NULL }; *name; name++)
+    for (const char *const *name = (const char *const[]){"pipe", "été 测试", "large", "kept", NULL}; *name; name++)
         remove(at(*name));
     rmdir(folder);
     return failed;

@@ -25,7 +25,7 @@ static void test_bool(void **state)
                                 "end_header\n",
                          "\1\2\3\4", 4);
     file = open_bytes(b.bytes, b.size);
-    expect_positions(file, (float[]){ 2, 3, 4 }, 3);
+    expect_positions(file, (float[]){2, 3, 4}, 3);
     patina_file_destroy(file);
 }
 
@@ -38,11 +38,11 @@ static void test_splat_colors(void **state)
                                         "1 2 3 0 1 -1 0.5\n4 5 6 -9 9 nan 0\n");
     assert_int_equal(info_of(file).color_type, PATINA_UINT8);
     assert_int_equal(info_of(file).attributes, 1); // opacity
-    expect_bytes(file, (uint8_t[]){ 128, 199, 56, 255, 0, 255, 0, 255 }, 8);
+    expect_bytes(file, (uint8_t[]){128, 199, 56, 255, 0, 255, 0, 255}, 8);
     patina_file_destroy(file);
     file = open_text(ASCII "element vertex 1\n" XYZ BASE "property uchar red\nproperty uchar green\nproperty uchar blue\n"
                            "end_header\n1 2 3 0 1 -1 7 8 9\n");
-    expect_bytes(file, (uint8_t[]){ 7, 8, 9, 255 }, 4);
+    expect_bytes(file, (uint8_t[]){7, 8, 9, 255}, 4);
     assert_int_equal(info_of(file).attributes, 3);
     patina_file_destroy(file);
 }
@@ -52,7 +52,7 @@ static void test_splat_colors(void **state)
 // What a copy as text makes of bytes. unix2dos leaves carriage returns with their line feeds alone.
 static struct blob as_text(const struct blob *b, int leaves_pairs)
 {
-    struct blob out = { .size = 0 };
+    struct blob out = {.size = 0};
     for (size_t i = 0; i < b->size; i++) {
         if (b->bytes[i] == '\n' && !(leaves_pairs && i && b->bytes[i - 1] == '\r'))
             out.bytes[out.size++] = '\r';
@@ -65,7 +65,7 @@ static void test_copied_as_text(void **state)
 {
     (void)state;
     const char *faces = "element face 2\nproperty list uchar uchar vertex_indices\n";
-    uint8_t body[44] = { 1, 10, 0, 13, 10, 7, 10, 10 };
+    uint8_t body[44] = {1, 10, 0, 13, 10, 7, 10, 10};
     char header[256];
     for (int kind = 0; kind < 4; kind++) { // a face of 10 corners has a line feed for its count
         snprintf(header, sizeof header, LITTLE "element vertex 2\n" XYZ "%send_header\n", kind & 1 ? faces : "");
@@ -75,13 +75,14 @@ static void test_copied_as_text(void **state)
         patina_file_destroy(open_bytes(b.bytes, b.size));
         refuse_bytes(mangled.bytes, mangled.size, PATINA_ERROR_FORMAT, "damaged by being copied as text: each of the");
     }
-    snprintf(header, sizeof header, "ply\r\nformat binary_little_endian 1.0\r\nelement vertex 2\r\nproperty float x\r\n"
-                                    "property float y\r\nproperty float z\r\nend_header\r\n");
-    uint8_t honest[26] = { 1, 13, 10, 0, 13, 10 };
+    snprintf(header, sizeof header,
+             "ply\r\nformat binary_little_endian 1.0\r\nelement vertex 2\r\nproperty float x\r\n"
+             "property float y\r\nproperty float z\r\nend_header\r\n");
+    uint8_t honest[26] = {1, 13, 10, 0, 13, 10};
     struct blob b = blob(header, honest, 24);
     patina_file_destroy(open_bytes(b.bytes, b.size)); // its rows end where it does
     honest[24] = 13, honest[25] = 10;
-    b = blob(header, (uint8_t[24]){ 1 }, 24);
+    b = blob(header, (uint8_t[24]){1}, 24);
     memcpy(b.bytes + b.size, honest + 24, 2); // an editor's last line end
     patina_file_destroy(open_bytes(b.bytes, b.size + 2));
 }
@@ -89,7 +90,7 @@ static void test_copied_as_text(void **state)
 static void test_too_many_bytes(void **state)
 {
     (void)state;
-    uint8_t body[24] = { 0 };
+    uint8_t body[24] = {0};
     struct blob b = blob(LITTLE "element vertex 1\n" XYZ "end_header\n", body, 24);
     empty_log();
     patina_file_destroy(open_bytes(b.bytes, b.size - 12));
@@ -104,7 +105,7 @@ static void test_too_many_bytes(void **state)
 static void test_faces_cut_short(void **state)
 {
     (void)state;
-    static const uint8_t body[] = { 1, 2, 3, 4, 5, 6, 2, 0, 1, 3, 0, 1 };
+    static const uint8_t body[] = {1, 2, 3, 4, 5, 6, 2, 0, 1, 3, 0, 1};
     struct blob b = blob(LITTLE "element vertex 2\nproperty char x\nproperty char y\nproperty char z\n"
                                 "element face 2\nproperty list uchar uchar vertex_indices\nend_header\n",
                          body, sizeof body);
@@ -113,7 +114,7 @@ static void test_faces_cut_short(void **state)
     patina_file *file = open_bytes(b.bytes, b.size);
     snprintf(words, sizeof words, "1 (memory): the file ends at byte %zu, inside row 1 of the 2 of element face", b.size);
     expect_log(words);
-    expect_positions(file, (float[]){ 1, 2, 3, 4, 5, 6 }, 6);
+    expect_positions(file, (float[]){1, 2, 3, 4, 5, 6}, 6);
     patina_file_destroy(file);
 }
 
@@ -144,7 +145,7 @@ static void test_normals_of_faces(void **state)
               "end_header\n4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n" CUBE,
     };
     const float r = sqrtf(1.0f / 3);
-    const float wanted[24] = { -r, -r, -r, r, -r, -r, r, r, -r, -r, r, -r, -r, -r, r, r, -r, r, r, r, r, -r, r, r };
+    const float wanted[24] = {-r, -r, -r, r, -r, -r, r, r, -r, -r, r, -r, -r, -r, r, r, -r, r, r, r, r, -r, r, r};
     for (int i = 0; i < 3; i++) {
         patina_file *file = open_text(files[i]);
         expect_normals(file, wanted, 24);
@@ -155,14 +156,14 @@ static void test_normals_of_faces(void **state)
 static void test_faces_of_any_size(void **state)
 {
     (void)state;
-    static const uint8_t body[] = { 0, 0, 0, 4, 0, 0, 4, 4, 0, 1, 1, 0, 0, 4, 0, 9, 9, 9, // the fourth lies inwards
-                                    0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 0, 0, 1, 5, 0, 0, 0, 5, 0, 1, 2, 3, 4 };
+    static const uint8_t body[] = {0, 0, 0, 4, 0, 0, 4, 4, 0, 1, 1, 0, 0, 4, 0, 9, 9, 9, // the fourth lies inwards
+                                   0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 0, 0, 1, 5, 0, 0, 0, 5, 0, 1, 2, 3, 4};
     struct blob b = blob(BIG "element vertex 6\nproperty uchar x\nproperty uchar y\nproperty uchar z\n"
                              "element face 4\nproperty list uint uchar vertex_indices\nend_header\n",
                          body, sizeof body);
     empty_log();
     patina_file *file = open_bytes(b.bytes, b.size);
-    expect_normals(file, (float[]){ 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 0 }, 18);
+    expect_normals(file, (float[]){0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 0}, 18);
     patina_file_destroy(file);
 
     // a strip, and another behind -1: all of it faces upwards
@@ -177,7 +178,8 @@ static void test_faces_of_any_size(void **state)
     enum { MANY = 100000 }; // a disc of one face
     char *text = malloc(MANY * 64u);
     assert_non_null(text);
-    int at = sprintf(text, ASCII "element vertex %d\n" XYZ "element face 1\nproperty list int int vertex_indices\nend_header\n", MANY);
+    int at = sprintf(text, ASCII "element vertex %d\n" XYZ "element face 1\nproperty list int int vertex_indices\nend_header\n",
+                     MANY);
     for (int i = 0; i < MANY; i++)
         at += sprintf(text + at, "%.9g %.9g 3\n", cos(i * 2 * 3.14159265358979 / MANY), sin(i * 2 * 3.14159265358979 / MANY));
     at += sprintf(text + at, "%d", MANY);
@@ -198,10 +200,11 @@ static void test_bad_faces(void **state)
 {
     (void)state;
     empty_log();
-    patina_file *file = open_text(ASCII "element vertex 3\n" XYZ "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+    patina_file *file = open_text(ASCII "element vertex 3\n" XYZ
+                                        "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
                                         "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 3\n3 -1 0 1\n4 0 1 2 99999\n");
     expect_log("1 (memory): 3 faces name points that are not there, and were left out; the first, 1, names 3 of 3");
-    expect_normals(file, (float[]){ 0, 0, 1, 0, 0, 1, 0, 0, 1 }, 9);
+    expect_normals(file, (float[]){0, 0, 1, 0, 0, 1, 0, 0, 1}, 9);
     patina_file_destroy(file);
     file = open_text(ASCII "element vertex 3\n" XYZ "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
                            "0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n3 0 0 1\n");
@@ -209,7 +212,7 @@ static void test_bad_faces(void **state)
     patina_file_destroy(file);
     file = open_text(ASCII "element vertex 1\n" XYZ "property float nx\nproperty float ny\nproperty float nz\nelement face 1\n"
                            "property list uchar int vertex_indices\nend_header\n0 0 0 1 0 0\n3 0 1 7\n");
-    expect_normals(file, (float[]){ 1, 0, 0 }, 3); // its own
+    expect_normals(file, (float[]){1, 0, 0}, 3); // its own
     patina_file_destroy(file);
     empty_log();
 }
@@ -222,8 +225,9 @@ static void test_range_grid(void **state)
 {
     (void)state;
     char text[4096];
-    int at = snprintf(text, sizeof text, ASCII "obj_info num_cols 8\nobj_info num_rows 5\nobj_info is_mesh 0\nelement vertex 39\n" XYZ
-                                               "element range_grid 40\nproperty list uchar int vertex_indices\nend_header\n");
+    int at = snprintf(text, sizeof text,
+                      ASCII "obj_info num_cols 8\nobj_info num_rows 5\nobj_info is_mesh 0\nelement vertex 39\n" XYZ
+                            "element range_grid 40\nproperty list uchar int vertex_indices\nend_header\n");
     for (int i = 0; i < 40; i++)
         if (i != 9)
             at += snprintf(text + at, sizeof text - (size_t)at, "%d %d %g\n", i % 8, i / 8, i % 8 / 2.0 + (i % 8 > 3 ? 10 : 0));
@@ -240,7 +244,8 @@ static void test_range_grid(void **state)
     for (int i = 0; i < 39; i++) {
         int cell = i < 9 ? i : i + 1;
         assert_true(columns[i] == (float)(cell % 8) && rows[i] == (float)(cell / 8));
-        assert_true(fabsf(n[3 * i] + sqrtf(0.2f)) < 1e-5f && fabsf(n[3 * i + 1]) < 1e-5f && fabsf(n[3 * i + 2] - sqrtf(0.8f)) < 1e-5f);
+        assert_true(fabsf(n[3 * i] + sqrtf(0.2f)) < 1e-5f && fabsf(n[3 * i + 1]) < 1e-5f &&
+                    fabsf(n[3 * i + 2] - sqrtf(0.8f)) < 1e-5f);
     }
     patina_file_destroy(file);
     strstr(text, "num_rows 5")[9] = '6'; // not as many cells as the grid should have

@@ -153,7 +153,8 @@ static void test_hidden_points_cast_no_shadow(void **state)
         patina_cloud_style style = {.mask = masks[i]};
         patina_scene *scene = scene_with(s, &style);
         CHECK(patina_scene_add_cloud(scene, below, NULL), scene);
-        const patina_light_desc sun = {.struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 2, .direction = {0.1, 0.1, -1}, .shadows = 1};
+        const patina_light_desc sun = {
+            .struct_size = sizeof sun, .type = PATINA_LIGHT_SUN, .power = 2, .direction = {0.1, 0.1, -1}, .shadows = 1};
         CHECK(patina_scene_add_light(scene, &sun), scene);
         CHECK(patina_frame_bake_shadows(frame, scene), frame);
         CHECK(patina_frame_read_shadows(frame, 1, 0, lit, 20000 * sizeof *lit), frame);
@@ -223,7 +224,8 @@ static void test_highlight(void **state)
 // A star that crosses itself, a box that reaches out of the picture, a hook of many corners, a box beyond three borders.
 static uint32_t outline(int which, double corners[][2])
 {
-    static const double boxes[2][4][2] = {{{60, 40}, {1000, 40}, {1000, 120.5}, {60, 120.5}}, {{83, -70}, {400, -70}, {400, 3000}, {83, 3000}}};
+    static const double boxes[2][4][2] = {{{60, 40}, {1000, 40}, {1000, 120.5}, {60, 120.5}},
+                                          {{83, -70}, {400, -70}, {400, 3000}, {83, 3000}}};
     const uint32_t count = which == 0 ? 5 : which % 2 ? 4 : 200;
     for (uint32_t i = 0; i < count; i++) {
         const double turn = which == 0 ? 4 * M_PI * i / 5 : 2 * M_PI * i / 200, r = which == 0 ? 70 : 40 + 25 * sin(7 * turn);
@@ -239,7 +241,8 @@ static int inside(const double corners[][2], uint32_t count, double x, double y)
     int in = 0;
     for (uint32_t i = 0; i < count; i++) {
         const double *a = corners[i], *b = corners[(i + 1) % count];
-        const double dx = b[0] - a[0], dy = b[1] - a[1], t = fmin(fmax(((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy), 0), 1);
+        const double dx = b[0] - a[0], dy = b[1] - a[1],
+                     t = fmin(fmax(((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy), 0), 1);
         if (hypot(x - a[0] - t * dx, y - a[1] - t * dy) < 1e-6)
             return -1;
         in ^= (a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) * dx / dy;
@@ -265,8 +268,8 @@ static uint32_t brute(const struct stage *s, const double corners[][2], uint32_t
         const float *p = s->points.position + 3 * i;
         double world[3], x, y, z;
         for (int r = 0; r < 3; r++)
-            world[r] = s->matrix[4 * r] * (double)p[0] + s->matrix[4 * r + 1] * (double)p[1] + s->matrix[4 * r + 2] * (double)p[2] +
-                       s->matrix[4 * r + 3];
+            world[r] = s->matrix[4 * r] * (double)p[0] + s->matrix[4 * r + 1] * (double)p[1] +
+                       s->matrix[4 * r + 2] * (double)p[2] + s->matrix[4 * r + 3];
         camera_project(&s->camera, SIZE, SIZE, world, &x, &y, &z);
         expected[i] = (int8_t)(x < 0 || y < 0 || x >= SIZE || y >= SIZE ? 0 : inside(corners, count, x, y));
         if (expected[i] == 1 && keys) {
@@ -282,7 +285,10 @@ static uint32_t brute(const struct stage *s, const double corners[][2], uint32_t
                 float shown;
                 memcpy(&shown, &word, 4);
                 const double slack = z - (double)shown - most;
-                expected[i] = (int8_t)(key == KEY_EMPTY ? expected[i] : fabs(slack) < 1e-5 && expected[i] != 1 ? -1 : slack < 0 ? 1 : expected[i]);
+                expected[i] = (int8_t)(key == KEY_EMPTY                         ? expected[i]
+                                       : fabs(slack) < 1e-5 && expected[i] != 1 ? -1
+                                       : slack < 0                              ? 1
+                                                                                : expected[i]);
             }
         }
         open += expected[i] < 0;
@@ -290,7 +296,8 @@ static uint32_t brute(const struct stage *s, const double corners[][2], uint32_t
     return open;
 }
 
-static uint32_t compare(const int8_t *expected, const uint8_t *bits, int (*may)(const struct stage *, uint32_t), const struct stage *s)
+static uint32_t compare(const int8_t *expected, const uint8_t *bits, int (*may)(const struct stage *, uint32_t),
+                        const struct stage *s)
 {
     uint32_t found = 0;
     for (uint32_t i = 0; i < TORUS; i++) {
@@ -315,7 +322,8 @@ static void test_pick(void **state)
     patina_device *device = support_device_first();
     for (int ortho = 0; ortho < 2; ortho++) {
         struct stage *s = make(ortho);
-        const double scale = fmax(fmax(hypot(1.1, -0.1), sqrt(0.04 + 0.64 + 0.04)), hypot(0.3, 1.4)); // the matrix's longest column
+        const double scale = fmax(fmax(hypot(1.1, -0.1), sqrt(0.04 + 0.64 + 0.04)),
+                                  hypot(0.3, 1.4)); // the matrix's longest column
         for (int which = 0; which < 4; which++) {
             const uint32_t count = outline(which, corners);
             patina_pick pick = {.struct_size = sizeof pick, .polygon = &corners[0][0], .corners = count};
@@ -385,7 +393,8 @@ static double srgb_of(double linear) { return linear <= 0.0031308 ? 12.92 * line
 
 static void graded(const patina_scan_grade *g, double c[3])
 {
-    const double luma[3] = {0.2126, 0.7152, 0.0722}, warm[3] = {exp2(0.5 * (double)g->temperature), 1, exp2(-0.5 * (double)g->temperature)};
+    const double luma[3] = {0.2126, 0.7152, 0.0722},
+                 warm[3] = {exp2(0.5 * (double)g->temperature), 1, exp2(-0.5 * (double)g->temperature)};
     double white = 0, grey = 0;
     for (int k = 0; k < 3; k++)
         white += luma[k] * warm[k];
@@ -510,8 +519,11 @@ static void test_refusals(void **state)
 int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_hidden_points_are_not_drawn), cmocka_unit_test(test_hidden_points_cast_no_shadow),
-        cmocka_unit_test(test_highlight), cmocka_unit_test(test_pick), cmocka_unit_test(test_grades), cmocka_unit_test(test_refusals)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_hidden_points_are_not_drawn),
+                                       cmocka_unit_test(test_hidden_points_cast_no_shadow),
+                                       cmocka_unit_test(test_highlight),
+                                       cmocka_unit_test(test_pick),
+                                       cmocka_unit_test(test_grades),
+                                       cmocka_unit_test(test_refusals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

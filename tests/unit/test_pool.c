@@ -83,7 +83,7 @@ static void test_late_helpers(void **state)
     struct pt_pool *pool = pt_pool_create(MOST_THREADS, 0);
     assert_non_null(pool);
     for (uint32_t round = 0; round < 20 * ROUNDS; round++) {
-        struct count count = { .wrong = 0 }; // gone when the next round begins
+        struct count count = {.wrong = 0}; // gone when the next round begins
         pt_parallel(pool, 8, 1, count_items, &count);
         for (uint32_t i = 0; i < 8; i++)
             assert_int_equal(count.times[i], 1);

@@ -23,7 +23,7 @@ struct stage {
 
 static void set_size(patina_scene *scene, uint32_t width, uint32_t height)
 {
-    patina_settings settings = { .struct_size = sizeof settings, .width = width, .height = height };
+    patina_settings settings = {.struct_size = sizeof settings, .width = width, .height = height};
     assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
 }
 
@@ -34,11 +34,9 @@ static struct stage set_stage(uint64_t memory_cap)
     for (int i = 0; i < POINTS; i++)
         for (int k = 0; k < 3; k++)
             points[i][k] = (float)((i * (7 + 6 * k)) % 97) / 97.0f;
-    patina_device_desc device = { .struct_size = sizeof device, .name = "cpu", .memory_cap = memory_cap };
-    patina_cloud_desc cloud = { .struct_size = sizeof cloud,
-                                .count = POINTS,
-                                .position = { points, PATINA_FLOAT32, 3, 0 } };
-    patina_camera camera = { .struct_size = sizeof camera };
+    patina_device_desc device = {.struct_size = sizeof device, .name = "cpu", .memory_cap = memory_cap};
+    patina_cloud_desc cloud = {.struct_size = sizeof cloud, .count = POINTS, .position = {points, PATINA_FLOAT32, 3, 0}};
+    patina_camera camera = {.struct_size = sizeof camera};
     assert_int_equal(patina_device_create(&device, &stage.device), PATINA_OK);
     assert_int_equal(patina_cloud_create(&cloud, NULL, &stage.cloud), PATINA_OK);
     assert_int_equal(patina_scene_create(&stage.scene), PATINA_OK);
@@ -78,14 +76,14 @@ static void test_picture_survives_memory_cap(void **state)
 {
     (void)state;
     struct stage probe = set_stage(0); // what a picture of this size takes
-    patina_frame_stats stats = { .struct_size = sizeof stats };
+    patina_frame_stats stats = {.struct_size = sizeof stats};
     assert_int_equal(patina_frame_render(probe.frame, probe.scene), PATINA_OK);
     assert_int_equal(patina_frame_get_stats(probe.frame, &stats), PATINA_OK);
     clear_stage(&probe);
     struct stage stage = set_stage(stats.plane_bytes);
     assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
     float *before = read_picture(&stage);
-    static const uint32_t sizes[] = { SIDE + 1, SIDE + 60, 700, 2000 };
+    static const uint32_t sizes[] = {SIDE + 1, SIDE + 60, 700, 2000};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         set_size(stage.scene, sizes[i], sizes[i]);
         assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_MEMORY);
@@ -115,7 +113,7 @@ static void test_lights_end_at_32(void **state)
 {
     (void)state;
     struct stage stage = set_stage(0);
-    patina_light_desc light = { .struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 1.0f };
+    patina_light_desc light = {.struct_size = sizeof light, .type = PATINA_LIGHT_SUN, .power = 1.0f};
     for (int i = 0; i < 32; i++)
         assert_int_equal(patina_scene_add_light(stage.scene, &light), PATINA_OK);
     assert_int_equal(patina_scene_add_light(stage.scene, &light), PATINA_ERROR_ARGUMENT);
@@ -127,7 +125,7 @@ static void test_bad_lights_and_shadows(void **state)
 {
     (void)state;
     struct stage stage = set_stage(0);
-    const patina_light_desc good = { .struct_size = sizeof good, .type = PATINA_LIGHT_AREA, .power = 1.0f };
+    const patina_light_desc good = {.struct_size = sizeof good, .type = PATINA_LIGHT_AREA, .power = 1.0f};
     patina_light_desc bad[9];
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         bad[i] = good;
@@ -145,16 +143,16 @@ static void test_bad_lights_and_shadows(void **state)
         assert_int_equal(patina_scene_add_light(stage.scene, &bad[i]), PATINA_ERROR_ARGUMENT);
         assert_message(stage.scene, "light: ");
     }
-    patina_settings settings = { .struct_size = sizeof settings, .shadow_samples = 4097 };
+    patina_settings settings = {.struct_size = sizeof settings, .shadow_samples = 4097};
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
-    settings = (patina_settings){ .struct_size = sizeof settings, .shadow_error = -0.1f };
+    settings = (patina_settings){.struct_size = sizeof settings, .shadow_error = -0.1f};
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "shadow_error is negative");
-    settings = (patina_settings){ .struct_size = sizeof settings, .world_directed = 2 };
+    settings = (patina_settings){.struct_size = sizeof settings, .world_directed = 2};
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
-    settings = (patina_settings){ .struct_size = sizeof settings, .world_light = { [2] = { [8] = NAN } } };
+    settings = (patina_settings){.struct_size = sizeof settings, .world_light = {[2] = {[8] = NAN}}};
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
-    settings = (patina_settings){ .struct_size = sizeof settings, .shadow_resolution = 16385 };
+    settings = (patina_settings){.struct_size = sizeof settings, .shadow_resolution = 16385};
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "shadow samples");
     float value;
@@ -171,7 +169,7 @@ static void test_planes_too_large(void **state)
     set_size(stage.scene, 65536, 8300);
     assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_ERROR_ARGUMENT);
     assert_message(stage.frame, "regions");
-    patina_settings part = { .struct_size = sizeof part, .width = 65536, .height = 8300, .region = { 32000, 4000, 32100, 4100 } };
+    patina_settings part = {.struct_size = sizeof part, .width = 65536, .height = 8300, .region = {32000, 4000, 32100, 4100}};
     assert_int_equal(patina_scene_set_settings(stage.scene, &part), PATINA_OK);
     assert_int_equal(patina_frame_render(stage.frame, stage.scene), PATINA_OK);
     clear_stage(&stage);
@@ -181,7 +179,7 @@ static void test_cameras(void **state)
 {
     (void)state;
     struct stage stage = set_stage(0);
-    patina_camera camera = { .struct_size = sizeof camera };
+    patina_camera camera = {.struct_size = sizeof camera};
     assert_int_equal(patina_scene_frame_camera(stage.scene, 30, 40, 0, &camera), PATINA_OK);
     patina_camera flat = camera, narrow = camera, endless = camera;
     for (int row = 0; row < 3; row++) // two parallel axes
@@ -217,38 +215,38 @@ static void test_statistics_in_any_locale(void **state)
 static void test_opacities_and_discs(void **state)
 {
     (void)state;
-    static const float wrong[] = { -0.1f, 1.5f, NAN, INFINITY };
-    static float points[4][3] = { { 0 }, { 1 }, { 0, 1 }, { 1, 1 } };
-    static const float opacities[4] = { 0.5f, 1.0f, -2.0f, NAN };
+    static const float wrong[] = {-0.1f, 1.5f, NAN, INFINITY};
+    static float points[4][3] = {{0}, {1}, {0, 1}, {1, 1}};
+    static const float opacities[4] = {0.5f, 1.0f, -2.0f, NAN};
     struct stage stage = set_stage(0);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        patina_cloud_style style = { .struct_size = sizeof style, .transparency = wrong[i] };
+        patina_cloud_style style = {.struct_size = sizeof style, .transparency = wrong[i]};
         assert_int_equal(patina_scene_add_cloud(stage.scene, stage.cloud, &style), PATINA_ERROR_ARGUMENT);
         assert_message(stage.scene, "transparency");
     }
-    patina_cloud_style style = { .struct_size = sizeof style, .radius = -1.0f };
+    patina_cloud_style style = {.struct_size = sizeof style, .radius = -1.0f};
     assert_int_equal(patina_scene_add_cloud(stage.scene, stage.cloud, &style), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "radius");
-    patina_settings settings = { .struct_size = sizeof settings, .surface = 3 };
+    patina_settings settings = {.struct_size = sizeof settings, .surface = 3};
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "surface");
-    patina_cloud_desc desc = { .struct_size = sizeof desc,
-                               .count = 4,
-                               .position = { points, PATINA_FLOAT32, 3, 0 },
-                               .opacity = { opacities, PATINA_FLOAT32, 3, 0 } };
+    patina_cloud_desc desc = {.struct_size = sizeof desc,
+                              .count = 4,
+                              .position = {points, PATINA_FLOAT32, 3, 0},
+                              .opacity = {opacities, PATINA_FLOAT32, 3, 0}};
     patina_cloud *cloud = NULL;
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
     assert_message(NULL, "opacity: 3 components; 1 is needed");
-    desc.opacity = (patina_array){ opacities, PATINA_INT32, 1, 0 };
+    desc.opacity = (patina_array){opacities, PATINA_INT32, 1, 0};
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
     assert_message(NULL, "opacity: element type 8");
     desc.opacity.type = PATINA_FLOAT32;
-    desc.radius = (patina_array){ opacities, PATINA_UINT8, 1, 0 };
+    desc.radius = (patina_array){opacities, PATINA_UINT8, 1, 0};
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_ERROR_ARGUMENT);
     assert_message(NULL, "radius: element type 3");
-    const float radii[4] = { 0.5f, -1.0f, NAN, 2.0f };
-    desc.radius = (patina_array){ radii, PATINA_FLOAT32, 1, 0 };
-    patina_cloud_info info = { .struct_size = sizeof info };
+    const float radii[4] = {0.5f, -1.0f, NAN, 2.0f};
+    desc.radius = (patina_array){radii, PATINA_FLOAT32, 1, 0};
+    patina_cloud_info info = {.struct_size = sizeof info};
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
     assert_int_equal(patina_cloud_get_info(cloud, &info), PATINA_OK);
     assert_true(info.has_radii && info.radius_most == 2.0f);
@@ -260,11 +258,14 @@ static void test_opacities_and_discs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_picture_survives_memory_cap), cmocka_unit_test(test_cancel_ends_with_its_render),
+        cmocka_unit_test(test_picture_survives_memory_cap),
+        cmocka_unit_test(test_cancel_ends_with_its_render),
         cmocka_unit_test(test_bad_lights_and_shadows),
-        cmocka_unit_test(test_lights_end_at_32),            cmocka_unit_test(test_planes_too_large),
+        cmocka_unit_test(test_lights_end_at_32),
+        cmocka_unit_test(test_planes_too_large),
         cmocka_unit_test(test_opacities_and_discs),
-        cmocka_unit_test(test_cameras),                     cmocka_unit_test(test_statistics_in_any_locale),
+        cmocka_unit_test(test_cameras),
+        cmocka_unit_test(test_statistics_in_any_locale),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -55,10 +55,15 @@ static patina_cloud *make_cloud(const struct scan *scan, int free_space)
     uint8_t *color = malloc(3 * scan->count);
     for (uint64_t i = 0; i < scan->count; i++)
         memset(color + 3 * i, scan->position[3 * i + 1] < BOARD + 0.1 ? 200 : 90, 3);
-    const patina_cloud_desc desc = {.struct_size = sizeof desc, .count = scan->count,
-                                    .position = {scan->position, PATINA_FLOAT64, 3, 0}, .color = {color, PATINA_UINT8, 3, 0}};
-    const patina_analysis_desc analysis = {.struct_size = sizeof analysis, .station_count = 2, .stations = stations,
-                                           .station = {scan->station, PATINA_UINT8, 1, 0}, .free_space = (uint32_t)free_space};
+    const patina_cloud_desc desc = {.struct_size = sizeof desc,
+                                    .count = scan->count,
+                                    .position = {scan->position, PATINA_FLOAT64, 3, 0},
+                                    .color = {color, PATINA_UINT8, 3, 0}};
+    const patina_analysis_desc analysis = {.struct_size = sizeof analysis,
+                                           .station_count = 2,
+                                           .stations = stations,
+                                           .station = {scan->station, PATINA_UINT8, 1, 0},
+                                           .free_space = (uint32_t)free_space};
     patina_cloud *cloud = NULL;
     CHECK(patina_cloud_create(&desc, NULL, &cloud), NULL);
     CHECK(patina_cloud_analyse(cloud, &analysis, NULL), cloud);
@@ -77,8 +82,8 @@ static patina_camera camera_at(int way)
     return camera;
 }
 
-static struct picture draw(patina_device *device, const patina_cloud *cloud, uint32_t free_space, int way, const patina_settings *settings,
-                           const double *placed)
+static struct picture draw(patina_device *device, const patina_cloud *cloud, uint32_t free_space, int way,
+                           const patina_settings *settings, const double *placed)
 {
     patina_cloud_style style = {.struct_size = sizeof style, .lighting = PATINA_LIGHTING_UNLIT, .free_space = free_space};
     patina_camera camera = camera_at(way);
@@ -123,7 +128,8 @@ static struct seen look(const struct picture *picture, int way)
             const uint32_t at = y * WIDTH + x;
             const float *color = picture->combined + 4 * at;
             seen.empty += picture->keys[at] == KEY_EMPTY;
-            const double z = picture->keys[at] == KEY_EMPTY ? 0.0 : (double)key_z(picture->keys[at]), there = eye[1] + z * ray[1];
+            const double z = picture->keys[at] == KEY_EMPTY ? 0.0 : (double)key_z(picture->keys[at]),
+                         there = eye[1] + z * ray[1];
             seen.board += z > 0.0 && there < BOARD + 0.5;
             seen.wall += there > WALL - 0.5;
             seen.magenta += color[0] > 0.5f && color[1] < 0.2f && color[2] > 0.5f;
@@ -157,12 +163,14 @@ static void test_slit(void **state)
             // from beside, the wall ends where the slit hid it from the scanner, and some of the slit lies near the board's points
             assert_true(after.board * (way == 1 ? 5 : 50) < before.board);
             assert_true(after.wall * (way == 1 ? 8 : 50) > before.board * (way == 1 ? 5 : 48));
-            assert_true(marked.board == before.board && marked.magenta * (way == 1 ? 8 : 50) > before.board * (way == 1 ? 6 : 48));
+            assert_true(marked.board == before.board &&
+                        marked.magenta * (way == 1 ? 8 : 50) > before.board * (way == 1 ? 6 : 48));
             struct picture turned = draw(device, cloud, PATINA_FREE_SPACE_USE, way, &settings, way < 2 ? placed : NULL);
             const uint64_t pixels = WIDTH * HEIGHT;
             uint64_t differ = 0; // the object is placed twice as large
             for (uint64_t i = 0; i < pixels; i++)
-                differ += (turned.keys[i] == KEY_EMPTY) != (used.keys[i] == KEY_EMPTY) || key_id(turned.keys[i]) != key_id(used.keys[i]);
+                differ += (turned.keys[i] == KEY_EMPTY) != (used.keys[i] == KEY_EMPTY) ||
+                          key_id(turned.keys[i]) != key_id(used.keys[i]);
             assert_true(differ * 100 < pixels);
             picture_free(&turned);
             picture_free(&off);

@@ -14,9 +14,11 @@
 
 // Numbers that processors treat each in their way; the first four bits of a NaN's payload tell two apart.
 static const uint32_t odd[] = {
-    0x00000000u, 0x80000000u, 0x3F800000u, 0xBF800000u, 0x3FC00000u, 0xBFC00000u, 0x00000001u, 0x80000001u, // 0, 1, 1.5, the least
+    0x00000000u, 0x80000000u, 0x3F800000u, 0xBF800000u, 0x3FC00000u, 0xBFC00000u,
+    0x00000001u, 0x80000001u,                                                     // 0, 1, 1.5, the least
     0x4EFFFFFFu, 0x4F000000u, 0xCF000000u, 0xCF000001u, 0x4F800000u, 0x7F7FFFFFu, // about 2^31, -2^31, 2^32, the largest
-    0x7F800000u, 0xFF800000u, 0x7FC00000u, 0xFFC00000u, 0x7FC12345u, 0x4B000001u, 0x3EFFFFFFu, 0xC2C80001u,
+    0x7F800000u, 0xFF800000u, 0x7FC00000u, 0xFFC00000u, 0x7FC12345u, 0x4B000001u,
+    0x3EFFFFFFu, 0xC2C80001u,
 };
 enum { ODD = sizeof odd / sizeof odd[0] };
 
@@ -105,7 +107,7 @@ static void test_lanes(void **state)
             if (lanes >> k & 1u)
                 assert_int_equal(out[n++], a[k]);
         assert_int_equal(vm_bits(vm_of_bits(lanes)), lanes);
-        uint64_t keys[PT_LANES] = { 0 };
+        uint64_t keys[PT_LANES] = {0};
         vi_store_keys(keys, vi_load(b), vi_load(a), lanes);
         for (uint32_t k = 0; k < PT_LANES; k++)
             assert_true(keys[k] == (lanes >> k & 1u ? (uint64_t)b[k] << 32 | a[k] : 0));

@@ -24,10 +24,10 @@ static patina_cloud_desc describe(uint64_t count)
             points[i][k] = (float)((i * (7 + 6 * k)) % 9973) / 9973.0f;
             colors[i][k] = (uint8_t)(i + k);
         }
-    return (patina_cloud_desc){ .struct_size = sizeof(patina_cloud_desc),
-                                .count = count,
-                                .position = { points, PATINA_FLOAT32, 3, 0 },
-                                .color = { colors, PATINA_UINT8, 3, 0 } };
+    return (patina_cloud_desc){.struct_size = sizeof(patina_cloud_desc),
+                               .count = count,
+                               .position = {points, PATINA_FLOAT32, 3, 0},
+                               .color = {colors, PATINA_UINT8, 3, 0}};
 }
 
 static const char *message(const void *handle)
@@ -63,15 +63,15 @@ static void test_builds_and_renders(void **state)
     assert_int_equal(patina_cloud_create(&desc, NULL, &direct), PATINA_OK);
 
     static float pixels[2][SIDE * SIDE * 4];
-    patina_cloud *clouds[2] = { built, direct };
+    patina_cloud *clouds[2] = {built, direct};
     patina_device *device;
-    patina_device_desc cpu = { .struct_size = sizeof cpu, .name = "cpu" };
+    patina_device_desc cpu = {.struct_size = sizeof cpu, .name = "cpu"};
     assert_int_equal(patina_device_create(&cpu, &device), PATINA_OK);
     for (int i = 0; i < 2; i++) {
         patina_scene *scene;
         patina_frame *frame;
-        patina_camera camera = { .struct_size = sizeof camera };
-        patina_settings settings = { .struct_size = sizeof settings, .width = SIDE, .height = SIDE };
+        patina_camera camera = {.struct_size = sizeof camera};
+        patina_settings settings = {.struct_size = sizeof settings, .width = SIDE, .height = SIDE};
         assert_int_equal(patina_scene_create(&scene), PATINA_OK);
         assert_int_equal(patina_scene_add_cloud(scene, clouds[i], NULL), PATINA_OK);
         assert_int_equal(patina_scene_set_settings(scene, &settings), PATINA_OK);
@@ -79,7 +79,7 @@ static void test_builds_and_renders(void **state)
         assert_int_equal(patina_scene_set_camera(scene, &camera), PATINA_OK);
         assert_int_equal(patina_frame_create(device, &frame), PATINA_OK);
         if (i == 0) {
-            patina_read read = { PATINA_PASS_COMBINED, pixels[i], sizeof pixels[i] - 1 };
+            patina_read read = {PATINA_PASS_COMBINED, pixels[i], sizeof pixels[i] - 1};
             assert_int_equal(patina_task_render(frame, scene, &read, 1, &task), PATINA_OK);
             assert_int_equal(patina_task_wait(task), PATINA_ERROR_ARGUMENT);
             assert_non_null(strstr(message(task), "patina_frame_read"));
@@ -188,7 +188,7 @@ static void test_fingerprints(void **state)
     run_fingerprint(&desc, second, PATINA_OK);
     assert_true(first[0] != second[0] && first[1] == second[1]);
     points[500][1] -= 1.0f;
-    desc.normal = (patina_array){ points, PATINA_FLOAT32, 3, 0 };
+    desc.normal = (patina_array){points, PATINA_FLOAT32, 3, 0};
     run_fingerprint(&desc, second, PATINA_OK);
     assert_true(first[0] != second[0] && first[1] == second[1]);
     desc.normal.stride = 16;
@@ -201,9 +201,9 @@ static void test_colors(void **state)
     patina_cloud_desc desc = describe(1000);
     patina_cloud *cloud;
     patina_task *task;
-    patina_cloud_info info = { .struct_size = sizeof info };
+    patina_cloud_info info = {.struct_size = sizeof info};
     assert_int_equal(patina_cloud_create(&desc, NULL, &cloud), PATINA_OK);
-    assert_int_equal(patina_task_set_colors(cloud, &(patina_array){ 0 }, &task), PATINA_OK);
+    assert_int_equal(patina_task_set_colors(cloud, &(patina_array){0}, &task), PATINA_OK);
     assert_int_equal(patina_task_wait(task), PATINA_OK);
     patina_task_destroy(task);
     assert_int_equal(patina_cloud_get_info(cloud, &info), PATINA_OK);
@@ -235,7 +235,7 @@ static void test_files(void **state)
     assert_int_equal(patina_task_open_file(path, NULL, &task), PATINA_OK);
     assert_int_equal(patina_task_take_file(task, &file), PATINA_OK);
     assert_int_equal(patina_task_take_file(task, &again), PATINA_ERROR_EMPTY);
-    patina_file_info info = { .struct_size = sizeof info };
+    patina_file_info info = {.struct_size = sizeof info};
     assert_int_equal(patina_file_get_info(file, &info), PATINA_OK);
     assert_int_equal(info.count, 1000);
     patina_file_destroy(file);
@@ -280,7 +280,7 @@ static void test_damaged_clouds(void **state)
         random = random * 1664525u + 1013904223u;
         // not in the padding behind a section, which is zero and read by nobody
         const off_t at = (off_t)(SECTION + ((uint64_t)random << 8) % (size - SECTION));
-        unsigned char old = 0, none[64] = { 0 }, around[64] = { 0 };
+        unsigned char old = 0, none[64] = {0}, around[64] = {0};
         assert_int_equal(fseeko(file, at, SEEK_SET), 0);
         const size_t got = fread(around, 1, sizeof around, file);
         if (!memcmp(around, none, got))
@@ -317,10 +317,14 @@ static void test_damaged_clouds(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_builds_and_renders), cmocka_unit_test(test_errors_come_through),
-        cmocka_unit_test(test_cancel),             cmocka_unit_test(test_destroy_waits),
-        cmocka_unit_test(test_fingerprints),       cmocka_unit_test(test_colors),
-        cmocka_unit_test(test_files),              cmocka_unit_test(test_damaged_clouds),
+        cmocka_unit_test(test_builds_and_renders),
+        cmocka_unit_test(test_errors_come_through),
+        cmocka_unit_test(test_cancel),
+        cmocka_unit_test(test_destroy_waits),
+        cmocka_unit_test(test_fingerprints),
+        cmocka_unit_test(test_colors),
+        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_damaged_clouds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

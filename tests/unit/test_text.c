@@ -117,8 +117,8 @@ static void test_decimal_commas(void **state)
     expect_rows("X;Y;Z;Wert\n2,051640;0,143959;-0,918971;7\n-1;2,5;3;0,25\n", "CSV", 2, "Wert", wanted);
     expect_rows("X\tY\tZ\tWert\n2,051640\t0,143959\t-0,918971\t7\n-1\t2,5\t3\t0,25\n", "CSV", 2, "Wert", wanted);
     expect_rows("x y z Wert\n2,051640 0,143959 -0,918971 7\n-1   2,5 3 0,25\n", "CSV", 2, "Wert", wanted);
-    expect_rows("\"X\",\"Y\",\"Z\",\"Wert\"\r\n\"2,051640\",\"0,143959\",\"-0,918971\",7\r\n-1,\"2,5\",\"3\",\"0,25\"\r\n", "CSV", 2,
-                "Wert", wanted);
+    expect_rows("\"X\",\"Y\",\"Z\",\"Wert\"\r\n\"2,051640\",\"0,143959\",\"-0,918971\",7\r\n-1,\"2,5\",\"3\",\"0,25\"\r\n",
+                "CSV", 2, "Wert", wanted);
     expect_rows("2,051640;0,143959;-0,918971;7;\n-1;2,5;3;2,5e-1;\n", "XYZ", 2, "intensity", wanted);
     expect_rows("2,051640 0,143959 -0,918971 7\n-1 2,5 3 0,25\n", "XYZ", 2, "intensity", wanted);
     const double points[8] = {1.5, 2, 3, 4, 5, 6, 7.25, 8};
@@ -133,7 +133,8 @@ static void test_tables(void **state)
     (void)state;
     const double wanted[8] = {1, 2, 3, NAN, 4, 5, 6, 0.5};
     expect_rows("x,y,z,Intensity\n1,2,3,\n4,5,6,0.5\n,,,\n", "CSV", 2, "Intensity", wanted);
-    expect_rows("\"x\";\"y\";\"z\";\"Scan Angle\"\n\"1.0\";\"2.0\";\"3.0\";\"\"\n\"4\";\"5\";\"6\";\"0.5\"\n", "CSV", 2, "Scan Angle", wanted);
+    expect_rows("\"x\";\"y\";\"z\";\"Scan Angle\"\n\"1.0\";\"2.0\";\"3.0\";\"\"\n\"4\";\"5\";\"6\";\"0.5\"\n", "CSV", 2,
+                "Scan Angle", wanted);
     expect_rows("\"1.0\",\"2.0\",\"3.0\",\n4,5,6,0.5\n", "XYZ", 2, "intensity", wanted);
     const double indexed[8] = {1, 2, 3, 0, 4, 5, 6, 1};
     expect_rows(",x,y,z\n0,1,2,3\n1,4,5,6\n", "CSV", 2, "column_1", indexed);
@@ -161,7 +162,9 @@ static void test_words(void **state)
     take_log();
     expect_rows("X,Y,Z,Note\n1.5,2,3,tree\n4,5,6,\"a, post\"\n", "CSV", 2, NULL, places);
     assert_non_null(strstr(take_log(), "column 'Note' holds words ('tree' in line 2) and is left out"));
-    expect_rows("\xEF\xBB\xBF" "Name;X;Y;Z;Code;Wert\r\nP 1;1,5;2;3;;7\r\n12;4;5;6;oak tree;8\r\n;;;;;\r\n", "CSV", 2, "Wert", wanted);
+    expect_rows("\xEF\xBB\xBF"
+                "Name;X;Y;Z;Code;Wert\r\nP 1;1,5;2;3;;7\r\n12;4;5;6;oak tree;8\r\n;;;;;\r\n",
+                "CSV", 2, "Wert", wanted);
     const char *said = take_log();
     assert_non_null(strstr(said, "column 'Name' holds words ('P 1' in line 2)"));
     assert_non_null(strstr(said, "column 'Code' holds words ('oak tree' in line 3)"));
@@ -214,13 +217,15 @@ enum { COLUMNS = 60, ROWS = 40 };
 // distance errs by up to 4 mm either way. Returns the text's new end.
 static char *put_wall(char *text, double x, double y, uint32_t *random)
 {
-    text += sprintf(text, "%d\n%d\n%g %g 2\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n%g %g 2 1\n", COLUMNS, ROWS, x, y, x, y);
+    text += sprintf(text, "%d\n%d\n%g %g 2\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n%g %g 2 1\n", COLUMNS, ROWS, x, y,
+                    x, y);
     for (int column = 0; column < COLUMNS; column++)
         for (int row = 0; row < ROWS; row++) {
             double u = (column - COLUMNS / 2) * 0.01, v = (row - ROWS / 2) * 0.01, depth = abs(column - 30) < 10 ? 3 : 5;
             *random = *random * 1664525u + 1013904223u;
             depth += 0.008 * ((*random >> 8) / 16777216.0 - 0.5);
-            text += row == 7 && column == 3 ? sprintf(text, "0 0 0 0\n") : sprintf(text, "%.5f %.5f %.5f 0.5\n", u * depth, depth, v * depth);
+            text += row == 7 && column == 3 ? sprintf(text, "0 0 0 0\n")
+                                            : sprintf(text, "%.5f %.5f %.5f 0.5\n", u * depth, depth, v * depth);
         }
     return text;
 }
@@ -268,7 +273,8 @@ static void test_grid_normals(void **state)
         column[i] = i / 3, row[i] = i % 3;
         position[i][0] = (float)column[i], position[i][1] = 7, position[i][2] = (float)row[i];
     }
-    patina_grid_desc desc = {.struct_size = sizeof desc, .count = 9, .position = position[0], .column = column, .row = row, .station = {1, 20, 1}};
+    patina_grid_desc desc = {
+        .struct_size = sizeof desc, .count = 9, .position = position[0], .column = column, .row = row, .station = {1, 20, 1}};
     assert_int_equal(patina_grid_normals(&desc, NULL, n[0]), PATINA_OK);
     for (int i = 0; i < 9; i++)
         assert_true(n[i][0] == 0 && n[i][1] == 1 && n[i][2] == 0);
@@ -314,7 +320,8 @@ static void test_refused(void **state)
 {
     (void)state;
     refuse("1 2 3\n4 5\n", "line 2: 2 numbers; 3 were expected");
-    refuse("1 2 3\n\n4 5 red\n", "line 3: column 3 holds a word, 'red', where a number is needed; a first line that names x, y, z");
+    refuse("1 2 3\n\n4 5 red\n",
+           "line 3: column 3 holds a word, 'red', where a number is needed; a first line that names x, y, z");
     refuse("1 2\n3 4\n", "fewer than three numbers");
     refuse("1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 0 0 1\n1 2 3 0.5\n", "within a scan");
     refuse("hello world\n", "not a PLY file");
@@ -326,7 +333,8 @@ static void test_refused(void **state)
     refuse("Point Id X Y Z Code\nP1 1 2 3 7\n", "which column is which cannot be told");
     refuse("1 P1 2 3\n4 P2 five 6\n", "line 2: column 3 holds a word, 'five'");
     refuse("X;Y;Z\n1.5;2;3\n1,5;2;3\n", "line 3: decimals behind a comma");
-    refuse_file("patina_text.csv", "id,lon,lat,elev\n1,2,3,4\n", "no columns x, y and z in its line of names: id, lon, lat, elev");
+    refuse_file("patina_text.csv", "id,lon,lat,elev\n1,2,3,4\n",
+                "no columns x, y and z in its line of names: id, lon, lat, elev");
     refuse_file("patina_text.txt", "Dear all, this is a letter\nwithout points\n", "names: Dear, all, this");
     refuse_file("patina_text.xyz", "hello world\n", "neither a PLY file nor lines of numbers");
 }
@@ -334,15 +342,9 @@ static void test_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_columns),
-        cmocka_unit_test(test_values),
-        cmocka_unit_test(test_decimal_commas),
-        cmocka_unit_test(test_tables),
-        cmocka_unit_test(test_words),
-        cmocka_unit_test(test_first_row_of_nan),
-        cmocka_unit_test(test_ptx),
-        cmocka_unit_test(test_ptx_grid),
-        cmocka_unit_test(test_grid_normals),
+        cmocka_unit_test(test_columns), cmocka_unit_test(test_values),   cmocka_unit_test(test_decimal_commas),
+        cmocka_unit_test(test_tables),  cmocka_unit_test(test_words),    cmocka_unit_test(test_first_row_of_nan),
+        cmocka_unit_test(test_ptx),     cmocka_unit_test(test_ptx_grid), cmocka_unit_test(test_grid_normals),
         cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

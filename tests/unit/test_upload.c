@@ -47,9 +47,8 @@ static void test_time(void **state)
     }
     qsort(seconds, 7, sizeof *seconds, ascending);
     qsort(work, 7, sizeof *work, ascending);
-    printf(
-        "  1000000 random points with normals and colours: %.3f s (%.3f to %.3f) on %ld processors, %.3f s of work\n",
-        seconds[3], seconds[0], seconds[6], sysconf(_SC_NPROCESSORS_ONLN), work[3]);
+    printf("  1000000 random points with normals and colours: %.3f s (%.3f to %.3f) on %ld processors, %.3f s of work\n",
+           seconds[3], seconds[0], seconds[6], sysconf(_SC_NPROCESSORS_ONLN), work[3]);
     points_free(&points);
 }
 
@@ -120,8 +119,8 @@ static void test_progress_and_cancel(void **state)
         cancelled += code == PATINA_ERROR_CANCELLED;
         latest = code == PATINA_ERROR_CANCELLED ? fmax(latest, late) : latest;
     }
-    printf("  3000000 points: %.3f s, %u steps of progress; %u of 10 cancelled, at most %.0f ms late\n", whole,
-           watch.steps, cancelled, 1e3 * latest);
+    printf("  3000000 points: %.3f s, %u steps of progress; %u of 10 cancelled, at most %.0f ms late\n", whole, watch.steps,
+           cancelled, 1e3 * latest);
     assert_true(cancelled >= 7);
     assert_true(latest <= 0.25 * whole + 0.05); // soon, beside the whole
     points_free(&points);
@@ -261,12 +260,8 @@ static void test_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_time),
-        cmocka_unit_test(test_progress_and_cancel),
-        cmocka_unit_test(test_cancelled_before),
-        cmocka_unit_test(test_spacing),
-        cmocka_unit_test(test_types_and_strides),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_time),    cmocka_unit_test(test_progress_and_cancel), cmocka_unit_test(test_cancelled_before),
+        cmocka_unit_test(test_spacing), cmocka_unit_test(test_types_and_strides),   cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,10 +12,10 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
     float *at = finish->memory + thread * finish->thread_floats + PT_ROW_PAD;
     const size_t s = finish->stride;
     for (uint32_t i = 0; i < finish->ring; i++, at += CHANNELS_SEEN * s)
-        walk->seen[i] = (struct pt_seen_row){ at, at + s, { at + 2 * s, at + 3 * s, at + 4 * s }, (uint8_t *)(at + 5 * s), 0, 0 };
+        walk->seen[i] = (struct pt_seen_row){at, at + s, {at + 2 * s, at + 3 * s, at + 4 * s}, (uint8_t *)(at + 5 * s), 0, 0};
     for (uint32_t i = 0; i < RING; i++, at += CHANNELS_COLOR * s) {
-        walk->shaded[i] = (struct pt_color_row){ NULL, { at, at + s, at + 2 * s, at + 3 * s } };
-        walk->smoothed[i] = (struct pt_color_row){ NULL, { at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s } };
+        walk->shaded[i] = (struct pt_color_row){NULL, {at, at + s, at + 2 * s, at + 3 * s}};
+        walk->smoothed[i] = (struct pt_color_row){NULL, {at + 4 * s, at + 5 * s, at + 6 * s, at + 7 * s}};
         for (uint32_t k = 0; k < 5; k++)
             walk->shown[i][k] = at + (8 + k) * s;
         for (uint32_t k = 0; k < 3; k++)
@@ -30,8 +30,7 @@ static void lay_out(const struct finish *finish, uint32_t thread, struct walk *w
 
 static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
 {
-    const struct pt_color_row *const rows[3] = { &walk->shaded[slot(y - 1)], &walk->shaded[slot(y)],
-                                                 &walk->shaded[slot(y + 1)] };
+    const struct pt_color_row *const rows[3] = {&walk->shaded[slot(y - 1)], &walk->shaded[slot(y)], &walk->shaded[slot(y + 1)]};
     struct pt_color_row *out = &walk->smoothed[slot(y)];
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
@@ -42,7 +41,7 @@ static void smooth(const struct finish *finish, struct walk *walk, int32_t y)
         const int flat = pt_flat(seen, x);
         end = flat ? end_of_part(seen, x) : x + PT_LANES;
         for (int k = 0; k < finish->channels && flat; k++) {
-            const float *const colors[3] = { rows[0]->color[k], rows[1]->color[k], rows[2]->color[k] };
+            const float *const colors[3] = {rows[0]->color[k], rows[1]->color[k], rows[2]->color[k]};
             pt_nine_flat(&nine, colors, (int32_t)x, (int32_t)end, scale, vf_set(k < 3 ? pt_float(PT_KEY_EMPTY_Z) : 1.0f),
                          out->color[k]);
         }
@@ -80,7 +79,7 @@ static vm mix_edges(const struct finish *finish, const struct around *around, co
 {
     const struct view_args *view = finish->planes.view;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
-    vf limit = empty, sum[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() }, count = vf_zero();
+    vf limit = empty, sum[4] = {vf_zero(), vf_zero(), vf_zero(), vf_zero()}, count = vf_zero();
     if (finish->line)
         some = vm_and(some, vm_not(vf_lt(vf_zero(), vf_load(finish->line + (size_t)y * view->width + x))));
     if (finish->antialias->layers)
@@ -123,12 +122,14 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
     size_t out = (size_t)y * args->crop_width + x;
     if (args->depth && args->centered) {
         const size_t at = (size_t)py * width + px;
-        vf_put(finish->depth + out, pt_centered_depth(args, finish->planes.keys + at, finish->offsets, pt_source_of(finish->planes.from, at), some), count);
+        vf_put(finish->depth + out,
+               pt_centered_depth(args, finish->planes.keys + at, finish->offsets, pt_source_of(finish->planes.from, at), some),
+               count);
     } else if (args->depth) {
         vf_put(finish->depth + out, z, count);
     }
     if (args->normal) {
-        vf normal[3], world[3] = { vf_zero(), vf_zero(), vf_zero() };
+        vf normal[3], world[3] = {vf_zero(), vf_zero(), vf_zero()};
         if (vm_bits(some)) {
             for (uint32_t k = 0; k < 3; k++)
                 normal[k] = vf_load(walk->shown[slot((int32_t)py)][k] + px);
@@ -141,8 +142,7 @@ static void put_passes(const struct finish *finish, const struct walk *walk, vf 
         const size_t at = (size_t)py * width + px;
         const vi source = vm_bits(some) ? pt_source(&finish->planes, at) : vi_set(0);
         if (vm_bits(some) && args->discs_count)
-            value = pt_source_among_discs(args, finish->planes.keys + at, finish->away + at, source, mixed, some, px,
-                                          py);
+            value = pt_source_among_discs(args, finish->planes.keys + at, finish->away + at, source, mixed, some, px, py);
         else if (vm_bits(some))
             value = pt_source_value(width, source, mixed, some, px, py);
         vf_put(finish->source + out, value, count);
@@ -159,7 +159,7 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct compose_args *args = finish->compose;
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
-    const struct around around = { { &walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)] } };
+    const struct around around = {{&walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)]}};
     const uint32_t row = (uint32_t)y - args->crop_y;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     float *combined = finish->combined + 4 * (size_t)row * args->crop_width;
@@ -168,17 +168,17 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
         background[k] = vf_set(args->background[k]);
     for (uint32_t x = 0; x < args->crop_width; x += PT_LANES) {
         uint32_t px = args->crop_x + x, count = pt_lanes_left(x, args->crop_width);
-        vf z = vf_load(seen->z + px), color[4] = { background[0], background[1], background[2], background[3] };
+        vf z = vf_load(seen->z + px), color[4] = {background[0], background[1], background[2], background[3]};
         vm some = vm_and(vm_first(count), vf_lt(z, empty)), mixed = vm_of_bits(0);
         if (vm_bits(some)) {
-            vf shown[4] = { vf_load(around.row[1]->color[0] + px), vf_load(around.row[1]->color[1] + px),
-                            vf_load(around.row[1]->color[2] + px), vf_set(1.0f) };
+            vf shown[4] = {vf_load(around.row[1]->color[0] + px), vf_load(around.row[1]->color[1] + px),
+                           vf_load(around.row[1]->color[2] + px), vf_set(1.0f)};
             if (pt_flat(seen, px)) { // opaque, and no edge
                 memcpy(color, shown, sizeof color);
             } else {
                 if (finish->antialias)
                     mixed = mix_edges(finish, &around, seen->limit, px, (uint32_t)y, some, shown);
-                const struct pt_here here = { .some = some };
+                const struct pt_here here = {.some = some};
                 pt_compose(args, &here, shown);
                 memcpy(color, shown, sizeof color);
             }
@@ -189,7 +189,7 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
     }
     for (uint32_t i = finish->last.first; i < finish->last.first + finish->last.count; i++)
         PT_POINTWISE_KERNELS[finish->passes[i].kernel].step(&(struct pt_walk_row){
-            .args = finish->passes[i].call.arguments, .y = row, .end = args->crop_width, .color = combined });
+            .args = finish->passes[i].call.arguments, .y = row, .end = args->crop_width, .color = combined});
 }
 
 // ---- or what is peeled ---------------------------------------------------------------------------------------------------
@@ -197,7 +197,7 @@ static void put_row(const struct finish *finish, struct walk *walk, int32_t y)
 static void peel_row(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
-    const struct around around = { { &walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)] } };
+    const struct around around = {{&walk->smoothed[slot(y - 1)], &walk->smoothed[slot(y)], &walk->smoothed[slot(y + 1)]}};
     const uint32_t *rect = finish->peel->view.rect, first = rect[0] / PT_TILE, width = finish->planes.view->width;
     const uint32_t columns = (width + PT_TILE - 1) / PT_TILE, last = (rect[2] + PT_TILE - 1) / PT_TILE;
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
@@ -205,7 +205,7 @@ static void peel_row(const struct finish *finish, struct walk *walk, int32_t y)
         walk->tiles[tx] = pt_tile_begin();
     for (uint32_t x = first * PT_TILE; x < rect[2]; x += PT_LANES) {
         vm lanes = vm_first(pt_lanes_left(x, rect[2]));
-        vf z = vf_load(seen->z + x), color[4] = { empty, empty, empty, empty };
+        vf z = vf_load(seen->z + x), color[4] = {empty, empty, empty, empty};
         vm some = vm_and(lanes, vf_lt(z, empty));
         if (vm_bits(some)) {
             for (uint32_t k = 0; k < 4; k++)
@@ -282,7 +282,7 @@ static void take_planes(struct finish *finish, const struct pt_cpu_call *call)
 
 int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
 {
-    struct finish finish = { .passes = passes };
+    struct finish finish = {.passes = passes};
     const struct pt_cpu_call *shared = &passes[0].call;
     for (uint32_t i = 0; i < count; i++) {
         const struct pt_cpu_call *call = &passes[i].call;
@@ -310,7 +310,8 @@ int PT_KERNEL_ENTRY(finish)(const struct pt_cpu_pass *passes, uint32_t count)
             finish.shading = PT_DATA(call, peel, shading);
             finish.planes.keys = PT_DATA(call, peel, keys);
             finish.planes.view = &finish.peel->view;
-            finish.peeled = (struct pt_peeled){ PT_DATA(call, peel, limit), PT_DATA(call, peel, through), PT_DATA(call, peel, over) };
+            finish.peeled = (struct pt_peeled){PT_DATA(call, peel, limit), PT_DATA(call, peel, through),
+                                               PT_DATA(call, peel, over)};
             finish.tiles = PT_DATA(call, peel, tiles);
             finish.base = (int32_t)(finish.peel->view.rect[1] / PT_TILE * PT_TILE);
             finish.end = (int32_t)finish.peel->view.rect[3];

@@ -20,46 +20,46 @@ struct steps { // passes that follow one another
 
 struct finish {
     const struct pt_cpu_pass *passes;
-    uint32_t shade_count;                     // of passes, from the first on
-    struct steps before, after, last;         // pointwise: before smoothing, after it, on the picture
-    const struct pt_buffer *albedo;           // the plane that one of them asks for; else NULL
-    int shows_normals;                        // one of them, or extract, asks for normals
-    const float *colors;                      // where nothing is shaded: as they are so far; and, where peeling or extract
-    const float *shading, *arrived;           // ask for them, what was shown
-    const struct smooth_args *smooth;         // NULL: off
-    const struct antialias_args *antialias;   // NULL: off
+    uint32_t shade_count;                   // of passes, from the first on
+    struct steps before, after, last;       // pointwise: before smoothing, after it, on the picture
+    const struct pt_buffer *albedo;         // the plane that one of them asks for; else NULL
+    int shows_normals;                      // one of them, or extract, asks for normals
+    const float *colors;                    // where nothing is shaded: as they are so far; and, where peeling or extract
+    const float *shading, *arrived;         // ask for them, what was shown
+    const struct smooth_args *smooth;       // NULL: off
+    const struct antialias_args *antialias; // NULL: off
     const struct compose_args *compose;
-    const struct extract_args *extract;       // NULL: nothing beside the colour
+    const struct extract_args *extract; // NULL: nothing beside the colour
     float *combined, *depth, *normals, *source, *shadow;
-    const float *offsets;                     // to the middles of measured pixels, where the depth asks for them
-    const float *away;                        // of discs' points, where the source asks for it
-    const struct peel_args *peel;             // NULL: the picture is composed
-    const float *through;                     // of the layers before; NULL before the first
-    const float *line;                        // lines, which anti-aliasing leaves to ink; NULL: none
+    const float *offsets;         // to the middles of measured pixels, where the depth asks for them
+    const float *away;            // of discs' points, where the source asks for it
+    const struct peel_args *peel; // NULL: the picture is composed
+    const float *through;         // of the layers before; NULL before the first
+    const float *line;            // lines, which anti-aliasing leaves to ink; NULL: none
     struct pt_peeled peeled;
     struct pt_tile_value *tiles;
-    int channels;                             // of colours: 3, or 4 with alpha
-    int32_t base, end;                        // rows that are finished
+    int channels;      // of colours: 3, or 4 with alpha
+    int32_t base, end; // rows that are finished
     struct pt_planes planes;
     int32_t reach;
     int with_normals;
     float weights[2 * PT_BLEND_MOST * PT_BLEND_MOST + 1];
     float *memory; // per thread
     size_t stride, thread_floats;
-    uint32_t ring; // of rows seen
+    uint32_t ring;      // of rows seen
     struct walk *walks; // per thread
 };
 
 // Where a thread is: it goes on where it stopped when its next rows follow.
 struct walk {
-    int32_t first, next;            // row of the picture that it began with; that comes next
+    int32_t first, next; // row of the picture that it began with; that comes next
     struct pt_seen_row seen[SEEN_MOST];
     struct pt_color_row shaded[RING], smoothed[RING];
-    float *shown[RING][5];          // normals, opacities, what arrives of the lights
-    float *albedo[RING][4];         // the last of them NULL
-    float *blended[3];              // sums of normals of the row at hand, where all that their windows show is one layer:
-    uint8_t *wide;                  // by `flat` of the row, or of windows wider than 3 x 3 pixels their radius, else 0
-    struct pt_tile_sum *tiles;      // of the row of tiles at hand
+    float *shown[RING][5];     // normals, opacities, what arrives of the lights
+    float *albedo[RING][4];    // the last of them NULL
+    float *blended[3];         // sums of normals of the row at hand, where all that their windows show is one layer:
+    uint8_t *wide;             // by `flat` of the row, or of windows wider than 3 x 3 pixels their radius, else 0
+    struct pt_tile_sum *tiles; // of the row of tiles at hand
 };
 
 static struct pt_seen_row *seen_row(const struct finish *finish, struct walk *walk, int32_t y)

@@ -48,8 +48,8 @@ static void see(const struct finish *finish, struct walk *walk, int32_t y)
 
 static void find_flat(const struct finish *finish, struct walk *walk, int32_t y)
 {
-    const struct pt_seen_row *const rows[3] = { seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
-                                                seen_row(finish, walk, y + 1) };
+    const struct pt_seen_row *const rows[3] = {seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
+                                               seen_row(finish, walk, y + 1)};
     if (rows[1]->end)
         pt_find_flat(rows, finish->planes.view->width);
 }
@@ -67,7 +67,8 @@ static void make_translucent(const struct finish *finish, const struct pt_cpu_ca
             continue;
         const size_t at = (size_t)y * width + x;
         const vi source = pt_color_pixels(&args->instance, pt_source(&finish->planes, at), at);
-        vf opacity = pt_opacity(&args->instance, PT_DATA(call, shade, colors), PT_DATA(call, shade, opacities), id, source, ours);
+        vf opacity = pt_opacity(&args->instance, PT_DATA(call, shade, colors), PT_DATA(call, shade, opacities), id, source,
+                                ours);
         for (uint32_t k = 0; k < 3; k++)
             vf_store_where(row->color[k] + x, vf_load(row->color[k] + x) * opacity, ours);
         vf_store_where(row->color[3] + x, opacity, ours);
@@ -88,7 +89,7 @@ static inline __attribute__((always_inline)) void light_row(const struct finish 
         around[reach + k] = seen_row(finish, walk, y + k);
     const uint8_t *one_layer = reach == 1 ? around[reach]->flat : walk->wide;
     for (uint32_t x = around[reach]->first; x < around[reach]->end; x += PT_LANES) {
-        vf color[3] = { vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x) }, normal[3];
+        vf color[3] = {vf_load(out->color[0] + x), vf_load(out->color[1] + x), vf_load(out->color[2] + x)}, normal[3];
         vi id;
         vm ours = pt_of_instance(finish->planes.keys + (size_t)y * view->width + x, &args->instance,
                                  pt_lanes_left(x, view->width), &id);
@@ -131,7 +132,8 @@ static void fetch_bytes(const struct finish *finish, const struct pt_cpu_call *c
         for (uint32_t i = 0; i < count; i++) {
             vi id;
             uint32_t x = first + i * PT_LANES;
-            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width), &id);
+            ours[i] = pt_of_instance(finish->planes.keys + (size_t)y * width + x, &args->instance, pt_lanes_left(x, width),
+                                     &id);
             vi_store(words + i * PT_LANES, vi_select(ours[i], id, vi_set(0)));
         }
         for (uint32_t i = 0; i < count * PT_LANES; i++)
@@ -191,13 +193,13 @@ static uint32_t end_of_part(const struct pt_seen_row *seen, uint32_t x)
 // Sums of normals wherever the blend's whole window is one layer.
 static void blend_nine(const struct finish *finish, struct walk *walk, int32_t y)
 {
-    const struct pt_seen_row *const rows[3] = { seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
-                                                seen_row(finish, walk, y + 1) };
+    const struct pt_seen_row *const rows[3] = {seen_row(finish, walk, y - 1), seen_row(finish, walk, y),
+                                               seen_row(finish, walk, y + 1)};
     const struct pt_nine nine = pt_blend_nine(finish->weights);
     for (uint32_t x = rows[1]->first, end; x < rows[1]->end; x = end) {
         end = end_of_part(rows[1], x);
         for (uint32_t k = 0; k < 3 && pt_flat(rows[1], x); k++) {
-            const float *const normals[3] = { rows[0]->normal[k], rows[1]->normal[k], rows[2]->normal[k] };
+            const float *const normals[3] = {rows[0]->normal[k], rows[1]->normal[k], rows[2]->normal[k]};
             pt_nine_flat(&nine, normals, (int32_t)x, (int32_t)end, vf_set(1.0f), vf_set(pt_float(PT_KEY_EMPTY_Z)),
                          walk->blended[k]);
         }
@@ -207,7 +209,7 @@ static void blend_nine(const struct finish *finish, struct walk *walk, int32_t y
 static void blend_wide(const struct finish *finish, struct walk *walk, int32_t y)
 {
     const struct pt_seen_row *around[2 * PT_BLEND_MOST + 1];
-    const struct pt_blend blend = { finish->planes.view, finish->reach, finish->weights, around };
+    const struct pt_blend blend = {finish->planes.view, finish->reach, finish->weights, around};
     const int32_t end = (int32_t)seen_row(finish, walk, y)->end;
     for (int32_t k = -finish->reach; k <= finish->reach; k++)
         around[finish->reach + k] = seen_row(finish, walk, y + k);
@@ -220,7 +222,7 @@ static void fetch_albedo(const struct finish *finish, struct walk *walk, const s
 {
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
     float *const *rows = walk->albedo[slot(y)];
-    const struct pt_color_row out = { seen->z, { rows[0], rows[1], rows[2], walk->shaded[slot(y)].color[3] } };
+    const struct pt_color_row out = {seen->z, {rows[0], rows[1], rows[2], walk->shaded[slot(y)].color[3]}};
     fetch(finish, call, seen, &out, y);
     if (finish->channels == 4)
         make_translucent(finish, call, seen, &out, walk->shown[slot(y)][3], y);
@@ -249,21 +251,21 @@ static void load_shaded(const struct finish *finish, struct walk *walk, int32_t 
 }
 
 // Steps on a row of colours.
-static void take_steps(const struct finish *finish, struct walk *walk, const struct steps *steps, const struct pt_color_row *colors,
-                       int32_t y)
+static void take_steps(const struct finish *finish, struct walk *walk, const struct steps *steps,
+                       const struct pt_color_row *colors, int32_t y)
 {
     const struct pt_seen_row *seen = seen_row(finish, walk, y);
     for (uint32_t i = steps->first; i < steps->first + steps->count && seen->end; i++) {
         const struct pt_cpu_call *call = &finish->passes[i].call;
         const struct pt_pointwise *kernel = &PT_POINTWISE_KERNELS[finish->passes[i].kernel];
         const size_t at = (size_t)y * finish->planes.view->width;
-        struct pt_walk_row row = { .args = call->arguments,
-                                   .clips = kernel->clips < 0 ? NULL : pt_cpu_data(call, (uint32_t)kernel->clips),
-                                   .y = (uint32_t)y,
-                                   .first = seen->first,
-                                   .end = seen->end,
-                                   .keys = finish->planes.keys + at,
-                                   .z = seen->z };
+        struct pt_walk_row row = {.args = call->arguments,
+                                  .clips = kernel->clips < 0 ? NULL : pt_cpu_data(call, (uint32_t)kernel->clips),
+                                  .y = (uint32_t)y,
+                                  .first = seen->first,
+                                  .end = seen->end,
+                                  .keys = finish->planes.keys + at,
+                                  .z = seen->z};
         if (kernel->shading >= 0 && !finish->shade_count)
             row.shading = (const float *)pt_cpu_data(call, (uint32_t)kernel->shading) + 4 * at;
         if (kernel->albedo >= 0 && !finish->shade_count)

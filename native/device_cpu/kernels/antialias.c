@@ -30,7 +30,7 @@ static int edge_color(const struct antialias *job, uint32_t x, uint32_t y, struc
     const float *through = job->args->behind ? PT_DATA(job->call, antialias, through) : NULL;
     const float empty = pt_float(PT_KEY_EMPTY_Z);
     uint32_t at = y * view->width + x;
-    float sum[4] = { 0.0f, 0.0f, 0.0f, 0.0f }, count = 0.0f, limit = empty;
+    float sum[4] = {0.0f, 0.0f, 0.0f, 0.0f}, count = 0.0f, limit = empty;
     if (job->args->layers)
         limit = pt_float((uint32_t)(keys[at] >> 32)) + deff[from[at] & ~PT_FROM_MIXED];
     for (int i = 0; i < 4; i++) {
@@ -119,7 +119,7 @@ int PT_KERNEL_ENTRY(antialias)(const struct pt_cpu_call *call)
 {
     const struct antialias_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct antialias job = { .call = call, .args = args };
+    struct antialias job = {.call = call, .args = args};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     uint32_t bands = (rect[3] - rect[1] + BAND_ROWS - 1) / BAND_ROWS;

@@ -10,7 +10,7 @@
 
 #include "device_cpu/vector_math.h"
 
-static const int8_t pt_cross[4][2] = { { 1, 0 }, { 0, 1 }, { -1, 0 }, { 0, -1 } };
+static const int8_t pt_cross[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
 #define PT_COVERAGE_NONE ((float)(5.0 / 6.0)) // at k = 0
 #define PT_COVERAGE_STEP ((float)(1.0 / 3.0))

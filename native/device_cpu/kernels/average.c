@@ -9,12 +9,13 @@
 #include "device_cpu/rows.h"
 
 enum {
-    BLOCK = 256,          // points
-    SUMS = PT_SUMS,       // colour 3, weight, normal 3, and what none of them is above
+    BLOCK = 256,    // points
+    SUMS = PT_SUMS, // colour 3, weight, normal 3, and what none of them is above
     ROOM = SUMS - 1,
-    FULL = 1 << 30,       // no term is above, so that a sum of more has to be emptied
+    FULL = 1 << 30,        // no term is above, so that a sum of more has to be emptied
     BAND_PIXELS = 1 << 16, // about
-    BAND_LEAST = 16, BAND_MOST = 64, // rows
+    BAND_LEAST = 16,
+    BAND_MOST = 64, // rows
 };
 
 struct depths { // between which a point counts
@@ -24,9 +25,9 @@ struct depths { // between which a point counts
 struct average {
     const struct pt_cpu_call *call;
     const struct average_args *args;
-    uint32_t rows;  // of a band
-    size_t stride;  // pixels of a row of one
-    char *memory;   // per thread
+    uint32_t rows; // of a band
+    size_t stride; // pixels of a row of one
+    char *memory;  // per thread
     size_t thread_bytes;
 };
 
@@ -116,13 +117,14 @@ static void project(const struct average *average, const struct band *band, cons
     const uint32_t *drawn = average->args->sifted ? PT_DATA(average->call, average, drawn) : NULL;
     const float below = (float)(view->origin_y + (int32_t)band->first) - PT_AVERAGE_WIDEST - 1.0f;
     const float above = (float)(view->origin_y + (int32_t)band->end) + PT_AVERAGE_WIDEST + 1.0f;
-    const vf one = vf_set(1.0f), left = vf_set((float)view->origin_x), right = vf_set((float)(view->origin_x + (int32_t)view->width));
+    const vf one = vf_set(1.0f), left = vf_set((float)view->origin_x),
+             right = vf_set((float)(view->origin_x + (int32_t)view->width));
     const float bottom = (float)view->origin_y, top = (float)(view->origin_y + (int32_t)view->height);
     const vf low = vf_set(below > bottom ? below : bottom), high = vf_set(above < top ? above : top);
     out->narrow.count = out->middle.count = out->wide.count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
-        const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                          vf_load(positions + 2 * (size_t)chunk->padded + i) };
+        const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                         vf_load(positions + 2 * (size_t)chunk->padded + i)};
         const vf z = vf_transform(chunk, 2, p[0], p[1], p[2]);
         vf x = vf_transform(chunk, 0, p[0], p[1], p[2]), y = vf_transform(chunk, 1, p[0], p[1], p[2]);
         if (view->perspective) {
@@ -143,7 +145,7 @@ static void project(const struct average *average, const struct band *band, cons
         if (!vm_bits(some))
             continue;
         const vf spacing = vf_gather(average->args->instance.spacing, vi_shr(word, PT_SPACING_SHIFT), some);
-        const vf footprint = vf_select(some, vf_footprint(view, z), one), place[3] = { x, y, z };
+        const vf footprint = vf_select(some, vf_footprint(view, z), one), place[3] = {x, y, z};
         const vf h = vf_max(vf_min((vf_set(PT_AVERAGE_TENT) * spacing) * vf_rcp(footprint), vf_set(PT_AVERAGE_WIDEST)), one);
         const vm narrow = vm_and(some, vf_le(h, one)), wide = vm_and(some, vf_lt(vf_set(1.5f), h));
         const vm middle = vm_and(some, vm_not(vm_or(narrow, wide)));
@@ -186,7 +188,7 @@ static inline void set_terms(const struct average *average, const struct block *
 {
     const struct instance_args *instance = &average->args->instance;
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST), one = vf_set(1.0f);
-    vf color[4], normal[4] = { vf_zero(), vf_zero(), vf_zero(), one };
+    vf color[4], normal[4] = {vf_zero(), vf_zero(), vf_zero(), one};
     float halves[2][PT_LANES][4];
     pt_albedo(instance, PT_DATA(average->call, average, colors), vi_load(block->id + i), vi_set(0), some, color);
     for (int k = 0; k < 3 && instance->color_format != 1; k++) {
@@ -228,10 +230,7 @@ static inline void add_pixel(const struct average *average, struct band *band, s
 }
 
 // One side of a tent, at pixels whose middles lie so far from the point.
-static inline vf tent(vf beside, vf share)
-{
-    return vf_max(vf_set(1.0f) - vf_abs(beside) * share, vf_zero());
-}
+static inline vf tent(vf beside, vf share) { return vf_max(vf_set(1.0f) - vf_abs(beside) * share, vf_zero()); }
 
 // Pixels and weights, packed, so that no branch waits for how many of each point count.
 struct counted {
@@ -253,7 +252,8 @@ static inline __attribute__((always_inline)) void add_few(const struct average *
         const vm lanes = vm_first(pt_lanes_left(i, block->count));
         const vf x = vf_load(block->x + i), y = vf_load(block->y + i), z = vf_load(block->z + i);
         const vf h = side == 2 ? one : vf_load(block->half + i), share = side == 2 ? one : vf_rcp(vf_select(lanes, h, one));
-        const vi left = vi_add(vf_int(vf_floor((x - half) - h)), vi_set(1)), low = vi_add(vf_int(vf_floor((y - half) - h)), vi_set(1));
+        const vi left = vi_add(vf_int(vf_floor((x - half) - h)), vi_set(1)),
+                 low = vi_add(vf_int(vf_floor((y - half) - h)), vi_set(1));
         vm any = vm_of_bits(0);
         counted.count = 0;
         for (uint32_t k = 0; k < side * side; k++) {
@@ -383,7 +383,7 @@ static void average_bands(void *context, uint32_t begin, uint32_t end, uint32_t 
     struct blocks blocks;
     char *memory = average->memory + thread * average->thread_bytes;
     for (uint32_t b = begin; b < end && !pt_cpu_cancelled(average->call); b++) {
-        struct band band = { .first = rect[1] + b * average->rows, .wide = (int64_t *)(void *)memory };
+        struct band band = {.first = rect[1] + b * average->rows, .wide = (int64_t *)(void *)memory};
         band.end = band.first + average->rows < rect[3] ? band.first + average->rows : rect[3];
         band.sums = (int32_t *)(void *)(band.wide + SUMS * pixels);
         band.depths = (struct depths *)(void *)(band.sums + SUMS * pixels);
@@ -406,7 +406,7 @@ static void average_bands(void *context, uint32_t begin, uint32_t end, uint32_t 
 
 int PT_KERNEL_ENTRY(average)(const struct pt_cpu_call *call)
 {
-    struct average average = { .call = call, .args = call->arguments };
+    struct average average = {.call = call, .args = call->arguments};
     const struct view_args *view = &average.args->view;
     if (view->rect[0] >= view->rect[2] || view->rect[1] >= view->rect[3] || !call->buffers[PT_BUF_average_chunks]->size)
         return PATINA_OK;

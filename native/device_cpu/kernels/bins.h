@@ -24,8 +24,8 @@ struct pt_bin_block {
     uint32_t before; // as a head; all that were filled before are full
     uint32_t word[PT_BIN_DISCS];
     float place[PT_BIN_DISCS][4]; // x, y, z, and the bits of the id
-    uint32_t order; // of the chunk that it was opened for: later ones are nearer
-    float nearest;  // no pixel of its discs is nearer
+    uint32_t order;               // of the chunk that it was opened for: later ones are nearer
+    float nearest;                // no pixel of its discs is nearer
     uint32_t nothing[2];
 };
 
@@ -70,14 +70,15 @@ static inline void *pt_bin_data(const struct pt_bins *bins, uint32_t of, uint32_
 static inline struct pt_disc_source pt_bin_source(const struct pt_bins *bins, uint32_t chunk, uint32_t *instance)
 {
     *instance = pt_chunk_instance(bins->begins, chunk, *instance);
-    const struct chunk_view *view =
-        (const struct chunk_view *)pt_bin_data(bins, PT_BUF_splat_chunks, *instance) + (chunk - bins->begins[*instance]);
-    return (struct pt_disc_source){ bins->view,
-                                    &bins->discs[*instance],
-                                    view,
-                                    (const float *)pt_bin_data(bins, PT_BUF_splat_positions, *instance) + 3 * (size_t)view->first,
-                                    (const uint32_t *)pt_bin_data(bins, PT_BUF_splat_surface, *instance) + view->first,
-                                    pt_bin_data(bins, PT_BUF_splat_radii, *instance) };
+    const struct chunk_view *view = (const struct chunk_view *)pt_bin_data(bins, PT_BUF_splat_chunks, *instance) +
+                                    (chunk - bins->begins[*instance]);
+    return (struct pt_disc_source){bins->view,
+                                   &bins->discs[*instance],
+                                   view,
+                                   (const float *)pt_bin_data(bins, PT_BUF_splat_positions, *instance) +
+                                       3 * (size_t)view->first,
+                                   (const uint32_t *)pt_bin_data(bins, PT_BUF_splat_surface, *instance) + view->first,
+                                   pt_bin_data(bins, PT_BUF_splat_radii, *instance)};
 }
 
 // No pixel of a disc lies nearer: see pt_patch_show. In orthographic views slopes that cancel may be off by an eighth.
@@ -126,10 +127,10 @@ struct pt_bin_batch {
     uint32_t drawn[PT_BIN_BATCH / PT_LANES], wide[PT_BIN_BATCH / PT_LANES]; // wide: over several tiles
 };
 
-static inline void pt_bin_list(const struct pt_bins *bins, struct pt_bin_batch *batch, uint32_t at, const struct pt_discs *discs,
-                               vi id, vi word, uint32_t drawn)
+static inline void pt_bin_list(const struct pt_bins *bins, struct pt_bin_batch *batch, uint32_t at,
+                               const struct pt_discs *discs, vi id, vi word, uint32_t drawn)
 {
-    const vf place[4] = { discs->x, discs->y, discs->z, vi_float(id) };
+    const vf place[4] = {discs->x, discs->y, discs->z, vi_float(id)};
     vi tiles[4];
     for (int k = 0; k < 4; k++)
         tiles[k] = vi_shr(discs->box[k], PT_DISC_TILE_SHIFT);
@@ -218,7 +219,9 @@ static inline void pt_bin_sort(struct pt_bins *bins)
         const struct pt_disc_source source = pt_bin_source(bins, c, &instance);
         const struct chunk_view *chunk = source.chunk;
         const float *r = chunk->row + 6, *p = source.positions;
-        const float z = chunk->count ? r[0] * p[0] + r[1] * p[chunk->padded] + r[2] * p[2 * (size_t)chunk->padded] + chunk->hi[2] : 0.0f;
+        const float z = chunk->count
+                            ? r[0] * p[0] + r[1] * p[chunk->padded] + r[2] * p[2 * (size_t)chunk->padded] + chunk->hi[2]
+                            : 0.0f;
         bins->order[c] = (uint64_t)(z > 0.0f ? pt_bits(z) : 0) << 32 | c;
     }
     qsort(bins->order, count, sizeof *bins->order, pt_bin_farther);
@@ -256,7 +259,8 @@ static inline int pt_bins_fill(struct pt_bins *bins)
     uint64_t chunks = 0;
     for (uint32_t i = 0; i < bins->instances; i++)
         chunks += bins->call->buffers[bins->first + i * bins->stride]->size / sizeof(struct chunk_view);
-    bins->order = pt_cpu_scratch(bins->call, 0, chunks * sizeof *bins->order + ((size_t)bins->instances + 1) * sizeof *bins->begins);
+    bins->order = pt_cpu_scratch(bins->call, 0,
+                                 chunks * sizeof *bins->order + ((size_t)bins->instances + 1) * sizeof *bins->begins);
     if (!bins->order)
         return PATINA_ERROR_MEMORY;
     bins->begins = (uint32_t *)(void *)(bins->order + chunks);
@@ -295,7 +299,7 @@ static inline void pt_bins_again(struct pt_bins *bins)
 enum { PT_CELL_SHIFT = 3, PT_CELLS = PT_DISC_TILE >> PT_CELL_SHIFT };
 struct pt_farthest {
     float all;
-    float cell[PT_CELLS * PT_CELLS];   // with those right of it and above
+    float cell[PT_CELLS * PT_CELLS];      // with those right of it and above
     float column[PT_CELLS][PT_DISC_TILE]; // by rows of cells: while they are filled
 };
 
@@ -328,9 +332,9 @@ static inline void pt_farthest_cull(const struct pt_farthest *farthest, const st
     const vi x0 = vi_sub(vi_select(vi_lt_unsigned(d->box[0], tile_x), tile_x, d->box[0]), tile_x);
     const vi y0 = vi_sub(vi_select(vi_lt_unsigned(d->box[1], tile_y), tile_y, d->box[1]), tile_y);
     const vi x1 = vi_sub(d->box[2], tile_x), y1 = vi_sub(d->box[3], tile_y); // beyond the tile, or before it and so far below 0
-    const vm beside = vm_or(vm_or(vi_lt_unsigned(x1, x0), vi_lt_unsigned(y1, y0)),
-                            vm_or(vi_lt_unsigned(vi_set((uint32_t)tile.width - 1), x0),
-                                  vi_lt_unsigned(vi_set((uint32_t)tile.height - 1), y0)));
+    const vm beside = vm_or(
+        vm_or(vi_lt_unsigned(x1, x0), vi_lt_unsigned(y1, y0)),
+        vm_or(vi_lt_unsigned(vi_set((uint32_t)tile.width - 1), x0), vi_lt_unsigned(vi_set((uint32_t)tile.height - 1), y0)));
     const vi column = vi_shr(x0, PT_CELL_SHIFT), row = vi_shr(y0, PT_CELL_SHIFT), two = vi_set(2);
     const vm small = vm_and(vi_lt_unsigned(vi_sub(vi_shr(x1, PT_CELL_SHIFT), column), two),
                             vi_lt_unsigned(vi_sub(vi_shr(y1, PT_CELL_SHIFT), row), two));
@@ -370,11 +374,9 @@ static inline void pt_bin_ask(const struct pt_bins *bins, const struct pt_bin_bl
 
 // Calls work for some discs of a block, PT_LANES from i on of those before `end` that belong to the same instance; returns
 // where the next begin.
-static inline __attribute__((always_inline)) uint32_t pt_bin_some(const struct pt_bins *bins, const struct pt_bin_block *block,
-                                                                  uint32_t i, uint32_t end, uint32_t *instance,
-                                                                  const struct pt_disc_tile *tile,
-                                                                  const struct pt_farthest *farthest, pt_bin_work *work,
-                                                                  void *context)
+static inline __attribute__((always_inline)) uint32_t
+pt_bin_some(const struct pt_bins *bins, const struct pt_bin_block *block, uint32_t i, uint32_t end, uint32_t *instance,
+            const struct pt_disc_tile *tile, const struct pt_farthest *farthest, pt_bin_work *work, void *context)
 {
     *instance = pt_bin_instance(bins, pt_bin_id(block, i), *instance);
     const struct disc_args *args = &bins->discs[*instance];
@@ -408,7 +410,8 @@ static inline uint32_t *pt_bin_next(const struct pt_bins *bins, uint32_t *cursor
 {
     uint32_t *next = NULL;
     for (uint32_t k = 0; k < threads; k++)
-        if (cursors[k] != PT_BIN_NONE && (!next || bins->blocks[cursors[k] >> PT_BIN_SHIFT].order > bins->blocks[*next >> PT_BIN_SHIFT].order))
+        if (cursors[k] != PT_BIN_NONE &&
+            (!next || bins->blocks[cursors[k] >> PT_BIN_SHIFT].order > bins->blocks[*next >> PT_BIN_SHIFT].order))
             next = cursors + k;
     return next;
 }
@@ -417,8 +420,8 @@ static inline uint32_t *pt_bin_next(const struct pt_bins *bins, uint32_t *cursor
 // nearest first. colors: 1 where it looks those up.
 static inline __attribute__((always_inline)) void pt_bin_walk(const struct pt_bins *bins, uint32_t thread, uint32_t bin,
                                                               const struct pt_disc_tile *tile,
-                                                              const struct pt_farthest *farthest, int colors,
-                                                              pt_bin_work *work, void *context)
+                                                              const struct pt_farthest *farthest, int colors, pt_bin_work *work,
+                                                              void *context)
 {
     const uint32_t threads = pt_pool_threads(bins->call->pool);
     uint32_t instance = 0, *cursors = bins->cursors + (size_t)thread * threads, *next;
@@ -441,8 +444,8 @@ static inline struct pt_disc_tile pt_bin_tile(const struct pt_bins *bins, uint32
 {
     const uint32_t x = tile % bins->columns * PT_DISC_TILE, y = tile / bins->columns * PT_DISC_TILE;
     const uint32_t width = bins->view->width - x, height = bins->view->height - y;
-    return (struct pt_disc_tile){ (int32_t)x, (int32_t)y, (int32_t)(width < PT_DISC_TILE ? width : PT_DISC_TILE),
-                                  (int32_t)(height < PT_DISC_TILE ? height : PT_DISC_TILE) };
+    return (struct pt_disc_tile){(int32_t)x, (int32_t)y, (int32_t)(width < PT_DISC_TILE ? width : PT_DISC_TILE),
+                                 (int32_t)(height < PT_DISC_TILE ? height : PT_DISC_TILE)};
 }
 
 static inline int pt_bin_empty(const struct pt_bins *bins, uint32_t bin)

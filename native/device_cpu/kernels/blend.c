@@ -54,7 +54,9 @@ static inline void set_terms(const struct pt_bins *bins, uint32_t instance, cons
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     vf color[4], normal[4], largest = scale;
     pt_albedo(args, colors, discs->id, vi_set(0), discs->drawn, color);
-    color[3] = pt_opacity(args, colors, PT_DATA_EACH(bins->call, blend, opacities, instance), discs->id, vi_set(0), discs->drawn) * scale;
+    color[3] = pt_opacity(args, colors, PT_DATA_EACH(bins->call, blend, opacities, instance), discs->id, vi_set(0),
+                          discs->drawn) *
+               scale;
     for (int k = 0; k < 3; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
         largest = vf_max(largest, vf_abs(color[k]));
@@ -114,7 +116,8 @@ static void add_depths(struct tile *tile, const struct pt_patches *list)
         const struct pt_shown shown = pt_patch_show(list, i);
         const uint32_t at = pt_patch_pixel(list, i);
         const vf nearest = pt_patch_load(tile->nearest + at), weight = pt_shown_weight(&shown);
-        const vm beyond = vi_lt_unsigned(vf_bits(pt_patch_load(tile->deepest + at)), vi_sub(vf_bits(shown.z), vf_bits(nearest)));
+        const vm beyond = vi_lt_unsigned(vf_bits(pt_patch_load(tile->deepest + at)),
+                                         vi_sub(vf_bits(shown.z), vf_bits(nearest)));
         vf_store(weights + i * PT_LANES, weight);
         vf_store(shares + i * PT_LANES, ((shown.z - nearest) * pt_patch_load(tile->inverse + at)) * weight);
         count_pixels(&taken, list, i, vm_and(shown.covered, vm_not(beyond)));
@@ -330,12 +333,12 @@ static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t th
 int PT_KERNEL_ENTRY(blend)(const struct pt_cpu_call *call)
 {
     const struct blend_args *args = call->arguments;
-    struct pt_bins bins = { .call = call,
-                            .view = &args->view,
-                            .discs = (const struct disc_args *)(args + 1),
-                            .instances = args->instances,
-                            .first = PT_BUF_blend_chunks,
-                            .stride = PT_EACH_blend };
+    struct pt_bins bins = {.call = call,
+                           .view = &args->view,
+                           .discs = (const struct disc_args *)(args + 1),
+                           .instances = args->instances,
+                           .first = PT_BUF_blend_chunks,
+                           .stride = PT_EACH_blend};
     pt_bins_again(&bins);
     if (!pt_cpu_scratch(call, 1, pt_pool_threads(call->pool) * sizeof(struct tile)))
         return PATINA_ERROR_MEMORY;

@@ -39,7 +39,7 @@ static inline void pt_blend_weights(float weights[2 * PT_BLEND_MOST * PT_BLEND_M
 
 static inline struct pt_nine pt_blend_nine(const float *weights)
 {
-    return (struct pt_nine){ weights[0], weights[1], weights[2] };
+    return (struct pt_nine){weights[0], weights[1], weights[2]};
 }
 
 // Which pixels of PT_LANES, at x, are of the layer.
@@ -51,12 +51,12 @@ static inline vm pt_blend_takes(const struct pt_seen_row *row, int32_t x, vf z, 
 static inline void pt_blend_nine_sum(const struct pt_blend *blend, uint32_t x, vf limit, vm filled, vf sum[3])
 {
     const struct pt_seen_row *const *rows = blend->around;
-    const float *const depths[3] = { rows[0]->z + x, rows[1]->z + x, rows[2]->z + x };
+    const float *const depths[3] = {rows[0]->z + x, rows[1]->z + x, rows[2]->z + x};
     const struct pt_nine nine = pt_blend_nine(blend->weights);
     vm same[3][3];
     pt_same_layer(depths, limit, filled, same);
     for (int k = 0; k < 3; k++) {
-        const float *const normals[3] = { rows[0]->normal[k] + x, rows[1]->normal[k] + x, rows[2]->normal[k] + x };
+        const float *const normals[3] = {rows[0]->normal[k] + x, rows[1]->normal[k] + x, rows[2]->normal[k] + x};
         sum[k] = pt_nine_pixels(&nine, normals, same);
     }
 }
@@ -167,12 +167,12 @@ static inline void pt_blend_flat(const struct pt_blend *blend, int32_t x, int32_
         }
     for (int32_t i = 0; i < end - x; i += PT_LANES) {
         const int reach = flat[(x + i) / PT_LANES];
-        vf sum[3] = { vf_zero(), vf_zero(), vf_zero() };
+        vf sum[3] = {vf_zero(), vf_zero(), vf_zero()};
         if (!reach)
             continue;
         for (int dy = 0; dy <= reach; dy++) {
-            const float *const rows[3] = { pairs[dy][0] + PT_BLEND_PAD + i, pairs[dy][1] + PT_BLEND_PAD + i,
-                                           pairs[dy][2] + PT_BLEND_PAD + i };
+            const float *const rows[3] = {pairs[dy][0] + PT_BLEND_PAD + i, pairs[dy][1] + PT_BLEND_PAD + i,
+                                          pairs[dy][2] + PT_BLEND_PAD + i};
             for (int k = 0; k < 3; k++)
                 sum[k] = sum[k] + vf_load(rows[k]) * vf_set(blend->weights[dy * dy]);
             for (int dx = 1; dx <= reach; dx++) {

@@ -16,7 +16,7 @@ struct start { // of a chunk
 struct center {
     const struct pt_cpu_call *call;
     const struct center_args *args;
-    const struct start *starts; // by id
+    const struct start *starts;  // by id
     uint32_t count, first, span; // of ids: all lie in [first, first + span)
 };
 
@@ -123,7 +123,8 @@ static void center_row(const struct center *center, uint32_t y)
         for (uint32_t x = first; x < end; x += PT_LANES) {
             const vi z = vi_load_z(keys + x), id = vi_load_id(keys + x);
             const vm some = vm_and(vm_first(pt_lanes_left(x, end)), vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z))));
-            const uint32_t lanes = vm_bits(vm_and(some, vi_lt_unsigned(vi_sub(id, vi_set(center->first)), vi_set(center->span))));
+            const uint32_t lanes = vm_bits(
+                vm_and(some, vi_lt_unsigned(vi_sub(id, vi_set(center->first)), vi_set(center->span))));
             vi_pack(measured.column + measured.count, vi_add(vi_set(x), vi_lanes()), lanes);
             vi_pack(measured.z + measured.count, z, lanes);
             vi_pack(measured.id + measured.count, id, lanes);
@@ -146,7 +147,7 @@ static void center_rows(void *context, uint32_t begin, uint32_t end, uint32_t th
 int PT_KERNEL_ENTRY(center)(const struct pt_cpu_call *call)
 {
     const struct chunk_view *chunks = PT_DATA(call, center, chunks);
-    struct center center = { .call = call, .args = call->arguments };
+    struct center center = {.call = call, .args = call->arguments};
     const uint32_t *rect = center.args->view.rect;
     center.count = (uint32_t)(call->buffers[PT_BUF_center_chunks]->size / sizeof *chunks);
     struct start *starts = pt_cpu_scratch(call, 0, (center.count + 1) * sizeof *starts);
@@ -154,7 +155,7 @@ int PT_KERNEL_ENTRY(center)(const struct pt_cpu_call *call)
         return PATINA_ERROR_MEMORY;
     int sorted = 1;
     for (uint32_t c = 0; c < center.count; c++) {
-        starts[c] = (struct start){ chunks[c].id_base + chunks[c].first, c };
+        starts[c] = (struct start){chunks[c].id_base + chunks[c].first, c};
         sorted &= !c || starts[c - 1].id < starts[c].id;
     }
     if (!sorted)

@@ -11,10 +11,11 @@ static void write_shown(const struct pt_cpu_call *call, const struct pt_triangle
     uint64_t *shown = PT_DATA(call, cover, shown);
     float *normals = PT_DATA(call, cover, shown_normal), *albedo = PT_DATA(call, cover, albedo);
     vf color[4];
-    vf smooth[4] = { n[0], n[1], n[2], n[3] };
+    vf smooth[4] = {n[0], n[1], n[2], n[3]};
     uint32_t zs[PT_LANES];
     if (mesh->has_normals) {
-        const vf object[3] = { pt_between(t, vertices, 3, front), pt_between(t, vertices, 4, front), pt_between(t, vertices, 5, front) };
+        const vf object[3] = {pt_between(t, vertices, 3, front), pt_between(t, vertices, 4, front),
+                              pt_between(t, vertices, 5, front)};
         pt_turn_normal(mesh, object, smooth);
     }
     for (uint32_t k = 0; k < 3; k++)
@@ -40,7 +41,8 @@ static void cover_pixels(const struct pt_cpu_call *call, uint32_t x, uint32_t y,
     size_t at = (size_t)y * view->width + x;
     struct pt_triangle t;
     vf ray[2], n[4];
-    pt_find_triangle(view, &args->mesh, PT_DATA(call, cover, vertices), PT_DATA(call, cover, indices), index, x, y, front, &t); // 1.
+    pt_find_triangle(view, &args->mesh, PT_DATA(call, cover, vertices), PT_DATA(call, cover, indices), index, x, y, front,
+                     &t); // 1.
     vf_ray(view, x, y, ray);
     pt_plane_normal(view, &args->mesh, &t, ray, n); // 2.
     // 3. layer distance of what is as dense as the pixels
@@ -71,12 +73,12 @@ static void cover_row(void *context, uint32_t y)
         size_t at = (size_t)y * args->view.width + x;
         vi z = vi_load_z(mesh_keys + at), other = vi_load_z(keys + at);
         vi index = vi_sub(vi_load_id(mesh_keys + at), vi_set(args->mesh.id_base));
-        vm front = vm_or(vi_lt_unsigned(z, other), vm_and(vi_eq(z, other), vi_lt_unsigned(vi_load_id(mesh_keys + at),
-                                                                                          vi_load_id(keys + at))));
+        vm front = vm_or(vi_lt_unsigned(z, other),
+                         vm_and(vi_eq(z, other), vi_lt_unsigned(vi_load_id(mesh_keys + at), vi_load_id(keys + at))));
         if (args->behind) // a pixel that was filled across a layer taken before
             front = vm_or(front, vf_le(vi_float(other), vf_load((const float *)PT_DATA(call, cover, limit) + at)));
-        front = vm_and(front, vm_and(vi_lt_unsigned(index, vi_set(args->mesh.id_count)),
-                                     vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z)))));
+        front = vm_and(front,
+                       vm_and(vi_lt_unsigned(index, vi_set(args->mesh.id_count)), vm_not(vi_eq(z, vi_set(PT_KEY_EMPTY_Z)))));
         front = vm_and(front, vm_first(pt_lanes_left(x, rect[2])));
         if (vm_bits(front))
             cover_pixels(call, x, y, index, z, front);

@@ -38,13 +38,13 @@ struct pt_disc_source {
     const struct chunk_view *chunk;
     const float *positions;  // of the chunk
     const uint32_t *surface; // of the chunk
-    const void *radii; // floats or shape words
+    const void *radii;       // floats or shape words
 };
 
 static inline vf pt_clamp_far(vf x) { return vf_min(vf_max(x, vf_set(-PT_DISC_FAR)), vf_set(PT_DISC_FAR)); }
 
-static const float pt_shape_cosines[64] = { PT_SHAPE_COSINES }, pt_shape_sines[64] = { PT_SHAPE_SINES },
-                   pt_shape_ratios[32] = { PT_SHAPE_RATIOS };
+static const float pt_shape_cosines[64] = {PT_SHAPE_COSINES}, pt_shape_sines[64] = {PT_SHAPE_SINES},
+                   pt_shape_ratios[32] = {PT_SHAPE_RATIOS};
 
 // Whether discs have the half axes of their points' shapes.
 static inline int pt_disc_shaped(const struct disc_args *args)
@@ -82,8 +82,8 @@ static inline void pt_disc_size(const struct disc_args *args, const void *radii,
 // the same, towards the view's axis: what passes the eye closely far outside the view is not drawn across it.
 static inline void pt_disc_near(const struct view_args *view, vm wide, struct pt_discs *d)
 {
-    const vf zero = vf_zero(), one = vf_set(1.0f), at[2] = { d->x, d->y }, far = vf_set(PT_DISC_FAR);
-    const float start[2] = { view->ray_x0, view->ray_y0 }, step[2] = { view->ray_xs, view->ray_ys };
+    const vf zero = vf_zero(), one = vf_set(1.0f), at[2] = {d->x, d->y}, far = vf_set(PT_DISC_FAR);
+    const float start[2] = {view->ray_x0, view->ray_y0}, step[2] = {view->ray_xs, view->ray_ys};
     const vf k = (d->radius * vf_set(1.001f)) * vf_rcp(d->z), left = one - k * k;
     const vm before = vf_le(vf_set(0.015625f), left); // the camera's plane
     const vf inverse = vf_rcp(vf_select(before, left, one));
@@ -106,8 +106,8 @@ static inline void pt_disc_near(const struct view_args *view, vm wide, struct pt
 // 2. The ball around the disc: how many pixels it reaches to the sides.
 static inline void pt_disc_reach(const struct view_args *view, struct pt_discs *d)
 {
-    const vf one = vf_set(1.0f), at[2] = { d->x, d->y };
-    const float start[2] = { view->ray_x0, view->ray_y0 }, step[2] = { view->ray_xs, view->ray_ys };
+    const vf one = vf_set(1.0f), at[2] = {d->x, d->y};
+    const float start[2] = {view->ray_x0, view->ray_y0}, step[2] = {view->ray_xs, view->ray_ys};
     vf before = one; // of the ball's nearest point: the camera's plane lies beyond it
     vm around = vm_of_bits(0);
     d->widest = one;
@@ -135,9 +135,9 @@ static inline void pt_disc_reach(const struct view_args *view, struct pt_discs *
 // The box of what lies between low and high, not beyond the window. Lanes without one are taken out of drawn.
 static inline void pt_disc_box(const struct view_args *view, const vf low[2], const vf high[2], struct pt_discs *d)
 {
-    const vf half = vf_set(0.5f), at[2] = { d->x, d->y };
-    const int32_t origin[2] = { view->origin_x, view->origin_y };
-    const uint32_t size[2] = { view->width, view->height };
+    const vf half = vf_set(0.5f), at[2] = {d->x, d->y};
+    const int32_t origin[2] = {view->origin_x, view->origin_y};
+    const uint32_t size[2] = {view->width, view->height};
     for (int k = 0; k < 2; k++) {
         vf own = vf_floor(at[k]), first = vf_floor(pt_clamp_far(low[k] + half)), last = vf_floor(pt_clamp_far(high[k] - half));
         first = vf_max(vf_min(first, own), vf_set((float)origin[k]));
@@ -191,8 +191,8 @@ static inline void pt_disc_axes(const struct disc_args *args, const struct pt_di
     const vm up = vf_le(vf_set(PT_SHAPE_UP), z);
     const vf a = vf_rcp(one + vf_abs(z)), b = (x * y) * a;
     const vf c = one - (y * y) * a;
-    const vf t1[3] = { one - (x * x) * a, zero - b, vf_select(up, zero - x, x) };
-    const vf t2[3] = { vf_select(up, zero - b, b), vf_select(up, c, zero - c), zero - y };
+    const vf t1[3] = {one - (x * x) * a, zero - b, vf_select(up, zero - x, x)};
+    const vf t2[3] = {vf_select(up, zero - b, b), vf_select(up, c, zero - c), zero - y};
     const vi angle = vi_and(vi_shr(d->shape, PT_SHAPE_ANGLE_SHIFT), vi_set(63));
     const vf cosine = vf_look_up(pt_shape_cosines, 64, angle), sine = vf_look_up(pt_shape_sines, 64, angle);
     const vf short_scale = d->ratio * vf_set(args->instance.axis_scale), long_scale = vf_set(args->instance.axis_scale);
@@ -203,9 +203,10 @@ static inline void pt_disc_axes(const struct disc_args *args, const struct pt_di
         across[k] = cosine * t2[k] - sine * t1[k];
     }
     for (int k = 0; k < 3; k++) {
-        axes[0][k] = ((vf_set(m[3 * k]) * along[0] + vf_set(m[3 * k + 1]) * along[1]) + vf_set(m[3 * k + 2]) * along[2]) * long_scale;
-        axes[1][k] =
-            ((vf_set(m[3 * k]) * across[0] + vf_set(m[3 * k + 1]) * across[1]) + vf_set(m[3 * k + 2]) * across[2]) * short_scale;
+        axes[0][k] = ((vf_set(m[3 * k]) * along[0] + vf_set(m[3 * k + 1]) * along[1]) + vf_set(m[3 * k + 2]) * along[2]) *
+                     long_scale;
+        axes[1][k] = ((vf_set(m[3 * k]) * across[0] + vf_set(m[3 * k + 1]) * across[1]) + vf_set(m[3 * k + 2]) * across[2]) *
+                     short_scale;
     }
 }
 
@@ -213,7 +214,7 @@ static inline void pt_disc_axes(const struct disc_args *args, const struct pt_di
 static inline void pt_disc_shape(const struct view_args *view, const struct disc_args *args, vi word, struct pt_discs *d)
 {
     const vf zero = vf_zero(), one = vf_set(1.0f), xs = vf_set(view->ray_xs), ys = vf_set(view->ray_ys);
-    vf u = zero, v = zero, n[3] = { zero, zero, one }, object[3];
+    vf u = zero, v = zero, n[3] = {zero, zero, one}, object[3];
     vm none = vm_first(PT_LANES);
     if (view->perspective) {
         u = vf_set(view->ray_x0) + xs * d->x;
@@ -255,8 +256,8 @@ static inline void pt_disc_shape(const struct view_args *view, const struct disc
     // a step of a pixel along x, y: (xs - gx u, -gx v, gx), (-gy u, ys - gy v, gy) times z / q, in radii (orthographic: depth is
     // -z); their squares and product, and the area that they span
     const vf sign = vf_set(view->perspective ? 1.0f : -1.0f);
-    const vf a[3] = { (xs - d->gx * u) * fine, (d->gx * v) * fine, (sign * d->gx) * fine };
-    const vf b[3] = { (d->gy * u) * fine, (ys - d->gy * v) * fine, (sign * d->gy) * fine };
+    const vf a[3] = {(xs - d->gx * u) * fine, (d->gx * v) * fine, (sign * d->gx) * fine};
+    const vf b[3] = {(d->gy * u) * fine, (ys - d->gy * v) * fine, (sign * d->gy) * fine};
     vf e = (a[0] * a[0] + a[1] * a[1]) + a[2] * a[2], f = (a[2] * b[2] - a[0] * b[0]) - a[1] * b[1];
     vf area = ((xs * fine) * (ys * fine)) * inverse;
     if (args->instance.has_normals && pt_disc_shaped(args)) {
@@ -287,7 +288,7 @@ static inline void pt_disc_shape(const struct view_args *view, const struct disc
 // no pixel that is covered.
 static inline void pt_disc_tight_box(const struct view_args *view, struct pt_discs *d)
 {
-    const vf one = vf_set(1.0f), least = vf_set(PT_DISC_LEAST), at[2] = { d->x, d->y };
+    const vf one = vf_set(1.0f), least = vf_set(PT_DISC_LEAST), at[2] = {d->x, d->y};
     const vm known = vm_and(vf_le(least, d->e), vf_le(least, d->m));
     vf most = one, low[2], high[2];
     if (view->perspective)
@@ -295,7 +296,7 @@ static inline void pt_disc_tight_box(const struct view_args *view, struct pt_dis
     most = most * vf_set(1.001f);
     const vf up = vf_rsqrt(vf_max(d->m, least)), beside = d->h * up;
     const vf square = vf_max(beside * beside + vf_rcp(vf_max(d->e, least)), vf_set(1e-12f)); // of what it reaches to the sides
-    const vf own[2] = { square * vf_rsqrt(square), up };
+    const vf own[2] = {square * vf_rsqrt(square), up};
     for (int k = 0; k < 2; k++) {
         const vf reach = own[k] * most + vf_set(0.02f);
         low[k] = vf_select(known, vf_max(at[k] - reach, d->low[k]), d->low[k]);
@@ -484,8 +485,8 @@ static inline struct pt_shown pt_patch_show(const struct pt_patches *list, uint3
     const struct view_args *view = list->view;
     const uint32_t k = pt_patch_disc(list, i), at = pt_patch_pixel(list, i);
     const vf one = vf_set(1.0f), z = vf_set(list->z[k]);
-    struct pt_shown out = { .dx = pt_patch_columns(list->middle_x + at % PT_DISC_TILE) - vf_set(list->x[k]),
-                            .dy = vf_load(list->middle_y[at / PT_DISC_TILE]) - vf_set(list->y[k]) };
+    struct pt_shown out = {.dx = pt_patch_columns(list->middle_x + at % PT_DISC_TILE) - vf_set(list->x[k]),
+                           .dy = vf_load(list->middle_y[at / PT_DISC_TILE]) - vf_set(list->y[k])};
     const vf slope = vf_set(list->gx[k]) * out.dx + vf_set(list->gy[k]) * out.dy;
     const vf w = out.dx + vf_set(list->h[k]) * out.dy;
     out.square = (vf_set(list->e[k]) * w) * w + (vf_set(list->m[k]) * out.dy) * out.dy;

@@ -86,8 +86,7 @@ int PT_KERNEL_ENTRY(edl)(const struct pt_cpu_call *call)
 {
     const struct edl_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct edl edl = {
-        .call = call, .args = args, .stride = pt_row_stride(args->view.width), .ring = 2 * args->reach + 1};
+    struct edl edl = {.call = call, .args = args, .stride = pt_row_stride(args->view.width), .ring = 2 * args->reach + 1};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     edl.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * edl.ring * edl.stride * sizeof(float));

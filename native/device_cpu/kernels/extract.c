@@ -19,7 +19,7 @@ static void extract_source(const struct extract_args *args, const uint64_t *keys
         vm mixed = vm_not(vi_eq(word, source));
         const uint32_t px = args->crop_x + x, py = args->crop_y + y;
         vf value = away ? pt_source_among_discs(args, keys + x, away + x, source, mixed, some, px, py)
-                           : pt_source_value(view->width, source, mixed, some, px, py);
+                        : pt_source_value(view->width, source, mixed, some, px, py);
         vf_store_where(out + x, value, lanes);
     }
 }
@@ -61,7 +61,8 @@ static void extract_row(void *context, uint32_t y)
         const vm lanes = vm_first(pt_lanes_left(x, args->crop_width));
         vf z = vi_float(vi_load_z(keys + x));
         if (args->centered)
-            z = pt_centered_depth(args, keys + x, PT_DATA(call, extract, offset), pt_source_of(PT_DATA(call, extract, from), row + x), lanes);
+            z = pt_centered_depth(args, keys + x, PT_DATA(call, extract, offset),
+                                  pt_source_of(PT_DATA(call, extract, from), row + x), lanes);
         vf_store_where(depth + x, z, lanes);
     }
     if (args->normal)
@@ -72,7 +73,8 @@ static void extract_row(void *context, uint32_t y)
                        args->discs_count ? (const float *)PT_DATA(call, extract, away) + row : NULL, y,
                        (float *)PT_DATA(call, extract, source) + out);
     if (args->shadow)
-        extract_shadow(args, keys, (const float *)PT_DATA(call, extract, arrived) + row, (float *)PT_DATA(call, extract, shadow) + out);
+        extract_shadow(args, keys, (const float *)PT_DATA(call, extract, arrived) + row,
+                       (float *)PT_DATA(call, extract, shadow) + out);
 }
 
 int PT_KERNEL_ENTRY(extract)(const struct pt_cpu_call *call)

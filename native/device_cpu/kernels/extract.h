@@ -49,10 +49,12 @@ static inline vf pt_source_among_discs(const struct extract_args *args, const ui
 }
 
 // z of pixels, those of ids that have one with the offset of where their surface was measured.
-static inline vf pt_centered_depth(const struct extract_args *args, const uint64_t *keys, const float *offsets, vi source, vm some)
+static inline vf pt_centered_depth(const struct extract_args *args, const uint64_t *keys, const float *offsets, vi source,
+                                   vm some)
 {
     const vf z = vi_float(vi_load_z(keys));
-    some = vm_and(some, vm_and(vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))), vi_lt_unsigned(vi_load_id(keys), vi_set(args->centered))));
+    some = vm_and(some,
+                  vm_and(vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))), vi_lt_unsigned(vi_load_id(keys), vi_set(args->centered))));
     return vm_bits(some) ? vf_add_where(some, z, vf_gather(offsets, source, some)) : z;
 }
 

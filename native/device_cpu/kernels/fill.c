@@ -22,8 +22,8 @@ static inline struct pixels neighbours(const struct fill *fill, vi x, vi y, int 
 {
     const vi width = vi_set(fill->view->width), height = vi_set(fill->view->height);
     const vi qx = vi_add(x, vi_set((uint32_t)(int32_t)ring_x[d])), qy = vi_add(y, vi_set((uint32_t)(int32_t)ring_y[d]));
-    return (struct pixels){ qx, qy, vi_add(vi_mul(qy, width), qx),
-                            vm_and(lanes, vm_and(vi_lt_unsigned(qx, width), vi_lt_unsigned(qy, height))) };
+    return (struct pixels){qx, qy, vi_add(vi_mul(qy, width), qx),
+                           vm_and(lanes, vm_and(vi_lt_unsigned(qx, width), vi_lt_unsigned(qy, height)))};
 }
 
 // 1. PT_LANES entries from `at` on, as far as `end`, take the least key among their neighbours.
@@ -315,7 +315,7 @@ static void step_bands(void *context, uint32_t begin, uint32_t end, uint32_t thr
 
 static void run_step(struct fill *fill, enum step step)
 {
-    struct step_job job = { fill, step };
+    struct step_job job = {fill, step};
     pt_parallel(fill->call->pool, bands(fill), 1, step_bands, &job);
 }
 
@@ -343,7 +343,8 @@ static int allocate(struct fill *fill)
     const struct view_args *view = fill->view;
     struct entries *e = &fill->entries;
     size_t count = bands(fill);
-    uint64_t **const planes[] = { &fill->covered, &fill->suspect, &fill->filled, &fill->dirty, &fill->touched, &fill->strays, &fill->closing };
+    uint64_t **const planes[] = {&fill->covered, &fill->suspect, &fill->filled, &fill->dirty,
+                                 &fill->touched, &fill->strays,  &fill->closing};
     enum { PLANES = sizeof planes / sizeof *planes };
     fill->words = ((view->width + 65) / 64 + WORDS - 1) / WORDS * WORDS;
     // every pixel may be kept, and be filled again in this step
@@ -394,14 +395,14 @@ static void run_phase(struct fill *fill, int occluded)
 int PT_KERNEL_ENTRY(fill)(const struct pt_cpu_call *call)
 {
     const struct fill_args *args = call->arguments;
-    struct fill fill = { .call = call,
-                         .args = args,
-                         .view = &args->view,
-                         .keys = PT_DATA(call, fill, keys),
-                         .from = PT_DATA(call, fill, from),
-                         .normals = PT_DATA(call, fill, normal),
-                         .deff = PT_DATA(call, fill, deff),
-                         .span = PT_DATA(call, fill, span) };
+    struct fill fill = {.call = call,
+                        .args = args,
+                        .view = &args->view,
+                        .keys = PT_DATA(call, fill, keys),
+                        .from = PT_DATA(call, fill, from),
+                        .normals = PT_DATA(call, fill, normal),
+                        .deff = PT_DATA(call, fill, deff),
+                        .span = PT_DATA(call, fill, span)};
     if (args->view.rect[0] >= args->view.rect[2] || args->view.rect[1] >= args->view.rect[3])
         return PATINA_OK;
     int error = allocate(&fill);

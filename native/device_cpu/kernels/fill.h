@@ -8,14 +8,14 @@
 enum { BAND_ROWS = 16, RING = 8, WORDS = sizeof(vi_words) / 8 };
 
 // The ring, anticlockwise from east.
-static const int8_t ring_x[RING] = { 1, 1, 0, -1, -1, -1, 0, 1 };
-static const int8_t ring_y[RING] = { 0, 1, 1, 1, 0, -1, -1, -1 };
+static const int8_t ring_x[RING] = {1, 1, 0, -1, -1, -1, 0, 1};
+static const int8_t ring_y[RING] = {0, 1, 1, 1, 0, -1, -1, -1};
 
 // The entries of a band, as columns.
 struct entries {
-    uint64_t *key, *old_key; // after this step; before the phase
+    uint64_t *key, *old_key;                     // after this step; before the phase
     uint32_t *x, *y, *qx, *qy, *from, *old_from; // q: the neighbour that it takes the key of
-    float *threshold; // before the phase: a neighbour nearer than this is dark
+    float *threshold;                            // before the phase: a neighbour nearer than this is dark
 };
 
 struct fill {
@@ -29,14 +29,15 @@ struct fill {
     // or the plane: words that follow each other are neighbours, whatever the row.
     uint64_t *covered, *suspect; // not empty; maybe occluded: as the planes were before, or filled since
     uint64_t *filled;            // in this phase
-    uint64_t *strays, *closing;  // alone before the phase where the surface is dense; covered, and no stray: the same where there are none
-    uint64_t *dirty, *touched;   // changed by the last step; by this one
-    size_t words;                // in a row; a multiple of WORDS
-    struct entries entries;      // of all bands
+    uint64_t *strays,
+        *closing; // alone before the phase where the surface is dense; covered, and no stray: the same where there are none
+    uint64_t *dirty, *touched; // changed by the last step; by this one
+    size_t words;              // in a row; a multiple of WORDS
+    struct entries entries;    // of all bands
     size_t band_entries;
-    uint32_t *kept, *listed; // per band: entries of earlier steps, of occluded pixels; with those of this step
-    int occluded;            // the phase
-    int first;               // its first step
+    uint32_t *kept, *listed;    // per band: entries of earlier steps, of occluded pixels; with those of this step
+    int occluded;               // the phase
+    int first;                  // its first step
     atomic_uint changed, alone; // alone: there are strays
 };
 
@@ -61,7 +62,7 @@ static struct span band_words(const struct fill *fill, uint32_t band)
 {
     uint32_t first, last;
     band_rows(fill, band, &first, &last);
-    return (struct span){ first * fill->words, last * fill->words };
+    return (struct span){first * fill->words, last * fill->words};
 }
 
 static void clear_band(const struct fill *fill, uint32_t band, uint64_t *plane)
@@ -90,7 +91,7 @@ static inline struct trio trio_of(const uint64_t *at)
     memcpy(&before, at - 1, sizeof before);
     memcpy(&own, at, sizeof own);
     memcpy(&behind, at + 1, sizeof behind);
-    return (struct trio){ own << 1 | before >> 63, own, own >> 1 | behind << 63 };
+    return (struct trio){own << 1 | before >> 63, own, own >> 1 | behind << 63};
 }
 
 // Which of 64 WORDS pixels have bits, or neighbours that do.
@@ -111,8 +112,8 @@ static inline void ring_of(const uint64_t *at, size_t words, vi_words *out)
 static inline void white_run(const uint64_t *at, size_t words, int length, vi_words *out)
 {
     const struct trio below = trio_of(at - words), own = trio_of(at), above = trio_of(at + words);
-    const vi_words dark[RING] = { own.east, above.east, above.own, above.west, own.west, below.west, below.own, below.east };
-    vi_words pair[RING], none = ~(vi_words){ 0 };
+    const vi_words dark[RING] = {own.east, above.east, above.own, above.west, own.west, below.west, below.own, below.east};
+    vi_words pair[RING], none = ~(vi_words){0};
     for (int d = 0; d < RING; d++)
         pair[d] = dark[d] | dark[(d + 1) % RING];
     for (int d = 0; d < RING; d++)

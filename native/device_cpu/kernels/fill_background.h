@@ -31,7 +31,7 @@ static void find_strays(struct fill *fill, uint32_t band)
 {
     const struct span span = band_words(fill, band);
     const uint32_t *rect = fill->view->rect;
-    vi_words any = { 0 };
+    vi_words any = {0};
     for (size_t i = span.begin; i < span.end; i += WORDS) {
         vi_words beside;
         ring_of(fill->covered + i, fill->words, &beside);
@@ -65,7 +65,7 @@ static void leave_strays(const struct fill *fill, uint32_t band, int still)
     const size_t end = (last + (last == fill->view->rect[3] && last < fill->view->height)) * fill->words;
     const struct span span = band_words(fill, band);
     for (size_t i = begin; i < end; i += WORDS) {
-        vi_words beside = { 0 }, own = *words_at(fill->covered + i);
+        vi_words beside = {0}, own = *words_at(fill->covered + i);
         if (i >= span.begin && i < span.end) {
             if (still)
                 ring_of(fill->covered + i, fill->words, &beside);

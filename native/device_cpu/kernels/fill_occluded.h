@@ -18,7 +18,7 @@ static inline struct row load_row(const uint64_t *keys, const struct view_args *
 {
     const struct pt_row_z z = pt_load_row_z(keys, view->width, view->height, x, y, edge);
     const vf beside = vf_min(z.west, z.east);
-    return (struct row){ z.west, z.own, z.east, beside, vf_min(beside, z.own) };
+    return (struct row){z.west, z.own, z.east, beside, vf_min(beside, z.own)};
 }
 
 // The least, over all two that are apart, of the farther.
@@ -129,7 +129,7 @@ static size_t list_suspects(const struct fill *fill, uint32_t band, const uint64
 static size_t list_hidden(const struct fill *fill, uint32_t band, size_t base)
 {
     const struct span span = band_words(fill, band);
-    vi_words any = { 0 };
+    vi_words any = {0};
     for (size_t i = span.begin; i < span.end; i += WORDS) {
         vi_words asked;
         wider((fill->first ? fill->suspect : fill->dirty) + i, fill->words, &asked);
@@ -158,7 +158,7 @@ static void scan_row(const struct fill *fill, uint32_t y)
 // All planes begin. A row beyond the rectangle is looked at, never changed.
 static void scan_band(struct fill *fill, uint32_t band)
 {
-    uint64_t *const planes[] = { fill->covered, fill->suspect, fill->dirty, fill->touched };
+    uint64_t *const planes[] = {fill->covered, fill->suspect, fill->dirty, fill->touched};
     const struct span span = band_words(fill, band);
     uint32_t first, last;
     band_rows(fill, band, &first, &last);

@@ -30,8 +30,7 @@ static struct row ring_row(const struct focus *focus, uint32_t thread, int32_t y
     float *base = focus->rows + thread * focus->thread_floats;
     const uint32_t slot = (uint32_t)(y + (int32_t)focus->ring) % focus->ring;
     const size_t s = focus->stride;
-    float *at = base + slot * CHANNELS * s + PT_ROW_PAD,
-          *largest = base + focus->ring * CHANNELS * s + slot * focus->blocks;
+    float *at = base + slot * CHANNELS * s + PT_ROW_PAD, *largest = base + focus->ring * CHANNELS * s + slot * focus->blocks;
     return (struct row){at, at + s, at + 2 * s, {at + 3 * s, at + 4 * s, at + 5 * s, at + 6 * s}, largest};
 }
 
@@ -136,8 +135,7 @@ static float look(const struct focus *focus, uint32_t thread, uint32_t x, int32_
 }
 
 // PT_LANES pixels from (x, y) on. most: from this distance on taps add nothing.
-static void focus_pixels(const struct focus *focus, uint32_t thread, uint32_t x, int32_t y, float most,
-                         struct sums *sums)
+static void focus_pixels(const struct focus *focus, uint32_t thread, uint32_t x, int32_t y, float most, struct sums *sums)
 {
     const int32_t reach = most < (float)focus->args->reach ? (int32_t)most : (int32_t)focus->args->reach;
     const struct row own = ring_row(focus, thread, y);

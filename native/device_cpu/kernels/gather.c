@@ -22,13 +22,14 @@ static inline void place(const struct gather *gather, const struct chunk_view *c
     const struct gather_args *args = gather->args;
     const struct view_args *view = &args->shade.view;
     const float *positions = (const float *)PT_DATA(gather->call, gather, positions) + 3 * (size_t)chunk->first;
-    const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                      vf_load(positions + 2 * (size_t)chunk->padded + i) };
+    const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                     vf_load(positions + 2 * (size_t)chunk->padded + i)};
     const vf farthest = vf_set(PT_SOFT_FARTHEST), near = vf_set(view->z_near), far = vf_set(view->z_far);
     out->x = vf_transform(chunk, 0, p[0], p[1], p[2]);
     out->y = vf_transform(chunk, 1, p[0], p[1], p[2]);
     out->z = vf_transform(chunk, 2, p[0], p[1], p[2]);
-    const vf own = vf_min(vi_float(vi_mul(vi_and(out->field, vi_set(PT_FIELD_RADIUS)), vi_set(1u << 15))) * vf_set(args->radius_scale),
+    const vf own = vf_min(vi_float(vi_mul(vi_and(out->field, vi_set(PT_FIELD_RADIUS)), vi_set(1u << 15))) *
+                              vf_set(args->radius_scale),
                           vf_set(PT_SOFT_WIDEST));
     const vf least = vf_footprint(view, out->z) * vf_set(PT_SOFT_LEAST);
     out->radius = vf_max(own, least);
@@ -49,7 +50,7 @@ static inline void light(const struct gather *gather, const struct points *point
 {
     const struct shade_args *args = &gather->args->shade;
     const vf zero = vf_zero(), one = vf_set(1.0f);
-    vf ray[2] = { points->x, points->y }, n[3];
+    vf ray[2] = {points->x, points->y}, n[3];
     pt_albedo(&args->instance, PT_DATA(gather->call, gather, colors), points->id, vi_set(0), points->some, color);
     const vm before = vf_lt(vf_set(PT_SOFT_BEFORE), points->z); // the eye may stand in a ball
     const vf r = vf_rcp(vf_select(before, points->z, one));
@@ -65,7 +66,8 @@ static inline void light(const struct gather *gather, const struct points *point
         return;
     vf_view_normal(&args->instance, word, n);
     const vf square = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
-    const vm known = vm_and(vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))), vf_lt(vf_set(1e-20f), square));
+    const vm known = vm_and(vm_not(vi_eq(vi_and(word, vi_set(PT_NORMAL_BITS)), vi_set(PT_NORMAL_NONE))),
+                            vf_lt(vf_set(1e-20f), square));
     const vf scale = vf_rsqrt(vf_select(known, square, one));
     for (int k = 0; k < 3; k++) // without one: across the view
         n[k] = vf_select(known, n[k] * scale, k == 2 ? one : zero);
@@ -106,8 +108,8 @@ static void gather_chunk(const struct gather *gather, const struct chunk_view *c
     float *records = (float *)PT_DATA(gather->call, gather, points) + (size_t)PT_SOFT_WORDS * chunk->record;
     const vf none = vf_set(pt_float(PT_KEY_EMPTY_Z));
     for (uint32_t i = 0; i < chunk->padded; i += PT_LANES) {
-        struct points points = { .field = vi_load(field + i), .id = vi_add(vi_set(chunk->first + i), vi_lanes()) };
-        vf first[4] = { none, none, none, none }, color[4] = { none, none, none, none };
+        struct points points = {.field = vi_load(field + i), .id = vi_add(vi_set(chunk->first + i), vi_lanes())};
+        vf first[4] = {none, none, none, none}, color[4] = {none, none, none, none};
         points.some = vm_first(i < chunk->count ? pt_lanes_left(i, chunk->count) : 0);
         points.some = vm_and(points.some, vi_lt_unsigned(vi_set(args->threshold), vi_shr(points.field, PT_FIELD_SHIFT)));
         if (vm_bits(points.some))
@@ -118,7 +120,7 @@ static void gather_chunk(const struct gather *gather, const struct chunk_view *c
                                       points.id, vi_set(0), points.some);
             const vi word = amount(args, &points, points.opacity * own);
             points.some = vm_and(points.some, vi_lt_unsigned(vi_set((1u << PT_SOFT_SHIFT) - 1), word));
-            const vf wide[4] = { points.x, points.y, points.z, points.radius };
+            const vf wide[4] = {points.x, points.y, points.z, points.radius};
             color[3] = vi_float(word);
             for (int k = 0; k < 4; k++) {
                 first[k] = vf_select(points.some, wide[k], none);
@@ -140,7 +142,8 @@ static void gather_chunks(void *context, uint32_t begin, uint32_t end, uint32_t 
 
 int PT_KERNEL_ENTRY(gather)(const struct pt_cpu_call *call)
 {
-    struct gather gather = { .call = call, .args = call->arguments };
-    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_gather_chunks]->size / sizeof(struct chunk_view)), 4, gather_chunks, &gather);
+    struct gather gather = {.call = call, .args = call->arguments};
+    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_gather_chunks]->size / sizeof(struct chunk_view)), 4, gather_chunks,
+                &gather);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

@@ -14,8 +14,14 @@ struct ink {
 
 static struct ink ink_of(const struct pt_cpu_call *call)
 {
-    return (struct ink){ call->arguments, PT_DATA(call, ink, keys), PT_DATA(call, ink, line), PT_DATA(call, ink, nearest), PT_DATA(call, ink, colors),
-                         PT_DATA(call, ink, color), PT_DATA(call, ink, depth), PT_DATA(call, ink, mask) };
+    return (struct ink){call->arguments,
+                        PT_DATA(call, ink, keys),
+                        PT_DATA(call, ink, line),
+                        PT_DATA(call, ink, nearest),
+                        PT_DATA(call, ink, colors),
+                        PT_DATA(call, ink, color),
+                        PT_DATA(call, ink, depth),
+                        PT_DATA(call, ink, mask)};
 }
 
 // Of lines of surfaces at z that show the instance's points `id`, not yet times their share.
@@ -72,7 +78,8 @@ static void ink_pixels(const struct ink *ink, size_t at, size_t to, vf share, ui
     vm some = vf_lt(vf_zero(), share);
     if (!vm_bits(some) || !(args->color_target || args->depth))
         return;
-    vi nearest = vi_load(ink->nearest + at), id = vi_sub(vi_gather_id(ink->keys, nearest, some), vi_set(args->instance.id_base));
+    vi nearest = vi_load(ink->nearest + at),
+       id = vi_sub(vi_gather_id(ink->keys, nearest, some), vi_set(args->instance.id_base));
     vf z = vi_float(vi_gather_z(ink->keys, nearest, some));
     vm ours = vm_and(some, vi_lt_unsigned(id, vi_set(args->instance.id_count)));
     if (!vm_bits(ours))

@@ -10,12 +10,12 @@ enum { BAND_ROWS = 64, PAD = 32 }; // rows that a thread takes at once; floats o
 
 // A row of the rectangle, by columns from its left side on.
 struct line_row {
-    float *z;      // +inf: empty, 0: may take no line
-    float *step;   // v of pixels with a step in depth beside them; +inf: none
-    float *disc;   // of them those with company
-    float *least;  // disc within reach along the row
-    float *own;    // of pixels with discs: the share that is the line's
-    float *radius; // of discs, in world units only
+    float *z;       // +inf: empty, 0: may take no line
+    float *step;    // v of pixels with a step in depth beside them; +inf: none
+    float *disc;    // of them those with company
+    float *least;   // disc within reach along the row
+    float *own;     // of pixels with discs: the share that is the line's
+    float *radius;  // of discs, in world units only
     uint64_t *bits; // a bit a disc, from 64 columns before the row on
     int steps, any; // there are steps, discs
 };
@@ -31,7 +31,7 @@ struct lines {
     const struct pt_cpu_call *call;
     uint32_t width; // of the rectangle
     size_t stride;
-    float *memory;  // per thread: a band's rows and one of scratch
+    float *memory; // per thread: a band's rows and one of scratch
     size_t thread_floats;
     float distances[PT_LINE_TAPS + PT_LANES]; // of the taps, pixels
 };
@@ -97,7 +97,7 @@ static struct tangent tangent_at(const struct lines *lines, vi x, vi y, vf z, vm
 {
     const struct view_args *view = &lines->args->view;
     const vf zero = vf_zero();
-    struct tangent out = { vf_set(1.0f), zero, zero, zero }; // behind an empty pixel is nothing
+    struct tangent out = {vf_set(1.0f), zero, zero, zero}; // behind an empty pixel is nothing
     vi at = vi_add(vi_mul(y, vi_set(view->width)), x);
     vm some = vm_and(wanted, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
     if (lines->args->behind)
@@ -261,7 +261,7 @@ static struct found search(const struct lines *lines, const struct line_row *row
     const vf half = vf_set(0.5f);
     const vi column = vi_add(vi_set(rect[0] + x), vi_lanes());
     const struct tangent tangent = tangent_at(lines, column, vi_set(y), z, some);
-    struct found found = { vf_zero(), vf_set(args->most), column };
+    struct found found = {vf_zero(), vf_set(args->most), column};
     const uint64_t asked = vm_bits(some);
     uint64_t discs[2 * PT_LINE_MOST + 1]; // that may show, by rows
     for (int k = -(int)args->reach; k <= (int)args->reach; k++) {
@@ -347,8 +347,8 @@ static void line_bands(void *context, uint32_t begin, uint32_t end, uint32_t thr
     float *at = lines->memory + thread * lines->thread_floats + PAD, *windows = at;
     const size_t s = lines->stride;
     for (uint32_t i = 0; i < BAND_ROWS + 2 * margin; i++, at += ROW_FLOATS * s)
-        rows[i] = (struct line_row){ at + s, at + 2 * s, at + 3 * s, at + 4 * s, at + 5 * s, at + 6 * s,
-                                     (uint64_t *)(void *)(at + 7 * s), 0, 0 };
+        rows[i] = (struct line_row){
+            at + s, at + 2 * s, at + 3 * s, at + 4 * s, at + 5 * s, at + 6 * s, (uint64_t *)(void *)(at + 7 * s), 0, 0};
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(lines->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
         uint32_t count = last - first + 2 * margin;
@@ -369,17 +369,17 @@ int PT_KERNEL_ENTRY(lines)(const struct pt_cpu_call *call)
     const uint32_t *rect = args->view.rect;
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
-    struct lines lines = { .args = args,
-                           .call = call,
-                           .keys = PT_DATA(call, lines, keys),
-                           .from = PT_DATA(call, lines, from),
-                           .normals = PT_DATA(call, lines, normal),
-                           .deff = PT_DATA(call, lines, deff),
-                           .line = PT_DATA(call, lines, line),
-                           .nearest = PT_DATA(call, lines, nearest),
-                           .limit = args->behind ? PT_DATA(call, lines, limit) : NULL,
-                           .through = args->behind ? PT_DATA(call, lines, through) : NULL,
-                           .width = rect[2] - rect[0] };
+    struct lines lines = {.args = args,
+                          .call = call,
+                          .keys = PT_DATA(call, lines, keys),
+                          .from = PT_DATA(call, lines, from),
+                          .normals = PT_DATA(call, lines, normal),
+                          .deff = PT_DATA(call, lines, deff),
+                          .line = PT_DATA(call, lines, line),
+                          .nearest = PT_DATA(call, lines, nearest),
+                          .limit = args->behind ? PT_DATA(call, lines, limit) : NULL,
+                          .through = args->behind ? PT_DATA(call, lines, through) : NULL,
+                          .width = rect[2] - rect[0]};
     lines.stride = ((size_t)lines.width + 15) / 16 * 16 + 3 * PAD; // vectors begin up to PAD behind the row's end
     lines.thread_floats = (1 + ROW_FLOATS * (BAND_ROWS + 2 * ((size_t)args->reach + 3))) * lines.stride;
     lines.memory = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * lines.thread_floats * sizeof(float));

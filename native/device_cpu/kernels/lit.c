@@ -30,7 +30,7 @@ static struct fall fall_of(const struct lit *lit, const struct chunk_view *chunk
 {
     const struct view_args *view = &lit->args.view;
     const float *window = lit->args.window;
-    struct fall f = { .z = vf_transform(chunk, 2, p[0], p[1], p[2]) };
+    struct fall f = {.z = vf_transform(chunk, 2, p[0], p[1], p[2])};
     for (uint32_t k = 0; k < 2; k++)
         f.at[k] = vf_transform(chunk, k, p[0], p[1], p[2]);
     if (view->perspective) {
@@ -64,11 +64,11 @@ static void look_around(const struct view_args *view, const uint64_t *keys, vi c
     const vm east = vm_and(lanes, vi_lt_unsigned(vi_add(column, next), columns));
     for (uint32_t i = 0, k = 0; i < 3; i++) {
         const vi y = vi_sub(vi_add(row, vi_set(i)), next), at = vi_add(vi_mul(y, columns), column);
-        const vm on = vi_lt_unsigned(y, rows), known[3] = { vm_and(west, on), vm_and(lanes, on), vm_and(east, on) };
+        const vm on = vi_lt_unsigned(y, rows), known[3] = {vm_and(west, on), vm_and(lanes, on), vm_and(east, on)};
         vi first[2], then[2]; // of the columns -1 and 0, and of 0 and 1
         vi_gather_two_z(keys, vi_sub(at, next), known[0], first);
         vi_gather_two_z(keys, at, known[1], then);
-        const vi z[3] = { first[0], then[0], then[1] };
+        const vi z[3] = {first[0], then[0], then[1]};
         for (uint32_t j = 0; j < 3; j++)
             if (i != 1 || j != 1) {
                 around->known[k] = known[j];
@@ -83,7 +83,8 @@ static vf farthest(const struct around *around, vf map, vf last)
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z));
     vf z = map;
     for (uint32_t i = 0; i < 8; i++)
-        z = vf_select(vm_and(around->known[i], vm_and(vf_lt(around->z[i], empty), vf_le(around->z[i], last))), vf_max(z, around->z[i]), z);
+        z = vf_select(vm_and(around->known[i], vm_and(vf_lt(around->z[i], empty), vf_le(around->z[i], last))),
+                      vf_max(z, around->z[i]), z);
     return z;
 }
 
@@ -206,13 +207,13 @@ static void enqueue(struct queue *queue, uint32_t i, const struct fall *fall, ui
 // PT_LANES queued points from i on.
 static struct fall queued(const struct queue *queue, uint32_t i, vm lanes)
 {
-    return (struct fall){ .at = { vi_float(vi_load(queue->at[0] + i)), vi_float(vi_load(queue->at[1] + i)) },
-                          .z = vi_float(vi_load(queue->z + i)),
-                          .map = vi_float(vi_load(queue->map + i)),
-                          .column = vi_load(queue->column + i),
-                          .row = vi_load(queue->row + i),
-                          .texel = vi_load(queue->texel + i),
-                          .behind = vm_and(lanes, vi_eq(vi_load(queue->behind + i), vi_set(1))) };
+    return (struct fall){.at = {vi_float(vi_load(queue->at[0] + i)), vi_float(vi_load(queue->at[1] + i))},
+                         .z = vi_float(vi_load(queue->z + i)),
+                         .map = vi_float(vi_load(queue->map + i)),
+                         .column = vi_load(queue->column + i),
+                         .row = vi_load(queue->row + i),
+                         .texel = vi_load(queue->texel + i),
+                         .behind = vm_and(lanes, vi_eq(vi_load(queue->behind + i), vi_set(1)))};
 }
 
 // Queues those of BLOCK slots from `first` on that have to be tested, or looked at in any case.
@@ -284,8 +285,9 @@ static void lit_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thr
 
 int PT_KERNEL_ENTRY(lit)(const struct pt_cpu_call *call)
 {
-    struct lit lit = { call, *(const struct lit_args *)call->arguments };
+    struct lit lit = {call, *(const struct lit_args *)call->arguments};
     lit.args.view.footprint = lit.args.view.footprint * PT_TEXEL_SLACK;
-    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_lit_chunks]->size / sizeof(struct chunk_view)), 4, lit_chunks, &lit);
+    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_lit_chunks]->size / sizeof(struct chunk_view)), 4, lit_chunks,
+                &lit);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

@@ -38,7 +38,8 @@ static void locate_row(void *context, uint32_t y)
             continue;
         struct pt_triangle t;
         vf ray[2], n[3], z = vi_float(vi_load_z(shown + at)), p[3];
-        pt_find_triangle(view, &args->mesh, PT_DATA(call, locate, vertices), PT_DATA(call, locate, indices), index, x, y, ours, &t);
+        pt_find_triangle(view, &args->mesh, PT_DATA(call, locate, vertices), PT_DATA(call, locate, indices), index, x, y, ours,
+                         &t);
         vf_ray(view, x, y, ray);
         pt_plane_normal(view, &args->mesh, &t, ray, n);
         // 1. in view space

@@ -50,16 +50,11 @@ static inline float pt_inside(const struct view_args *view, int plane, const str
 {
     float reach = view->perspective ? PT_MESH_REACH * c->z : PT_MESH_REACH;
     switch (plane) {
-    case 0:
-        return c->z - view->z_near;
-    case 1:
-        return reach + c->x;
-    case 2:
-        return reach - c->x;
-    case 3:
-        return reach + c->y;
-    default:
-        return reach - c->y;
+    case 0: return c->z - view->z_near;
+    case 1: return reach + c->x;
+    case 2: return reach - c->x;
+    case 3: return reach + c->y;
+    default: return reach - c->y;
     }
 }
 
@@ -68,7 +63,7 @@ static inline struct pt_corner pt_meet(const struct view_args *view, int plane, 
                                        const struct pt_corner *out, float d_out)
 {
     float whole = d_in - d_out, t = whole >= 1e-30f ? d_in * pt_reciprocal(whole) : 0.0f;
-    struct pt_corner c = { in->x + t * (out->x - in->x), in->y + t * (out->y - in->y), in->z + t * (out->z - in->z) };
+    struct pt_corner c = {in->x + t * (out->x - in->x), in->y + t * (out->y - in->y), in->z + t * (out->z - in->z)};
     if (plane == 0)
         c.z = view->z_near;
     return c;
@@ -106,7 +101,7 @@ static inline void pt_outline_of(const struct view_args *view, const struct mesh
     out->count = 0;
     for (uint32_t i = 0; i < 3; i++) {
         const float *p = vertices + (size_t)mesh->stride * indices[3 * (size_t)index + i];
-        c[i] = (struct pt_corner){ pt_mesh_row(mesh, 0, p), pt_mesh_row(mesh, 1, p), pt_mesh_row(mesh, 2, p) };
+        c[i] = (struct pt_corner){pt_mesh_row(mesh, 0, p), pt_mesh_row(mesh, 1, p), pt_mesh_row(mesh, 2, p)};
         if (!pt_drawable(&c[i]))
             return;
     }
@@ -140,7 +135,7 @@ static inline float pt_position_float(int32_t x) { return (float)(x >> 12) * 409
 // Triangle (0, i, i + 1) of an outline; 0 when it covers nothing.
 static inline int pt_facet_of(const struct pt_outline *outline, uint32_t i, struct pt_facet *out)
 {
-    uint32_t k[3] = { 0, i, i + 1 };
+    uint32_t k[3] = {0, i, i + 1};
     const int32_t *x = outline->x, *y = outline->y;
     const float *v = outline->value;
     int64_t area = (int64_t)(x[k[1]] - x[0]) * (y[k[2]] - y[0]) - (int64_t)(x[k[2]] - x[0]) * (y[k[1]] - y[0]);

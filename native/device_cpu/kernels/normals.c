@@ -13,7 +13,7 @@ struct depth_row {
     float *z, *w; // by column, from -PT_ROW_PAD on; +inf and anything where nothing is
 };
 
-struct center { // PT_LANES pixels of a row
+struct center {            // PT_LANES pixels of a row
     uint32_t at[PT_LANES]; // columns, counted from the row's pad on; some of the row where nobody asks
     vf z, w;
     vf distance, slope, step[2]; // what belongs to the same surface: kernel_args.h
@@ -66,7 +66,7 @@ static vf depths_at(const struct depth_row *row, vi at, vm ours) { return vf_gat
 static vf change_towards(const struct normals_args *args, const struct depth_row *const *around, const struct center *c, vi at,
                          int across, int up, vm *known)
 {
-    static const float shares[PT_STEP_REACH] = { 1.0f, 0.5f, 0.333333343f };
+    static const float shares[PT_STEP_REACH] = {1.0f, 0.5f, 0.333333343f};
     const int radius = (int)args->radius, reach = radius < PT_STEP_REACH ? radius : PT_STEP_REACH;
     vf change = vf_zero();
     *known = vm_and(c->ours, vm_not(c->ours));
@@ -114,7 +114,7 @@ static inline __attribute__((always_inline)) struct sums sum_window(const struct
                                                                     const struct center *c, int packed, int steep)
 {
     const vf zero = vf_zero(), one = vf_set(1.0f);
-    struct sums s = { zero, zero, zero, zero, zero, zero, zero, zero, zero };
+    struct sums s = {zero, zero, zero, zero, zero, zero, zero, zero, zero};
     for (int32_t dy = -c->most; dy <= c->most; dy++) {
         const struct depth_row *row = around[(int32_t)args->radius + dy];
         vf n = zero, x = zero, xx = zero, w = zero, xw = zero, up = c->step[1] * vf_set((float)dy);
@@ -184,7 +184,7 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     const struct view_args *view = &args->view;
     const struct instance_args *instance = &args->instance;
     const struct depth_row *own = around[args->radius];
-    struct center c = { .ours = ours };
+    struct center c = {.ours = ours};
     vi_store(c.at, vi_select(ours, at, packed ? vi_set(PT_ROW_PAD) : at));
     c.z = vf_select(c.ours, depths_at(own, at, ours), vf_set(1.0f));
     c.w = linear_depth(view, c.z);
@@ -201,7 +201,7 @@ static inline __attribute__((always_inline)) void normal_pixels(const struct job
     } else {
         sums = sum_window(args, around, &c, packed, 0);
     }
-    vf a, b, w, n[3], ray[2] = { vf_zero(), vf_zero() };
+    vf a, b, w, n[3], ray[2] = {vf_zero(), vf_zero()};
     vm found = vm_and(c.ours, solve(&c, &sums, &a, &b, &w));
     // 3. the plane's normal from dw/dx = a, dw/dy = b a pixel
     n[0] = a * vf_set(view->ray_ys);
@@ -248,7 +248,7 @@ static void normals_row(const struct job *job, const struct depth_row *const *ar
 {
     const struct view_args *view = &job->args->view;
     const uint64_t *keys = (const uint64_t *)PT_DATA(job->call, normals, keys) + (size_t)y * view->width;
-    struct packed packed = { .count = 0 };
+    struct packed packed = {.count = 0};
     for (uint32_t x = view->rect[0]; x < view->rect[2]; x += PT_LANES) {
         vi id, at = vi_add(vi_set(x + PT_ROW_PAD), vi_lanes());
         vm ours = pt_of_instance(keys + x, &job->args->instance, pt_lanes_left(x, view->rect[2]), &id);
@@ -274,7 +274,7 @@ static void normals_bands(void *context, uint32_t begin, uint32_t end, uint32_t 
     struct depth_row rows[ROWS_MOST];
     for (int32_t k = 0; k < ring; k++) {
         float *row = job->memory + ((size_t)thread * (uint32_t)ring + (uint32_t)k) * 2 * job->stride + 2 * PT_ROW_PAD;
-        rows[k] = (struct depth_row){ row, row + job->stride };
+        rows[k] = (struct depth_row){row, row + job->stride};
     }
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(job->call); band++) {
         const int32_t first = (int32_t)(view->rect[1] + band * BAND_ROWS);
@@ -294,7 +294,7 @@ int PT_KERNEL_ENTRY(normals)(const struct pt_cpu_call *call)
 {
     const struct normals_args *args = call->arguments;
     const uint32_t *rect = args->view.rect, threads = pt_pool_threads(call->pool);
-    struct job job = { .call = call, .args = args, .stride = pt_row_stride(args->view.width) };
+    struct job job = {.call = call, .args = args, .stride = pt_row_stride(args->view.width)};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     const size_t rows = (size_t)threads * (2 * args->radius + 1);

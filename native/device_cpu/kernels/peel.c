@@ -20,8 +20,8 @@ static void empty_keys(uint64_t *keys, uint32_t lanes)
 static void peel_pixels(const struct peel *peel, size_t at, vm lanes, struct pt_tile_sum *tile)
 {
     const vf zero = vf_zero();
-    vf z = vi_float(vi_load_z(peel->keys + at)), color[4] = { zero, zero, zero, zero }, distance = zero;
-    vf shading[4] = { zero, zero, zero, zero };
+    vf z = vi_float(vi_load_z(peel->keys + at)), color[4] = {zero, zero, zero, zero}, distance = zero;
+    vf shading[4] = {zero, zero, zero, zero};
     vm some = vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
     if (vm_bits(some)) {
         vf_load4(peel->color + 4 * at, color);
@@ -50,13 +50,13 @@ static void peel_rows(void *context, uint32_t begin, uint32_t end, uint32_t thre
 {
     const struct pt_cpu_call *call = context;
     const struct peel_args *args = call->arguments;
-    const struct peel peel = { .args = args,
-                               .keys = PT_DATA(call, peel, keys),
-                               .from = PT_DATA(call, peel, from),
-                               .deff = PT_DATA(call, peel, deff),
-                               .shading = PT_DATA(call, peel, shading),
-                               .color = PT_DATA(call, peel, color),
-                               .planes = { PT_DATA(call, peel, limit), PT_DATA(call, peel, through), PT_DATA(call, peel, over) } };
+    const struct peel peel = {.args = args,
+                              .keys = PT_DATA(call, peel, keys),
+                              .from = PT_DATA(call, peel, from),
+                              .deff = PT_DATA(call, peel, deff),
+                              .shading = PT_DATA(call, peel, shading),
+                              .color = PT_DATA(call, peel, color),
+                              .planes = {PT_DATA(call, peel, limit), PT_DATA(call, peel, through), PT_DATA(call, peel, over)}};
     struct pt_tile_value *tiles = PT_DATA(call, peel, tiles);
     uint32_t columns = (args->view.width + PT_TILE - 1) / PT_TILE, first = args->view.rect[1] / PT_TILE;
     (void)thread;

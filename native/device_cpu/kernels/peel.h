@@ -33,7 +33,7 @@ static inline vm pt_peel_pixels(const struct peel_args *args, const struct pt_pe
     vm behind = vm_and(some, vf_lt(before, z));
     // 2. behind what was blended before
     if (first || vm_bits(behind)) {
-        vf sum[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
+        vf sum[4] = {vf_zero(), vf_zero(), vf_zero(), vf_zero()};
         if (!first || args->inked)
             vf_load4(planes->over + 4 * at, sum);
         vf through = one - sum[3];
@@ -55,10 +55,7 @@ static inline vm pt_peel_pixels(const struct peel_args *args, const struct pt_pe
     return behind;
 }
 
-static inline struct pt_tile_sum pt_tile_begin(void)
-{
-    return (struct pt_tile_sum){ .least = vf_set(pt_float(PT_KEY_EMPTY_Z)) };
-}
+static inline struct pt_tile_sum pt_tile_begin(void) { return (struct pt_tile_sum){.least = vf_set(pt_float(PT_KEY_EMPTY_Z))}; }
 
 static inline struct pt_tile_value pt_tile_end(const struct pt_tile_sum *sum)
 {
@@ -66,7 +63,7 @@ static inline struct pt_tile_value pt_tile_end(const struct pt_tile_sum *sum)
     vf_store(least, sum->least);
     for (int i = 1; i < PT_LANES; i++)
         least[0] = pt_min(least[0], least[i]);
-    return (struct pt_tile_value){ least[0], sum->covered };
+    return (struct pt_tile_value){least[0], sum->covered};
 }
 
 #endif

@@ -21,7 +21,7 @@ static uint32_t pull_cell(const struct pull_args *args, const uint64_t *fine_key
 static struct cells least(struct cells a, struct cells b)
 {
     vm less = pt_less(b.z, b.id, a.z, a.id);
-    return (struct cells){ vi_select(less, b.z, a.z), vi_select(less, b.id, a.id), vi_select(less, b.from, a.from) };
+    return (struct cells){vi_select(less, b.z, a.z), vi_select(less, b.id, a.id), vi_select(less, b.from, a.from)};
 }
 
 // The lesser of each pair of 2 PT_LANES fine pixels from `at` on; those of level 0 are measured ones, or empty.
@@ -33,15 +33,16 @@ static struct cells least_of_row(const uint64_t *keys, const uint32_t *from, siz
         id[k] = vi_load_id(keys + at + k * PT_LANES);
         f[k] = measured ? vi_add(vi_set((uint32_t)at + k * PT_LANES), vi_lanes()) : vi_load(from + at + k * PT_LANES);
     }
-    return least((struct cells){ vi_evens(z[0], z[1]), vi_evens(id[0], id[1]), vi_evens(f[0], f[1]) },
-                 (struct cells){ vi_odds(z[0], z[1]), vi_odds(id[0], id[1]), vi_odds(f[0], f[1]) });
+    return least((struct cells){vi_evens(z[0], z[1]), vi_evens(id[0], id[1]), vi_evens(f[0], f[1])},
+                 (struct cells){vi_odds(z[0], z[1]), vi_odds(id[0], id[1]), vi_odds(f[0], f[1])});
 }
 
 // Whole vectors of cells with four children each; returns where they end.
-static uint32_t pull_vectors(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from,
-                             uint64_t *keys, uint32_t *from, uint32_t y)
+static uint32_t pull_vectors(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, uint64_t *keys,
+                             uint32_t *from, uint32_t y)
 {
-    uint32_t x = args->view.rect[0], end = args->view.rect[2] < args->fine_width / 2 ? args->view.rect[2] : args->fine_width / 2;
+    uint32_t x = args->view.rect[0],
+             end = args->view.rect[2] < args->fine_width / 2 ? args->view.rect[2] : args->fine_width / 2;
     const int measured = args->view.level == 1;
     if (2 * y + 1 >= args->fine_height)
         return x;
@@ -55,8 +56,8 @@ static uint32_t pull_vectors(const struct pull_args *args, const uint64_t *fine_
     return x;
 }
 #else
-static uint32_t pull_vectors(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from,
-                             uint64_t *keys, uint32_t *from, uint32_t y)
+static uint32_t pull_vectors(const struct pull_args *args, const uint64_t *fine_keys, const uint32_t *fine_from, uint64_t *keys,
+                             uint32_t *from, uint32_t y)
 {
     (void)fine_keys, (void)fine_from, (void)keys, (void)from, (void)y;
     return args->view.rect[0];

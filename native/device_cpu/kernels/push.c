@@ -26,10 +26,12 @@ static uint32_t asked(const struct push *push, uint32_t x, uint32_t y, vf parent
     if (x >= rect[2] || y < rect[1] || y >= rect[3])
         return 0;
     const vm lanes = vm_first(pt_lanes_left(x, rect[2]));
-    const vf z = vi_float(vi_load_z((const uint64_t *)PT_DATA(push->call, push, keys) + (size_t)y * push->args->view.width + x));
-    *p = (struct pixels){ x, y, z, parent };
+    const vf z = vi_float(
+        vi_load_z((const uint64_t *)PT_DATA(push->call, push, keys) + (size_t)y * push->args->view.width + x));
+    *p = (struct pixels){x, y, z, parent};
     vm some = vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)));
-    vf t = vf_select(some, z - pt_least_distance(&push->args->view, push->args->least, push->args->least_share, z), z); // what is nearer covers it
+    vf t = vf_select(some, z - pt_least_distance(&push->args->view, push->args->least, push->args->least_share, z),
+                     z); // what is nearer covers it
     uint32_t bits = vm_bits(vm_and(lanes, vf_lt(parent, t)));
     if (push->args->background)
         bits &= ~vm_bits(some);
@@ -45,8 +47,10 @@ static uint32_t covered(const struct push *push, const struct pixels *p, vf besi
     vm lanes = vm_of_bits(bits), some = vm_and(lanes, vf_lt(p->z, vf_set(pt_float(PT_KEY_EMPTY_Z))));
     vf t = p->z;
     if (vm_bits(some)) {
-        t = vf_select(some, t - pt_own_distance(&push->args->view, PT_DATA(push->call, push, deff), PT_DATA(push->call, push, normal),
-                                                PT_DATA(push->call, push, from), at, t, some), t);
+        t = vf_select(some,
+                      t - pt_own_distance(&push->args->view, PT_DATA(push->call, push, deff), PT_DATA(push->call, push, normal),
+                                          PT_DATA(push->call, push, from), at, t, some),
+                      t);
         lanes = vm_and(lanes, vf_lt(p->parent, t));
         if (!vm_bits(lanes))
             return 0;
@@ -104,8 +108,8 @@ static void load_parents(const struct push *push, uint32_t x, uint32_t y, vf z, 
     p->farthest = z;
     if (push->args->refined && p->give) {
         const vi cell = vi_cell_of(p->source, push->args->from_width, push->coarse.level, push->args->coarse_width);
-        p->farthest = vf_farthest(PT_DATA(push->call, push, coarse_keys), PT_DATA(push->call, push, coarse_from), cell, p->source, vm_of_bits(p->give), z,
-                                  distance, inverse);
+        p->farthest = vf_farthest(PT_DATA(push->call, push, coarse_keys), PT_DATA(push->call, push, coarse_from), cell,
+                                  p->source, vm_of_bits(p->give), z, distance, inverse);
     }
     p->dot = (normal[0] * p->ray[0] + normal[1] * p->ray[1]) - normal[2];
     for (uint32_t column = 0; column < 2; column++) {
@@ -119,7 +123,8 @@ struct sides { // rows of coarse cells: the parents', and the one on the pixels'
 };
 
 // z of the cells' pixels of column 0 or 1, row y: refined, of the surface's tangent plane there.
-static inline vi pixel_z(const struct push *push, const struct parents *p, const struct sides *sides, uint32_t column, uint32_t y)
+static inline vi pixel_z(const struct push *push, const struct parents *p, const struct sides *sides, uint32_t column,
+                         uint32_t y)
 {
     if (!push->args->refined)
         return vf_bits(p->z);
@@ -138,7 +143,8 @@ static inline vi pixel_z(const struct push *push, const struct parents *p, const
 }
 
 // 4. The pixels of row y that `bits` names, PT_LANES in each half, take their parents' keys.
-static void take(const struct push *push, const struct parents *p, const struct sides *sides, uint32_t y, const uint32_t bits[2])
+static void take(const struct push *push, const struct parents *p, const struct sides *sides, uint32_t y,
+                 const uint32_t bits[2])
 {
     vi z[2], id[2], source[2];
     vi_zip(pixel_z(push, p, sides, 0, y), pixel_z(push, p, sides, 1, y), z);
@@ -171,7 +177,8 @@ static inline __attribute__((always_inline)) void fetch_pixels(const struct push
 
 static inline __attribute__((always_inline)) void fetch_surfaces(const struct push *push, uint32_t x, uint32_t y)
 {
-    const uint32_t *source = (const uint32_t *)PT_DATA(push->call, push, coarse_from) + (size_t)y * push->args->coarse_width + x;
+    const uint32_t *source = (const uint32_t *)PT_DATA(push->call, push, coarse_from) + (size_t)y * push->args->coarse_width +
+                             x;
     for (uint32_t i = 0; y < push->args->coarse_height && i < PT_LANES; i++) {
         __builtin_prefetch((const float *)PT_DATA(push->call, push, normal) + 4 * (size_t)source[i]);
         __builtin_prefetch((const float *)PT_DATA(push->call, push, span) + source[i]);
@@ -213,7 +220,7 @@ static void push_cells(const struct push *push, uint32_t x, uint32_t y)
     const uint32_t give = twice(parents.give);
     for_pixels(own.west, own.east, beside);
     for (uint32_t row = 0; give && row < 2; row++) {
-        const struct sides sides = { own, load_cells(push, x, row ? y + 1 : y - 1) };
+        const struct sides sides = {own, load_cells(push, x, row ? y + 1 : y - 1)};
         for_pixels(sides.next.own, sides.next.own, above);
         for_pixels(sides.next.west, sides.next.east, corner);
         for (uint32_t half = 0; half < 2; half++)
@@ -229,7 +236,7 @@ static void push_rows(void *context, uint32_t begin, uint32_t end, uint32_t thre
     const struct pt_cpu_call *call = context;
     const struct push_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct push push = { .call = call, .args = args, .coarse = args->view };
+    struct push push = {.call = call, .args = args, .coarse = args->view};
     (void)thread;
     push.coarse.level++;
     for (uint32_t y = begin; y < end && !pt_cpu_cancelled(call); y++)

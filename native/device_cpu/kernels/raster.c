@@ -10,7 +10,7 @@ enum { BATCH = 128 }; // triangles
 
 struct target {
     uint64_t *keys;
-    const float *limit; // only what lies beyond counts; NULL: everything
+    const float *limit;            // only what lies beyond counts; NULL: everything
     const struct pt_cpu_call *cut; // by the opacity of the mesh's image; NULL: nothing is
 };
 
@@ -21,7 +21,8 @@ static vm left_by_image(const struct pt_cpu_call *call, uint32_t index, uint32_t
     struct pt_triangle t;
     struct pt_on_image place;
     vf color[4];
-    pt_find_triangle(&args->view, &args->mesh, PT_DATA(call, raster, vertices), PT_DATA(call, raster, indices), vi_set(index), x, y, lanes, &t);
+    pt_find_triangle(&args->view, &args->mesh, PT_DATA(call, raster, vertices), PT_DATA(call, raster, indices), vi_set(index),
+                     x, y, lanes, &t);
     pt_place_on_image(&t, &args->mesh.texture, PT_DATA(call, raster, vertices), lanes, &place);
     pt_image_at(&args->mesh.texture, PT_DATA(call, raster, texels), &place, lanes, color);
     return vm_and(lanes, vf_le(vf_set(args->mesh.texture.cut), color[3]));
@@ -99,15 +100,15 @@ static void draw_facet(const struct view_args *view, const struct pt_facet *face
 {
     const int32_t half = 1 << (PT_MESH_BITS - 1), unit = 1 << PT_MESH_BITS;
     const int32_t *x = facet->x, *y = facet->y;
-    int32_t low[2] = { x[0], y[0] }, high[2] = { x[0], y[0] };
+    int32_t low[2] = {x[0], y[0]}, high[2] = {x[0], y[0]};
     for (int k = 1; k < 3; k++) {
         low[0] = x[k] < low[0] ? x[k] : low[0];
         low[1] = y[k] < low[1] ? y[k] : low[1];
         high[0] = x[k] > high[0] ? x[k] : high[0];
         high[1] = y[k] > high[1] ? y[k] : high[1];
     }
-    int32_t begin[2] = { view->origin_x, view->origin_y };
-    int32_t end[2] = { view->origin_x + (int32_t)view->width, view->origin_y + (int32_t)view->height };
+    int32_t begin[2] = {view->origin_x, view->origin_y};
+    int32_t end[2] = {view->origin_x + (int32_t)view->width, view->origin_y + (int32_t)view->height};
     for (int k = 0; k < 2; k++) { // the centres between them
         int32_t first = (int32_t)-divide_down(half - low[k], unit), last = (int32_t)divide_down(high[k] - half, unit);
         begin[k] = first > begin[k] ? first : begin[k];
@@ -126,15 +127,16 @@ static void raster_range(void *context, uint32_t begin, uint32_t end, uint32_t t
 {
     const struct pt_cpu_call *call = context;
     const struct raster_args *args = call->arguments;
-    const struct target target = { PT_DATA(call, raster, keys), args->behind ? PT_DATA(call, raster, limit) : NULL,
-                                   args->mesh.texture.cut > 0.0f ? call : NULL };
+    const struct target target = {PT_DATA(call, raster, keys), args->behind ? PT_DATA(call, raster, limit) : NULL,
+                                  args->mesh.texture.cut > 0.0f ? call : NULL};
     (void)thread;
     for (uint32_t batch = begin; batch < end && !pt_cpu_cancelled(call); batch++) {
         uint32_t first = batch * BATCH, left = args->mesh.id_count - first;
         for (uint32_t i = first; i < first + (left < BATCH ? left : BATCH); i++) {
             struct pt_outline outline;
             struct pt_facet facet;
-            pt_outline_of(&args->view, &args->mesh, PT_DATA(call, raster, vertices), PT_DATA(call, raster, indices), i, &outline);
+            pt_outline_of(&args->view, &args->mesh, PT_DATA(call, raster, vertices), PT_DATA(call, raster, indices), i,
+                          &outline);
             for (uint32_t k = 1; k + 1 < outline.count; k++)
                 if (pt_facet_of(&outline, k, &facet))
                     draw_facet(&args->view, &facet, args->mesh.id_base + i, target);

@@ -10,7 +10,7 @@ static inline vf pt_place_on_ramp(const struct shade_args *args, const vf toward
 {
     const struct recolor_args *recolor = &args->recolor;
     const vf zero = vf_set(recolor->zero), slope = vf_set(recolor->along[0]);
-    vf ray[2] = { towards[0], towards[1] };
+    vf ray[2] = {towards[0], towards[1]};
     if (recolor->source == PT_RAMP_SCALAR)
         return (scalars - zero) * slope;
     vf depth = z + vf_set(args->eye_z);

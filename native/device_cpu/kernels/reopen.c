@@ -133,11 +133,13 @@ static void reopen_row(void *context, uint32_t y)
     const struct reopen_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
     const size_t row = (size_t)y * args->view.width;
-    struct planes planes = {.keys = (uint64_t *)PT_DATA(call, reopen, keys) + row, .from = (uint32_t *)PT_DATA(call, reopen, from) + row};
+    struct planes planes = {.keys = (uint64_t *)PT_DATA(call, reopen, keys) + row,
+                            .from = (uint32_t *)PT_DATA(call, reopen, from) + row};
     planes.all_away = args->discs ? PT_DATA(call, reopen, away) : NULL;
     planes.away = args->discs ? planes.all_away + row : NULL;
     planes.limit = args->phase == PT_REOPEN_FIND ? (float *)PT_DATA(call, reopen, limit) + row : NULL;
-    planes.kept = args->phase == PT_REOPEN_KEEP || args->phase == PT_REOPEN_TAKE ? (uint64_t *)PT_DATA(call, reopen, kept) + row : NULL;
+    planes.kept = args->phase == PT_REOPEN_KEEP || args->phase == PT_REOPEN_TAKE ? (uint64_t *)PT_DATA(call, reopen, kept) + row
+                                                                                 : NULL;
     if (args->phase == PT_REOPEN_KEEP) {
         memcpy(planes.kept + rect[0], planes.keys + rect[0], (rect[2] - rect[0]) * sizeof *planes.kept);
         return;

@@ -26,9 +26,9 @@ struct scatter {
 
 struct target {
     uint64_t *keys;
-    const float *limit; // only what lies beyond counts; NULL: everything
+    const float *limit;    // only what lies beyond counts; NULL: everything
     const uint32_t *drawn; // bits of sifted chunks
-    int shared;         // by several threads
+    int shared;            // by several threads
 };
 
 static inline void store_least(struct target target, uint32_t pixel, uint64_t key)
@@ -60,15 +60,15 @@ struct window { // the view's, as vectors
 
 static struct window window_of(const struct view_args *view)
 {
-    return (struct window){ .z_near = vf_set(view->z_near),
-                            .z_far = vf_set(view->z_far),
-                            .left = vf_set((float)view->origin_x),
-                            .right = vf_set((float)(view->origin_x + (int32_t)view->width)),
-                            .bottom = vf_set((float)view->origin_y),
-                            .top = vf_set((float)(view->origin_y + (int32_t)view->height)),
-                            .origin_x = vi_set((uint32_t)view->origin_x),
-                            .origin_y = vi_set((uint32_t)view->origin_y),
-                            .width = vi_set(view->width) };
+    return (struct window){.z_near = vf_set(view->z_near),
+                           .z_far = vf_set(view->z_far),
+                           .left = vf_set((float)view->origin_x),
+                           .right = vf_set((float)(view->origin_x + (int32_t)view->width)),
+                           .bottom = vf_set((float)view->origin_y),
+                           .top = vf_set((float)(view->origin_y + (int32_t)view->height)),
+                           .origin_x = vi_set((uint32_t)view->origin_x),
+                           .origin_y = vi_set((uint32_t)view->origin_y),
+                           .width = vi_set(view->width)};
 }
 
 // 1. Pixels and depths of points [first, last). What their pixels hold is asked for: a chunk's first points find it in memory.
@@ -78,8 +78,8 @@ static inline void project(const struct view_args *view, const struct window *w,
 {
     uint32_t count = 0;
     for (uint32_t i = first; i < last; i += PT_LANES) {
-        const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                          vf_load(positions + 2 * (size_t)chunk->padded + i) };
+        const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                         vf_load(positions + 2 * (size_t)chunk->padded + i)};
         vf z = vf_transform(chunk, 2, p[0], p[1], p[2]);
         vf x = vf_transform(chunk, 0, p[0], p[1], p[2]), y = vf_transform(chunk, 1, p[0], p[1], p[2]);
         if (view->perspective) {
@@ -88,8 +88,9 @@ static inline void project(const struct view_args *view, const struct window *w,
             y = y * r;
         }
         // clip: NaN fails every comparison; what was sifted out is not drawn
-        vm inside = vm_and(vm_and(vf_le(w->z_near, z), vf_le(z, w->z_far)),
-                           vm_and(vm_and(vf_le(w->left, x), vf_lt(x, w->right)), vm_and(vf_le(w->bottom, y), vf_lt(y, w->top))));
+        vm inside = vm_and(
+            vm_and(vf_le(w->z_near, z), vf_le(z, w->z_far)),
+            vm_and(vm_and(vf_le(w->left, x), vf_lt(x, w->right)), vm_and(vf_le(w->bottom, y), vf_lt(y, w->top))));
         if (chunk->sifted)
             inside = vm_and(inside, vm_of_bits(target.drawn[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD));
         if (chunk->cull)
@@ -142,10 +143,10 @@ struct walk { // over chunks
 static void begin_walk(const struct scatter *scatter, int shared, struct walk *walk)
 {
     const struct pt_cpu_call *call = scatter->call;
-    walk->target = (struct target){ .keys = PT_DATA(call, scatter, keys),
-                                    .limit = scatter->args->behind ? PT_DATA(call, scatter, limit) : NULL,
-                                    .drawn = scatter->args->sifted ? PT_DATA(call, scatter, drawn) : NULL,
-                                    .shared = shared };
+    walk->target = (struct target){.keys = PT_DATA(call, scatter, keys),
+                                   .limit = scatter->args->behind ? PT_DATA(call, scatter, limit) : NULL,
+                                   .drawn = scatter->args->sifted ? PT_DATA(call, scatter, drawn) : NULL,
+                                   .shared = shared};
     walk->window = window_of(&scatter->args->view);
     walk->instance = walk->count = 0;
 }
@@ -159,7 +160,8 @@ static const struct chunk_view *chunk_at(const struct scatter *scatter, uint32_t
 static void walk_chunk(const struct scatter *scatter, uint32_t c, struct walk *walk)
 {
     const struct chunk_view *chunk = chunk_at(scatter, c, &walk->instance);
-    const float *positions = (const float *)PT_DATA_EACH(scatter->call, scatter, positions, walk->instance) + 3 * (size_t)chunk->first;
+    const float *positions = (const float *)PT_DATA_EACH(scatter->call, scatter, positions, walk->instance) +
+                             3 * (size_t)chunk->first;
     const uint32_t *surface = (const uint32_t *)PT_DATA_EACH(scatter->call, scatter, surface, walk->instance) + chunk->first;
     for (uint32_t first = 0; first < chunk->count; first += BLOCK, walk->count++) {
         const uint32_t last = chunk->count - first < BLOCK ? chunk->count : first + BLOCK;
@@ -185,7 +187,8 @@ static void scatter_stripes(void *context, uint32_t begin, uint32_t end, uint32_
         uint32_t i = scatter->stripes[s].next;
         begin_walk(scatter, 0, &walk);
         for (; i < scatter->stripes[s].end && !atomic_load_explicit(&scatter->over, memory_order_relaxed) &&
-               !pt_cpu_cancelled(scatter->call); i++)
+               !pt_cpu_cancelled(scatter->call);
+             i++)
             walk_chunk(scatter, scatter->order[i], &walk);
         end_walk(&walk);
         scatter->stripes[s].next = i;
@@ -211,7 +214,7 @@ static uint32_t bin_of(const struct view_args *view, uint32_t row) { return (uin
 // The stripes of bins: as many points in each.
 static void divide_rows(const struct scatter *scatter, uint32_t chunks, uint32_t stripes, uint16_t stripe_of[BINS])
 {
-    uint64_t points[BINS] = { 0 }, all = 1, before = 0;
+    uint64_t points[BINS] = {0}, all = 1, before = 0;
     for (uint32_t c = 0, instance = 0; c < chunks; c++) {
         const struct chunk_view *chunk = chunk_at(scatter, c, &instance);
         points[bin_of(&scatter->args->view, (chunk->row_first + chunk->row_end) / 2)] += chunk->count;
@@ -254,7 +257,7 @@ int PT_KERNEL_ENTRY(scatter)(const struct pt_cpu_call *call)
 {
     const struct scatter_args *args = call->arguments;
     const uint32_t stripes = pt_pool_threads(call->pool);
-    struct scatter scatter = { .call = call, .args = args };
+    struct scatter scatter = {.call = call, .args = args};
     uint32_t left = 0;
     scatter.begins = pt_cpu_scratch(call, 0, ((size_t)args->instances + 1) * sizeof *scatter.begins);
     if (!scatter.begins)

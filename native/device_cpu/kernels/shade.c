@@ -19,14 +19,15 @@ static struct pt_seen_row ring_row(const struct shade *shade, uint32_t thread, u
 {
     float *row = shade->rows + ((size_t)thread * shade->ring + slot) * CHANNELS * shade->stride + PT_ROW_PAD;
     const size_t s = shade->stride;
-    return (struct pt_seen_row){ row, row + s, { row + 2 * s, row + 3 * s, row + 4 * s }, NULL, 0, 0 };
+    return (struct pt_seen_row){row, row + s, {row + 2 * s, row + 3 * s, row + 4 * s}, NULL, 0, 0};
 }
 
 static void shade_row(const struct shade *shade, const struct pt_seen_row *const *around, uint32_t y)
 {
     const struct shade_args *args = shade->args;
     const uint32_t *rect = args->view.rect;
-    float *shading = PT_DATA(shade->call, shade, shading), *colors = PT_DATA(shade->call, shade, color), *arrived = PT_DATA(shade->call, shade, arrived);
+    float *shading = PT_DATA(shade->call, shade, shading), *colors = PT_DATA(shade->call, shade, color),
+          *arrived = PT_DATA(shade->call, shade, arrived);
     const uint64_t *keys = shade->planes.keys + (size_t)y * args->view.width;
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         if (args->instance.color_format)
@@ -35,7 +36,7 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         if (args->instance.has_opacities)
             pt_fetch_ahead(keys, x + 4 * PT_LANES, rect[2], &args->instance, PT_DATA(shade->call, shade, opacities), 1);
         size_t at = (size_t)y * args->view.width + x;
-        vf color[4], normal[4] = { vf_zero(), vf_zero(), vf_zero(), vf_zero() };
+        vf color[4], normal[4] = {vf_zero(), vf_zero(), vf_zero(), vf_zero()};
         vi id;
         vm ours = pt_of_instance(shade->planes.keys + at, &args->instance, pt_lanes_left(x, rect[2]), &id);
         if (!vm_bits(ours))
@@ -44,9 +45,10 @@ static void shade_row(const struct shade *shade, const struct pt_seen_row *const
         pt_albedo(&args->instance, PT_DATA(shade->call, shade, colors), id, source, ours, color);
         if (pt_recolors(args))
             pt_recolor(args, x, y, vf_load(around[args->blend]->z + x), ours, color);
-        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, PT_DATA(shade->call, shade, shadows), x, y, id,
-                                   ours, 0, color, normal);
-        normal[3] = color[3] = pt_opacity(&args->instance, PT_DATA(shade->call, shade, colors), PT_DATA(shade->call, shade, opacities), id, source, ours);
+        vf share = pt_shade_pixels(args, &shade->planes, around, shade->weights, NULL, PT_DATA(shade->call, shade, shadows), x,
+                                   y, id, ours, 0, color, normal);
+        normal[3] = color[3] = pt_opacity(&args->instance, PT_DATA(shade->call, shade, colors),
+                                          PT_DATA(shade->call, shade, opacities), id, source, ours);
         for (int k = 0; k < 3; k++)
             color[k] = color[k] * color[3];
         vf_store4(shading + 4 * at, normal, vm_bits(ours));
@@ -85,12 +87,16 @@ int PT_KERNEL_ENTRY(shade)(const struct pt_cpu_call *call)
 {
     const struct shade_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct shade shade = { .call = call,
-                           .args = args,
-                           .planes = { &args->view, { 0, 0, args->view.width, args->view.height }, PT_DATA(call, shade, keys),
-                                       PT_DATA(call, shade, from), PT_DATA(call, shade, normal), PT_DATA(call, shade, deff) },
-                           .stride = pt_row_stride(args->view.width),
-                           .ring = 2 * args->blend + 1 };
+    struct shade shade = {.call = call,
+                          .args = args,
+                          .planes = {&args->view,
+                                     {0, 0, args->view.width, args->view.height},
+                                     PT_DATA(call, shade, keys),
+                                     PT_DATA(call, shade, from),
+                                     PT_DATA(call, shade, normal),
+                                     PT_DATA(call, shade, deff)},
+                          .stride = pt_row_stride(args->view.width),
+                          .ring = 2 * args->blend + 1};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     pt_blend_weights(shade.weights);

@@ -6,7 +6,7 @@
 #include "device_cpu/kernels/blend_normals.h"
 #include "device_cpu/kernels/recolor.h"
 
-static const uint32_t pt_color_bytes[] = { 0, 3, 12, 0, 4, 0 }; // of a point, by color_format
+static const uint32_t pt_color_bytes[] = {0, 3, 12, 0, 4, 0}; // of a point, by color_format
 
 // Colours of three bytes, gathered as words: byte offsets fit a signed index.
 static inline int pt_gathers_bytes(const struct instance_args *instance)
@@ -71,8 +71,8 @@ static inline void pt_albedo(const struct instance_args *instance, const void *c
 }
 
 // The points' opacity, times the instance's.
-static inline vf pt_opacity(const struct instance_args *instance, const void *colors, const uint8_t *opacities, vi id, vi source,
-                            vm ours)
+static inline vf pt_opacity(const struct instance_args *instance, const void *colors, const uint8_t *opacities, vi id,
+                            vi source, vm ours)
 {
     vf opacity = vf_set(instance->opacity);
     if (!instance->has_opacities)
@@ -164,8 +164,7 @@ static inline void pt_add_light(const struct instance_args *instance, const stru
         specular[k] = specular[k] + vf_set(light->color[k]) * shine;
 }
 
-static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z, const vf n[3],
-                            struct pt_surface_point *s)
+static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z, const vf n[3], struct pt_surface_point *s)
 {
     const vf zero = vf_zero(), one = vf_set(1.0f);
     s->to_eye[0] = s->to_eye[1] = zero;
@@ -180,7 +179,7 @@ static inline void pt_place(const struct shade_args *args, const vf ray[2], vf z
         s->to_eye[0] = zero - ray[0];
         s->to_eye[1] = zero - ray[1];
     }
-    vm away = vf_lt(pt_dot3(n, s->to_eye), zero); // both sides are lit
+    vm away = vf_lt(pt_dot3(n, s->to_eye), zero);                   // both sides are lit
     if (args->view.perspective && args->instance.specular > 0.0f) { // only shine needs it as a unit
         vf r = vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + one);
         for (int k = 0; k < 3; k++)
@@ -255,10 +254,11 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
 // Light on, and shown normals of, PT_LANES pixels of the instance from (x, y) on. color: in albedo. around: rows
 // y - blend ... y + blend. blended: sums of normals at x, where all are one layer; NULL: not known. Returns the mean share of
 // the casting lights that arrives.
-static inline __attribute__((always_inline)) vf
-pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes, const struct pt_seen_row *const *around,
-                const float *weights, float *const *blended, const uint32_t *shadows, uint32_t x, uint32_t y, vi id, vm ours,
-                int plain, vf color[3], vf normal[3])
+static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes,
+                                                                const struct pt_seen_row *const *around, const float *weights,
+                                                                float *const *blended, const uint32_t *shadows, uint32_t x,
+                                                                uint32_t y, vi id, vm ours, int plain, vf color[3],
+                                                                vf normal[3])
 {
     size_t at = (size_t)y * args->view.width + x;
     const struct pt_seen_row *own = around[args->blend];
@@ -273,7 +273,7 @@ pt_shade_pixels(const struct shade_args *args, const struct pt_planes *planes, c
             for (int k = 0; k < 3 && blended; k++)
                 sum[k] = vf_load(blended[k] + x);
             if (!blended)
-                pt_blend_sum(&(struct pt_blend){ &args->view, (int)args->blend, weights, around }, x, filled, sum);
+                pt_blend_sum(&(struct pt_blend){&args->view, (int)args->blend, weights, around}, x, filled, sum);
             pt_blend_normals(sum, filled, normal);
         }
     }

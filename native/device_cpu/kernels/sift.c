@@ -29,8 +29,8 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
     vm keep = vm_of_bits(chunk->clip_keeps ? 0u : ~0u), cut = vm_of_bits(0);
     if (chunk->clip_count) { // else positions need not come from memory, and there may be no clips
         const struct clip_view *clips = (const struct clip_view *)PT_DATA(sift->call, sift, clips) + chunk->clip_first;
-        const vf p[3] = { vf_load(positions + i), vf_load(positions + chunk->padded + i),
-                          vf_load(positions + 2 * (size_t)chunk->padded + i) };
+        const vf p[3] = {vf_load(positions + i), vf_load(positions + chunk->padded + i),
+                         vf_load(positions + 2 * (size_t)chunk->padded + i)};
         for (uint32_t k = 0; k < chunk->clip_keeps; k++)
             keep = vm_or(keep, inside(&clips[k], p));
         for (uint32_t k = chunk->clip_keeps; k < chunk->clip_count; k++)
@@ -64,7 +64,9 @@ static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
         const struct chunk_view *chunk = &chunks[c];
         const float *positions = (const float *)PT_DATA(sift->call, sift, positions) + 3 * (size_t)chunk->first;
         uint32_t *words = (uint32_t *)PT_DATA(sift->call, sift, drawn) + chunk->sifted - 1;
-        const uint32_t *mask = args->by_mask ? (const uint32_t *)PT_DATA(sift->call, sift, mask) + chunk->first / PT_SLOTS_A_WORD : NULL;
+        const uint32_t *mask = args->by_mask
+                                   ? (const uint32_t *)PT_DATA(sift->call, sift, mask) + chunk->first / PT_SLOTS_A_WORD
+                                   : NULL;
         for (uint32_t first = 0; first < chunk->count && chunk->sifted; first += PT_SLOTS_A_WORD) {
             uint32_t word = 0;
             for (uint32_t i = 0; i < PT_SLOTS_A_WORD; i += PT_LANES)
@@ -77,11 +79,12 @@ static void sift_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 int PT_KERNEL_ENTRY(sift)(const struct pt_cpu_call *call)
 {
     const struct sift_args *args = call->arguments;
-    struct sift sift = { .call = call };
+    struct sift sift = {.call = call};
     for (uint32_t i = 0; i < 256; i++) {
         sift.hides[i] = args->hidden[i / 32] >> i % 32 & 1u;
         sift.hides_shape[i] = args->hidden_shapes[i / 32] >> i % 32 & 1u;
     }
-    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_sift_chunks]->size / sizeof(struct chunk_view)), 4, sift_chunks, &sift);
+    pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_sift_chunks]->size / sizeof(struct chunk_view)), 4, sift_chunks,
+                &sift);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
 }

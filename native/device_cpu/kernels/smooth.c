@@ -54,14 +54,14 @@ static void smooth_bands(void *context, uint32_t begin, uint32_t end, uint32_t t
     for (uint32_t k = 0; k < 3; k++) {
         float *row = smooth->rows + ((size_t)thread * 3 + k) * CHANNELS * smooth->stride + PT_ROW_PAD;
         const size_t s = smooth->stride;
-        ring[k] = (struct pt_color_row){ row, { row + s, row + 2 * s, row + 3 * s, row + 4 * s } };
+        ring[k] = (struct pt_color_row){row, {row + s, row + 2 * s, row + 3 * s, row + 4 * s}};
     }
     for (uint32_t band = begin; band < end && !pt_cpu_cancelled(smooth->call); band++) {
         uint32_t first = rect[1] + band * BAND_ROWS, last = first + BAND_ROWS < rect[3] ? first + BAND_ROWS : rect[3];
         load_row(smooth, (int32_t)first - 1, &ring[(first + 2) % 3]);
         load_row(smooth, (int32_t)first, &ring[first % 3]);
         for (uint32_t y = first; y < last; y++) {
-            const struct pt_color_row *const rows[3] = { &ring[(y + 2) % 3], &ring[y % 3], &ring[(y + 1) % 3] };
+            const struct pt_color_row *const rows[3] = {&ring[(y + 2) % 3], &ring[y % 3], &ring[(y + 1) % 3]};
             load_row(smooth, (int32_t)y + 1, rows[2]);
             smooth_row(smooth, rows, y);
         }
@@ -72,13 +72,13 @@ int PT_KERNEL_ENTRY(smooth)(const struct pt_cpu_call *call)
 {
     const struct smooth_args *args = call->arguments;
     const uint32_t *rect = args->view.rect;
-    struct smooth smooth = { .call = call,
-                             .args = args,
-                             .planes = { .view = &args->view,
-                                         .keys = PT_DATA(call, smooth, keys),
-                                         .from = PT_DATA(call, smooth, from),
-                                         .deff = PT_DATA(call, smooth, deff) },
-                             .stride = pt_row_stride(args->view.width) };
+    struct smooth smooth = {.call = call,
+                            .args = args,
+                            .planes = {.view = &args->view,
+                                       .keys = PT_DATA(call, smooth, keys),
+                                       .from = PT_DATA(call, smooth, from),
+                                       .deff = PT_DATA(call, smooth, deff)},
+                            .stride = pt_row_stride(args->view.width)};
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     smooth.rows = pt_cpu_scratch(call, 0, pt_pool_threads(call->pool) * 3 * CHANNELS * smooth.stride * sizeof(float));

@@ -32,9 +32,11 @@ static void save_pixel(const struct pt_soft_tile *tile, uint32_t i, uint32_t x, 
 {
     const struct soft_args *args = tile->bins->args;
     const struct pt_cpu_call *call = tile->bins->call;
-    const size_t at = (size_t)y * args->view.width + x, crop = ((size_t)y - args->crop_y) * args->crop_width + (x - args->crop_x);
+    const size_t at = (size_t)y * args->view.width + x,
+                 crop = ((size_t)y - args->crop_y) * args->crop_width + (x - args->crop_x);
     float *target = (float *)PT_DATA(call, soft, target) + 4 * (args->layered ? at : crop);
-    const float own[4] = { tile->color[0][i], tile->color[1][i], tile->color[2][i], 1.0f - tile->through[i] }, left = 1.0f - target[3];
+    const float own[4] = {tile->color[0][i], tile->color[1][i], tile->color[2][i], 1.0f - tile->through[i]},
+                left = 1.0f - target[3];
     for (int k = 0; k < 4; k++)
         target[k] = args->layered ? target[k] + left * own[k] : own[k] + tile->through[i] * target[k];
     if (args->density == 1)
@@ -42,7 +44,8 @@ static void save_pixel(const struct pt_soft_tile *tile, uint32_t i, uint32_t x, 
     else if (args->density)
         ((float *)PT_DATA(call, soft, density))[crop] += tile->density[i];
     if (args->layered && args->last)
-        ((float *)PT_DATA(call, soft, reached))[at] = pt_float((uint32_t)(((const uint64_t *)PT_DATA(call, soft, keys))[at] >> 32));
+        ((float *)PT_DATA(call, soft, reached))[at] = pt_float(
+            (uint32_t)(((const uint64_t *)PT_DATA(call, soft, keys))[at] >> 32));
 }
 
 static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -53,7 +56,7 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
     for (uint32_t t = begin + bins->first; t < end + bins->first && !pt_cpu_cancelled(bins->call); t++) {
         const uint32_t x = rect[0] + t % bins->columns * PT_SOFT_TILE, y = rect[1] + t / bins->columns * PT_SOFT_TILE;
         const uint32_t *list = bins->lists + bins->begins[t], count = bins->begins[t + 1] - bins->begins[t];
-        struct pt_soft_tile tile = { .bins = bins, .x = (int32_t)x, .y = (int32_t)y, .thread = thread };
+        struct pt_soft_tile tile = {.bins = bins, .x = (int32_t)x, .y = (int32_t)y, .thread = thread};
         tile.width = rect[2] - x < PT_SOFT_TILE ? rect[2] - x : PT_SOFT_TILE;
         tile.height = rect[3] - y < PT_SOFT_TILE ? rect[3] - y : PT_SOFT_TILE;
         load(&tile);
@@ -86,14 +89,14 @@ static int draw_batch(struct soft *soft)
 
 int PT_KERNEL_ENTRY(soft)(const struct pt_cpu_call *call)
 {
-    struct soft soft = { .bins = { .call = call, .args = call->arguments, .points = PT_DATA(call, soft, points) } };
+    struct soft soft = {.bins = {.call = call, .args = call->arguments, .points = PT_DATA(call, soft, points)}};
     const uint32_t *rect = soft.bins.args->view.rect;
     if (rect[0] >= rect[2] || rect[1] >= rect[3])
         return PATINA_OK;
     int error = pt_soft_bins_open(&soft.bins);
     while (!error && pt_soft_batch(&soft.bins))
         error = draw_batch(&soft);
-    const uint64_t told[2] = { atomic_load(&soft.fragments), soft.bins.drawn };
+    const uint64_t told[2] = {atomic_load(&soft.fragments), soft.bins.drawn};
     memcpy(PT_DATA(call, soft, bins), told, sizeof told);
     return error;
 }

@@ -10,8 +10,8 @@ enum { PT_SOFT_NUMBERS = 10 }; // floats kept of a ball
 // Of the balls that a pixel's ray meets; room for a list, and PT_LANES more.
 struct pt_soft_hits {
     uint32_t count;
-    float *d, *along, *inverse, *half;   // d, half of the chord: in radii; inverse: 1 / radius
-    float *depth, *weight, *color[3];    // depth: m lambda; weight: of the colour
+    float *d, *along, *inverse, *half; // d, half of the chord: in radii; inverse: 1 / radius
+    float *depth, *weight, *color[3];  // depth: m lambda; weight: of the colour
     float *shells;
     uint32_t *record, *open;
     uint64_t *ends, *other; // order of the place << 32 | hit << 1 | 1 at its end
@@ -82,8 +82,8 @@ struct pt_soft_ray {
 };
 
 // Which of a list's balls the ray meets.
-static inline void pt_soft_meet(const struct pt_soft_tile *tile, const struct pt_soft_ray *ray, const uint32_t *list, uint32_t count,
-                                struct pt_soft_hits *hits)
+static inline void pt_soft_meet(const struct pt_soft_tile *tile, const struct pt_soft_ray *ray, const uint32_t *list,
+                                uint32_t count, struct pt_soft_hits *hits)
 {
     const struct soft_args *args = tile->bins->args;
     const vf one = vf_set(1.0f), zero = vf_zero(), u = vf_set(ray->u), v = vf_set(ray->v);
@@ -95,7 +95,8 @@ static inline void pt_soft_meet(const struct pt_soft_tile *tile, const struct pt
         vf scale = one;
         if (args->view.perspective)
             scale = p[2];
-        const vf ex = (p[0] - vf_set(ray->x) * scale) * vf_set(args->view.ray_xs), ey = (p[1] - vf_set(ray->y) * scale) * vf_set(args->view.ray_ys);
+        const vf ex = (p[0] - vf_set(ray->x) * scale) * vf_set(args->view.ray_xs),
+                 ey = (p[1] - vf_set(ray->y) * scale) * vf_set(args->view.ray_ys);
         const vf across = ex * u + ey * v, inverse = vf_rcp(vf_select(some, p[3], one));
         const vf square = vf_max(((ex * ex + ey * ey) - (across * across) * vf_set(1.0f / ray->n)) * (inverse * inverse), zero);
         const vf along = (p[2] * vf_set(ray->n) + across) * vf_set(1.0f / ray->root), left = one - square;
@@ -136,10 +137,12 @@ static inline float pt_soft_weigh(const struct pt_soft_tile *tile, const struct 
         float lanes[PT_LANES];
         vf_gather4(tile->bins->points, vi_add(vi_mul(vi_load(hits->record + i), vi_set(2)), vi_set(1)), some, look);
         const vf d = vf_select(some, vf_load(hits->d + i), zero), half = vf_select(some, vf_load(hits->half + i), one);
-        const vf inverse = vf_select(some, vf_load(hits->inverse + i), one), along = vf_select(some, vf_load(hits->along + i), zero);
+        const vf inverse = vf_select(some, vf_load(hits->inverse + i), one),
+                 along = vf_select(some, vf_load(hits->along + i), zero);
         const vf shells = vf_select(some, vf_load(hits->shells + i), one);
         const vi word = vf_bits(vf_select(some, look[3], zero));
-        const vf a = vi_convert(vi_shr(word, PT_SOFT_SHIFT)) * vf_set(1.0f / PT_SOFT_STEPS), w = vi_convert(vi_and(word, vi_set(255))) * vf_set(1.0f / 255.0f);
+        const vf a = vi_convert(vi_shr(word, PT_SOFT_SHIFT)) * vf_set(1.0f / PT_SOFT_STEPS),
+                 w = vi_convert(vi_and(word, vi_set(255))) * vf_set(1.0f / 255.0f);
         const vf full = vf_min(a, vf_set(PT_SOFT_FULLEST)), lambda = zero - pt_soft_log1p(zero - full);
         vf factor = one;
         if (vm_bits(vm_and(some, vf_lt(w, one)))) { // [S Eq. 22]
@@ -147,7 +150,10 @@ static inline float pt_soft_weigh(const struct pt_soft_tile *tile, const struct 
             const vf own = one - vf_exp2(vf_max(whole * vf_set(-1.44269504f), vf_set(-126.0f)));
             const vf opacity = (full * (one - d)) * (one - w) + own * w;
             const vm sure = vm_and(vf_lt(w, one), vf_lt(vf_set(1e-9f), whole));
-            factor = vf_select(sure, (zero - pt_soft_log1p(zero - vf_min(opacity, vf_set(PT_SOFT_FULLEST)))) * vf_rcp(vf_select(sure, whole, one)), one);
+            factor = vf_select(sure,
+                               (zero - pt_soft_log1p(zero - vf_min(opacity, vf_set(PT_SOFT_FULLEST)))) *
+                                   vf_rcp(vf_select(sure, whole, one)),
+                               one);
         }
         vf_store(hits->depth + i, factor * lambda);
         vf_store(hits->weight + i, (one - d) * a);
@@ -155,7 +161,8 @@ static inline float pt_soft_weigh(const struct pt_soft_tile *tile, const struct 
             vf_store(hits->color[k] + i, vf_select(some, look[k], zero));
         if (!args->density)
             continue;
-        const vf begin = vf_max((vf_set(ray->from) - along) * inverse, zero - half), end = vf_min((vf_set(ray->to) - along) * inverse, half);
+        const vf begin = vf_max((vf_set(ray->from) - along) * inverse, zero - half),
+                 end = vf_min((vf_set(ray->to) - along) * inverse, half);
         sums = vf_mul_where(some, (inverse * inverse) * vf_set(PT_SOFT_BALL), pt_soft_integral(d, begin, vf_max(begin, end)));
         vf_store(lanes, sums);
         for (uint32_t k = 0; k < PT_LANES; k++)
@@ -176,9 +183,11 @@ static inline void pt_soft_sort_ends(struct pt_soft_hits *hits, uint32_t count)
         }
     for (uint32_t run = 16; run < count; run *= 2) {
         for (uint32_t begin = 0; begin < count; begin += 2 * run) {
-            const uint32_t middle = begin + run < count ? begin + run : count, end = begin + 2 * run < count ? begin + 2 * run : count;
+            const uint32_t middle = begin + run < count ? begin + run : count,
+                           end = begin + 2 * run < count ? begin + 2 * run : count;
             for (uint32_t a = begin, b = middle, to = begin; to < end; to++)
-                hits->other[to] = b == end || (a < middle && hits->ends[a] <= hits->ends[b]) ? hits->ends[a++] : hits->ends[b++];
+                hits->other[to] = b == end || (a < middle && hits->ends[a] <= hits->ends[b]) ? hits->ends[a++]
+                                                                                             : hits->ends[b++];
         }
         uint64_t *swap = hits->ends;
         hits->ends = hits->other;
@@ -193,17 +202,19 @@ static inline float pt_soft_place(uint64_t end)
 }
 
 // What the open balls lose between two places, and the mean of their colours.
-static inline float pt_soft_piece(const struct pt_soft_tile *tile, const struct pt_soft_hits *hits, uint32_t open, float from, float to,
-                                  float color[3])
+static inline float pt_soft_piece(const struct pt_soft_tile *tile, const struct pt_soft_hits *hits, uint32_t open, float from,
+                                  float to, float color[3])
 {
     const vf zero = vf_zero(), one = vf_set(1.0f);
-    vf sums[5] = { zero, zero, zero, zero, zero };
-    float totals[5] = { 0.0f };
+    vf sums[5] = {zero, zero, zero, zero, zero};
+    float totals[5] = {0.0f};
     for (uint32_t i = 0; i < open; i += PT_LANES) {
         const vm some = vm_first(pt_lanes_left(i, open));
         const vi hit = vi_load(hits->open + i);
-        const vf half = vf_gather(hits->half, hit, some), inverse = vf_gather(hits->inverse, hit, some), along = vf_gather(hits->along, hit, some);
-        const vf begin = vf_max((vf_set(from) - along) * inverse, zero - half), end = vf_max(vf_min((vf_set(to) - along) * inverse, half), begin);
+        const vf half = vf_gather(hits->half, hit, some), inverse = vf_gather(hits->inverse, hit, some),
+                 along = vf_gather(hits->along, hit, some);
+        const vf begin = vf_max((vf_set(from) - along) * inverse, zero - half),
+                 end = vf_max(vf_min((vf_set(to) - along) * inverse, half), begin);
         const vf shells = vf_select(some, vf_gather(hits->shells, hit, some), one), weight = vf_gather(hits->weight, hit, some);
         const vf depth = pt_soft_depth(tile->bins->args, shells, vf_gather(hits->d, hit, some), begin, end, some);
         sums[0] = sums[0] + vf_mul_where(some, vf_gather(hits->depth, hit, some), depth);
@@ -229,7 +240,8 @@ static inline float pt_soft_left(double lost)
     return lost > 0.0 ? lanes[0] : 1.0f;
 }
 
-static inline void pt_soft_pixel(struct pt_soft_tile *tile, const struct pt_soft_ray *ray, struct pt_soft_hits *hits, uint32_t at)
+static inline void pt_soft_pixel(struct pt_soft_tile *tile, const struct pt_soft_ray *ray, struct pt_soft_hits *hits,
+                                 uint32_t at)
 {
     uint32_t count = 0, open = 0;
     double lost = 0.0;
@@ -268,8 +280,8 @@ static inline void pt_soft_pixel(struct pt_soft_tile *tile, const struct pt_soft
 
 static void pt_soft_lay_out(struct pt_soft_hits *hits, char *memory, uint32_t room)
 {
-    float **const floats[PT_SOFT_NUMBERS] = { &hits->d, &hits->along, &hits->inverse, &hits->half, &hits->depth, &hits->weight,
-                                              &hits->color[0], &hits->color[1], &hits->color[2], &hits->shells };
+    float **const floats[PT_SOFT_NUMBERS] = {&hits->d,      &hits->along,    &hits->inverse,  &hits->half,     &hits->depth,
+                                             &hits->weight, &hits->color[0], &hits->color[1], &hits->color[2], &hits->shells};
     for (uint32_t k = 0; k < PT_SOFT_NUMBERS; k++)
         *floats[k] = (float *)(void *)(memory + 4 * (size_t)room * k);
     hits->record = (uint32_t *)(void *)(memory + 4 * (size_t)room * PT_SOFT_NUMBERS);
@@ -279,7 +291,10 @@ static void pt_soft_lay_out(struct pt_soft_hits *hits, char *memory, uint32_t ro
 }
 
 // Bytes for a list of `room`, a multiple of 16.
-static inline size_t pt_soft_hit_bytes(uint32_t room) { return (size_t)room * (4 * (PT_SOFT_NUMBERS + 2) + 4 * sizeof(uint64_t)); }
+static inline size_t pt_soft_hit_bytes(uint32_t room)
+{
+    return (size_t)room * (4 * (PT_SOFT_NUMBERS + 2) + 4 * sizeof(uint64_t));
+}
 
 static void pt_soft_balls(struct pt_soft_tile *tile, const uint32_t *list, uint32_t count, char *memory, uint32_t room)
 {
@@ -289,8 +304,10 @@ static void pt_soft_balls(struct pt_soft_tile *tile, const uint32_t *list, uint3
     for (uint32_t y = 0; y < tile->height; y++)
         for (uint32_t x = 0; x < tile->width; x++) {
             const uint32_t at = y * PT_SOFT_TILE + x;
-            struct pt_soft_ray ray = { .x = (float)(view->origin_x + tile->x + (int32_t)x) + 0.5f,
-                                       .y = (float)(view->origin_y + tile->y + (int32_t)y) + 0.5f, .n = 1.0f, .root = 1.0f };
+            struct pt_soft_ray ray = {.x = (float)(view->origin_x + tile->x + (int32_t)x) + 0.5f,
+                                      .y = (float)(view->origin_y + tile->y + (int32_t)y) + 0.5f,
+                                      .n = 1.0f,
+                                      .root = 1.0f};
             if (view->perspective) {
                 ray.u = view->ray_x0 + view->ray_xs * ray.x;
                 ray.v = view->ray_y0 + view->ray_ys * ray.y;

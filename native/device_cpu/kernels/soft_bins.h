@@ -19,9 +19,9 @@ struct pt_soft_bins {
     const struct soft_args *args;
     const float *points;
     uint32_t columns, rows, tiles, ranges;
-    uint32_t drawn;         // of the records
-    uint32_t first, end;    // tiles of this batch
-    uint64_t *keys, *other; // depth << 32 | record
+    uint32_t drawn;            // of the records
+    uint32_t first, end;       // tiles of this batch
+    uint64_t *keys, *other;    // depth << 32 | record
     struct pt_soft_box *boxes; // by record
     uint32_t *lists;
     size_t room;
@@ -38,7 +38,10 @@ static inline uint32_t pt_soft_order(float z)
     return bits >> 31 ? ~bits : bits | 1u << 31;
 }
 
-static inline uint32_t pt_soft_range(uint32_t count, uint32_t ranges, uint32_t i) { return (uint32_t)((uint64_t)count * i / ranges); }
+static inline uint32_t pt_soft_range(uint32_t count, uint32_t ranges, uint32_t i)
+{
+    return (uint32_t)((uint64_t)count * i / ranges);
+}
 
 // Ends of PT_LANES balls or discs on screen along one axis, pixels of the picture. ray: of the centre, in units of the axis.
 static inline void pt_soft_ends(const struct pt_soft_bins *bins, vf ray, vf ratio, float begin, float step, vf out[2])
@@ -61,7 +64,7 @@ static inline vm pt_soft_boxes(const struct pt_soft_bins *bins, const vf p[4], v
 {
     const struct view_args *view = &bins->args->view;
     const vf one = vf_set(1.0f), zero = vf_zero();
-    const float begin[2] = { view->ray_x0, view->ray_y0 }, step[2] = { view->ray_xs, view->ray_ys };
+    const float begin[2] = {view->ray_x0, view->ray_y0}, step[2] = {view->ray_xs, view->ray_ys};
     vm good = some; // of others the eye may stand in the ball: it is everywhere
     vf r = one;
     if (view->perspective && bins->args->model != PT_SOFT_EXPRESS)
@@ -117,7 +120,8 @@ static void pt_soft_look(void *context, uint32_t begin, uint32_t end, uint32_t t
             vf_store(z, p[2]);
             for (uint32_t lanes = vm_bits(some); lanes; lanes &= lanes - 1) {
                 const uint32_t k = (uint32_t)__builtin_ctz(lanes);
-                bins->boxes[i + k] = (struct pt_soft_box){ (uint16_t)words[0][k], (uint16_t)words[1][k], (uint16_t)words[2][k], (uint16_t)words[3][k] };
+                bins->boxes[i + k] = (struct pt_soft_box){(uint16_t)words[0][k], (uint16_t)words[1][k], (uint16_t)words[2][k],
+                                                          (uint16_t)words[3][k]};
                 keys[bins->count[q]++] = (uint64_t)pt_soft_order(z[k]) << 32 | (i + k);
             }
         }
@@ -250,7 +254,8 @@ static inline int pt_soft_bins_open(struct pt_soft_bins *bins)
     pt_parallel(bins->call->pool, bins->ranges, 1, pt_soft_look, bins);
     bins->drawn = 0;
     for (uint32_t q = 0; q < bins->ranges; q++) {
-        memcpy(bins->keys + bins->drawn, bins->other + pt_soft_range(n / 16, bins->ranges, q) * 16, bins->count[q] * sizeof *bins->keys);
+        memcpy(bins->keys + bins->drawn, bins->other + pt_soft_range(n / 16, bins->ranges, q) * 16,
+               bins->count[q] * sizeof *bins->keys);
         bins->drawn += bins->count[q];
     }
     pt_soft_sort(bins);

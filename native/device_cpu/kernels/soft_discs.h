@@ -11,7 +11,8 @@ struct pt_soft_disc { // q = (a dx + b dy) dx + c dy^2
 };
 
 // PT_LANES records of a list.
-static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint32_t *list, uint32_t count, struct pt_soft_disc *out)
+static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint32_t *list, uint32_t count,
+                                     struct pt_soft_disc *out)
 {
     const struct view_args *view = &tile->bins->args->view;
     const vm some = vm_first(count);
@@ -32,19 +33,37 @@ static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint
         scale = scale * p[2];
     }
     const vf inverse = vf_rcp((u * u + v * v) + one), square = scale * scale;
-    const vf columns[8] = { p[0], p[1], p[2], (square * (xs * xs)) * (one - (u * u) * inverse),
-                            (square * (xs * ys)) * (vf_set(-2.0f) * ((u * v) * inverse)), (square * (ys * ys)) * (one - (v * v) * inverse), density, p[3] };
+    const vf columns[8] = {p[0],
+                           p[1],
+                           p[2],
+                           (square * (xs * xs)) * (one - (u * u) * inverse),
+                           (square * (xs * ys)) * (vf_set(-2.0f) * ((u * v) * inverse)),
+                           (square * (ys * ys)) * (one - (v * v) * inverse),
+                           density,
+                           p[3]};
     for (int k = 0; k < 8; k++)
         vf_store(lanes[k], columns[k]);
     for (int k = 0; k < 4; k++)
         vf_store(looks[k], look[k]);
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t word = pt_bits(looks[3][i]);
-        out[i] = (struct pt_soft_disc){ lanes[0][i] - (float)(view->origin_x + tile->x) - 0.5f, lanes[1][i] - (float)(view->origin_y + tile->y) - 0.5f,
-                                        lanes[2][i], lanes[3][i], lanes[4][i], lanes[5][i], (float)(word >> PT_SOFT_SHIFT) * (1.0f / PT_SOFT_STEPS),
-                                        (float)(word & 255u) * (1.0f / 255.0f), { looks[0][i], looks[1][i], looks[2][i] }, lanes[6][i], 0, 0, 0, 0 };
+        out[i] = (struct pt_soft_disc){lanes[0][i] - (float)(view->origin_x + tile->x) - 0.5f,
+                                       lanes[1][i] - (float)(view->origin_y + tile->y) - 0.5f,
+                                       lanes[2][i],
+                                       lanes[3][i],
+                                       lanes[4][i],
+                                       lanes[5][i],
+                                       (float)(word >> PT_SOFT_SHIFT) * (1.0f / PT_SOFT_STEPS),
+                                       (float)(word & 255u) * (1.0f / 255.0f),
+                                       {looks[0][i], looks[1][i], looks[2][i]},
+                                       lanes[6][i],
+                                       0,
+                                       0,
+                                       0,
+                                       0};
         // q reaches 1 at these on each side of the middle
-        const float flat = 4.0f * out[i].a * out[i].c - out[i].b * out[i].b, wide = flat > 0.0f ? __builtin_sqrtf(4.0f * out[i].c / flat) + 0.01f : 1e9f;
+        const float flat = 4.0f * out[i].a * out[i].c - out[i].b * out[i].b,
+                    wide = flat > 0.0f ? __builtin_sqrtf(4.0f * out[i].c / flat) + 0.01f : 1e9f;
         const float tall = flat > 0.0f ? __builtin_sqrtf(4.0f * out[i].a / flat) + 0.01f : 1e9f;
         out[i].x0 = (int32_t)pt_max(out[i].x - wide, 0.0f);
         out[i].y0 = (int32_t)pt_max(out[i].y - tall, 0.0f);

@@ -22,7 +22,8 @@ static inline int pt_soft_spent(const struct pt_soft_tile *tile)
 {
     vm open = vm_of_bits(0);
     for (uint32_t i = 0; i < PT_SOFT_PIXELS; i += PT_LANES)
-        open = vm_or(open, vm_and(vf_le(vf_set(PT_SOFT_SPENT), vf_load(tile->through + i)), vf_lt(vf_load(tile->from + i), vf_load(tile->to + i))));
+        open = vm_or(open, vm_and(vf_le(vf_set(PT_SOFT_SPENT), vf_load(tile->through + i)),
+                                  vf_lt(vf_load(tile->from + i), vf_load(tile->to + i))));
     return !vm_bits(open);
 }
 

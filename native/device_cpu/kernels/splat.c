@@ -103,13 +103,13 @@ static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thr
 int PT_KERNEL_ENTRY(splat)(const struct pt_cpu_call *call)
 {
     const struct splat_args *args = call->arguments;
-    struct pt_bins bins = { .call = call,
-                            .view = &args->view,
-                            .discs = (const struct disc_args *)(args + 1),
-                            .drawn = args->sifted ? PT_DATA(call, splat, drawn) : NULL,
-                            .instances = args->instances,
-                            .first = PT_BUF_splat_chunks,
-                            .stride = PT_EACH_splat };
+    struct pt_bins bins = {.call = call,
+                           .view = &args->view,
+                           .discs = (const struct disc_args *)(args + 1),
+                           .drawn = args->sifted ? PT_DATA(call, splat, drawn) : NULL,
+                           .instances = args->instances,
+                           .first = PT_BUF_splat_chunks,
+                           .stride = PT_EACH_splat};
     int error = pt_bins_fill(&bins);
     if (error)
         return error;

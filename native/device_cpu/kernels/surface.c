@@ -46,7 +46,7 @@ static void surface_pixels(const struct surface_args *args, const struct pt_cpu_
         n[k] = n[k] * scale;
     // 3. without one: towards the viewer
     if (vm_bits(none)) {
-        vf towards[3] = { vf_zero(), vf_zero(), one };
+        vf towards[3] = {vf_zero(), vf_zero(), one};
         if (view->perspective) {
             vf r = vf_rsqrt((ray[0] * ray[0] + ray[1] * ray[1]) + one);
             towards[0] = (vf_zero() - ray[0]) * r;
@@ -86,7 +86,8 @@ static void surface_row(void *context, uint32_t y)
     const size_t row = (size_t)y * args->view.width;
     const uint64_t *keys = (const uint64_t *)PT_DATA(call, surface, keys) + row;
     uint32_t *from = (uint32_t *)PT_DATA(call, surface, from) + row;
-    const uint32_t *words = PT_DATA(call, surface, surface), *shapes = args->sigma_scale > 0.0f ? PT_DATA(call, surface, shapes) : NULL;
+    const uint32_t *words = PT_DATA(call, surface, surface),
+                   *shapes = args->sigma_scale > 0.0f ? PT_DATA(call, surface, shapes) : NULL;
     struct measured measured;
     for (uint32_t first = rect[0]; first < rect[2]; first += BLOCK) {
         const uint32_t end = rect[2] - first < BLOCK ? rect[2] : first + BLOCK;

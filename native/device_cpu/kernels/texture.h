@@ -27,8 +27,8 @@ static inline void pt_image_side(const vf f[3], const vf corner[3][2], const vf 
 }
 
 // 1. of the triangles t.
-static inline void pt_place_on_image(const struct pt_triangle *t, const struct texture_args *image, const float *vertices, vm lanes,
-                                     struct pt_on_image *out)
+static inline void pt_place_on_image(const struct pt_triangle *t, const struct texture_args *image, const float *vertices,
+                                     vm lanes, struct pt_on_image *out)
 {
     vf corner[3][2];
     for (uint32_t i = 0; i < 3; i++)
@@ -55,7 +55,8 @@ static inline void pt_place_on_image(const struct pt_triangle *t, const struct t
 }
 
 // Adds texels, colour by opacity, times a weight.
-static inline void pt_add_texel(const struct texture_args *image, const uint32_t *texels, vi index, vf weight, vm lanes, vf sum[4])
+static inline void pt_add_texel(const struct texture_args *image, const uint32_t *texels, vi index, vf weight, vm lanes,
+                                vf sum[4])
 {
     vf c[4];
     if (image->format == PT_TEXELS_FLOAT) {
@@ -100,7 +101,7 @@ static inline void pt_add_level(const struct texture_args *image, const uint32_t
         near[k] = pt_wrap_texel(image, base[k], size[k]);
         far[k] = pt_wrap_texel(image, vi_add(base[k], vi_set(1)), size[k]);
     }
-    vm ends[4] = { lanes, lanes, lanes, lanes }; // left, right, low, high: whether they are on the image
+    vm ends[4] = {lanes, lanes, lanes, lanes}; // left, right, low, high: whether they are on the image
     if (image->wrap == PT_WRAP_CLIP)
         for (uint32_t k = 0; k < 4; k++)
             ends[k] = vm_and(lanes, vi_lt_unsigned(vi_add(base[k / 2], vi_set(k % 2)), size[k / 2]));
@@ -145,13 +146,14 @@ static inline vm pt_on_it(const vf at[2], vm lanes)
 }
 
 // 2. and 3.: colour and opacity.
-static inline void pt_image_at(const struct texture_args *image, const uint32_t *texels, const struct pt_on_image *place, vm lanes,
-                               vf out[4])
+static inline void pt_image_at(const struct texture_args *image, const uint32_t *texels, const struct pt_on_image *place,
+                               vm lanes, vf out[4])
 {
     const vf zero = vf_zero(), one = vf_set(1.0f), half = vf_set(0.5f);
-    vf square[2], sum[4] = { zero, zero, zero, zero };
+    vf square[2], sum[4] = {zero, zero, zero, zero};
     for (int next = 0; next < 2; next++) {
-        const vf x = place->side[next][0] * vf_set((float)image->sizes[0]), y = place->side[next][1] * vf_set((float)image->sizes[1]);
+        const vf x = place->side[next][0] * vf_set((float)image->sizes[0]),
+                 y = place->side[next][1] * vf_set((float)image->sizes[1]);
         square[next] = x * x + y * y;
     }
     const vm upright = vf_lt(square[0], square[1]);
@@ -173,9 +175,11 @@ static inline void pt_image_at(const struct texture_args *image, const uint32_t 
         const vf along = vf_set((float)i + 0.5f) * share - half;
         vf at[2];
         for (int k = 0; k < 2; k++)
-            at[k] = place->at[k] + vf_select(vm_and(sharp, asked), zero, along * vf_select(upright, place->side[1][k], place->side[0][k]));
+            at[k] = place->at[k] +
+                    vf_select(vm_and(sharp, asked), zero, along * vf_select(upright, place->side[1][k], place->side[0][k]));
         pt_wrap_place(image, at);
-        const vm mixed = vm_and(asked, vm_not(sharp)), square_ones = pt_on_it(at, vm_and(asked, sharp)), between = vm_and(mixed, vf_lt(zero, beyond));
+        const vm mixed = vm_and(asked, vm_not(sharp)), square_ones = pt_on_it(at, vm_and(asked, sharp)),
+                 between = vm_and(mixed, vf_lt(zero, beyond));
         if (vm_bits(mixed))
             pt_add_level(image, texels, finer, at, (one - beyond) * share, mixed, sum);
         if (vm_bits(between))

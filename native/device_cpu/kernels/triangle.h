@@ -6,12 +6,12 @@
 #include "device_cpu/rows.h"
 
 struct pt_triangle {
-    vi corner[3];        // first float of each vertex
-    vf position[3][3];   // object units
-    vf share[3];         // of each vertex at the pixel
-    vf away[3][2];       // of each corner from the pixel's centre, times its depth
-    vf depth[3];         // 1 in orthographic views
-    vm turned;           // its corners run clockwise
+    vi corner[3];      // first float of each vertex
+    vf position[3][3]; // object units
+    vf share[3];       // of each vertex at the pixel
+    vf away[3][2];     // of each corner from the pixel's centre, times its depth
+    vf depth[3];       // 1 in orthographic views
+    vm turned;         // its corners run clockwise
 };
 
 // Which of PT_LANES pixels from `at` on show the mesh; index: its triangles that they show.
@@ -34,8 +34,7 @@ static inline vf pt_between(const struct pt_triangle *t, const float *vertices, 
 // The triangle, and where on it the centres of PT_LANES pixels from (x, y) on lie: areas of the triangles that the centre
 // makes with two corners each, as seen from the eye.
 static inline void pt_find_triangle(const struct view_args *view, const struct mesh_args *mesh, const float *vertices,
-                                    const uint32_t *indices, vi index, uint32_t x, uint32_t y, vm lanes,
-                                    struct pt_triangle *t)
+                                    const uint32_t *indices, vi index, uint32_t x, uint32_t y, vm lanes, struct pt_triangle *t)
 {
     const vf px = vi_convert(vi_add(vi_set((uint32_t)view->origin_x + x), vi_lanes())) + vf_set(0.5f);
     const vf py = vf_set((float)(view->origin_y + (int32_t)y) + 0.5f);

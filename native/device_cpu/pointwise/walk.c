@@ -26,11 +26,11 @@ static inline __attribute__((always_inline)) void load3(const float *pixels, con
     }
 }
 
-static inline __attribute__((always_inline)) void walk(const struct pt_walk_row *row, const void *args, const struct pt_pointwise kind,
-                                                       int planar, body_of *body)
+static inline __attribute__((always_inline)) void walk(const struct pt_walk_row *row, const void *args,
+                                                       const struct pt_pointwise kind, int planar, body_of *body)
 {
     const vf empty = vf_set(pt_float(PT_KEY_EMPTY_Z)), one = vf_set(1.0f);
-    struct pt_here here = { .y = vi_set(row->y), .clips = row->clips };
+    struct pt_here here = {.y = vi_set(row->y), .clips = row->clips};
     for (uint32_t x = row->first; x < row->end; x += PT_LANES) {
         const vm lanes = vm_first(pt_lanes_left(x, row->end));
         vf color[4];
@@ -66,11 +66,12 @@ static inline __attribute__((always_inline)) void walk(const struct pt_walk_row 
 }
 
 // In the plane, or in the crop; y: of the rectangle of either.
-static inline __attribute__((always_inline)) struct pt_walk_row row_of(const struct pt_cpu_call *call, const struct pt_pointwise kind, uint32_t y)
+static inline __attribute__((always_inline)) struct pt_walk_row row_of(const struct pt_cpu_call *call,
+                                                                       const struct pt_pointwise kind, uint32_t y)
 {
     const struct view_args *view = call->arguments;
     const struct crop_args *crop = call->arguments;
-    struct pt_walk_row row = { .args = call->arguments, .y = y, .first = view->rect[0], .end = view->rect[2] };
+    struct pt_walk_row row = {.args = call->arguments, .y = y, .first = view->rect[0], .end = view->rect[2]};
     size_t at = (size_t)y * view->width;
     if (of_crop(kind)) {
         at = kind.keys < 0 ? (size_t)y * crop->crop_width : at + (size_t)crop->crop_y * view->width + crop->crop_x;
@@ -96,34 +97,34 @@ static inline int run(const struct pt_cpu_call *call, const struct pt_pointwise 
 }
 
 // Arguments are copied: what a row is written to might be them, for all that the compiler knows.
-#define PT_POINTWISE(name, ...)                                                                                               \
-    static inline __attribute__((always_inline)) void name##_body(const void *args, const struct pt_here *here, vf color[4])  \
-    {                                                                                                                         \
-        pt_##name(args, here, color);                                                                                         \
-    }                                                                                                                         \
-    static void name##_step(const struct pt_walk_row *row)                                                                    \
-    {                                                                                                                         \
-        const struct name##_args args = *(const struct name##_args *)row->args;                                               \
-        const struct pt_pointwise kind = { __VA_ARGS__, NULL };                                                               \
-        walk(row, &args, kind, !of_crop(kind), name##_body);                                                                  \
-    }                                                                                                                         \
-    static void name##_row(void *context, uint32_t y)                                                                         \
-    {                                                                                                                         \
-        const struct pt_cpu_call *call = context;                                                                             \
-        const struct name##_args args = *(const struct name##_args *)call->arguments;                                         \
-        const struct pt_pointwise kind = { __VA_ARGS__, NULL };                                                               \
-        const struct pt_walk_row row = row_of(call, kind, y);                                                                 \
-        walk(&row, &args, kind, 0, name##_body);                                                                              \
-    }                                                                                                                         \
-    int PT_KERNEL_ENTRY(name)(const struct pt_cpu_call *call)                                                                 \
-    {                                                                                                                         \
-        return run(call, (struct pt_pointwise){ __VA_ARGS__, NULL }, name##_row);                                             \
+#define PT_POINTWISE(name, ...)                                                                                                \
+    static inline __attribute__((always_inline)) void name##_body(const void *args, const struct pt_here *here, vf color[4])   \
+    {                                                                                                                          \
+        pt_##name(args, here, color);                                                                                          \
+    }                                                                                                                          \
+    static void name##_step(const struct pt_walk_row *row)                                                                     \
+    {                                                                                                                          \
+        const struct name##_args args = *(const struct name##_args *)row->args;                                                \
+        const struct pt_pointwise kind = {__VA_ARGS__, NULL};                                                                  \
+        walk(row, &args, kind, !of_crop(kind), name##_body);                                                                   \
+    }                                                                                                                          \
+    static void name##_row(void *context, uint32_t y)                                                                          \
+    {                                                                                                                          \
+        const struct pt_cpu_call *call = context;                                                                              \
+        const struct name##_args args = *(const struct name##_args *)call->arguments;                                          \
+        const struct pt_pointwise kind = {__VA_ARGS__, NULL};                                                                  \
+        const struct pt_walk_row row = row_of(call, kind, y);                                                                  \
+        walk(&row, &args, kind, 0, name##_body);                                                                               \
+    }                                                                                                                          \
+    int PT_KERNEL_ENTRY(name)(const struct pt_cpu_call *call)                                                                  \
+    {                                                                                                                          \
+        return run(call, (struct pt_pointwise){__VA_ARGS__, NULL}, name##_row);                                                \
     }
 #include "pointwise.def"
 #undef PT_POINTWISE
 
 const struct pt_pointwise PT_POINTWISE_KERNELS[PT_KERNEL_COUNT] = {
-#define PT_POINTWISE(name, ...) [PT_KERNEL_##name] = { __VA_ARGS__, name##_step },
+#define PT_POINTWISE(name, ...) [PT_KERNEL_##name] = {__VA_ARGS__, name##_step},
 #include "pointwise.def"
 #undef PT_POINTWISE
 };

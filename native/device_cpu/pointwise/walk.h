@@ -10,13 +10,13 @@ struct pt_walk_row {
     const void *args;
     const void *clips;
     uint32_t y, first, end;
-    const uint64_t *keys;     // at column 0. Of pictures that have none NULL: all pixels hold something
-    const float *z;           // at column 0; NULL: the keys' own. Beyond the row's end +inf, as far as a vector goes
-    const float *shading, *albedo;             // float4, at column 0; or, where these are NULL:
+    const uint64_t *keys;          // at column 0. Of pictures that have none NULL: all pixels hold something
+    const float *z;                // at column 0; NULL: the keys' own. Beyond the row's end +inf, as far as a vector goes
+    const float *shading, *albedo; // float4, at column 0; or, where these are NULL:
     const float *normal_rows[3], *albedo_rows[3];
-    const float *from;        // float4: the colours that are read; NULL: color
-    float *color;             // float4, at column 0; NULL:
-    float *color_rows[4];     // the last one NULL: all is opaque
+    const float *from;    // float4: the colours that are read; NULL: color
+    float *color;         // float4, at column 0; NULL:
+    float *color_rows[4]; // the last one NULL: all is opaque
 };
 
 // keys ... result: which of its buffers these are, -1: none. A result is a picture of the crop; without one colours are changed in

@@ -117,7 +117,10 @@ static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
     const vi from = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)&pt_pack_table[lanes]));
     vi_store(p, _mm256_permutevar8x32_epi32(a, from));
 }
-static inline vi vi_west(vi before, vi own) { return _mm256_alignr_epi8(own, _mm256_permute2x128_si256(before, own, 0x21), 12); }
+static inline vi vi_west(vi before, vi own)
+{
+    return _mm256_alignr_epi8(own, _mm256_permute2x128_si256(before, own, 0x21), 12);
+}
 static inline vi vi_east(vi own, vi behind) { return _mm256_alignr_epi8(_mm256_permute2x128_si256(own, behind, 0x21), own, 4); }
 #define PT_VECTOR(name) _mm256_##name
 static inline __attribute__((always_inline)) vi vi_pick(const char *base, size_t scale, const uint32_t at[PT_LANES])

@@ -49,12 +49,14 @@ static inline void vf_stream_pixels(float *p, vf r[4])
 }
 static inline void vi_pack(uint32_t *p, vi a, uint32_t lanes)
 {
-#define FROM(i, j, k, l) { 0x03020100 + i * 0x04040404, 0x03020100 + j * 0x04040404, 0x03020100 + k * 0x04040404, \
-                           0x03020100 + l * 0x04040404 }
-    static const int32_t from[16][4] = { FROM(0, 0, 0, 0), FROM(0, 0, 0, 0), FROM(1, 0, 0, 0), FROM(0, 1, 0, 0),
-                                         FROM(2, 0, 0, 0), FROM(0, 2, 0, 0), FROM(1, 2, 0, 0), FROM(0, 1, 2, 0),
-                                         FROM(3, 0, 0, 0), FROM(0, 3, 0, 0), FROM(1, 3, 0, 0), FROM(0, 1, 3, 0),
-                                         FROM(2, 3, 0, 0), FROM(0, 2, 3, 0), FROM(1, 2, 3, 0), FROM(0, 1, 2, 3) };
+#define FROM(i, j, k, l)                                                                                                       \
+    {                                                                                                                          \
+        0x03020100 + i * 0x04040404, 0x03020100 + j * 0x04040404, 0x03020100 + k * 0x04040404, 0x03020100 + l * 0x04040404     \
+    }
+    static const int32_t from[16][4] = {FROM(0, 0, 0, 0), FROM(0, 0, 0, 0), FROM(1, 0, 0, 0), FROM(0, 1, 0, 0),
+                                        FROM(2, 0, 0, 0), FROM(0, 2, 0, 0), FROM(1, 2, 0, 0), FROM(0, 1, 2, 0),
+                                        FROM(3, 0, 0, 0), FROM(0, 3, 0, 0), FROM(1, 3, 0, 0), FROM(0, 1, 3, 0),
+                                        FROM(2, 3, 0, 0), FROM(0, 2, 3, 0), FROM(1, 2, 3, 0), FROM(0, 1, 2, 3)};
 #undef FROM
     vi_store(p, vi_pick_bytes(a, from[lanes]));
 }

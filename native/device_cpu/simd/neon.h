@@ -30,7 +30,7 @@ static inline vi vi_load(const void *p) { return vreinterpretq_u32_u8(vld1q_u8(p
 static inline void vf_store(float *p, vf a) { vst1q_f32(p, a); }
 static inline void vi_store(void *p, vi a) { vst1q_u8(p, vreinterpretq_u8_u32(a)); }
 static inline vi vi_set(uint32_t x) { return vdupq_n_u32(x); }
-static inline vi vi_lanes(void) { return (vi){ 0, 1, 2, 3 }; }
+static inline vi vi_lanes(void) { return (vi){0, 1, 2, 3}; }
 static inline vi vi_add(vi a, vi b) { return vaddq_u32(a, b); }
 static inline vi vi_sub(vi a, vi b) { return vsubq_u32(a, b); }
 static inline vi vi_mul(vi a, vi b) { return vmulq_u32(a, b); }
@@ -39,7 +39,7 @@ static inline vi vi_or(vi a, vi b) { return vorrq_u32(a, b); }
 static inline vi vi_shr(vi a, int n) { return vshlq_u32(a, vdupq_n_s32(-n)); }
 static inline vm vi_eq(vi a, vi b) { return vceqq_u32(a, b); }
 static inline vm vi_lt_unsigned(vi a, vi b) { return vcltq_u32(a, b); }
-static inline uint32_t vm_bits(vm m) { return vaddvq_u32(vandq_u32(m, (vi){ 1, 2, 4, 8 })); }
+static inline uint32_t vm_bits(vm m) { return vaddvq_u32(vandq_u32(m, (vi){1, 2, 4, 8})); }
 static inline vi vi_evens(vi a, vi b) { return vuzp1q_u32(a, b); }
 static inline vi vi_odds(vi a, vi b) { return vuzp2q_u32(a, b); }
 static inline void vi_zip(vi a, vi b, vi out[2])
@@ -48,7 +48,7 @@ static inline void vi_zip(vi a, vi b, vi out[2])
     out[1] = vzip2q_u32(a, b);
 }
 static inline vm vm_first(uint32_t n) { return vcltq_u32(vi_lanes(), vdupq_n_u32(n)); }
-static inline vm vm_of_bits(uint32_t bits) { return vtstq_u32(vdupq_n_u32(bits), (vi){ 1, 2, 4, 8 }); }
+static inline vm vm_of_bits(uint32_t bits) { return vtstq_u32(vdupq_n_u32(bits), (vi){1, 2, 4, 8}); }
 static inline vm vm_and(vm a, vm b) { return vandq_u32(a, b); }
 static inline vm vm_or(vm a, vm b) { return vorrq_u32(a, b); }
 static inline vm vm_not(vm a) { return vmvnq_u32(a); }

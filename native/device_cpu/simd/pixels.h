@@ -33,14 +33,14 @@ static inline void vf_gather3_1(const float *pixels, const float *fourth, vi i, 
 }
 static inline void vf_store4(float *pixels, const vf in[4], uint32_t lanes)
 {
-    vf r[4] = { in[0], in[1], in[2], in[3] };
+    vf r[4] = {in[0], in[1], in[2], in[3]};
     vf_transpose(r);
     vf_store_pixels(pixels, r, lanes);
 }
 static inline void vf_put4(float *p, const vf pixels[4], uint32_t count)
 {
     if (count == PT_LANES && (uintptr_t)p % 64 == 0) {
-        vf r[4] = { pixels[0], pixels[1], pixels[2], pixels[3] };
+        vf r[4] = {pixels[0], pixels[1], pixels[2], pixels[3]};
         vf_transpose(r);
         vf_stream_pixels(p, r);
     } else

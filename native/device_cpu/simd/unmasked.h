@@ -29,7 +29,10 @@ static inline void vi_gather_two_z(const uint64_t *keys, vi i, vm m, vi z[2])
     z[1] = vf_bits(words[3]);
 }
 #ifdef PT_VECTOR
-static inline vi vi_least_pairs(vi a, vi b) { return PT_VECTOR(blendv_epi8)(a, b, PT_VECTOR(cmpgt_epi64)(a, b)); } // of 64 bits each, signed
+static inline vi vi_least_pairs(vi a, vi b)
+{
+    return PT_VECTOR(blendv_epi8)(a, b, PT_VECTOR(cmpgt_epi64)(a, b));
+} // of 64 bits each, signed
 #endif
 enum { PT_KEYS_AT_ONCE = PT_LANES / 2 };
 static inline void vi_least_keys(uint64_t *keys, size_t apart, vi z, vi id)

@@ -16,14 +16,14 @@ extern "C" {
 typedef struct patina_mesh_desc {
     size_t struct_size;
     uint64_t vertex_count;
-    patina_array position;   // 3 x FLOAT32 or FLOAT64, object units. A triangle with a NaN/Inf corner is not drawn
-    patina_array normal;     // 3 x FLOAT32/FLOAT64, any length, of every vertex, shared out over the triangle. Optional: without
-                             // it, and where it comes to zero, triangles are lit flat
-    patina_array color;      // 3 or 4 x FLOAT32, linear, of every vertex, shared out likewise. Optional; else the style's
+    patina_array position; // 3 x FLOAT32 or FLOAT64, object units. A triangle with a NaN/Inf corner is not drawn
+    patina_array normal;   // 3 x FLOAT32/FLOAT64, any length, of every vertex, shared out over the triangle. Optional: without
+                           // it, and where it comes to zero, triangles are lit flat
+    patina_array color;    // 3 or 4 x FLOAT32, linear, of every vertex, shared out likewise. Optional; else the style's
     uint64_t triangle_count;
     const uint32_t *indices; // three a triangle, below vertex_count; NULL: vertices 0 1 2, 3 4 5, ...
-    patina_array uv;         // 2 x FLOAT32 or FLOAT64, of every vertex: where on an image it lies, 0..1 from its lower left corner;
-                             // what is not finite is 0. Optional; for the style's texture
+    patina_array uv; // 2 x FLOAT32 or FLOAT64, of every vertex: where on an image it lies, 0..1 from its lower left corner;
+                     // what is not finite is 0. Optional; for the style's texture
 } patina_mesh_desc;
 
 typedef struct patina_mesh_info {
@@ -50,12 +50,12 @@ enum patina_wrap { // beyond the image
 typedef struct patina_texture_desc {
     size_t struct_size;
     uint32_t width, height; // texels, 1..16384
-    patina_array pixels;    // width * height elements of 3 or 4 x UINT8, UINT16 (0..max) or FLOAT32 (linear, within +-65504), row
-                            // by row from the bottom left. Colour, not multiplied by the 4th component, its opacity (0..1; none: 1).
-                            // Not finite: 0, of opacity 1. UINT8 takes 5.4 bytes a texel, the others 21.4
-    uint32_t raw;           // 1 = integers are linear; 0 = sRGB. Opacity is linear
-    uint32_t nearest;       // 1 = each texel is a square where it is larger than a pixel; 0 = shared out between four
-    uint32_t wrap;          // patina_wrap
+    patina_array pixels; // width * height elements of 3 or 4 x UINT8, UINT16 (0..max) or FLOAT32 (linear, within +-65504), row
+        // by row from the bottom left. Colour, not multiplied by the 4th component, its opacity (0..1; none: 1).
+        // Not finite: 0, of opacity 1. UINT8 takes 5.4 bytes a texel, the others 21.4
+    uint32_t raw;     // 1 = integers are linear; 0 = sRGB. Opacity is linear
+    uint32_t nearest; // 1 = each texel is a square where it is larger than a pixel; 0 = shared out between four
+    uint32_t wrap;    // patina_wrap
 } patina_texture_desc;
 
 // An image of any size, not only powers of two, with box means of it for where it is small on screen: up to eight probes of two of
@@ -75,19 +75,19 @@ enum patina_alpha {
 
 typedef struct patina_mesh_style {
     size_t struct_size;
-    double world_from_object[16]; // row-major; all zero = identity
-    float color[3];               // linear, of meshes without colours; all zero = 0.8 grey, unless exact
-    uint32_t shadow_off;          // bits of patina_shadow_off: NO_CAST, NO_RECEIVE
-    uint32_t unlit;               // 1 = the colour as it is, as if it shone by itself; lights and shadows change nothing
+    double world_from_object[16];  // row-major; all zero = identity
+    float color[3];                // linear, of meshes without colours; all zero = 0.8 grey, unless exact
+    uint32_t shadow_off;           // bits of patina_shadow_off: NO_CAST, NO_RECEIVE
+    uint32_t unlit;                // 1 = the colour as it is, as if it shone by itself; lights and shadows change nothing
     const patina_texture *texture; // in place of color and the mesh's colours; the mesh has uv. Outlives the scene or the next
                                    // patina_scene_clear. NULL = none
-    uint32_t alpha;               // patina_alpha: what the texture's opacity does
-    float alpha_least;            // CLIP: what is less opaque is not there, 0..1; 0 = 0.5
-    uint32_t exact;               // 1 = black is black
+    uint32_t alpha;                // patina_alpha: what the texture's opacity does
+    float alpha_least;             // CLIP: what is less opaque is not there, 0..1; 0 = 0.5
+    uint32_t exact;                // 1 = black is black
 } patina_mesh_style;
-#define PATINA_MESH_STYLE_INIT                                                                                   \
-    {                                                                                                            \
-        .struct_size = sizeof(patina_mesh_style), .color = {0.8f, 0.8f, 0.8f}, .alpha_least = 0.5f, .exact = 1   \
+#define PATINA_MESH_STYLE_INIT                                                                                                 \
+    {                                                                                                                          \
+        .struct_size = sizeof(patina_mesh_style), .color = {0.8f, 0.8f, 0.8f}, .alpha_least = 0.5f, .exact = 1                 \
     }
 
 // A mesh is opaque but for its texture, seen from both sides, lit by all lights (ambient and diffuse), takes part in every pass,

@@ -58,16 +58,16 @@ extern "C" {
 #define PATINA_VERSION_PATCH 0
 
 // One list of errors. X(name, code, sentence)
-#define PATINA_ERRORS(X)                                                                 \
-    X(ERROR_ARGUMENT, -1, "an argument is out of range")                                 \
-    X(ERROR_MEMORY, -2, "out of memory")                                                 \
-    X(ERROR_FILE, -3, "the file cannot be opened, read or written")                      \
-    X(ERROR_FORMAT, -4, "the file does not hold what its format promises")               \
-    X(ERROR_UNSUPPORTED, -5, "this build or machine cannot do that")                     \
-    X(ERROR_DEVICE, -6, "the device failed or was lost")                                 \
-    X(ERROR_CANCELLED, -7, "cancelled")                                                  \
-    X(ERROR_TOO_MANY_POINTS, -8, "more than 2^32 - 2 points in one scene")               \
-    X(ERROR_EMPTY, -9, "there is nothing to read")                                       \
+#define PATINA_ERRORS(X)                                                                                                       \
+    X(ERROR_ARGUMENT, -1, "an argument is out of range")                                                                       \
+    X(ERROR_MEMORY, -2, "out of memory")                                                                                       \
+    X(ERROR_FILE, -3, "the file cannot be opened, read or written")                                                            \
+    X(ERROR_FORMAT, -4, "the file does not hold what its format promises")                                                     \
+    X(ERROR_UNSUPPORTED, -5, "this build or machine cannot do that")                                                           \
+    X(ERROR_DEVICE, -6, "the device failed or was lost")                                                                       \
+    X(ERROR_CANCELLED, -7, "cancelled")                                                                                        \
+    X(ERROR_TOO_MANY_POINTS, -8, "more than 2^32 - 2 points in one scene")                                                     \
+    X(ERROR_EMPTY, -9, "there is nothing to read")                                                                             \
     X(ERROR_INTERNAL, -10, "internal error")
 
 enum patina_error {
@@ -107,27 +107,27 @@ PATINA_API size_t patina_log_next(char *buffer, size_t size, int *level);
 
 PATINA_API int patina_progress_create(patina_progress **out);
 PATINA_API void patina_progress_destroy(patina_progress *progress);
-PATINA_API void patina_progress_cancel(patina_progress *progress);      // the call returns PATINA_ERROR_CANCELLED soon
+PATINA_API void patina_progress_cancel(patina_progress *progress);       // the call returns PATINA_ERROR_CANCELLED soon
 PATINA_API float patina_progress_value(const patina_progress *progress); // 0..1
 
 // ---- device ----------------------------------------------------------------------------------------------------
 
 typedef struct patina_device_desc {
     size_t struct_size;
-    const char *name; // "auto" (default), "cpu", "cpu-scalar", "gl-egl", "gl-osmesa"; CPU levels may be asked for
-                      // by name too: "cpu-sse42", "cpu-avx2", "cpu-avx512", on ARM "cpu-neon"
-    uint32_t threads; // CPU worker threads; 0 = one per core available to the process
-    uint32_t batch;   // scheduling batch (items a worker takes at once); 0 = automatic. Never changes a picture.
+    const char *name;    // "auto" (default), "cpu", "cpu-scalar", "gl-egl", "gl-osmesa"; CPU levels may be asked for
+                         // by name too: "cpu-sse42", "cpu-avx2", "cpu-avx512", on ARM "cpu-neon"
+    uint32_t threads;    // CPU worker threads; 0 = one per core available to the process
+    uint32_t batch;      // scheduling batch (items a worker takes at once); 0 = automatic. Never changes a picture.
     uint64_t memory_cap; // bytes of planes that a frame may hold (about 100 a pixel, 150 in transparent scenes); 0 = no limit
 } patina_device_desc;
 
 typedef struct patina_device_info {
     size_t struct_size;
-    char name[32];          // "cpu-avx512", "gl-egl", ...
-    char description[192];  // processor or GL renderer and version
+    char name[32];         // "cpu-avx512", "gl-egl", ...
+    char description[192]; // processor or GL renderer and version
     uint32_t threads;
-    uint32_t hardware;      // 1 when a GPU does the work
-    uint32_t key64;         // 1 when 64-bit atomics passed the self-test
+    uint32_t hardware; // 1 when a GPU does the work
+    uint32_t key64;    // 1 when 64-bit atomics passed the self-test
 } patina_device_info;
 
 // Makes a device. "auto" takes GL on a hardware driver, else the CPU. A device that cannot be had is
@@ -177,28 +177,28 @@ typedef struct patina_cloud_desc {
 
 typedef struct patina_cloud_info {
     size_t struct_size;
-    uint64_t count;          // points as given; ids are 0 .. count-1 in the given order
-    uint64_t drawn;          // of them with finite positions and opacity above 0
+    uint64_t count; // points as given; ids are 0 .. count-1 in the given order
+    uint64_t drawn; // of them with finite positions and opacity above 0
     uint64_t chunks;
-    uint64_t bytes;          // anonymous memory held at rest
+    uint64_t bytes;                // anonymous memory held at rest
     double box_min[3], box_max[3]; // over the drawn points; an empty cloud has min > max
-    double spacing;          // median over chunks of the local spacing (about 1/sqrt(points per area)), object units
+    double spacing;                // median over chunks of the local spacing (about 1/sqrt(points per area)), object units
     double spacing_min, spacing_max;
     uint64_t invalid_positions, invalid_normals, invalid_colors; // NaN/Inf (normals: or zero); the last two of drawn points
     uint32_t has_normals, has_colors, has_opacities;
     double origin[3];
-    double layer_distance;   // automatic d~: what d_min = 0 stands for at the median spacing, object units. Each chunk
-                             // takes its own spacing's
+    double layer_distance; // automatic d~: what d_min = 0 stands for at the median spacing, object units. Each chunk
+                           // takes its own spacing's
     uint32_t has_radii;
-    float radius_most;       // of the points' own radii
+    float radius_most; // of the points' own radii
     uint32_t has_scalars, has_classes;
-    float scalar_range[2];   // least and greatest finite scalar; 0, 0 without one
-    uint32_t class_bits[8];  // classes that drawn points have: class c is bit c % 32 of word c / 32
-    uint32_t has_shapes;     // the cloud was analysed: patina_cloud_analyse
-    uint32_t normals_oriented; // 1: every normal knows its side, as given or by a station; PATINA_SIDES_VOTED: some by votes
+    float scalar_range[2];      // least and greatest finite scalar; 0, 0 without one
+    uint32_t class_bits[8];     // classes that drawn points have: class c is bit c % 32 of word c / 32
+    uint32_t has_shapes;        // the cloud was analysed: patina_cloud_analyse
+    uint32_t normals_oriented;  // 1: every normal knows its side, as given or by a station; PATINA_SIDES_VOTED: some by votes
     uint64_t estimated_normals; // of points whose normal the analysis found
-    uint64_t kinds[6];       // drawn points of each patina_kind
-    uint64_t seen_through;   // drawn points that some station saw through: patina_analysis_desc.free_space
+    uint64_t kinds[6];          // drawn points of each patina_kind
+    uint64_t seen_through;      // drawn points that some station saw through: patina_analysis_desc.free_space
 } patina_cloud_info;
 
 // Builds a cloud: chunks of Morton neighbours, strata, boxes, normal cones, local spacing. At most 24 bytes a point
@@ -221,10 +221,10 @@ PATINA_API int patina_cloud_dense_box(const patina_cloud *cloud, double box_min[
 enum patina_kind {
     PATINA_KIND_UNKNOWN = 0, // not analysed, alone, or all neighbours at its own place
     PATINA_KIND_SURFACE = 1,
-    PATINA_KIND_BORDER = 2,  // of a surface: neighbours on one side only
-    PATINA_KIND_LINE = 3,    // a wire, a railing's bar
-    PATINA_KIND_VOLUME = 4,  // foliage
-    PATINA_KIND_STRAY = 5,   // far from what its neighbours are part of
+    PATINA_KIND_BORDER = 2, // of a surface: neighbours on one side only
+    PATINA_KIND_LINE = 3,   // a wire, a railing's bar
+    PATINA_KIND_VOLUME = 4, // foliage
+    PATINA_KIND_STRAY = 5,  // far from what its neighbours are part of
 };
 
 // Where nothing tells the side of a surface, 64 views from outside vote for the one that is seen; sheets face up.
@@ -232,19 +232,20 @@ enum patina_kind {
 
 typedef struct patina_analysis_desc {
     size_t struct_size;
-    uint32_t neighbours;     // 3..64; 0 = 16, and 48 where 16 leave doubts
-    uint32_t threads;        // 0 = one per core
-    uint32_t keep_normals;   // 1 = normals that the cloud has stay, and only missing ones are estimated. 0 = all are
-                             // estimated, on the side of those that it has
-    uint32_t station_count;  // places of the scanner, in object units: estimated normals face the one that ...
-    const double *stations;  // 3 each
-    patina_array station;    // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
-    uint32_t free_space;     // 1 = points that a station, not their own, saw through are marked: its samples around the
-                             // direction to the point lie farther. Needs stations and station. 4 bytes meanwhile for each of
-                             // a station's directions, 128 MiB at most; what all stations saw stays
-                             // with the cloud, 64 MiB at most
-    patina_array row, column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell footprints and free
-                             // space how far apart the directions are. Optional: else found from how dense they are
+    uint32_t neighbours;    // 3..64; 0 = 16, and 48 where 16 leave doubts
+    uint32_t threads;       // 0 = one per core
+    uint32_t keep_normals;  // 1 = normals that the cloud has stay, and only missing ones are estimated. 0 = all are
+                            // estimated, on the side of those that it has
+    uint32_t station_count; // places of the scanner, in object units: estimated normals face the one that ...
+    const double *stations; // 3 each
+    patina_array station;   // ... 1 x UINT8/UINT16 names for each point, count elements; without it, the nearest. Optional
+    uint32_t free_space;    // 1 = points that a station, not their own, saw through are marked: its samples around the
+                            // direction to the point lie farther. Needs stations and station. 4 bytes meanwhile for each of
+                            // a station's directions, 128 MiB at most; what all stations saw stays
+                            // with the cloud, 64 MiB at most
+    patina_array row,
+        column; // of each point in its scan's grid, 1 x UINT16/UINT32/INT32, count elements; tell footprints and free
+                // space how far apart the directions are. Optional: else found from how dense they are
 } patina_analysis_desc;
 
 // The second change that a cloud allows: gives points normals, spacings of their own, and footprints, so that what closes
@@ -257,13 +258,13 @@ PATINA_API int patina_cloud_analyse(patina_cloud *cloud, const patina_analysis_d
 // the cloud was given.
 typedef struct patina_neighbourhoods {
     size_t struct_size;
-    float *normal;      // 3 each; 0 = none
-    float *axis;        // 3 each: direction of the greater half axis; 0 without a normal
-    float *spacing;     // about 1 / sqrt(points per area) where the point lies
-    float *half_axes;   // 2 each, of its footprint, the greater first
-    float *sigma;       // thickness: noise, and disagreement of scans; 0 = unknown
-    uint8_t *kind;      // patina_kind
-    float *certainty;   // 0..1: how well that explains the neighbours
+    float *normal;         // 3 each; 0 = none
+    float *axis;           // 3 each: direction of the greater half axis; 0 without a normal
+    float *spacing;        // about 1 / sqrt(points per area) where the point lies
+    float *half_axes;      // 2 each, of its footprint, the greater first
+    float *sigma;          // thickness: noise, and disagreement of scans; 0 = unknown
+    uint8_t *kind;         // patina_kind
+    float *certainty;      // 0..1: how well that explains the neighbours
     uint8_t *seen_through; // 1: by some station, see patina_analysis_desc.free_space
     // From the `neighbours` nearest, walked anew for any cloud.
     uint32_t neighbours; // 1..64
@@ -297,10 +298,10 @@ typedef struct patina_file_info {
     uint32_t position_type; // patina_type as stored in the file
     uint32_t color_type;    // PATINA_NONE without colour
     uint32_t has_normals;
-    double origin[3];       // float64 origin that positions are relative to; 0 unless float32 would lose detail
+    double origin[3];              // float64 origin that positions are relative to; 0 unless float32 would lose detail
     double box_min[3], box_max[3]; // of all finite positions, origin included
     uint64_t invalid_positions;
-    uint32_t stations;      // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
+    uint32_t stations; // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
 } patina_file_info;
 
 typedef struct patina_file_attribute {
@@ -318,11 +319,12 @@ PATINA_API void patina_file_destroy(patina_file *file);
 PATINA_API int patina_file_get_info(const patina_file *file, patina_file_info *info);
 PATINA_API int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_file_attribute *attribute);
 // Copies one column as float32 (uint8 for colour) into the caller's buffer of `size` bytes.
-PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, size_t size);   // relative to origin
+PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, size_t size); // relative to origin
 PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);
-PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size);   // sRGB
-PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);    // linear
-PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz, size_t size); // file coordinates: origin included
+PATINA_API int patina_file_read_colors_u8(const patina_file *file, uint8_t *rgba, size_t size); // sRGB
+PATINA_API int patina_file_read_colors_f32(const patina_file *file, float *rgba, size_t size);  // linear
+PATINA_API int patina_file_read_stations(const patina_file *file, double *xyz,
+                                         size_t size); // file coordinates: origin included
 PATINA_API int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size);
 // A scanner's grid, of one scan: which column and row each point lies in, and where the scanner stood, in the positions'
 // coordinates.
@@ -383,55 +385,56 @@ enum patina_shadow_off { PATINA_SHADOW_NO_CAST = 1, PATINA_SHADOW_NO_RECEIVE = 2
 
 typedef struct patina_cloud_style {
     size_t struct_size;
-    double world_from_object[16]; // all zero = identity. Mirrored, non-uniform, singular: all allowed
-    uint32_t lighting;            // patina_lighting
-    uint32_t cull_back;           // 1 = points that face away are not drawn; ignored without normals and where the cloud
-                                  // is transparent
-    float d_min;                  // the paper's d~, world units: least distance of two layers; 0 = automatic
-    float color[3];               // linear; colour of points without one. All zero = (0.8, 0.8, 0.8), unless exact
+    double world_from_object[16];     // all zero = identity. Mirrored, non-uniform, singular: all allowed
+    uint32_t lighting;                // patina_lighting
+    uint32_t cull_back;               // 1 = points that face away are not drawn; ignored without normals and where the cloud
+                                      // is transparent
+    float d_min;                      // the paper's d~, world units: least distance of two layers; 0 = automatic
+    float color[3];                   // linear; colour of points without one. All zero = (0.8, 0.8, 0.8), unless exact
     float ambient, diffuse, specular; // Phong factors; all three zero = 1, 1, 0
-    uint32_t shininess;           // Phong exponent; 0 = 32
-    float transparency;           // share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn at all.
-                                  // Opacity is 1 - transparency, times the point's own. Paper [D 5]. Its shadow
-                                  // is as much lighter: by this number once, however many of its surfaces stand
-                                  // in the way; where points have opacities of their own, by up to 8 of them
-    uint32_t shadow_off;          // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
-    float radius;                 // of every point's disc, world units, for PATINA_SURFACE_SPLATS; 0 = the point's own, else
-                                  // 1.75 times the local spacing
-    uint32_t color_source;        // patina_color_source
-    const float *ramp;            // ramp_count x 3, linear; copied. Evenly spaced over the range, straight between, even
-                                  // beyond. NULL = from black to white. A scalar that is NaN takes `color`
-    uint32_t ramp_count;          // 2..PATINA_MAX_RAMP
-    float ramp_range[2];          // values at its ends; equal = automatic: least and greatest value of the cloud's points,
-                                  // for heights and distances of its chunks' boxes
-    float exposure;               // stops, -32..32; on the colour, before light
-    float contrast;               // 0..16: slope in stops around mid grey (0.18), after exposure; 0 = 1
-    uint32_t hidden_classes[8];   // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
-    uint32_t clip_off;            // 1 = clips leave this cloud whole
+    uint32_t shininess;               // Phong exponent; 0 = 32
+    float transparency;               // share of light that a surface lets through, 0..1; 0 = opaque, 1 = not drawn at all.
+                                      // Opacity is 1 - transparency, times the point's own. Paper [D 5]. Its shadow
+                                      // is as much lighter: by this number once, however many of its surfaces stand
+                                      // in the way; where points have opacities of their own, by up to 8 of them
+    uint32_t shadow_off;              // bits of patina_shadow_off; 0 = casts shadows, receives them, and shadows itself
+    float radius;               // of every point's disc, world units, for PATINA_SURFACE_SPLATS; 0 = the point's own, else
+                                // 1.75 times the local spacing
+    uint32_t color_source;      // patina_color_source
+    const float *ramp;          // ramp_count x 3, linear; copied. Evenly spaced over the range, straight between, even
+                                // beyond. NULL = from black to white. A scalar that is NaN takes `color`
+    uint32_t ramp_count;        // 2..PATINA_MAX_RAMP
+    float ramp_range[2];        // values at its ends; equal = automatic: least and greatest value of the cloud's points,
+                                // for heights and distances of its chunks' boxes
+    float exposure;             // stops, -32..32; on the colour, before light
+    float contrast;             // 0..16: slope in stops around mid grey (0.18), after exposure; 0 = 1
+    uint32_t hidden_classes[8]; // bits as in patina_cloud_info.class_bits: points that are not drawn and cast no shadow
+    uint32_t clip_off;          // 1 = clips leave this cloud whole
     // Of clouds that were analysed; nothing for others:
-    uint32_t free_space;          // patina_free_space: what becomes of what a station saw through
-    uint32_t hidden_kinds;        // bits 1 << patina_kind: points that are not drawn and cast no shadow
-    float least_certainty;        // 0..1: points less certain of their kind are not drawn and cast no shadow
-    float largest_gap;            // world units; no disc is wider, whatever its radius; 0 = as wide as it is
-    const patina_mask *mask;      // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
-                                  // the scene or the next patina_scene_clear, as the cloud must; the grade too
-    const patina_grade *grade;    // of this cloud: its colours in place of the cloud's own. NULL = none
-    uint32_t exact;               // 1 = black is black, and three Phong factors of 0 are none
-    uint32_t was_padding;         // says nothing
+    uint32_t free_space;   // patina_free_space: what becomes of what a station saw through
+    uint32_t hidden_kinds; // bits 1 << patina_kind: points that are not drawn and cast no shadow
+    float least_certainty; // 0..1: points less certain of their kind are not drawn and cast no shadow
+    float largest_gap;     // world units; no disc is wider, whatever its radius; 0 = as wide as it is
+    const patina_mask
+        *mask; // of this cloud: points that it hides are not drawn and cast no shadow. NULL = none. It must outlive
+               // the scene or the next patina_scene_clear, as the cloud must; the grade too
+    const patina_grade *grade; // of this cloud: its colours in place of the cloud's own. NULL = none
+    uint32_t exact;            // 1 = black is black, and three Phong factors of 0 are none
+    uint32_t was_padding;      // says nothing
     // Of soft points [Seemann et al.], SPEC 5; nothing for others:
-    uint32_t soft;                // patina_soft
-    uint32_t soft_model;          // patina_soft_model; the same of all soft clouds of a scene, as soft_shells is
-    uint32_t soft_shells;         // CONCENTRIC: of every ball, 1..64; 0 = as many as its size on screen asks for
-    float soft_radius;            // of every ball, world units; 0 = the point's own radius, else 1.13 times its spacing, as [S Eq. 20]
-                                  // has it of even points: a point without neighbours is not seen then
-    float soft_opacity;           // of a ball through its centre, 0..1, times the cloud's and the point's opacity; 0 = 0.5
-    float soft_modulation;        // 0..1, from the model's own opacity (0) to one that falls evenly from a ball's centre to its rim,
-                                  // so that single points show (1); 1 - W of [S Eq. 22].
-                                  // FIELD: l_m - t of it: such a share of the field's range above the threshold leads from that
-                                  // opacity to the model's own; 0 = none of it
-    const patina_field *field;    // of this cloud, for FIELD. It must outlive what the mask must
-    float soft_threshold;         // FIELD: 0..1; points with more are soft
-    float soft_unused;            // says nothing
+    uint32_t soft;         // patina_soft
+    uint32_t soft_model;   // patina_soft_model; the same of all soft clouds of a scene, as soft_shells is
+    uint32_t soft_shells;  // CONCENTRIC: of every ball, 1..64; 0 = as many as its size on screen asks for
+    float soft_radius;     // of every ball, world units; 0 = the point's own radius, else 1.13 times its spacing, as [S Eq. 20]
+                           // has it of even points: a point without neighbours is not seen then
+    float soft_opacity;    // of a ball through its centre, 0..1, times the cloud's and the point's opacity; 0 = 0.5
+    float soft_modulation; // 0..1, from the model's own opacity (0) to one that falls evenly from a ball's centre to its rim,
+                           // so that single points show (1); 1 - W of [S Eq. 22].
+                           // FIELD: l_m - t of it: such a share of the field's range above the threshold leads from that
+                           // opacity to the model's own; 0 = none of it
+    const patina_field *field; // of this cloud, for FIELD. It must outlive what the mask must
+    float soft_threshold;      // FIELD: 0..1; points with more are soft
+    float soft_unused;         // says nothing
 } patina_cloud_style;
 #define PATINA_CLOUD_STYLE_INIT                                                                                                \
     {                                                                                                                          \
@@ -460,26 +463,26 @@ enum patina_area_shape { PATINA_AREA_RECTANGLE = 0, PATINA_AREA_ELLIPSE = 1 };
 typedef struct patina_light_desc {
     size_t struct_size;
     uint32_t type;
-    float color[3];     // linear; all zero = white
-    float power;        // sun: irradiance W/m2; others: radiant power W, of spots as if they shone all around. As in Blender
-    double position[3]; // world, all but suns; area: its middle
+    float color[3];      // linear; all zero = white
+    float power;         // sun: irradiance W/m2; others: radiant power W, of spots as if they shone all around. As in Blender
+    double position[3];  // world, all but suns; area: its middle
     double direction[3]; // world, sun, spot, area: the way the light travels; zero = (0,0,-1)
-    double side[3];     // world, area: along its width; zero = any. Made perpendicular to direction
-    float angle;        // sun: radians that its disc spans, 0..pi; 0 = sharp shadows
-    float radius;       // point, spot: of the ball that shines; 0 = sharp shadows. Changes nothing but shadows
-    float size[2];      // area: width along side, and height; 0 = 1
-    uint32_t shape;     // area: patina_area_shape
-    float cone;         // spot: radians between opposite edges, 0..pi; 0 = pi/4
-    float blend;        // spot: share of the cone over which the edge fades, 0..1
-    uint32_t shadows;   // 1 = casts shadows
+    double side[3];      // world, area: along its width; zero = any. Made perpendicular to direction
+    float angle;         // sun: radians that its disc spans, 0..pi; 0 = sharp shadows
+    float radius;        // point, spot: of the ball that shines; 0 = sharp shadows. Changes nothing but shadows
+    float size[2];       // area: width along side, and height; 0 = 1
+    uint32_t shape;      // area: patina_area_shape
+    float cone;          // spot: radians between opposite edges, 0..pi; 0 = pi/4
+    float blend;         // spot: share of the cone over which the edge fades, 0..1
+    uint32_t shadows;    // 1 = casts shadows
 } patina_light_desc;
 
 typedef struct patina_camera {
     size_t struct_size;
     uint32_t orthographic;
-    double world_from_camera[16]; // columns are normalised; a scaled camera is allowed
+    double world_from_camera[16];    // columns are normalised; a scaled camera is allowed
     double left, right, bottom, top; // window at distance 1 (perspective) or in world units (orthographic)
-    double near_clip, far_clip;   // distances along the view; orthographic near may be negative
+    double near_clip, far_clip;      // distances along the view; orthographic near may be negative
 } patina_camera;
 
 enum patina_quality { PATINA_QUALITY_REFINED = 0, PATINA_QUALITY_PAPER = 1 }; // filled depth: tangent plane | source's
@@ -528,28 +531,28 @@ typedef struct patina_settings {
                                  // light. Expected from what the last doubling changed, root mean square over the points
                                  // in the penumbra; borders, a spacing wide, are off beyond that. Whole textures are made,
                                  // also with shadow_lazy. 0 = shadow_samples as set
-    uint32_t own_background;   // 1 = background lies behind the points, and world_color only lights them
-    float background[3];       // linear, with own_background; not where the film is transparent
+    uint32_t own_background;     // 1 = background lies behind the points, and world_color only lights them
+    float background[3];         // linear, with own_background; not where the film is transparent
     uint32_t surface;            // patina_surface
     uint32_t shadow_uncut;       // 1 = what clips cut away still casts shadows
-    uint32_t pixel_samples;      // of a picture at rest, 1..4096; 0 = 1, with pixel_noise at most so many, 0 = 256: the colour is
-                                 // the mean of about so many samples a pixel, of finer pixels where that is truer, shifted
-                                 // pictures for the rest, each smoothed and anti-aliased as is set (truest with antialias on). Other
-                                 // passes and keys are those of one sample. More than one: whole shadow textures, in spite of
-                                 // shadow_lazy, and of shadow_progressive without pixel_progressive
-    uint32_t depth;              // patina_depth
-    uint32_t world_directed;     // 1 = ambient light differs by direction: world_light, not world_color, which stays the background
-    float world_light[3][9];     // with world_directed, of red, green, blue: the irradiance over pi of a surface with the normal n
-                                 // (unit, world) as weights of 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1; below 0 it counts as 0
-    uint32_t pixel_progressive;  // 1 = patina_frame_render makes the picture of one sample, and each patina_frame_refine betters
-                                 // it. What comes in the end is the same to the bit
-    float pixel_noise;           // > 0: samples end once stats.pixel_error is at most this; of a region by its own pixels. Asked at
-                                 // certain numbers of samples, which neither threads nor steps change. 0 = pixel_samples as set
-    uint32_t average;            // 1: pixels of clouds that are filled show the mean of the points about their surface, each weighted
-                                 // by how near their middle it fell, in place of the nearest point alone: colours, and normals where
-                                 // points have them. Truer where several points fall into a pixel, steadier where a camera or an
-                                 // object moves. Not where colours come from a ramp or points have opacities of their own; discs
-                                 // show means either way
+    uint32_t pixel_samples; // of a picture at rest, 1..4096; 0 = 1, with pixel_noise at most so many, 0 = 256: the colour is
+                            // the mean of about so many samples a pixel, of finer pixels where that is truer, shifted
+                            // pictures for the rest, each smoothed and anti-aliased as is set (truest with antialias on). Other
+                            // passes and keys are those of one sample. More than one: whole shadow textures, in spite of
+                            // shadow_lazy, and of shadow_progressive without pixel_progressive
+    uint32_t depth;         // patina_depth
+    uint32_t world_directed; // 1 = ambient light differs by direction: world_light, not world_color, which stays the background
+    float world_light[3][9]; // with world_directed, of red, green, blue: the irradiance over pi of a surface with the normal n
+                             // (unit, world) as weights of 1, x, y, z, xy, yz, zx, x^2 - y^2, 3 z^2 - 1; below 0 it counts as 0
+    uint32_t pixel_progressive; // 1 = patina_frame_render makes the picture of one sample, and each patina_frame_refine betters
+                                // it. What comes in the end is the same to the bit
+    float pixel_noise; // > 0: samples end once stats.pixel_error is at most this; of a region by its own pixels. Asked at
+                       // certain numbers of samples, which neither threads nor steps change. 0 = pixel_samples as set
+    uint32_t average;  // 1: pixels of clouds that are filled show the mean of the points about their surface, each weighted
+                       // by how near their middle it fell, in place of the nearest point alone: colours, and normals where
+                       // points have them. Truer where several points fall into a pixel, steadier where a camera or an
+                       // object moves. Not where colours come from a ramp or points have opacities of their own; discs
+                       // show means either way
 } patina_settings;
 
 #define PATINA_MAX_LAYERS 16
@@ -576,7 +579,7 @@ typedef struct patina_effects {
 } patina_effects;
 #define PATINA_EFFECTS_INIT                                                                                                    \
     {                                                                                                                          \
-        .struct_size = sizeof(patina_effects), .exact = 1, .edl_radius = 1.4f, .hatch_spacing = 6.0f, .hatch_opacity = 1.0f,               \
+        .struct_size = sizeof(patina_effects), .exact = 1, .edl_radius = 1.4f, .hatch_spacing = 6.0f, .hatch_opacity = 1.0f,   \
         .paper_color = {1.0f, 1.0f, 1.0f}, .contour_axis = {0.0f, 0.0f, 1.0f}, .contour_width = 1.0f, .contour_every = 5,      \
         .contour_bold = 2.0f                                                                                                   \
     }
@@ -589,24 +592,24 @@ enum patina_line_surface { PATINA_LINE_SURFACE_SHOWN = 0, PATINA_LINE_SURFACE_PA
 // them smooth surfaces show none, however oblique. Where layers are peeled each has its lines.
 typedef struct patina_lines {
     size_t struct_size;
-    float width;          // pixels, 0..16; 0 = 2. In world units with `world`: as wide on screen as that is there, at most 16
-    uint32_t world;       // 1 = width in world units, above 0
-    float offset;         // world units: least step in depth that makes a line, more by 1 / |n.v| on oblique surfaces. Small ones
-                          // draw creases too. 0 = automatic: that which makes two layers (d_min, twice the local spacing, ..)
-    uint32_t source;      // patina_line_source: `color`; that of the outline's own points (of meshes white), times `color`; from
-                          // `color` near to `far_color` far
-    float color[3];       // linear; all zero = black, of POINT a quarter unless exact
-    float far_color[3];   // DEPTH
-    float range[2];       // DEPTH: z of near and far; far not beyond near = those of everything's boxes
-    float transparency;   // 0 = opaque, 1 = not drawn
-    float soft;           // share of the width over which a line fades outwards, 0..1; 0 = hard, anti-aliased where the picture is
-    uint32_t surface;     // patina_line_surface: what lies under the lines. NONE hides what is behind it still, where opaque
-    float paper[3];       // PAPER: linear; all zero = white, unless exact
-    uint32_t exact;       // 1 = black is black
+    float width;        // pixels, 0..16; 0 = 2. In world units with `world`: as wide on screen as that is there, at most 16
+    uint32_t world;     // 1 = width in world units, above 0
+    float offset;       // world units: least step in depth that makes a line, more by 1 / |n.v| on oblique surfaces. Small ones
+                        // draw creases too. 0 = automatic: that which makes two layers (d_min, twice the local spacing, ..)
+    uint32_t source;    // patina_line_source: `color`; that of the outline's own points (of meshes white), times `color`; from
+                        // `color` near to `far_color` far
+    float color[3];     // linear; all zero = black, of POINT a quarter unless exact
+    float far_color[3]; // DEPTH
+    float range[2];     // DEPTH: z of near and far; far not beyond near = those of everything's boxes
+    float transparency; // 0 = opaque, 1 = not drawn
+    float soft;       // share of the width over which a line fades outwards, 0..1; 0 = hard, anti-aliased where the picture is
+    uint32_t surface; // patina_line_surface: what lies under the lines. NONE hides what is behind it still, where opaque
+    float paper[3];   // PAPER: linear; all zero = white, unless exact
+    uint32_t exact;   // 1 = black is black
 } patina_lines;
-#define PATINA_LINES_INIT                                                                                                  \
-    {                                                                                                                      \
-        .struct_size = sizeof(patina_lines), .width = 2.0f, .paper = {1.0f, 1.0f, 1.0f}, .exact = 1                        \
+#define PATINA_LINES_INIT                                                                                                      \
+    {                                                                                                                          \
+        .struct_size = sizeof(patina_lines), .width = 2.0f, .paper = {1.0f, 1.0f, 1.0f}, .exact = 1                            \
     }
 
 PATINA_API int patina_scene_create(patina_scene **out);
@@ -628,20 +631,20 @@ PATINA_API int patina_scene_set_lines(patina_scene *scene, const patina_lines *l
 // A camera that frames the scene's clouds, as far as clips leave them and without strays (patina_cloud_dense_box), seen from
 // `azimuth` degrees around z (0 = from -y) and `elevation` degrees above the horizon, vertical field of view fov_degrees
 // (0 = 45.8).
-PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation,
-                                         double fov_degrees, patina_camera *camera);
+PATINA_API int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double elevation, double fov_degrees,
+                                         patina_camera *camera);
 
 // ---- frame -----------------------------------------------------------------------------------------------------
 
 // X(NAME, channels, sentence)
-#define PATINA_PASSES(X)                                                                                       \
-    X(COMBINED, 4, "premultiplied scene-linear colour")                                                        \
-    X(DEPTH, 1, "linear z, +inf where nothing is")                                                             \
-    X(NORMAL, 3, "world-space unit normal, 0 where nothing is")                                                \
-    X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")   \
-    X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")               \
-    X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")                    \
-    X(CERTAINTY, 1, "0..1, of the nearest point's kind, as analysed; 0 where nothing is known, or nothing is")   \
+#define PATINA_PASSES(X)                                                                                                       \
+    X(COMBINED, 4, "premultiplied scene-linear colour")                                                                        \
+    X(DEPTH, 1, "linear z, +inf where nothing is")                                                                             \
+    X(NORMAL, 3, "world-space unit normal, 0 where nothing is")                                                                \
+    X(SOURCE, 1, "0 nothing; 1 measured; 1 + d filled from d pixels away; negative: mixed by anti-aliasing")                   \
+    X(SHADOW, 1, "mean share of the casting lights that arrives; 1 lit by all, or nothing there")                              \
+    X(LINE, 1, "share of the pixel that a line covers, of the first layer; 0 without lines")                                   \
+    X(CERTAINTY, 1, "0..1, of the nearest point's kind, as analysed; 0 where nothing is known, or nothing is")                 \
     X(THICKNESS, 1, "sigma of the nearest point's surface, world units; 0 where nothing is known, or nothing is")
 
 enum patina_pass {
@@ -665,28 +668,28 @@ typedef struct patina_expected_error {
 
 typedef struct patina_frame_stats {
     size_t struct_size;
-    uint32_t width, height;     // of the passes (the region's)
-    uint64_t points;            // in the scene
-    uint64_t points_scattered;  // in chunks that were not culled
-    uint64_t triangles;         // of meshes in view
+    uint32_t width, height;    // of the passes (the region's)
+    uint64_t points;           // in the scene
+    uint64_t points_scattered; // in chunks that were not culled
+    uint64_t triangles;        // of meshes in view
     uint64_t chunks, chunks_culled;
-    double ms;                  // whole render call
-    uint64_t plane_bytes;       // planes held by the frame, those of shadow maps too
-    uint32_t layers;            // of surface that show something; 1 without peeling, 0 where nothing is in view
-    float spacing_px;           // of points on screen, that 95% of the covered area stays below
+    double ms;            // whole render call
+    uint64_t plane_bytes; // planes held by the frame, those of shadow maps too
+    uint32_t layers;      // of surface that show something; 1 without peeling, 0 where nothing is in view
+    float spacing_px;     // of points on screen, that 95% of the covered area stays below
     patina_expected_error expected;
-    uint64_t shadow_bytes;      // shadow textures held by the frame
-    uint32_t shadow_maps;       // light views drawn for this picture; 0 when every texture was at hand
+    uint64_t shadow_bytes;                // shadow textures held by the frame
+    uint32_t shadow_maps;                 // light views drawn for this picture; 0 when every texture was at hand
     uint32_t shadow_width, shadow_height; // of the largest of them, texels
-    uint32_t shadow_pending;    // progressive: lights that further renders still refine
-    uint32_t shadow_samples;    // of the light that took most
-    float shadow_error;         // the largest of the lights' expected errors, with settings.shadow_error
-    uint64_t chunks_clipped;    // of the culled: those that clips and hidden classes took whole
-    uint64_t chunks_cut;        // in view, whose points were tested one by one
-    uint32_t pixel_samples;     // whose mean every pixel is at least; 1: of the picture without samples
-    uint32_t pixel_pending;     // progressive: samples a pixel that patina_frame_refine takes yet, at most
-    float pixel_error;          // expected standard error of the mean, shares of white in levels as sRGB's, root mean square over
-                                // the pixels whose samples differ; 0 = not known: fewer than two shifted pictures
+    uint32_t shadow_pending;              // progressive: lights that further renders still refine
+    uint32_t shadow_samples;              // of the light that took most
+    float shadow_error;                   // the largest of the lights' expected errors, with settings.shadow_error
+    uint64_t chunks_clipped;              // of the culled: those that clips and hidden classes took whole
+    uint64_t chunks_cut;                  // in view, whose points were tested one by one
+    uint32_t pixel_samples;               // whose mean every pixel is at least; 1: of the picture without samples
+    uint32_t pixel_pending;               // progressive: samples a pixel that patina_frame_refine takes yet, at most
+    float pixel_error; // expected standard error of the mean, shares of white in levels as sRGB's, root mean square over
+                       // the pixels whose samples differ; 0 = not known: fewer than two shifted pictures
 } patina_frame_stats;
 
 // A frame keeps its planes from render to render. The device must outlive it. Frames of one device may be rendered from
@@ -720,7 +723,8 @@ PATINA_API int patina_frame_read_keys(const patina_frame *frame, uint64_t *keys,
 PATINA_API int patina_frame_bake_shadows(patina_frame *frame, const patina_scene *scene);
 // Copies the share of a light that arrives at each point, 0..1, in file order: count floats, size in bytes must fit exactly.
 // After a lazy render only the points that the picture showed say something; the others are 1. Gone with the cloud.
-PATINA_API int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint32_t light, float *values, size_t size);
+PATINA_API int patina_frame_read_shadows(const patina_frame *frame, uint32_t instance, uint32_t light, float *values,
+                                         size_t size);
 // Writes the frame's whole textures to a file, 1, 2 or 4 bytes a point and light, with what they depend on and a checksum.
 PATINA_API int patina_frame_save_shadows(const patina_frame *frame, const char *path);
 // Takes textures from such a file instead of computing them. PATINA_ERROR_FORMAT, and the frame as it was, when the file is
@@ -759,9 +763,9 @@ typedef struct patina_panorama {
     uint32_t width, height;       // of the whole picture, 1..65536
     uint32_t region[4];           // x0, y0, x1, y1 in pixels (from bottom left): join only this crop; all zero = whole
     double world_from_camera[16]; // -z is the middle of the whole picture, +y its upper border
-    double longitude[2];          // radians at the left and the right border, within -pi..pi, growing to the right; zero = -pi, pi
-    double latitude[2];           // at the lower and the upper border, within -pi/2..pi/2; both zero = -pi/2, pi/2
-    double near_clip, far_clip;   // distances from the eye; in the middle of a face the near one is 1.8 times nearer
+    double longitude[2]; // radians at the left and the right border, within -pi..pi, growing to the right; zero = -pi, pi
+    double latitude[2];  // at the lower and the upper border, within -pi/2..pi/2; both zero = -pi/2, pi/2
+    double near_clip, far_clip; // distances from the eye; in the middle of a face the near one is 1.8 times nearer
 } patina_panorama;
 
 // The camera of a face, 0..5, and the pixels of its side: as fine as the picture in the middle of a face, finer elsewhere.

@@ -33,13 +33,13 @@ typedef struct patina_scan_grade {
 // A cloud's own colours, each point's changed by the grade of its scan. scans: of each point in the given order, info.count; NULL = all
 // are of scan 0. Scans from `count` on (1..1024 grades) stay as they are. As much memory as the cloud's colours take; given to scenes by
 // style.grade, where color_source is OWN. PATINA_ERROR_EMPTY for a cloud without colours. After patina_cloud_set_colors make another.
-PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades, uint32_t count,
-                                   patina_grade **out);
+PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
+                                   uint32_t count, patina_grade **out);
 PATINA_API void patina_grade_destroy(patina_grade *grade);
 
 // ---- fields: which points are soft ---------------------------------------------------------------------------------
 
-enum patina_field_source { // of a point's number
+enum patina_field_source {        // of a point's number
     PATINA_FIELD_VALUES = 0,      // desc.values
     PATINA_FIELD_SCALAR = 1,      // the cloud's scalar
     PATINA_FIELD_LUMINANCE = 2,   // of its colour, 0..1 as a screen shows it
@@ -48,7 +48,7 @@ enum patina_field_source { // of a point's number
     PATINA_FIELD_UNCERTAINTY = 5, // [S Eq. 21] of its 16 nearest, 0..1; takes as long as an analysis
     PATINA_FIELD_DENSITY = 6,     // points per area of the object, where the point lies
 };
-enum patina_field_shape { // of world_from_shape
+enum patina_field_shape {        // of world_from_shape
     PATINA_FIELD_FROM_POINT = 0, // its origin
     PATINA_FIELD_FROM_PLANE = 1, // x and y through its origin; below it negative
     PATINA_FIELD_FROM_AXIS = 2,  // z through its origin
@@ -56,15 +56,15 @@ enum patina_field_shape { // of world_from_shape
 
 typedef struct patina_field_desc {
     size_t struct_size;
-    uint32_t source;         // patina_field_source
-    uint32_t shape;          // patina_field_shape, for DISTANCE
-    uint64_t count;          // of values: patina_cloud_info.count
-    const float *values;     // in the given order
-    double range[2];         // numbers that become 0 and 1, straight between; the first may be the greater. Equal: 0 and 1 where all
-                             // lie within, else what one point of a hundred lies below, and above
-    uint32_t classes[8];     // bits as in patina_cloud_info.class_bits
-    uint32_t invert;         // 1 = 1 becomes 0, and the reverse; NaN stays 0
-    uint32_t unused;         // says nothing
+    uint32_t source;     // patina_field_source
+    uint32_t shape;      // patina_field_shape, for DISTANCE
+    uint64_t count;      // of values: patina_cloud_info.count
+    const float *values; // in the given order
+    double range[2]; // numbers that become 0 and 1, straight between; the first may be the greater. Equal: 0 and 1 where all
+                     // lie within, else what one point of a hundred lies below, and above
+    uint32_t classes[8];                                // bits as in patina_cloud_info.class_bits
+    uint32_t invert;                                    // 1 = 1 becomes 0, and the reverse; NaN stays 0
+    uint32_t unused;                                    // says nothing
     double world_from_object[16], world_from_shape[16]; // row-major; all zero = identity
 } patina_field_desc;
 
@@ -72,19 +72,21 @@ typedef struct patina_field_desc {
 // and 4 on a device. Given to scenes by style.field, which has the threshold: one field serves any. It never changes: after an edit
 // make another. Any number of fields of one cloud. PATINA_ERROR_EMPTY where the cloud has no such numbers. progress: may be NULL, ends
 // UNCERTAINTY early.
-PATINA_API int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc, patina_progress *progress, patina_field **out);
+PATINA_API int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc, patina_progress *progress,
+                                   patina_field **out);
 PATINA_API void patina_field_destroy(patina_field *field);
 
 // ---- picking: which points lie in an outline on the picture ---------------------------------------------------------
 
 typedef struct patina_pick {
     size_t struct_size;
-    uint32_t instance;      // of the scene
-    const double *polygon;  // corners x 2: pixels of the full picture from its bottom left, closed by itself, even and odd: what an
-                            // outline goes around twice is outside. NULL = everything
-    uint32_t corners;       // 3..16384; 0 = no polygon
-    uint32_t classes[8];    // bits as in patina_cloud_info.class_bits: only points of these; all zero = any
-    uint32_t threads;       // 0 = one per core
+    uint32_t instance; // of the scene
+    const double
+        *polygon;     // corners x 2: pixels of the full picture from its bottom left, closed by itself, even and odd: what an
+                      // outline goes around twice is outside. NULL = everything
+    uint32_t corners; // 3..16384; 0 = no polygon
+    uint32_t classes[8]; // bits as in patina_cloud_info.class_bits: only points of these; all zero = any
+    uint32_t threads;    // 0 = one per core
 } patina_pick;
 
 // Sets the bits (as a mask's; size: (count + 7) / 8 bytes) of an instance's points that the scene draws: hidden by no class, kind, mask
@@ -97,8 +99,8 @@ PATINA_API int patina_scene_pick(const patina_scene *scene, const patina_frame *
                                  patina_progress *progress, uint8_t *bits, size_t size);
 // Mixes a colour into the pixels of a COMBINED pass whose nearest point is selected by its instance's mask, filled ones too: for
 // viewports. scene: rendered last in the frame. strength: 0..1, the colour's share. pixels: width * height * 4.
-PATINA_API int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene, const float color[3], float strength,
-                                      float *pixels, size_t size);
+PATINA_API int patina_frame_highlight(const patina_frame *frame, const patina_scene *scene, const float color[3],
+                                      float strength, float *pixels, size_t size);
 
 #ifdef __cplusplus
 }

@@ -27,8 +27,8 @@ typedef struct patina_read {
 PATINA_API int patina_task_render(patina_frame *frame, const patina_scene *scene, const patina_read *reads, uint32_t count,
                                   patina_task **out);
 // The same of patina_frame_refine.
-PATINA_API int patina_task_refine(patina_frame *frame, const patina_scene *scene, double ms, const patina_read *reads, uint32_t count,
-                                  patina_task **out);
+PATINA_API int patina_task_refine(patina_frame *frame, const patina_scene *scene, double ms, const patina_read *reads,
+                                  uint32_t count, patina_task **out);
 PATINA_API int patina_task_build(const patina_cloud_desc *desc, patina_progress *progress,
                                  patina_task **out); // patina_cloud_create
 PATINA_API int patina_task_set_colors(patina_cloud *cloud, const patina_array *color,
@@ -44,7 +44,7 @@ PATINA_API int patina_task_apply(patina_task *task); // waits; PATINA_ERROR_EMPT
 // written once the task is done. About as fast as memory is read.
 PATINA_API int patina_task_fingerprint(const patina_cloud_desc *desc, uint64_t values[2], patina_task **out);
 PATINA_API int patina_task_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals,
-                                        patina_task **out); // patina_grid_normals
+                                        patina_task **out);                                           // patina_grid_normals
 PATINA_API int patina_task_open_file(const char *path, patina_progress *progress, patina_task **out); // patina_file_open
 PATINA_API int patina_task_save(const patina_cloud *cloud, const char *path, patina_task **out);      // patina_cloud_save
 PATINA_API int patina_task_verify(const char *path, patina_progress *progress, patina_task **out);    // patina_cloud_verify

@@ -7,8 +7,7 @@
 
 static double hashed(int64_t x, int64_t y, int64_t z)
 {
-    uint64_t h = (uint64_t)x * 0x9E3779B97F4A7C15u ^ (uint64_t)y * 0xC2B2AE3D27D4EB4Fu ^
-                 (uint64_t)z * 0x165667B19E3779F9u;
+    uint64_t h = (uint64_t)x * 0x9E3779B97F4A7C15u ^ (uint64_t)y * 0xC2B2AE3D27D4EB4Fu ^ (uint64_t)z * 0x165667B19E3779F9u;
     h ^= h >> 32;
     h *= 0xD6E8FEB86659FD93u;
     h ^= h >> 32;
@@ -53,14 +52,11 @@ static double share_of(const material *m, const double *p, const double *n, doub
         *tone = 0.9 + 0.2 * hashed((int64_t)floor(x), (int64_t)floor(y), 11);
         return 0.0;
     }
-    case PATTERN_WOOD:
-        return noise(p[0] / (0.25 * l), p[1] / (0.25 * l), p[2] / (4.0 * l));
+    case PATTERN_WOOD: return noise(p[0] / (0.25 * l), p[1] / (0.25 * l), p[2] / (4.0 * l));
     case PATTERN_CLOUDS:
         return 0.7 * noise(p[0] / l, p[1] / l, p[2] / l) + 0.3 * noise(4.0 * p[0] / l, 4.0 * p[1] / l, 4.0 * p[2] / l);
-    case PATTERN_CHECKS:
-        return hashed((int64_t)floor(u / l), (int64_t)floor(v / l), 13) < 0.5 ? 0.0 : 1.0;
-    default:
-        return 0.0;
+    case PATTERN_CHECKS: return hashed((int64_t)floor(u / l), (int64_t)floor(v / l), 13) < 0.5 ? 0.0 : 1.0;
+    default: return 0.0;
     }
 }
 
@@ -71,8 +67,8 @@ void rays_albedo(const material *materials, const int32_t *which, const double *
         const material *m = &materials[which[i]];
         const double *p = place + 3 * i;
         double tone = 1.0, share = share_of(m, p, normal + 3 * i, &tone);
-        double fine = 0.3 * noise(40.0 * p[0], 40.0 * p[1], 40.0 * p[2]) +
-                      0.7 * noise(9.0 * p[0], 9.0 * p[1], 9.0 * p[2]) - 0.5;
+        double fine = 0.3 * noise(40.0 * p[0], 40.0 * p[1], 40.0 * p[2]) + 0.7 * noise(9.0 * p[0], 9.0 * p[1], 9.0 * p[2]) -
+                      0.5;
         tone *= 1.0 + m->grain * fine;
         for (int c = 0; c < 3; c++)
             rgb[3 * i + c] = (float)fmin(fmax(tone * (m->first[c] + share * (m->second[c] - m->first[c])), 0.0), 1.0);

@@ -36,10 +36,7 @@ typedef struct builder {
     int32_t *order;
 } builder;
 
-static box empty_box(void)
-{
-    return (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-}
+static box empty_box(void) { return (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}; }
 
 static void grow(box *b, const box *other)
 {
@@ -269,8 +266,8 @@ static void *work(void *argument)
     return NULL;
 }
 
-int rays_trace(const rays *r, const double *origin, int32_t shared_origin, const double *direction, int64_t n,
-               double *t, int32_t *triangle, int32_t threads)
+int rays_trace(const rays *r, const double *origin, int32_t shared_origin, const double *direction, int64_t n, double *t,
+               int32_t *triangle, int32_t threads)
 {
     pthread_t ids[MOST_THREADS];
     part parts[MOST_THREADS];

@@ -26,7 +26,7 @@ RAYS_API void rays_destroy(rays *r);
 RAYS_API int rays_trace(const rays *r, const double *origin, int32_t shared_origin, const double *direction, int64_t n,
                         double *t, int32_t *triangle, int32_t threads);
 // Linear colours at places on surfaces with unit normals.
-RAYS_API void rays_albedo(const material *materials, const int32_t *which, const double *place, const double *normal,
-                          int64_t n, float *rgb);
+RAYS_API void rays_albedo(const material *materials, const int32_t *which, const double *place, const double *normal, int64_t n,
+                          float *rgb);
 
 #endif
