@@ -370,15 +370,6 @@ static void plan_layer_passes(struct pt_builder *builder, enum pt_plane color)
                       extract.depth ? PT_PLANE_LAYER_DEPTH : PT_PLANE_COUNT);
 }
 
-// Where the depth pass tells of surfaces, and not of points. Discs have no mean where surfaces lie close behind each other: that of
-// shells 1.5 spacings apart lies 1.2 behind the first.
-int pt_tells_surfaces(const struct pt_builder *builder)
-{
-    const patina_settings *settings = &builder->scene->settings;
-    return settings->depth == PATINA_DEPTH_SURFACE && (settings->passes >> PATINA_PASS_DEPTH & 1u) &&
-           (builder->plan->filled || (settings->surface == PATINA_SURFACE_SPLATS && !builder->plan->sigmas));
-}
-
 // ---- the picture -------------------------------------------------------------------------------------------------------
 
 static void set_background(const patina_settings *settings, float background[4])

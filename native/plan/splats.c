@@ -4,6 +4,15 @@
 
 #include <string.h>
 
+// Where the depth pass tells of surfaces, and not of points. Discs have no mean where surfaces lie close behind each other: that of
+// shells 1.5 spacings apart lies 1.2 behind the first.
+int pt_tells_surfaces(const struct pt_builder *builder)
+{
+    const patina_settings *settings = &builder->scene->settings;
+    return settings->depth == PATINA_DEPTH_SURFACE && (settings->passes >> PATINA_PASS_DEPTH & 1u) &&
+           (builder->plan->filled || (settings->surface == PATINA_SURFACE_SPLATS && !builder->plan->sigmas));
+}
+
 int pt_tells_depths(const struct pt_builder *builder)
 {
     return builder->layer == 1 && pt_tells_surfaces(builder) && builder->scene->settings.surface == PATINA_SURFACE_SPLATS;
