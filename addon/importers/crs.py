@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long the units of a coordinate reference system are: from its WKT (OGC 01-009, ISO 19162), else from GeoTIFF keys, else
-from the words beside those. Plain: no Blender, no library."""
+"""How long the units of a coordinate reference system are: from its WKT (OGC 01-009, ISO 19162), else from GeoTIFF keys (units,
+else the EPSG number of a system), else from the words beside those. Plain: no Blender, no library."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from . import epsg
+
 FOOT, US_FOOT = 0.3048, 1200.0 / 3937.0  # metres
-NAMES = {FOOT: "feet", US_FOOT: "US survey feet"}
+NAMES = {1.0: "meters", FOOT: "feet", US_FOOT: "US survey feet"}
 
 # EPSG numbers of units
 _UNITS = {9001: 1.0, 9002: FOOT, 9003: US_FOOT, 9005: 0.3047972654, 9036: 1000.0, 9096: 0.9144}
 
 # GeoTIFF keys
 _MODEL, _LINEAR, _LINEAR_SIZE, _VERTICAL = 1024, 3076, 3077, 4099
+_PROJECTED, _HEIGHT = 3072, 4096  # EPSG numbers of systems
+_HEIGHT_WORDS = 4097  # where they begin
 _GEOGRAPHIC = 2  # a model
 
 _HORIZONTAL = {"PROJCS", "PROJCRS", "PROJECTEDCRS", "LOCAL_CS", "ENGCRS", "ENGINEERINGCRS", "GEOCCS"}
@@ -34,8 +38,13 @@ class Units:
     degrees: bool = False  # x and y are angles: across says nothing
 
     def __str__(self) -> str:
-        return "degrees" if self.degrees else next(
-            (name for metres, name in NAMES.items() if abs(self.across / metres - 1.0) < 1e-7), f"{self.across:.9g} m")
+        across, up = "degrees" if self.degrees else _called(self.across), _called(self.up)
+        same = across == up or (self.degrees and self.up == 1.0)
+        return across if same else f"{across}, heights in {up}"
+
+
+def _called(size: float) -> str:
+    return next((name for metres, name in NAMES.items() if abs(size / metres - 1.0) < 1e-7), f"{size:.9g} m")
 
 
 def units(text: str, keys: Mapping[int, float] | None = None) -> Units | None:
@@ -44,14 +53,35 @@ def units(text: str, keys: Mapping[int, float] | None = None) -> Units | None:
     root = _parsed(text)
     if root and root[0] in _ROOTS:
         return _of_wkt(root)
-    words = [part.strip() for part in text.split("|")]
+    heights, places = _in_parts(text, keys)
+    up = _UNITS.get(int(keys.get(_VERTICAL, 0))) or _of_number(epsg.UP, keys.get(_HEIGHT)) or heights
     if keys.get(_MODEL) == _GEOGRAPHIC:
-        return Units(1.0, _UNITS.get(int(keys.get(_VERTICAL, 9001)), 1.0), True)
-    across = _UNITS.get(int(keys.get(_LINEAR, 0)), keys.get(_LINEAR_SIZE)) or _in_words(words[0])
-    up = _UNITS.get(int(keys.get(_VERTICAL, 0))) or next(filter(None, map(_in_words, words[1:])), None)
+        return Units(1.0, up or 1.0, True)
+    number = keys.get(_PROJECTED)
+    across = _UNITS.get(int(keys.get(_LINEAR, 0)), keys.get(_LINEAR_SIZE)) or _of_number(epsg.ACROSS, number, places)
     if across is None and up is None:
         return None
-    return Units(across or 1.0, up or across or 1.0)
+    return Units(across or up or 1.0, up or across or 1.0)
+
+
+def _of_number(table: dict[float, str], number: float | None, words: float | None = None) -> float | None:
+    """Metres of the unit of a system by its EPSG number, else as words beside it say; the systems that the table does not
+    name are in metres. None without either."""
+    code = int(number or 0)
+    known = 1024 <= code < 32767 and not 5000 <= code < 5200  # those are datums of heights, of any unit
+    return epsg.metres(table, code) or words or (1.0 if known else None)
+
+
+def _in_parts(text: str, keys: Mapping[int, float]) -> tuple[float | None, float | None]:
+    """What the words say of heights, and of x and y: parts behind each other, with a | behind each. Which are of heights a key
+    says, else all but the first are."""
+    begin, parts = 0, {}
+    for part in text.split("|"):
+        parts[begin] = part
+        begin += len(part) + 1
+    of_heights = {int(keys[_HEIGHT_WORDS])} if _HEIGHT_WORDS in keys else set(parts) - {0}
+    heights, places = ([_in_words(part) for begin, part in parts.items() if (begin in of_heights) == up] for up in (True, False))
+    return next(filter(None, heights), None), next(filter(None, places), None)
 
 
 def name(text: str) -> str:

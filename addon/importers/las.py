@@ -131,9 +131,9 @@ def _records(file: BinaryIO, head: bytes, at: int, records: int, end: int
 
 
 def _geo_keys(directory: bytes, doubles: bytes) -> dict[int, float]:
-    """The keys of a GeoTIFF directory whose values are numbers."""
+    """The keys of a GeoTIFF directory whose values are numbers; of those that are words, where they begin."""
     entries = [struct.unpack_from("<4H", directory, at) for at in range(8, len(directory) - 7, 8)]
-    found: dict[int, float] = {key: value for key, place, _, value in entries if place == 0}
+    found: dict[int, float] = {key: value for key, place, _, value in entries if place in {0, 34737}}
     for key, place, _, index in entries:
         if place == 34736 and 8 * index + 8 <= len(doubles):
             found[key] = struct.unpack_from("<d", doubles, 8 * index)[0]

@@ -78,13 +78,26 @@ def test_units_of_coordinate_systems():
             ("NAD83 / Texas Central|NAVD88|", {1024: 1, 3076: 9003}, (us, us, False)),
             ("NAD83 / Texas Central (ftUS)|NAVD88 height (m)|", {1024: 1}, (us, us, False)),
             ("somewhere", {1024: 1, 3076: 32767, 3077: 0.9144, 4099: 9002}, (0.9144, foot, False)),
-            ("somewhere|", {1024: 2}, (1, 1, True))):
+            ("somewhere|", {1024: 2}, (1, 1, True)),
+            ("NAVD88 via Geoid09|", {1024: 1, 3072: 2229, 4097: 0, 4099: 9003}, (us, us, False)),  # of a file of a scanner's maker
+            ("", {1024: 1, 3072: 2229}, (us, us, False)), ("", {1024: 1, 3072: 2913, 4096: 5703}, (foot, 1, False)),
+            ("", {1024: 1, 3072: 26912, 4096: 6360}, (1, us, False)), ("", {1024: 1, 3072: 2229, 4096: 5103}, (us, us, False)),
+            ("NAVD88 height (ftUS)|", {1024: 1, 3072: 32612, 4097: 0}, (1, us, False)),
+            ("somewhere|", {1024: 1, 3072: 32767, 4099: 9003}, (us, us, False))):  # all that is told
         found = crs.units(text, keys)
         check(found is not None, f"nothing found in {text[:40]}")
         check_close((found.across, found.up), wanted[:2], 1e-9, text[:40])
         check(found.degrees == wanted[2], text[:40])
     for text in ("", "somewhere in metres", "PROJCS[\"somewhere\"]", "[[[", "UNIT", 'PROJCS["a' * 2000, "A[" * 5000, ")]"):
         check(crs.units(text, {}) is None, f"found something in {text[:20]}")
+
+
+def test_units_for_people():
+    for units, wanted in ((crs.Units(1.0, 1.0), "meters"), (crs.Units(crs.US_FOOT, crs.US_FOOT), "US survey feet"),
+                          (crs.Units(1.0, crs.US_FOOT), "meters, heights in US survey feet"),
+                          (crs.Units(crs.FOOT, 1.0), "feet, heights in meters"), (crs.Units(1.0, 1.0, True), "degrees"),
+                          (crs.Units(1.0, crs.FOOT, True), "degrees, heights in feet")):
+        check(str(units) == wanted, f"{units}, not {wanted}")
 
 
 def las_file(name, positions, wkt="", keys=()):
@@ -110,7 +123,8 @@ def las_file(name, positions, wkt="", keys=()):
 
 def test_feet_become_metres():
     rng = np.random.default_rng(3)
-    for name, options in (("wkt", {"wkt": PROJECTED}), ("keys", {"keys": [(1024, 1), (3076, 9003)]})):
+    for name, options in (("wkt", {"wkt": PROJECTED}), ("keys", {"keys": [(1024, 1), (3076, 9003)]}),
+                          ("number", {"keys": [(1024, 1), (3072, 2229), (4099, 9003)]})):
         feet = rng.uniform(0, 300, (200, 3)) + (1000000.0, 200000.0, 50.0)
         path = las_file(f"feet_{name}.las", feet, **options)
         wanted = (feet - feet[0]) * crs.US_FOOT
