@@ -4,8 +4,9 @@
 
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
-enum { LOOKED_AT = 1000, LONGEST_NUMBER = 64 };
+enum { LOOKED_AT = 1000, LONGEST_NUMBER = 64, LONGEST_NOTE = 4096 };
 
 bool pt_is_comment(const uint8_t *at, const uint8_t *end)
 {
@@ -32,6 +33,26 @@ struct span {
     const uint8_t *begin, *end;
 };
 
+// The quote that ends a cell whose text begins at `at`; doubled ones are part of it. NULL where none does: within the line, or
+// of a table's cell, where line ends may stand between, within LONGEST_NOTE bytes and before a separator or line end.
+static const uint8_t *closing_quote(uint8_t between, const uint8_t *at, const uint8_t *end)
+{
+    bool broken = false;
+    end = end - at > LONGEST_NOTE ? at + LONGEST_NOTE : end;
+    for (; at < end; at++) {
+        broken |= pt_is_line_end(*at);
+        if (broken && !between)
+            return NULL;
+        if (*at != '"')
+            continue;
+        if (at + 1 < end && at[1] == '"')
+            at++;
+        else
+            return !broken || at + 1 == end || at[1] == between || pt_is_line_end(at[1]) ? at : NULL;
+    }
+    return NULL;
+}
+
 // The cell or word at `at`, without blanks around it and without its quotes; *next: behind it and, of a cell, before the
 // separator. Quotes keep separators.
 static inline struct span take(enum pt_parting parting, const uint8_t *at, const uint8_t *end, const uint8_t **next)
@@ -40,7 +61,8 @@ static inline struct span take(enum pt_parting parting, const uint8_t *at, const
     bool quoted = at < end && *at == '"';
     struct span found = {at + quoted, at};
     if (quoted) {
-        for (at++; at < end && *at != '"' && !pt_is_line_end(*at); at++)
+        const uint8_t *closing = closing_quote(between, at + 1, end);
+        for (at = closing ? closing : at + 1; at < end && *at != '"' && !pt_is_line_end(*at); at++)
             ;
         found.end = at;
     }
@@ -51,6 +73,15 @@ static inline struct span take(enum pt_parting parting, const uint8_t *at, const
             ;
     *next = at;
     return found;
+}
+
+// Line ends in a cell.
+static uint32_t count_breaks(struct span cell)
+{
+    uint32_t count = 0;
+    for (const uint8_t *at = cell.begin; at < cell.end; at++)
+        count += *at == '\n' || (*at == '\r' && (at + 1 == cell.end || at[1] != '\n'));
+    return count;
 }
 
 // A number whose decimals stand behind a comma.
@@ -100,6 +131,7 @@ static inline __attribute__((always_inline)) const uint8_t *read_line(struct pt_
         } else if (!read_number(cells, parting, word, &value)) {
             value = NAN;
             found.strange++;
+            found.breaks += between ? count_breaks(word) : 0;
             found.strange_columns |= found.count < 32 ? UINT32_C(1) << found.count : 0;
         }
         found.width++;
@@ -130,11 +162,22 @@ const uint8_t *pt_cells_name(enum pt_parting parting, const uint8_t *at, const u
     if (at >= end || pt_is_line_end(*at))
         return NULL;
     struct span word = take(parting, at, end, &at);
-    size_t length = (size_t)(word.end - word.begin);
-    length = length < size ? length : size - 1;
-    memcpy(name, word.begin, length);
+    size_t length = 0;
+    for (const uint8_t *p = word.begin; p < word.end && length + 1 < size; p++) {
+        name[length++] = (char)(pt_is_line_end(*p) ? ' ' : *p);
+        p += *p == '"' && p + 1 < word.end && p[1] == '"';
+    }
     name[length] = 0;
     return at + (at < end && separator(parting) && *at == separator(parting));
+}
+
+bool pt_cells_says_empty(const char *word)
+{
+    static const char *const said[] = {"-", "--", "n/a", "na", "#N/A", "null", "none", "nil", "<null>", "?"};
+    for (size_t i = 0; i < sizeof said / sizeof *said; i++)
+        if (!strcasecmp(word, said[i]))
+            return true;
+    return false;
 }
 
 // ---- which parting ---------------------------------------------------------------------------------------------------------
@@ -158,18 +201,6 @@ static const uint8_t *next_line(enum pt_parting parting, const uint8_t *at, cons
     }
 }
 
-// Separators of one line outside quotes.
-static uint32_t count_separators(const uint8_t *at, const uint8_t *end, uint8_t separator)
-{
-    uint32_t count = 0;
-    bool quoted = false;
-    for (; at < end && !pt_is_line_end(*at); at++) {
-        quoted ^= *at == '"';
-        count += !quoted && *at == separator;
-    }
-    return count;
-}
-
 // Whether a cell holds several words, all of them numbers: then blanks part numbers too.
 static bool holds_numbers(struct span cell)
 {
@@ -190,22 +221,19 @@ static bool holds_numbers(struct span cell)
 static bool is_table(enum pt_parting parting, const uint8_t *at, const uint8_t *end)
 {
     uint32_t wanted = 0, lines = 0;
-    at = next_line(parting, at, end);
-    for (; at < end && lines < LOOKED_AT; at = next_line(parting, line_end(at, end), end), lines++) {
-        uint32_t found = count_separators(at, end, separator(parting));
+    for (at = next_line(parting, at, end); at < end && lines < LOOKED_AT; at = next_line(parting, at, end), lines++) {
+        uint32_t found = 0;
+        for (bool more = true; more; found += more, at += more) {
+            while (at < end && pt_cells_skips(parting, *at))
+                at++;
+            struct span word = take(parting, at, end, &at);
+            if ((!lines && parting == PT_PARTED_BY_TAB && word.begin == word.end) || (lines && holds_numbers(word)))
+                return false;
+            more = at < end && *at == separator(parting);
+        }
         wanted = lines ? wanted : found;
         if (found < 2 || found != wanted)
             return false;
-        for (const uint8_t *p = at; p < end && !pt_is_line_end(*p);) {
-            while (p < end && pt_cells_skips(parting, *p))
-                p++;
-            struct span word = take(parting, p, end, &p);
-            if (!lines && parting == PT_PARTED_BY_TAB && word.begin == word.end)
-                return false;
-            if (lines && holds_numbers(word))
-                return false;
-            p += p < end && !pt_is_line_end(*p);
-        }
     }
     return lines > 0;
 }

@@ -5,10 +5,21 @@
 // What a column is follows from its name, else from how many columns there are and what the first rows hold: 4: x y z
 // intensity; 6: x y z and colour bytes, or unit normals; 7: x y z intensity colour; 9: colour bytes and normals. What is
 // none of these becomes an attribute.
+//
+// Words among the numbers, decided in this order once all rows are counted (decide_words):
+// 1. A word where a coordinate, colour or normal is needed: the file is refused, by its line. Needed is what the names say
+//    so, and without names every column in which the first row holds a number.
+// 2. "-", "n/a" and the like are empty cells.
+// 3. Of a column's cells that are not empty, more than a tenth are words: it is left out, and named.
+// 4. Else those words are empty cells, counted and told.
+// 5. Columns were left out, and a row has not as many words as the first: refused, since which is which cannot be told.
+// 6. Without names, a first column of whole numbers that count up by one, at least four columns of numbers and words at the
+//    row's end: it numbers the points and is left out; where that is not so, what was taken as x, y and z is told.
 #include "base/progress.h"
 #include "cells.h"
 #include "file.h"
 #include "number.h"
+#include "roles.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -17,20 +28,30 @@
 #include <string.h>
 #include <strings.h>
 
-enum { MOST_COLUMNS = 32, SAMPLES = 1000, POLL_LINES = 8192, NAME_SIZE = 64 };
+enum { MOST_COLUMNS = 32, SAMPLES = 1000, POLL_LINES = 8192, WORD_SHARE = 10 };
 
-enum role { ATTRIBUTE, X, Y, Z, NX, NY, NZ, RED, GREEN, BLUE, ALPHA };
+// The words that one column holds among its numbers.
+struct words {
+    uint64_t count, first_line;
+    char first[48];
+};
 
 struct text {
     const struct pt_input *input;
     struct patina_file *file;
     struct pt_cells cells;
     const uint8_t *at, *end;
-    uint64_t line;    // of `at`, from 1
-    uint32_t columns; // numbers of a row
-    uint32_t width;   // words of a row, those that are left out too
-    uint32_t words;   // columns that hold words and are left out, a bit each
-    uint32_t needed;  // columns that must not: what their names say is no attribute, or all but the first row's words
+    uint64_t line;     // of `at`, from 1
+    uint32_t breaks;   // line ends within the quotes of the line before `at`
+    uint32_t columns;  // numbers of a row
+    uint32_t width;    // words of a row, those that are left out too
+    uint32_t left_out; // columns of words, or that number the points: a bit each
+    uint32_t needed;   // columns that must hold none: what their names say is no attribute, or all but the first row's words
+    uint64_t odd_line; // the first row that has not as many words as the first, 0: all have
+    uint32_t odd_width;
+    bool words; // there were some, of any kind
+    struct words found[MOST_COLUMNS];
+    uint64_t filled[MOST_COLUMNS]; // numbers of a column
     uint32_t name_count;
     char names[MOST_COLUMNS][NAME_SIZE];
     bool named, ptx, pts;
@@ -50,6 +71,8 @@ struct text {
 // Comes to the next line that holds something; false at the end.
 static bool find_line(struct text *t)
 {
+    t->line += t->breaks;
+    t->breaks = 0;
     for (;;) {
         while (t->at < t->end && (pt_cells_skips(t->cells.parting, *t->at) || pt_is_line_end(*t->at))) {
             t->line += *t->at == '\n' || (*t->at == '\r' && (t->at + 1 == t->end || t->at[1] != '\n'));
@@ -67,21 +90,16 @@ static struct pt_line read_line(struct text *t, double values[MOST_COLUMNS])
 {
     struct pt_line line;
     t->at = pt_cells_read(&t->cells, t->at, t->end, values, MOST_COLUMNS, &line);
+    t->breaks = line.breaks;
     return line;
 }
 
-// A row without the columns of words; Where it has not as many words as the first, which
-// is which cannot be told: it counts none.
-static struct pt_line read_row(struct text *t, double values[MOST_COLUMNS])
+static void leave_out(const struct text *t, double values[MOST_COLUMNS])
 {
-    struct pt_line line = read_line(t, values);
     uint32_t kept = 0;
-    for (uint32_t c = 0; t->words && c < line.count; c++)
-        if (!(t->words >> c & 1))
+    for (uint32_t c = 0; t->left_out && c < MOST_COLUMNS; c++)
+        if (!(t->left_out >> c & 1))
             values[kept++] = values[c];
-    t->width = t->width ? t->width : line.count;
-    line.count = t->words ? (line.count == t->width ? kept : 0) : line.count;
-    return line;
 }
 
 static int fail_at(const struct text *t, const char *what)
@@ -101,41 +119,7 @@ static void read_names(struct text *t, const uint8_t *at)
     t->name_count = t->name_count < MOST_COLUMNS ? t->name_count : MOST_COLUMNS;
 }
 
-static const struct {
-    const char *name;
-    enum role role;
-} known_names[] = {
-    {"x", X},     {"y", Y},    {"z", Z},     {"easting", X},   {"northing", Y},  {"elevation", Z}, {"height", Z},
-    {"nx", NX},   {"ny", NY},  {"nz", NZ},   {"normal_x", NX}, {"normal_y", NY}, {"normal_z", NZ}, {"r", RED},
-    {"g", GREEN}, {"b", BLUE}, {"a", ALPHA}, {"red", RED},     {"green", GREEN}, {"blue", BLUE},   {"alpha", ALPHA},
-};
-
-static bool has(const struct text *t, enum role first)
-{
-    uint32_t found = 0;
-    for (uint32_t c = 0; c < t->columns; c++)
-        for (uint32_t k = 0; k < 3; k++)
-            found |= (uint32_t)(t->roles[c] == first + k) << k;
-    return found == 7;
-}
-
-// A name that comes twice, or a family that is not whole, stays an attribute.
-static void name_roles(struct text *t)
-{
-    for (uint32_t c = 0; c < t->columns; c++)
-        for (size_t k = 0; k < sizeof known_names / sizeof *known_names; k++) {
-            bool taken = false;
-            for (uint32_t other = 0; other < c; other++)
-                taken |= t->roles[other] == known_names[k].role;
-            if (!taken && !strcasecmp(t->names[c], known_names[k].name))
-                t->roles[c] = known_names[k].role;
-        }
-    for (uint32_t c = 0; c < t->columns; c++) {
-        bool normal = t->roles[c] >= NX && t->roles[c] <= NZ, color = t->roles[c] >= RED;
-        if ((normal && !has(t, NX)) || (color && !has(t, RED)))
-            t->roles[c] = ATTRIBUTE;
-    }
-}
+static bool has(const struct text *t, enum role first) { return pt_roles_have(t->roles, t->columns, first); }
 
 static void set_three(struct text *t, uint32_t column, enum role first)
 {
@@ -291,29 +275,71 @@ static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
     }
 }
 
-// Columns of the row at `at` that hold words are left out from now on, where they may be.
+static void call_column(const struct text *t, uint32_t c, char called[NAME_SIZE + 16])
+{
+    if (c < t->name_count && t->names[c][0])
+        snprintf(called, NAME_SIZE + 16, "column '%s'", t->names[c]);
+    else
+        snprintf(called, NAME_SIZE + 16, "column %u", c + 1);
+}
+
+static int refuse_word(const struct text *t, uint32_t column, const char *word)
+{
+    char what[320], called[NAME_SIZE + 16];
+    bool thousands = strchr(word, ',') && strspn(word, "+-0123456789.,") == strlen(word);
+    call_column(t, column, called);
+    snprintf(what, sizeof what, "%s holds a word, '%.40s', where a number is needed; %s", called, word,
+             thousands  ? "marks between thousands are not read, take them out"
+             : t->named ? "take the line out, or correct it"
+                        : "a first line that names x, y, z and the others lets columns of words be left out");
+    return fail_at(t, what);
+}
+
+// Counts the words of the row at `at`, in these columns.
 static int meet_words(struct text *t, const uint8_t *at, uint32_t columns)
 {
-    char word[NAME_SIZE] = "", called[NAME_SIZE + 16];
+    char word[NAME_SIZE] = "";
     for (uint32_t c = 0; c < MOST_COLUMNS && (at = pt_cells_name(t->cells.parting, at, t->end, word, sizeof word)); c++) {
         if (!(columns >> c & 1))
             continue;
-        if (c < t->name_count && t->names[c][0])
-            snprintf(called, sizeof called, "column '%s'", t->names[c]);
-        else
-            snprintf(called, sizeof called, "column %u", c + 1);
-        if (t->needed >> c & 1) {
-            char what[256];
-            snprintf(what, sizeof what, "%s holds a word, '%.40s', where a number is needed; %s", called, word,
-                     t->named ? "take the line out, or correct it"
-                              : "a first line that names x, y, z and the others lets columns of words be left out");
-            return fail_at(t, what);
+        if (t->needed >> c & 1)
+            return refuse_word(t, c, word);
+        if (pt_cells_says_empty(word))
+            continue;
+        struct words *found = &t->found[c];
+        if (!found->count++) {
+            found->first_line = t->line;
+            snprintf(found->first, sizeof found->first, "%.40s", word);
         }
-        pt_log(PT_LOG_WARNING, "%s: %s holds words ('%.40s' in line %llu) and is left out", t->input->name, called, word,
-               (unsigned long long)t->line);
-        t->words |= UINT32_C(1) << c;
     }
     return PATINA_OK;
+}
+
+static int fail_width(const struct text *t, const char *what, uint32_t width, uint32_t wanted)
+{
+    char text[96];
+    snprintf(text, sizeof text, "%u %s; %u were expected", width, what, wanted);
+    return fail_at(t, text);
+}
+
+// Before rows are stored: what a row has, against the first one.
+static int check_row(struct text *t, const uint8_t *at, struct pt_line line, const double values[MOST_COLUMNS])
+{
+    if (!t->width) {
+        t->width = line.width;
+        t->columns = line.count;
+    }
+    if (line.width != t->width && !t->odd_line) {
+        t->odd_line = t->line;
+        t->odd_width = line.width;
+    }
+    int code = line.strange ? meet_words(t, at, line.strange_columns) : PATINA_OK;
+    if (!code && (line.count < t->columns || (line.strange && line.width != t->width)))
+        code = fail_width(t, line.strange || t->words ? "words" : "numbers", line.width, t->width);
+    t->words |= line.strange > 0;
+    for (uint32_t c = 0; c < line.count; c++)
+        t->filled[c] += !isnan(values[c]);
+    return code;
 }
 
 // Goes over all rows; stores them, or only counts them and keeps the first ones.
@@ -342,25 +368,16 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
             continue;
         }
         const uint8_t *start = t->at;
-        struct pt_line line = read_row(t, values);
+        struct pt_line line = read_line(t, values);
         if (t->pts && line.count == 1 && !line.strange)
             continue; // how many points follow: the lines say it themselves
         if (line.empty && line.empty == line.width)
             continue; // a table's last lines
-        if (line.strange_columns & ~t->words) {
-            int code = meet_words(t, start, line.strange_columns & ~t->words);
-            if (code)
-                return code;
-            continue; // all rows are gone over again
-        }
-        if (!t->columns)
-            t->columns = line.count;
-        if (line.count < t->columns || (t->words && !line.count)) {
-            char what[96];
-            snprintf(what, sizeof what, t->words ? "%u words; %u were expected" : "%u numbers; %u were expected", line.width,
-                     t->words ? t->width : t->columns);
-            return fail_at(t, what);
-        }
+        int code = storing ? PATINA_OK : check_row(t, start, line, values);
+        if (code)
+            return code;
+        if (storing)
+            leave_out(t, values);
         if (t->cells.commas && t->cells.points)
             return fail_at(t, "decimals behind a comma, and others in this file behind a point: which is which cannot be told");
         if (t->ptx) {
@@ -389,6 +406,7 @@ static void rewind_text(struct text *t, const uint8_t *body, uint64_t line)
 {
     t->at = body;
     t->line = line;
+    t->breaks = 0;
 }
 
 // ---- columns -----------------------------------------------------------------------------------------------------------------
@@ -453,7 +471,7 @@ static bool names_points(const struct text *t)
 {
     struct text named = *t;
     named.columns = t->name_count;
-    name_roles(&named);
+    pt_roles_by_name(named.roles, named.names, named.columns);
     return has(&named, X);
 }
 
@@ -463,7 +481,7 @@ static uint32_t needed_columns(const struct text *t)
     struct text named = *t;
     uint32_t found = 0;
     named.columns = t->name_count;
-    name_roles(&named);
+    pt_roles_by_name(named.roles, named.names, named.columns);
     for (uint32_t c = 0; c < t->name_count; c++)
         found |= (uint32_t)(named.roles[c] != ATTRIBUTE) << c;
     return found;
@@ -475,7 +493,8 @@ static int fail_names(const struct text *t)
     uint32_t c = 0;
     for (; c < t->name_count && strlen(names) + strlen(t->names[c]) + 8 < sizeof names; c++)
         snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", c ? ", " : "", t->names[c]);
-    return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: no columns x, y and z in its line of names: %s%s", t->input->name, names,
+    return pt_fail(NULL, PATINA_ERROR_FORMAT,
+                   "%s: no columns x, y and z in its line of names: %s%s; rename the columns that are", t->input->name, names,
                    c < t->name_count ? ", ..." : "");
 }
 
@@ -538,7 +557,7 @@ static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
         return fail_at(t, "fewer than three numbers");
     while (!t->named && t->columns > 3 && always_empty(sample, count, t->columns - 1))
         t->columns--; // each line ends with a separator
-    name_roles(t);
+    pt_roles_by_name(t->roles, t->names, t->columns);
     if (t->named && !has(t, X))
         return fail_names(t);
     if (t->named && t->cells.parting == PT_PARTED_LOOSELY && t->columns == 2 * t->name_count)
@@ -553,17 +572,77 @@ static int choose_roles(struct text *t, double (*sample)[MOST_COLUMNS])
     return PATINA_OK;
 }
 
-// Of columns that hold words.
-static void leave_out_names(struct text *t)
+// Whether the sampled rows number the points in their first column, before four columns of numbers and words at their end.
+static bool has_numbers_of_points(const struct text *t, double (*sample)[MOST_COLUMNS], uint32_t count)
 {
-    uint32_t kept = 0;
-    for (uint32_t c = 0; c < MOST_COLUMNS; c++)
-        if (!(t->words >> c & 1))
+    uint32_t left_out = 0;
+    for (uint32_t c = 0; c < t->columns; c++)
+        left_out += t->left_out >> c & 1;
+    if (t->columns - left_out < 4 || !(t->left_out >> (t->columns - 1) & 1) || (t->left_out & 1) || count < 3)
+        return false;
+    bool counts = sample[0][0] == floor(sample[0][0]);
+    for (uint32_t i = 1; i < count; i++)
+        counts &= sample[i][0] == sample[i - 1][0] + 1.0;
+    return counts;
+}
+
+// Says which columns of the file, from 1, are taken for a place where nothing names them.
+static void tell_places(const struct text *t, bool numbered)
+{
+    uint32_t at[4] = {0}, found = 0;
+    for (uint32_t c = 0; c < t->columns && found < 4; c++)
+        if (!(t->left_out >> c & 1))
+            at[found++] = c + 1;
+    if (found == 4 || numbered)
+        pt_log(PT_LOG_WARNING, "%s: %sx, y and z are taken from columns %u, %u and %u; a first line of names would tell",
+               t->input->name, numbered ? "column 1 counts up by one: point numbers, left out; " : "", at[0], at[1], at[2]);
+}
+
+// What becomes of columns with words: see the head.
+static int decide_words(struct text *t, double (*sample)[MOST_COLUMNS])
+{
+    char called[NAME_SIZE + 16];
+    for (uint32_t c = 0; c < MOST_COLUMNS; c++) {
+        const struct words *found = &t->found[c];
+        if (!found->count)
+            continue;
+        call_column(t, c, called);
+        if (WORD_SHARE * found->count > found->count + t->filled[c]) {
+            t->left_out |= UINT32_C(1) << c;
+            pt_log(PT_LOG_WARNING, "%s: %s holds words ('%s' in line %llu) and is left out", t->input->name, called,
+                   found->first, (unsigned long long)found->first_line);
+        } else {
+            pt_log(PT_LOG_WARNING, "%s: %s holds %llu word%s among its numbers ('%s' in line %llu), taken as empty",
+                   t->input->name, called, (unsigned long long)found->count, found->count > 1 ? "s" : "", found->first,
+                   (unsigned long long)found->first_line);
+        }
+    }
+    if (!t->left_out)
+        return PATINA_OK;
+    bool loose = t->cells.parting == PT_PARTED_LOOSELY || t->cells.parting == PT_PARTED_BY_BLANKS;
+    if (t->odd_line) {
+        t->line = t->odd_line;
+        return fail_width(t, "words", t->odd_width, t->width);
+    }
+    if (t->named && (t->width < t->name_count || (loose && t->width > t->name_count)))
+        return fail_at(t, t->width < t->name_count ? "fewer words than names: which column is which cannot be told"
+                                                   : "more words than names: which column is which cannot be told");
+    uint32_t count = t->file->count < SAMPLES ? (uint32_t)t->file->count : SAMPLES;
+    if (!t->named) {
+        bool numbered = has_numbers_of_points(t, sample, count);
+        t->left_out |= numbered;
+        tell_places(t, numbered);
+    }
+    uint32_t kept = 0, columns = t->columns;
+    for (uint32_t c = 0; c < columns; c++)
+        if (!(t->left_out >> c & 1))
             memmove(t->names[kept++], t->names[c], NAME_SIZE);
-    for (; kept < MOST_COLUMNS; kept++)
+    for (t->columns = kept; kept < MOST_COLUMNS; kept++)
         t->names[kept][0] = 0;
-    for (uint32_t c = t->name_count; c-- > 0;)
-        t->name_count -= t->words >> c & 1;
+    t->name_count = t->named ? t->columns : 0;
+    for (uint32_t i = 0; i < count; i++)
+        leave_out(t, sample[i]);
+    return PATINA_OK;
 }
 
 static int read_all(struct text *t)
@@ -571,18 +650,14 @@ static int read_all(struct text *t)
     double(*sample)[MOST_COLUMNS] = calloc(SAMPLES, sizeof *sample);
     const uint8_t *body = t->at;
     uint64_t line = 1, count;
-    uint32_t known;
     int code = sample ? look(t, &body, &line) : PATINA_ERROR_MEMORY;
     if (!code) {
-        do {
-            known = t->words;
-            t->columns = t->width = 0;
-            rewind_text(t, body, line);
-            code = walk(t, false, sample, &t->file->count);
-        } while (!code && t->words != known);
-        if (!code && t->words && t->width < t->name_count)
-            code = fail_at(t, "fewer words than names: which column is which cannot be told");
-        leave_out_names(t);
+        rewind_text(t, body, line);
+        code = walk(t, false, sample, &t->file->count);
+    }
+    if (!code) {
+        t->line = line;
+        code = decide_words(t, sample);
     }
     if (!code && t->file->count > UINT32_MAX - 1)
         code = pt_fail(NULL, PATINA_ERROR_TOO_MANY_POINTS, "%s: %llu points, more than 2^32 - 2", t->input->name,
@@ -597,11 +672,28 @@ static int read_all(struct text *t)
     return code;
 }
 
-int pt_text_read(struct patina_file *file, const struct pt_input *input)
+// Where the lines begin: behind a byte order mark, and behind a first line "sep=;" as Excel writes it.
+static struct text begin(const struct pt_input *input)
 {
-    struct text t = {.input = input, .file = file, .at = input->data, .end = input->data + input->size, .line = 1};
+    struct text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
+    if (t.end - t.at > 6 && !strncasecmp((const char *)t.at, "sep=", 4) && pt_is_line_end(t.at[5]))
+        t.at += 5;
+    return t;
+}
+
+static bool is_utf16(const struct pt_input *input)
+{
+    return input->size >= 2 && (!memcmp(input->data, "\xFF\xFE", 2) || !memcmp(input->data, "\xFE\xFF", 2));
+}
+
+int pt_text_read(struct patina_file *file, const struct pt_input *input)
+{
+    if (is_utf16(input))
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: a text in UTF-16, which is not read; save it as CSV UTF-8", input->name);
+    struct text t = begin(input);
+    t.file = file;
     int code = read_all(&t);
     free(t.attributes);
     if (code || !t.staged) {
@@ -637,9 +729,9 @@ bool pt_text_is(const struct pt_input *input)
     static const uint8_t gzip[] = {0x1f, 0x8b};
     if (!input->size || !memcmp(input->data, gzip, input->size < 2 ? input->size : 2))
         return false;
-    struct text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
-    if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
-        t.at += 3;
+    if (is_utf16(input))
+        return true;
+    struct text t = begin(input);
     char word[NAME_SIZE];
     if (!find_line(&t) || !pt_cells_name(PT_PARTED_LOOSELY, t.at, t.end, word, sizeof word))
         return false;

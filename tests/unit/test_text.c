@@ -177,6 +177,110 @@ static void test_words(void **state)
     expect("Note,X,Y,Z,nx,ny,nz\ntree,1,2,3,0,0,1\n", "CSV", 1, PATINA_NONE, 1, "");
 }
 
+static void refuse(const char *text, const char *part)
+{
+    patina_file *file = NULL;
+    char message[256] = "";
+    assert_int_equal(patina_file_open_memory(text, strlen(text), &file), PATINA_ERROR_FORMAT);
+    patina_message(NULL, message, sizeof message);
+    if (!strstr(message, part))
+        fail_msg("'%s' is not in '%s'", part, message);
+}
+
+// Wherever the first word of a column stands, it is left out: point numbers with one of them 3A.
+static void test_words_met_late(void **state)
+{
+    (void)state;
+    const double wanted[6] = {1, 2, 3, 1, 2, 4};
+    take_log();
+    expect_rows("Name,X,Y,Z\n1,1,2,3\n2A,1,2,4\n", "CSV", 2, NULL, wanted);
+    assert_non_null(strstr(take_log(), "column 'Name' holds words ('2A' in line 3) and is left out"));
+    const double four[12] = {1, 2, 3, 1, 2, 4, 2, 2, 3, 4, 5, 6};
+    expect_rows("Name,X,Y,Z\n1,1,2,3\n2,1,2,4\n3A,2,2,3\n4,4,5,6\n", "CSV", 4, NULL, four);
+    expect_rows("X Y Z Name\n1 2 3 1\n1 2 4 2\n2 2 3 3A\n4 5 6 4\n", "CSV", 4, NULL, four);
+    expect_rows("Id,X,Y,Z,Code\n1,1,2,3,7\n2,1,2,4,a\n3A,2,2,3,8\n4,4,5,6,9\n", "CSV", 4, NULL, four);
+}
+
+// One word among many numbers is an empty cell; so are cells that say that they are.
+static void test_stray_words(void **state)
+{
+    (void)state;
+    enum { ROWS = 300 };
+    static char text[ROWS * 32];
+    static float values[ROWS];
+    char *end = text + sprintf(text, "X,Y,Z,Wert\n");
+    for (int i = 0; i < ROWS; i++)
+        end += i == 200 ? sprintf(end, "%d,2,3,#DIV/0!\n", i) : sprintf(end, "%d,2,3,%d\n", i, i);
+    take_log();
+    patina_file *file = read(text);
+    assert_int_equal(info_of(file).count, ROWS);
+    assert_int_equal(info_of(file).attributes, 1);
+    assert_int_equal(patina_file_read_attribute(file, 0, values, sizeof values), PATINA_OK);
+    for (int i = 0; i < ROWS; i++)
+        assert_true(i == 200 ? isnan(values[i]) : values[i] == (float)i);
+    assert_non_null(strstr(take_log(), "column 'Wert' holds 1 word among its numbers ('#DIV/0!' in line 202), taken as empty"));
+    patina_file_destroy(file);
+    const double wanted[16] = {1, 2, 3, NAN, 1, 2, 4, 5, 1, 2, 5, NAN, 1, 2, 6, NAN};
+    expect_rows("x,y,z,w\n1,2,3,-\n1,2,4,5\n1,2,5,n/a\n1,2,6,NaN\n", "CSV", 4, "w", wanted);
+    assert_string_equal(take_log(), "");
+    refuse("x,y,z,w\n1,2,3,4\n1,2,n/a,5\n", "line 3: column 'z' holds a word");
+}
+
+// Without names, a first column that counts up by one before four others and a word numbers the points.
+static void test_point_numbers(void **state)
+{
+    (void)state;
+    const double wanted[9] = {54.5, 45.25, 3, 55.5, 46.25, 4, 56.5, 47.25, 5}, four[4] = {1, 54.5, 45.25, 3};
+    take_log();
+    expect_rows("1000,54.5,45.25,3,TREE\n1001,55.5,46.25,4,TREE\n1002,56.5,47.25,5,WALL\n", "XYZ", 3, NULL, wanted);
+    assert_non_null(
+        strstr(take_log(), "column 1 counts up by one: point numbers, left out; x, y and z are taken from columns 2, 3 and 4"));
+    expect_rows("1 54.5 45.25 3 TREE\n", "XYZ", 1, "intensity", four); // one row counts nothing
+    assert_non_null(strstr(take_log(), "x, y and z are taken from columns 1, 2 and 3"));
+    expect("1,54,45,3\n2,55,46,4\n3,56,47,5\n", "XYZ", 3, PATINA_NONE, 0, "intensity");
+    expect("1,54,45,TREE\n2,55,46,TREE\n3,56,47,TREE\n", "XYZ", 3, PATINA_NONE, 0, "");
+    expect("1,5,5,3,a\n2,5,6,4,a\n4,5,7,5,a\n", "XYZ", 3, PATINA_NONE, 0, "intensity");
+}
+
+// Headers as surveys and spreadsheets write them.
+static void test_headers(void **state)
+{
+    (void)state;
+    static const char *const headers[] = {"X [m],Y [m],Z [m]",
+                                          "X (m),Y (m),Z (m)",
+                                          "Easting(m),Northing(m),Height(m)",
+                                          "E,N,H",
+                                          "XCOORD,YCOORD,ZCOORD",
+                                          "pos_x,pos_y,pos_z",
+                                          "x_coord,y_coord,z_coord",
+                                          "Rechtswert,Hochwert,H\xC3\xB6he",
+                                          "Rechtswert,Hochwert,H\xF6he",
+                                          "sep=,\nX,Y,Z",
+                                          "sep=,\r\nX,Y,Z"};
+    const double wanted[6] = {1.5, 2, 3, 4, 5, 6};
+    for (size_t i = 0; i < sizeof headers / sizeof *headers; i++) {
+        char text[128];
+        snprintf(text, sizeof text, "%s\n1.5,2,3\n4,5,6\n", headers[i]);
+        expect_rows(text, "CSV", 2, NULL, wanted);
+    }
+    expect("n,x,y,z,h,e\n1,2,3,4,5,6\n", "CSV", 1, PATINA_NONE, 0, "n h e");
+    expect("X [m];Y [m];Z [m];R (0-255);G;B\n1;2;3;4;5;6\n", "CSV", 1, PATINA_UINT8, 0, "");
+}
+
+// A note within quotes may hold line ends, and quotes of its own; lines are counted on.
+static void test_quoted_lines(void **state)
+{
+    (void)state;
+    const double wanted[6] = {1, 2, 3, 4, 5, 6};
+    take_log();
+    expect_rows("Name,X,Y,Z,Note\nP0,1,2,3,\"two\nlines\"\nP1,4,5,6,\"two\r\nlines, and\nmore\"\n", "CSV", 2, NULL, wanted);
+    assert_non_null(strstr(take_log(), "('two lines' in line 2)"));
+    expect_rows("\"Name\";X;Y;Z\n\"Tree \"\"big\"\" 0\";1;2;3\n\"a \"\"b\"\"\";4;5;6\n", "CSV", 2, NULL, wanted);
+    assert_non_null(strstr(take_log(), "'Tree \"big\" 0'"));
+    refuse("X,Y,Z,Note\n1,2,3,\"two\nlines\"\n1,2,tree,b\n", "line 4: column 'Z' holds a word");
+    expect_rows("X,Y,Z,Note\n1,2,3,\"inch\n4,5,6,b\n", "CSV", 2, NULL, wanted);
+}
+
 // A first row without a place is a row like another, and says nothing of what the columns are.
 static void test_first_row_of_nan(void **state)
 {
@@ -289,16 +393,6 @@ static void test_grid_normals(void **state)
     assert_int_equal(patina_grid_normals(&desc, NULL, n[0]), PATINA_ERROR_ARGUMENT);
 }
 
-static void refuse(const char *text, const char *part)
-{
-    patina_file *file = NULL;
-    char message[256] = "";
-    assert_int_equal(patina_file_open_memory(text, strlen(text), &file), PATINA_ERROR_FORMAT);
-    patina_message(NULL, message, sizeof message);
-    if (!strstr(message, part))
-        fail_msg("'%s' is not in '%s'", part, message);
-}
-
 // The same of a file on disk, whose name says what it is meant to be.
 static void refuse_file(const char *name, const char *text, const char *part)
 {
@@ -330,7 +424,10 @@ static void test_refused(void **state)
     refuse("X,Y,Z,Red,Green,Blue\n1,2,3,4,5,6\n1,2,3,4,n/a,6\n", "line 3: column 'Green' holds a word, 'n/a'");
     refuse("X,Y,Z,Note\n1,2,3,tree\n1,2,tree,4\n", "line 3: column 'Z' holds a word, 'tree'");
     refuse("X Y Z Note\n1 2 3 tree\n1 2 3 a tree\n", "line 3: 5 words; 4 were expected");
-    refuse("Point Id X Y Z Code\nP1 1 2 3 7\n", "which column is which cannot be told");
+    refuse("Point Id X Y Z Code\nP1 1 2 3 7\n", "line 2: fewer words than names: which column is which cannot be told");
+    refuse("Name X Y Z\nP 1 1 2 3\nP 2 1 2 4\n", "line 2: more words than names");
+    refuse("Name,X,Y,Z\na,\"456,789.784\",\"5,412,343.884\",-1.5\nb,1,2,3\n", "marks between thousands are not read");
+    refuse("\xFF\xFEX", "a text in UTF-16, which is not read; save it as CSV UTF-8");
     refuse("1 P1 2 3\n4 P2 five 6\n", "line 2: column 3 holds a word, 'five'");
     refuse("X;Y;Z\n1.5;2;3\n1,5;2;3\n", "line 3: decimals behind a comma");
     refuse_file("patina_text.csv", "id,lon,lat,elev\n1,2,3,4\n",
@@ -342,10 +439,11 @@ static void test_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_columns), cmocka_unit_test(test_values),   cmocka_unit_test(test_decimal_commas),
-        cmocka_unit_test(test_tables),  cmocka_unit_test(test_words),    cmocka_unit_test(test_first_row_of_nan),
-        cmocka_unit_test(test_ptx),     cmocka_unit_test(test_ptx_grid), cmocka_unit_test(test_grid_normals),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_columns),       cmocka_unit_test(test_values),         cmocka_unit_test(test_decimal_commas),
+        cmocka_unit_test(test_tables),        cmocka_unit_test(test_words),          cmocka_unit_test(test_first_row_of_nan),
+        cmocka_unit_test(test_ptx),           cmocka_unit_test(test_ptx_grid),       cmocka_unit_test(test_grid_normals),
+        cmocka_unit_test(test_refused),       cmocka_unit_test(test_words_met_late), cmocka_unit_test(test_stray_words),
+        cmocka_unit_test(test_point_numbers), cmocka_unit_test(test_headers),        cmocka_unit_test(test_quoted_lines),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
