@@ -5,13 +5,10 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import EnumProperty
-from bpy.types import Context, Node, NodeSocket, NodeTree, Operator, Scene, TOPBAR_MT_render
+from bpy.types import Context, Operator, Scene, TOPBAR_MT_render
 
-from .. import pairs
+from .. import combination, pairs
 from ..pairs import MARK
-
-NODE = "Patina Combine"
-_BELOW = 1 if bpy.app.version < (5, 0, 0) else 0  # input of Alpha Over; before it was the factor, 1
 
 
 class PATINA_OT_combine(Operator):
@@ -47,7 +44,7 @@ draws them, and the compositor takes what is nearer. That scene follows this one
         points = _points_scene(scene)
         for one in (scene, points):
             one.view_layers[layer].use_pass_z = True
-        _link_nodes(scene, points, layer)
+        combination.link(scene, points, layer)
         self.report({'INFO'}, f"F12 renders '{scene.name}' with points now; Patina's settings are in scene '{points.name}'")
         return {'FINISHED'}
 
@@ -84,9 +81,11 @@ def _points_scene(scene: Scene) -> Scene:
     """A scene of the same objects that Patina draws, without faces and without background. The one from last time goes."""
     old = pairs.points_of(scene)
     points = scene.copy()  # collections and objects are the same
-    if old:  # what was set there stays
+    if old:  # what was set there stays, and what lies in it alone
         for name in old.patina.keys():
             points.patina[name] = old.patina[name]
+        pairs.bring_own(points, old)
+        combination.hand_over(scene, old, points)
         bpy.data.scenes.remove(old)
     points.name = f"{scene.name} Points"
     points[MARK] = scene
@@ -99,74 +98,6 @@ def _points_scene(scene: Scene) -> Scene:
     else:
         points.compositing_node_group = None
     return points
-
-
-def _tree(scene: Scene) -> NodeTree:
-    """The scene's compositor tree; a new one shows the scene's layer."""
-    if bpy.app.version < (5, 0, 0):
-        scene.use_nodes = True
-        return scene.node_tree
-    if scene.compositing_node_group is None:
-        tree = bpy.data.node_groups.new(f"{scene.name} Compositor", 'CompositorNodeTree')
-        tree.interface.new_socket("Image", in_out='OUTPUT', socket_type='NodeSocketColor')
-        scene.compositing_node_group = tree
-    return scene.compositing_node_group
-
-
-def _output(tree: NodeTree) -> NodeSocket:
-    """Where the picture goes."""
-    kind = 'COMPOSITE' if bpy.app.version < (5, 0, 0) else 'GROUP_OUTPUT'
-    found = [node for node in tree.nodes if node.type == kind]
-    node = found[0] if found else tree.nodes.new(
-        'CompositorNodeComposite' if kind == 'COMPOSITE' else 'NodeGroupOutput')
-    node.location = node.location if found else (700, 300)
-    return node.inputs[0]
-
-
-def _layers(tree: NodeTree, scene: Scene, layer: str, place: tuple[int, int]) -> Node:
-    """A Render Layers node of a scene's layer: the one that is there, or a new one."""
-    for node in tree.nodes:
-        if node.type == 'R_LAYERS' and node.scene == scene and node.layer == layer:
-            return node
-    node = tree.nodes.new('CompositorNodeRLayers')
-    node.scene, node.layer, node.location = scene, layer, place
-    return node
-
-
-def _over(tree: NodeTree, name: str, place: tuple[int, int], below: NodeSocket, above: NodeSocket) -> NodeSocket:
-    """One premultiplied picture over another."""
-    node = tree.nodes.get(name) or tree.nodes.new('CompositorNodeAlphaOver')
-    node.name = node.label = name
-    node.location = place
-    tree.links.new(below, node.inputs[_BELOW])
-    tree.links.new(above, node.inputs[_BELOW + 1])
-    return node.outputs[0]
-
-
-def _link_nodes(scene: Scene, points: Scene, layer: str) -> None:
-    """What went into the output goes through the combination: of the picture over the points and the points over the picture,
-    each pixel takes the one whose upper half is nearer. (Z Combine's own use of alpha takes premultiplied colours for straight.)
-    """
-    tree = _tree(scene)
-    output = _output(tree)
-    around, ours = _layers(tree, scene, layer, (0, 300)), _layers(tree, points, layer, (0, -100))
-    for node in [node for node in tree.nodes if node.type == 'R_LAYERS' and node.scene is None]:
-        tree.nodes.remove(node)  # of the points' scene that went
-    known = tree.nodes.get(f"{NODE}: under")
-    source = known.inputs[_BELOW + 1] if known else output
-    image = source.links[0].from_socket if source.is_linked else around.outputs["Image"]
-    combine = tree.nodes.get(NODE) or tree.nodes.new('CompositorNodeZcombine')
-    combine.name = combine.label = NODE
-    combine.location = (500, 200)
-    under = _over(tree, f"{NODE}: under", (300, 300), ours.outputs["Image"], image)
-    over = _over(tree, f"{NODE}: over", (300, 0), image, ours.outputs["Image"])
-    if bpy.app.version < (5, 0, 0):
-        combine.use_alpha = combine.use_antialias_z = False
-    else:
-        combine.inputs["Use Alpha"].default_value = combine.inputs["Anti-Alias"].default_value = False
-    for place, socket in enumerate((under, around.outputs["Depth"], over, ours.outputs["Depth"])):
-        tree.links.new(socket, combine.inputs[place])
-    tree.links.new(combine.outputs[0], output)
 
 
 def _menu(self: bpy.types.Menu, _context: Context) -> None:

@@ -7,6 +7,7 @@ import tempfile
 import bpy
 import numpy as np
 from harness import add_points, check, check_close, new_scene, reports
+from patina import pairs
 
 
 def crossing():
@@ -120,6 +121,100 @@ def change(scene):
     yield "cropped border", lambda: border(True)
     yield "border", lambda: border(False)
     yield "markers", markers
+
+
+def places(scene):
+    """(what, step, whether the small patch of points in the upper left corner shows): where objects and collections are put."""
+    x, y = np.meshgrid(np.linspace(-0.5, -0.3, 60), np.linspace(0.2, 0.4, 60))
+    patch = np.stack([x, y, np.full_like(x, -2.0)], -1).reshape(-1, 3)
+    obj = add_points(patch, np.tile(np.uint8((0, 255, 0, 255)), (len(patch), 1)), None, name="patch", link=False)
+    outer, inner = bpy.data.collections.new("outer"), bpy.data.collections.new("inner")
+
+    def layer_of(*names):
+        found = bpy.context.view_layer.layer_collection
+        for name in names:
+            found = found.children[name]
+        return found
+
+    def moved():
+        inner.objects.unlink(obj)
+        outer.objects.link(obj)
+
+    yield "at the root", lambda: scene.collection.objects.link(obj), True
+    yield "away from it", lambda: scene.collection.objects.unlink(obj), False
+    yield "in a new collection", lambda: (inner.objects.link(obj), scene.collection.children.link(inner)), True
+    yield "excluded", lambda: setattr(layer_of("inner"), "exclude", True), False
+    yield "not any more", lambda: setattr(layer_of("inner"), "exclude", False), True
+    yield "deeper", lambda: (scene.collection.children.unlink(inner), outer.children.link(inner),
+                             scene.collection.children.link(outer)), True
+    yield "the outer excluded", lambda: setattr(layer_of("outer"), "exclude", True), False
+    yield "the inner alone", lambda: (setattr(layer_of("outer"), "exclude", False),
+                                      setattr(layer_of("outer", "inner"), "exclude", True)), False
+    yield "out of it", moved, True
+    yield "held out", lambda: setattr(layer_of("outer"), "holdout", True), False
+    yield "no more", lambda: setattr(layer_of("outer"), "holdout", False), True
+    yield "removed", lambda: bpy.data.collections.remove(outer), False
+
+
+def test_points_follow_collections():
+    """What is put into the scene later shows, wherever; what is excluded or taken away does not. Nothing has to be combined again."""
+    scene = crossing()
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    points = bpy.data.scenes[f"{scene.name} Points"]
+    for what, step, shown in places(scene):
+        step()
+        green = picture(scene)[35:40, 11:17, 1].max()
+        check((green > 0.5) == shown, f"{what}: {green:.2f} of green where the points are")
+        check({item.name for item in points.collection.all_objects} == {item.name for item in scene.collection.all_objects}, what)
+
+
+def test_followed_before_a_picture():
+    """Blender tells of collections at once: the scene of points is right on the screen too, and in undo."""
+    scene = crossing()
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    points = bpy.data.scenes[f"{scene.name} Points"]
+    late = bpy.data.collections.new("late")
+    scene.collection.children.link(late)
+    bpy.context.view_layer.update()
+    check("late" in points.collection.children, "a new collection came not before the picture")
+    bpy.context.view_layer.layer_collection.children["late"].exclude = True
+    bpy.context.view_layer.update()
+    check(points.view_layers[0].layer_collection.children["late"].exclude, "it is not excluded before the picture")
+
+
+def test_points_scene_has_its_own():
+    """What an artist puts into the scene of points alone stays in it, combined again too."""
+    scene = crossing()
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    points = bpy.data.scenes[f"{scene.name} Points"]
+    own = add_points(np.zeros((3, 3)), name="own", link=False)
+    points.collection.objects.link(own)
+    for _ in range(2):
+        picture(scene)
+        points = bpy.data.scenes[f"{scene.name} Points"]
+        check("own" in points.collection.objects and "own" not in scene.collection.objects, f"{points.collection.objects[:]}")
+        bpy.ops.scene.patina_combine(engine='CYCLES')
+
+
+def test_scene_of_points_deleted():
+    """Then the picture is that of the first scene alone, which is said once; combining again brings the points back."""
+    scene = crossing()
+    alone = picture(scene)
+    bpy.ops.scene.patina_combine(engine='CYCLES')
+    both = picture(scene)
+    said, tell = [], pairs.tell
+    pairs.tell = said.append
+    try:
+        bpy.data.scenes.remove(bpy.data.scenes[f"{scene.name} Points"])
+        for _ in range(2):
+            check_close(picture(scene), alone, 1e-6, "the faces alone")
+        check(len(said) == 1 and "without points" in said[0] and scene.name in said[0], f"{said}")
+        bpy.ops.scene.patina_combine(engine='CYCLES')
+        bpy.ops.scene.patina_combine(engine='CYCLES')
+        check_close(picture(scene), both, 1e-6, "combined again")
+        check(len(said) == 1, f"{said}")
+    finally:
+        pairs.tell = tell
 
 
 def test_points_follow_their_scene():
