@@ -171,14 +171,14 @@ def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], f
             continue
         key = obj.data.as_pointer()
         if key not in boxes:
-            boxes[key] = _corners(obj, frame)
+            boxes[key] = dense_corners(obj, frame)
         solid = not chosen and obj.type == 'MESH' and len(obj.data.polygons) and not obj.patina.linked_file
         (others if solid else points).extend(instance.matrix_world @ corner for corner in boxes[key])
     return points or others
 
 
-def _corners(obj: bpy.types.Object, frame: int) -> list[Vector]:
-    """Of the box without strays, in the object's space. Of a mesh with faces, of all of it."""
+def dense_corners(obj: bpy.types.Object, frame: int) -> list[Vector]:
+    """Of the box without strays, in the object's space. Of a mesh with faces, of all of it. PatinaError where a file cannot be read."""
     if obj.patina.linked_file:
         source = linked.source_of(obj, frame, [])
         if source is None:

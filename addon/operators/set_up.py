@@ -10,7 +10,9 @@ import bpy
 from bpy.types import Context, Object, Operator, Scene
 from mathutils import Vector
 
+from .. import native
 from ..engine import PatinaRenderEngine
+from . import analyze
 
 START = {"Cube": 'MESH', "Camera": 'CAMERA', "Light": 'LIGHT'}  # what Blender begins with
 LEAST = 0.05  # W/m2 from a lamp that count as light; the start scene's gives a cube beside it 1.5
@@ -34,15 +36,25 @@ def _as_it_came(obj: Object) -> bool:
 def unlit(scene: Scene, points: Sequence[Object]) -> bool:
     """Whether some of the points get light of none. Those with colours of their own too: a ramp over heights or classes is lit."""
     lamps = [lamp for lamp in scene.objects if lamp.type == 'LIGHT' and not lamp.hide_render]
-    return not scene.patina.studio.use_light and not all(any(_reaches(lamp, obj) for lamp in lamps) for obj in points)
+    if scene.patina.studio.use_light or any(lamp.data.type == 'SUN' and lamp.data.energy > LEAST for lamp in lamps):
+        return False
+    return not lamps or not all(any(_reaches(lamp, corners) for lamp in lamps) for corners in (_corners(scene, obj) for obj in points))
 
 
-def _reaches(lamp: Object, obj: Object) -> bool:
-    if lamp.data.type == 'SUN':
-        return lamp.data.energy > LEAST
-    corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]  # where it stands amid them, too, it must reach
+def _corners(scene: Scene, obj: Object) -> list[Vector]:
+    """In the world, of the box without strays; of a file that cannot be read the box that the object shows."""
+    found = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    try:
+        corners = analyze.dense_corners(found, scene.frame_current)
+    except native.PatinaError:
+        corners = []
+    return [obj.matrix_world @ corner for corner in corners or map(Vector, obj.bound_box)]
+
+
+def _reaches(lamp: Object, corners: Sequence[Vector]) -> bool:
+    """Where it stands amid them, too, it must reach. No sun."""
     away = sum((lamp.matrix_world.translation - corner).length_squared for corner in corners) / 8.0
-    return lamp.data.energy > LEAST * 4.0 * math.pi * math.pi * max(away, 1e-12)
+    return lamp.data.type != 'SUN' and lamp.data.energy > LEAST * 4.0 * math.pi * math.pi * max(away, 1e-12)
 
 
 class PATINA_OT_set_up(Operator):

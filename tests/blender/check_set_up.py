@@ -54,6 +54,22 @@ def test_set_up_leaves_what_is_lit():
     check(not scene.patina.studio.use_headlight, "a headlight that nobody needs")
 
 
+def test_strays_keep_no_light_away():
+    """A ball beside the start scene's lamp, and one point at a hundred radii: the lamp reaches what is there, linked or not."""
+    for count, link in ((300, False), (2000, True)):
+        scene = start_scene()
+        points, _, _ = sphere(count, 1.0, (0, 0, 0))
+        points = np.concatenate([points, [(70.0, 50.0, 50.0)]])
+        rows = [(axis, "f4", points[:, i]) for i, axis in enumerate("xyz")]
+        obj, = import_ply(write_ply(f"stray_{count}.ply", rows), link=link)
+        check(not set_up.unlit(scene, [obj]), f"{count} points: the lamp reaches them")
+        bpy.ops.scene.patina_set_up()
+        check(not scene.patina.studio.use_headlight, f"{count} points: a headlight that nobody needs")
+        obj.matrix_world.translation = (400, 0, 0)
+        bpy.context.view_layer.update()
+        check(set_up.unlit(scene, [obj]), "far from the lamp")
+
+
 def test_ramps_of_coloured_surveys_are_lit():
     """Colours of their own are shown without light; colours by height are not, and were nearly black."""
     scene = start_scene()
