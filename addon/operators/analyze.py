@@ -10,7 +10,7 @@ from mathutils import Matrix, Vector
 
 from .. import jobs, native
 from ..importers import NORMAL_NAME, WHOLE, Progress
-from ..sync import analysis, analyzing, attributes, linked
+from ..sync import analysis, analyzing, attributes, linked, losses
 from .steps import Stepped
 
 # attribute → its type, the key of an element's values
@@ -167,7 +167,7 @@ def _corners_of(depsgraph: bpy.types.Depsgraph, chosen: set[bpy.types.Object], f
     for instance in depsgraph.object_instances:
         obj = instance.object
         owner = instance.parent if instance.is_instance else obj
-        if not _has_points(obj) or chosen and owner.original not in chosen:
+        if not _has_points(obj) or chosen and owner.original not in chosen or not losses.is_placed(instance, []):
             continue
         key = obj.data.as_pointer()
         if key not in boxes:

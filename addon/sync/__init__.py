@@ -89,7 +89,7 @@ def describe_items(depsgraph: bpy.types.Depsgraph, view: View, notices: list[str
     return SceneDescription(
         clouds=points,
         meshes=[item for item in items if isinstance(item, MeshItem)],
-        clips=clips.collect(depsgraph),
+        clips=clips.collect(depsgraph, notices),
         lights=lights.collect(depsgraph, notices, around.spot),
         headlight=lights.headlight(scene, view, notices),
         lines=lines.read(scene, view.camera),

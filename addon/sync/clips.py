@@ -9,6 +9,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from ..properties import enum_number
+from . import losses
 from .camera import row_major
 
 
@@ -29,11 +30,11 @@ def cuts(obj: bpy.types.Object) -> bool:
     return obj.patina.clip.shape != 'NONE'
 
 
-def collect(depsgraph: bpy.types.Depsgraph) -> list[Clip]:
+def collect(depsgraph: bpy.types.Depsgraph, notices: list[str]) -> list[Clip]:
     clips = []
     for instance in depsgraph.object_instances:
         obj = instance.object
-        if not cuts(obj):
+        if not cuts(obj) or not losses.is_placed(instance, notices):
             continue
         clips.append(of_object(obj, instance.matrix_world))
     return clips

@@ -276,7 +276,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             unknown.look_at_light(instance)
         if obj.type not in {'MESH', 'POINTCLOUD'} or not instance.show_self or not obj.visible_camera or clips.cuts(obj):
             continue
-        if not visible(instance):
+        if not visible(instance) or not losses.is_placed(instance, notices):
             continue
         attributes.finish_edits(obj)
         solid = obj.type == 'MESH' and len(obj.data.polygons) > 0 and not obj.patina.linked_file

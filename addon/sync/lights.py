@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import bpy
 from mathutils import Matrix, Vector
 
+from . import losses
 from .camera import Camera, View
 from .world import Spot
 
@@ -72,6 +73,8 @@ def collect(depsgraph: bpy.types.Depsgraph, notices: list[str], spot: Spot | Non
             continue
         color, power = _emission(obj.data)
         if power <= 0.0 or max(color) <= 0.0:  # zero would mean "default" to the library
+            continue
+        if not losses.is_placed(instance, notices):
             continue
         lights.append(_light(obj.data, instance.matrix_world, color, power, use_shadows))
     suns = [_sun(spot.color, 1.0, -Vector(spot.toward), spot.angle, use_shadows)] if spot else []

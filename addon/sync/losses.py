@@ -3,13 +3,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+
+import bpy
 
 from .. import native, options
 
 
 class Loss(str):
     """A notice of what a picture was to show and does not."""
+
+
+def is_placed(instance: bpy.types.DepsgraphObjectInstance, notices: list[str]) -> bool:
+    """Whether an object or instance stands somewhere; one that a driver, say, put at a place that is no number is named."""
+    if math.isfinite(sum(map(sum, instance.matrix_world))):
+        return True
+    notice = Loss(f"'{instance.object.name}' is left out: its location, rotation or scale is not a number")
+    if notice not in notices:
+        notices.append(notice)
+    return False
 
 
 def check(notices: Iterable[str]) -> None:

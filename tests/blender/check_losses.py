@@ -2,6 +2,7 @@
 """Linked files that are missing or cannot be read, frames without points: a warning, and with --patina-strict a failure."""
 
 import contextlib
+import math
 import subprocess
 import sys
 
@@ -9,7 +10,8 @@ import bpy
 from check_import import import_ply
 from check_linked import dense
 from check_sequence import link, scans, shown
-from harness import REPOSITORY, SCRATCH, Skip, add_points, check, drawn, failing_render, new_scene, render, reports, sphere, written
+from harness import REPOSITORY, SCRATCH, Skip, add_light, add_points, check, drawn, failing_render, new_scene, render, reports, sphere, written
+from mathutils import Matrix
 
 
 @contextlib.contextmanager
@@ -42,6 +44,47 @@ def test_left_out_with_a_warning():
         with strictly():
             message = failing_render()
             check(str(path) in message and not written, message)
+
+
+def nowhere(obj):
+    """As a driver that divides by zero leaves it."""
+    obj.matrix_world = Matrix.Translation((float("nan"), 0.0, 0.0))
+    return obj
+
+
+def test_objects_without_a_place():
+    """What stands at a place that is no number is left out and named once, whatever it is; the others are drawn."""
+    def face(name):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+        bpy.context.scene.collection.objects.link(obj := bpy.data.objects.new(name, mesh))
+        return obj
+
+    def clip(name):
+        bpy.context.scene.collection.objects.link(obj := bpy.data.objects.new(name, None))
+        obj.patina.clip.shape = 'BOX'
+        return obj
+
+    def lamp(name):
+        obj = add_light('POINT', 100.0)
+        obj.name = name
+        return obj
+
+    def cloud(name):
+        return add_points(*sphere(3000, 0.5), name=name)
+
+    for make in (face, clip, lamp, cloud):
+        scene = new_scene()
+        add_points(*sphere(3000, 0.5))
+        whole = len(drawn(render()))
+        scene.patina.meshes = 'TRIANGLES'
+        nowhere(make("nowhere"))
+        check(len(drawn(render())) == whole > 100, f"{make.__name__}: {len(drawn(render()))} pixels where {whole} were")
+        check([kind for kind, text in reports if "'nowhere'" in text] == ['WARNING'] and len(reports) == 1, f"{make.__name__}: {reports}")
+        with strictly():
+            check("'nowhere'" in failing_render(), make.__name__)
+    bpy.ops.object.patina_frame_points()
+    check(all(map(math.isfinite, scene.camera.location)), f"the camera went to {scene.camera.location[:]}")
 
 
 def test_an_animation_goes_on():
