@@ -200,9 +200,14 @@ def _known_gap(group: PropertyGroup) -> float:
     return 2.0 * _known_distance(group)
 
 
-def _follow_file(group: PropertyGroup, _context: Context) -> None:
+def _linked_file(group: PropertyGroup) -> str:
     from ..sync import files  # which needs these properties
-    files.follow(group.id_data)
+    return files.text_of(group.id_data)
+
+
+def _link_file(group: PropertyGroup, path: str) -> None:
+    from ..sync import files
+    files.assign(group.id_data, path)
 
 
 class PatinaObjectProperties(PropertyGroup):
@@ -284,7 +289,7 @@ class PatinaObjectProperties(PropertyGroup):
     linked_data: PointerProperty(  # where the file's path is kept: sync/files.py
         type=Volume, name="Linked Data", override=_OVERRIDE, options={'HIDDEN'})
     linked_file: StringProperty(
-        name="Linked File", override=_OVERRIDE, subtype='FILE_PATH', options=_PATH, update=_follow_file,
+        name="Linked File", subtype='FILE_PATH', options=_PATH, get=_linked_file, set=_link_file,
         description="Point file that is drawn in place of the object's own vertices; its points never become Blender's. "
                     "Number signs in its name stand for digits: scan_####.ply shows a file a frame")
     sequence: PointerProperty(type=PatinaSequenceProperties, override=_OVERRIDE)

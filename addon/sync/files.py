@@ -4,7 +4,7 @@
 A Volume datablock holds it, for those of datablocks are the paths that Blender itself takes care of: it makes them relative
 and absolute, maps them anew on Save As, finds them where they are missing, packs and unpacks them, and farms collect them.
 Paths among an add-on's own properties get nothing of that. Volumes stand in no list of pictures, and Blender opens none that
-no object shows. Object.patina.linked_file is how scripts say it, and what older versions saved.
+no object shows. Object.patina.linked_file is how scripts see and say it; older versions saved it as a text.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
@@ -19,6 +20,7 @@ from bpy.app.handlers import persistent
 from ..importers.reading import told
 from . import kept, sequence
 
+_TEXT = "linked_file"
 _unpacked: dict[tuple[int, int], Path] = {}  # of packed files, by place in memory and size
 
 
@@ -28,7 +30,7 @@ def assign(obj: bpy.types.Object, path: str) -> None:
     volume = group.linked_data
     if not path:
         group.linked_data = None
-        group.linked_file = ""
+        _stored(obj).pop(_TEXT, None)
         return
     place = Path(bpy.path.abspath(path))
     files = sequence.files_of(place) if sequence.is_pattern(place) else {}
@@ -41,8 +43,7 @@ def assign(obj: bpy.types.Object, path: str) -> None:
         own = volume if volume and not volume.library and volume.users == 1 else None
         volume = group.linked_data = next(known, own) or bpy.data.volumes.new(told(bpy.path.basename(path)))
         volume.filepath, volume.is_sequence = path, follows
-    if group.linked_file != text_of(obj):
-        group.linked_file = text_of(obj)
+    _stored(obj).pop(_TEXT, None)
 
 
 def as_preferred(path: Path) -> str:
@@ -60,7 +61,7 @@ def path_of(obj: bpy.types.Object) -> Path | None:
     original = obj.original
     volume = original.patina.linked_data
     if volume is None:  # of an older version, and of a library
-        text = original.patina.linked_file
+        text = text_of(original)
         return Path(bpy.path.abspath(text, library=original.library)) if text else None
     path = Path(bpy.path.abspath(volume.filepath, library=volume.library))
     if volume.packed_file and not volume.is_sequence:  # of those Blender packs the first
@@ -84,32 +85,27 @@ def _put_down(packed: bpy.types.PackedFile, path: Path) -> Path:
 
 
 def text_of(obj: bpy.types.Object) -> str:
-    """What linked_file is to say."""
+    """What linked_file says."""
     volume = obj.patina.linked_data
     if volume is None:
-        return obj.patina.linked_file
+        return _stored(obj).get(_TEXT, "")
     if not volume.is_sequence:
         return volume.filepath
     path = Path(volume.filepath)
     return volume.filepath[:-len(path.name)] + (sequence.pattern_of(path) or path).name
 
 
-def follow(obj: bpy.types.Object) -> None:
-    """linked_file was set."""
-    if obj.patina.linked_file != text_of(obj) or obj.patina.linked_file and obj.patina.linked_data is None:
-        assign(obj, obj.patina.linked_file)
+def _stored(obj: bpy.types.Object) -> Any:
+    """What older versions saved, by property; like a dict."""
+    return obj.patina if bpy.app.version < (5, 0, 0) else obj.patina.bl_system_properties_get() or {}
 
 
 @persistent
-def _tell(*_) -> None:
-    """Once a file is loaded, and before and after it is saved, which may rewrite paths: objects of older versions get their volume, and all say what holds."""
+def _renew(*_) -> None:
+    """Once a file is loaded: objects of older versions get their volume."""
     for obj in bpy.data.objects:
-        if obj.library is None and (obj.patina.linked_data or obj.patina.linked_file):
-            text = text_of(obj)
-            if obj.patina.linked_data is None:
-                assign(obj, text)
-            elif obj.patina.linked_file != text:
-                obj.patina.linked_file = text
+        if obj.library is None and _stored(obj).get(_TEXT):
+            assign(obj, text_of(obj))
 
 
 @persistent
@@ -117,8 +113,7 @@ def _forget(*_) -> None:
     _unpacked.clear()
 
 
-_HANDLERS = ((bpy.app.handlers.load_pre, _forget), (bpy.app.handlers.load_post, _tell), (bpy.app.handlers.save_pre, _tell),
-             (bpy.app.handlers.save_post, _tell))
+_HANDLERS = ((bpy.app.handlers.load_pre, _forget), (bpy.app.handlers.load_post, _renew))
 
 
 def register() -> None:

@@ -46,6 +46,7 @@ def test_linked_path_is_made_relative_and_absolute():
     check(obj.patina.linked_file == "//scans/scan.ply", f"what scripts see once it is saved: {obj.patina.linked_file}")
     bpy.ops.file.make_paths_absolute()
     check(obj.patina.linked_data.filepath == str(scan), obj.patina.linked_data.filepath)
+    check(obj.patina.linked_file == str(scan), f"what scripts see at once: {obj.patina.linked_file}")
 
 
 def drawn_points():
@@ -95,6 +96,7 @@ def test_missing_scan_is_found():
     check(any("scan.ply is missing" in text for _, text in reports), f"{reports}")
     bpy.ops.file.find_missing_files(directory=str(base / "second"))
     check(files.path_of(obj).samefile(base / "second/deep/scan.ply"), f"{files.path_of(obj)}")
+    check(Path(bpy.path.abspath(obj.patina.linked_file)).samefile(base / "second/deep/scan.ply"), f"scripts see {obj.patina.linked_file}")
     check("20,000" in drawn_points(), "not drawn")
 
 
@@ -118,6 +120,7 @@ def test_packed_scan_needs_no_file():
         check((pixels == picture[name]).all(), f"{name} differs")
     bpy.ops.file.unpack_all(method='WRITE_ORIGINAL')
     check(scan.is_file() and files.path_of(obj).samefile(scan), "not put back")
+    check(Path(os.path.normpath(bpy.path.abspath(obj.patina.linked_file))) == scan, f"scripts see {obj.patina.linked_file}")
 
 
 def test_objects_share_a_file_and_part():
@@ -146,7 +149,7 @@ def test_sequence_keeps_its_pattern():
     held = obj.patina.linked_data
     check((held.filepath, held.is_sequence) == ("//scans/step_003.ply", True), f"{held.filepath}")
     check(files.path_of(obj) == base / "first/scans/step_###.ply", f"{files.path_of(obj)}")
-    check(files.text_of(obj) == "//scans/step_###.ply", files.text_of(obj))
+    check(obj.patina.linked_file == "//scans/step_###.ply", obj.patina.linked_file)
 
 
 def test_files_of_older_versions():
@@ -155,19 +158,37 @@ def test_files_of_older_versions():
     far_scene()
     obj, = import_ply(scan, link=True)
     save(base / "first/scene.blend")
-    obj.patina.linked_file = "//scans/scan.ply"
     obj.patina.property_unset("linked_data")
-    check(files.path_of(obj) == scan, "a text alone is enough")
-    from patina.sync.files import _HANDLERS
-    saving = [item for item in bpy.app.handlers.save_pre if item in {function for _, function in _HANDLERS}]
-    for function in saving:
-        bpy.app.handlers.save_pre.remove(function)
+    old = obj.patina if bpy.app.version < (5, 0, 0) else obj.patina.bl_system_properties_get()
+    old["linked_file"] = "//scans/scan.ply"
+    check(files.path_of(obj) == scan and obj.patina.linked_file == "//scans/scan.ply", "a text alone is enough")
     save(base / "first/older.blend")
-    for function in saving:
-        bpy.app.handlers.save_pre.append(function)
     bpy.ops.wm.open_mainfile(filepath=str(base / "first/older.blend"))
-    held = bpy.data.objects["scan"].patina.linked_data
+    obj = bpy.data.objects["scan"]
+    held = obj.patina.linked_data
     check(held is not None and held.filepath == "//scans/scan.ply", "not brought to the present form")
+    held.filepath = "//other.ply"
+    check(obj.patina.linked_file == "//other.ply", "the old text still speaks")
+    obj.patina.linked_file = ""
+    check(obj.patina.linked_file == "" and files.path_of(obj) is None, "let go, the old text comes back")
+
+
+def test_overridden_from_a_library():
+    """An override links another file than its library's object, from then on."""
+    base, scan = places("override")
+    far_scene()
+    import_ply(scan, link=True)
+    save(base / "first/library.blend")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    save(base / "second/user.blend")
+    with bpy.data.libraries.load(str(base / "first/library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["scan"]
+    bpy.context.scene.collection.objects.link(obj := bpy.data.objects["scan"].override_create())
+    obj.patina.linked_file = "//other.ply"
+    save(base / "second/user.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(base / "second/user.blend"))
+    found = {bool(item.library): item.patina.linked_file for item in bpy.data.objects}
+    check(found[False] == "//other.ply" and found[True].endswith("scan.ply"), f"{found}")
 
 
 def test_linked_from_a_library():
