@@ -34,6 +34,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     # shading; what lasts is in sync.clouds.CACHE and render.device_for.
     _viewport: viewport.Viewport | None = None  # of an instance that draws a 3D view
     _moment, _moments = 0, 1  # of a final picture: which is under way, and how many
+    _asked = 1  # samples of its pixels, all moments together; 0: noise decides
 
     def update_render_passes(self, scene: bpy.types.Scene | None = None,
                              renderlayer: bpy.types.ViewLayer | None = None) -> None:
@@ -76,6 +77,8 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         """One picture, the mean of its moments where motion is blurred."""
         frame, moments = depsgraph.scene_eval.frame_current_final, motion.moments(depsgraph.scene_eval)
         done, color, ms, told, ranks = 0, 0.0, 0.0, set(), {}
+        least = most = 0  # samples of a pixel
+        self._asked = sum(moment.samples for moment in moments)
         data: tuple[sync.SceneDescription, render.Picture] | None = None
         with passes.Shown(self, depsgraph.view_layer_eval, eye) as shown:
             show = None if bpy.app.background else shown.put
@@ -92,6 +95,8 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
                             raise
                         break  # those that there are stay
                     done, color, ms = done + 1, color + picture.planes["COMBINED"], ms + picture.stats["ms"]
+                    most += picture.stats["pixel_samples"]
+                    least += picture.stats.get("pixel_samples_least", picture.stats["pixel_samples"])
                     cryptomatte.gather(ranks, picture.ranks)
                     if moment.gives_data or not data:
                         data = description, picture
@@ -106,7 +111,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         picture.planes.update(cryptomatte.planes(ranks, (item.plane for item in passes.enabled(layer)), size, 1.0 / done))
         passes.write(self, layer, description, picture.planes, eye)
         stopped = done < len(moments) or bool(picture.stats.get("pixel_pending"))
-        summary = _summary(picture, ms, stopped)
+        summary = _summary(picture, ms, _kept(least, most, self._asked) if stopped else "")
         self._status(summary, 1.0)
         if stopped:  # the window of a picture that was ended says no more of it
             self._tell('INFO', summary)
@@ -151,7 +156,9 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         return self._stopped()
 
     def _poll_drawing(self, progress: float) -> bool:
-        self._progress(BUILDING + (1.0 - BUILDING) * progress)
+        share = (self._moment + progress) / self._moments
+        self._status(f"Rendering, {share:.0%}" + (f" of {self._asked:,} samples" if self._asked > 1 else ""),
+                     BUILDING + (1.0 - BUILDING) * progress)
         return self._stopped()
 
     def _progress(self, share: float) -> None:
@@ -174,15 +181,21 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
             self.error_set(told(f"Patina: {text}"))
 
 
-def _summary(picture: render.Picture, ms: float, stopped: bool) -> str:
-    """The line above a final picture."""
+def _kept(least: int, most: int, asked: int) -> str:
+    """What a picture that was ended has. asked: 0 where noise was to decide."""
+    taken = f"{most:,}" if least == most else f"{least:,} to {most:,}"
+    return f"{taken} of {asked:,} samples, stopped" if asked else f"{taken} sample{'s' * (most != 1)}, stopped"
+
+
+def _summary(picture: render.Picture, ms: float, kept: str) -> str:
+    """The line above a final picture; kept: of one that was ended."""
     stats, parts = picture.stats, []
     if stats["layers"] > 1:
         parts.append(f"{stats['layers']} layers")
-    if stats.get("pixel_samples", 1) > 1:
+    if kept:
+        parts.append(kept)
+    elif stats["pixel_samples"] > 1:
         parts.append(f"{stats['pixel_samples']} samples")
-    if stopped:
-        parts.append("stopped")
     return ", ".join([f"{stats['points']:,} points, {ms:.1f} ms, {picture.device}", *parts])
 
 

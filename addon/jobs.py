@@ -43,8 +43,8 @@ INTERVAL = 0.02
 def run(work: Callable[[], T], cancel: Callable[[], None], poll: Callable[[], bool]) -> T:
     """Calls work() on a worker thread and returns its result or raises its exception.
 
-    Meanwhile poll() is called on this thread; when it returns True, cancel() is called and the worker is waited
-    for. An exception out of poll() cancels too, and is raised after the worker has ended.
+    Meanwhile poll() is called on this thread; once it returned True, cancel() is called until the worker has ended: between two of
+    its steps it hears nothing, and the next one begins anew. An exception out of poll() cancels too, and is raised then.
     """
     outcome: list[T] = []
     failure: list[BaseException] = []
@@ -61,15 +61,13 @@ def run(work: Callable[[], T], cancel: Callable[[], None], poll: Callable[[], bo
     worker = threading.Thread(target=target, name="patina", daemon=True)
     worker.start()
     try:
-        cancelled = False
         while not done.wait(INTERVAL):
-            if not cancelled and poll():
-                cancelled = True
-                cancel()
-    except BaseException:
-        cancel()
-        raise
+            if poll():
+                break
     finally:
+        while not done.is_set():
+            cancel()
+            done.wait(INTERVAL)
         worker.join()
     if failure:
         try:

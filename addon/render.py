@@ -251,6 +251,7 @@ class _Pieces:
                  news: _News) -> None:
         self._parts, self._frames, self._finish, self._news = parts, frames, finish, news
         self.stats: list[dict[str, Any]] = [{} for _ in parts]
+        self.taken = [1] * len(parts[0][0].pieces)  # samples by piece, where they come by and by
         self._frame, self._done, self._each = frames[0], 0.0, 1.0  # under way; the share that is done, and that of each step
 
     def progress(self) -> float:
@@ -273,7 +274,10 @@ class _Pieces:
                     describe(scene, drawn, wanted)
                     self._frame.render(scene)
                     if refined:
-                        self._better(scene, canvas, piece)
+                        try:
+                            self._better(scene, canvas, piece)
+                        finally:
+                            self.taken[number] = self._frame.stats()["pixel_samples"]
                     else:
                         canvas.put(piece, {name: _read(self._frame, name) for name in wanted})
                 self._count(stats, canvas.pieces[0].face != piece.face)
@@ -330,6 +334,8 @@ def _draw_pieces(device: native.Device, parts: list[tuple[Canvas, list[str]]], f
         with ANALYSES.drawing():
             jobs.run(work, lambda: [frame.cancel() for frame in frames], look)
         stats = drawing.stats[0] | {"ms": sum(each["ms"] for each in drawing.stats), "pixel_pending": int(cut_off)}
+        if cut_off:
+            stats |= {"pixel_samples": max(drawing.taken), "pixel_samples_least": min(drawing.taken)}
         return Picture(drawing.planes(), stats, device.label, notice)
 
 

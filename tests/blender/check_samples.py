@@ -2,11 +2,12 @@
 """Samples of final pictures as they come: shown from the first one on, kept when Esc ends them, ended by a noise threshold."""
 
 import re
+import threading
 
 import numpy as np
 from check_motion import stage
 from harness import add_points, check, new_scene, render, reports, sphere, stats
-from patina import engine
+from patina import engine, jobs
 from patina import render as drawing
 
 _described: list[tuple] = []
@@ -21,9 +22,9 @@ def scene_of(samples, width=96, height=72):
 
 
 def taken():
-    """How many samples the last picture says that it has."""
-    found = re.search(r"(\d+) samples", stats[-1])
-    return int(found[1]) if found else 1
+    """How many samples the last picture says that it has, at the most."""
+    found = re.search(r"([\d,]+) (of [\d,]+ )?samples", stats[-1])
+    return int(found[1].replace(",", "")) if found else 1
 
 
 def stopped_when(condition):
@@ -98,13 +99,61 @@ def test_esc_keeps_the_picture():
     check(render() and "stopped" not in stats[-1], "the next render is whole")
 
 
+def test_esc_tells_the_samples():
+    """How many there are of how many, where one alone was taken too, and which tiles have; while it goes on, its share."""
+    scene = scene_of(1024)
+    calls = []
+    stopped_when(lambda: calls.append(1) or len(calls) > 8)
+    check(re.search(r" [\d,]+ of 1,024 samples, stopped", stats[-1]), stats[-1])
+    check(any(re.fullmatch(r"Rendering, \d+% of 1,024 samples", text) for text in stats), f"{stats}")
+    scene.patina.surface, scene.patina.samples = 'SPLATS', 1024
+    better = drawing.native.Frame.refine
+
+    def never(*_):
+        raise drawing.native.PatinaCancelled("cancelled", drawing.native.CANCELLED)
+
+    drawing.native.Frame.refine = never
+    try:
+        render()
+        check(stats[-1].endswith("1 of 1,024 samples, stopped"), stats[-1])
+        scene.patina.samples, scene.patina.noise = 1, 0.01
+        render()
+        check(stats[-1].endswith(" 1 sample, stopped"), stats[-1])
+    finally:
+        drawing.native.Frame.refine = better
+    scene.patina.surface, scene.patina.samples, scene.patina.noise = 'FILL', 100, 0.0
+    render()
+    check(stats[-1].endswith("100 samples"), f"a whole one: {stats[-1]}")
+
+
+def test_esc_between_two_steps():
+    """Each step of the samples begins anew, so that an Esc between two of them was heard by none."""
+    heard = threading.Event()
+
+    def work():
+        for _ in range(400):
+            heard.clear()
+            if heard.wait(0.05):
+                return True
+        return False
+
+    asked = []
+
+    def cancel():
+        asked.append(1)
+        if len(asked) > 1:  # the first comes between two steps
+            heard.set()
+
+    check(jobs.run(work, cancel, lambda: True), "it went on to its end")
+
+
 def test_esc_keeps_moments():
     """With motion blur the moments that there are make the picture."""
     scene = stage()
     scene.patina.motion_steps = 400
     calls = []
     kept = stopped_when(lambda: calls.append(1) or len(calls) > 40)
-    check(kept and "stopped" in stats[-1], f"{stats[-1]}")
+    check(kept and re.search(r" \d+ of \d+ samples, stopped", stats[-1]), f"{stats[-1]}")
     check(scene.frame_current == 1 and scene.frame_subframe == 0.0, "the frame is the artist's again")
     total = kept["Combined"][..., 3].sum()
     check(abs(total / 64.0 - 1.0) < 0.01, f"the tile covers {total:.2f} of 64 pixels")
@@ -196,6 +245,7 @@ def test_esc_keeps_tiles():
     finally:
         drawing.draw = draw
     check(kept and "stopped" in stats[-1], stats[-1])
+    check(re.search(r" 1 to [\d,]+ of 1,024 samples", stats[-1]), stats[-1])
     check(((kept["Combined"][..., 3] > 0) == (one["Combined"][..., 3] > 0)).mean() > 0.97, "the points are there")
     check((kept["Combined"] != one["Combined"]).any() and (kept["Depth"] == one["Depth"]).all(), "nothing is better than one sample")
 
