@@ -30,20 +30,31 @@ class PATINA_OT_export_points(Operator, ExportHelper):
     selected: BoolProperty(name="Selected Only", default=True, description="Leave out objects that are not selected")
     filter_glob: StringProperty(default="*.ply;*.las", options={'HIDDEN'})
     filename_ext = ""
+    _seen = ""  # the format when the dialog last looked
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> set[str]:
+        self._seen = self.kind
+        return super().invoke(context, event)
 
     def check(self, _context: Context) -> bool:
+        """Of format and name the one that was changed decides."""
         path = Path(self.filepath)
-        if path.suffix.lower() in {".ply", ".las"} and path.suffix.lower()[1:] == self.kind.lower():
+        named = _kind_of(path)
+        if named not in {"", self.kind} and self.kind == self._seen:
+            self.kind = self._seen = named
+            return True
+        self._seen = self.kind
+        if named == self.kind:
             return False
         self.filepath = str(path.with_suffix(f".{self.kind.lower()}"))
         return True
 
     def execute(self, context: Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath)).with_suffix(f".{self.kind.lower()}")
-        depsgraph = context.evaluated_depsgraph_get()
-        objects = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
-                   if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and
-                   (obj.select_get() or not self.selected)]
+        path = Path(bpy.path.abspath(self.filepath))
+        if not self.properties.is_property_set("kind"):  # of a script
+            self.kind = _kind_of(path) or self.kind
+        path = path.with_suffix(f".{self.kind.lower()}")
+        objects, solid = self._objects(context)
         parts = []
         try:
             for obj in objects:
@@ -65,8 +76,22 @@ class PATINA_OT_export_points(Operator, ExportHelper):
             return {'CANCELLED'}
         if left:
             self.report({'WARNING'}, f"LAS has no place for {', '.join(left)}")
-        self.report({'INFO'}, f"Exported {len(points.positions):,} points to {path.name}")
+        faces = f". Left out: {solid} mesh{'es' * (solid > 1)} with faces" if solid else ""
+        self.report({'INFO'}, f"Exported {len(points.positions):,} points to {path.name}{faces}")
         return {'FINISHED'}
+
+    def _objects(self, context: Context) -> tuple[list[bpy.types.Object], int]:
+        """Evaluated, and how many were left out: faces' corners are no scan, unless there is nothing else."""
+        depsgraph = context.evaluated_depsgraph_get()
+        found = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
+                 if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and (obj.select_get() or not self.selected)]
+        points = [obj for obj in found if obj.patina.linked_file or obj.type != 'MESH' or not len(obj.data.polygons)]
+        return (points, len(found) - len(points)) if points else (found, 0)
+
+
+def _kind_of(path: Path) -> str:
+    """What a name says, or nothing."""
+    return {".ply": 'PLY', ".las": 'LAS'}.get(path.suffix.lower(), "")
 
 
 def _gps_start(objects: list[bpy.types.Object]) -> float:

@@ -184,8 +184,9 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
                 return self._ended([])
             except native.PatinaError as error:
                 self._tell('ERROR', f"{first.name}: {error}")
-        if found:
-            _select_none()
+        if not found:
+            return {'CANCELLED'}
+        _select_none()
         for path, item in found.items():
             name = told(name_of(path).replace("#", "").rstrip("_-. ") or path.stem if self.sequence else name_of(path))
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
@@ -197,7 +198,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         self._finish(context)
         count = sum(item.cloud.count for item in found.values())
         self.report({'INFO'}, f"Linked {count:,} point{'s' * (count != 1)}. {_told_next(context)}")
-        return {'FINISHED'} if found else {'CANCELLED'}
+        return {'FINISHED'}
 
     def _named(self, path: Path) -> tuple[Path, Path]:
         """What an object names, and the file to read now: of a sequence its pattern and its first file."""

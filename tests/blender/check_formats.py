@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Point files of many kinds in, PLY and LAS out: what is kept, what is refused and how."""
 
+import os
 import struct
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 from check_import import attribute_of, positions_of
 from check_import import import_ply as import_points
-from harness import REPOSITORY, SCRATCH, Skip, check, check_close, drawn, new_scene, render
+from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, drawn, new_scene, render
 from patina import importers, native
 from patina.importers import e57, las, pcd, reading
 
@@ -120,6 +123,42 @@ def test_las_round_trip():
     check(back.notes["gps_time_start"] == 3e8, f"GPS time from {back.notes}")
     check_close(back.scalars["gps_time"], points.scalars["gps_time"], 0, "GPS time")
     check(any("2,000 points" in line for line in las.preview(path)), f"preview {las.preview(path)}")
+
+
+def test_export_by_name():
+    """A script's exp.las is LAS without more words; in the dialog the one of name and format decides that was changed."""
+    new_scene()
+    add_points(np.zeros((7, 3))).select_set(True)
+    for name, options, made in (("named.las", {}, "named.las"), ("named.ply", {}, "named.ply"), ("plain", {}, "plain.ply"),
+                                ("other.las", {"kind": 'PLY'}, "other.ply")):
+        bpy.ops.export_scene.patina_points(filepath=str(SCRATCH / name), **options)
+        path = SCRATCH / made
+        check(path.read_bytes()[:4] == (b"LASF" if made.endswith("las") else b"ply\n"), f"{name}: {made}")
+        path.unlink()
+    from patina.operators.export_points import PATINA_OT_export_points as export_points
+    dialog = SimpleNamespace(kind='PLY', _seen='PLY', filepath="/a/scan.ply")
+    for change, kind, name in (({}, 'PLY', "scan.ply"), ({"filepath": "/a/scan.las"}, 'LAS', "scan.las"), ({"kind": 'PLY'}, 'PLY', "scan.ply"),
+                               ({"filepath": "/a/more"}, 'PLY', "more.ply"), ({"kind": 'LAS'}, 'LAS', "more.las")):
+        vars(dialog).update(change)
+        export_points.check(dialog, None)
+        check((dialog.kind, dialog.filepath) == (kind, f"/a/{name}"), f"{change}: {dialog}")
+        check(not export_points.check(dialog, None), f"{change}: it goes on and on")
+
+
+def test_export_leaves_faces_out():
+    """The start scene's cube is selected, and no scan; alone it is what is meant."""
+    new_scene()
+    add_points(np.zeros((7, 3))).select_set(True)
+    mesh = bpy.data.meshes.new("faces")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.scene.collection.objects.link(faces := bpy.data.objects.new("faces", mesh))
+    faces.select_set(True)
+    path = SCRATCH / "faces_out.ply"
+    for count in (7, 3):
+        bpy.ops.export_scene.patina_points(filepath=str(path))
+        found = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+        check(len(found.positions) == count, f"{len(found.positions)} points, not {count}")
+        bpy.data.objects["points"].select_set(False)
 
 
 def las_file(name, form, fields, rows, extras=(), behind=False):
@@ -298,6 +337,16 @@ def test_missing_packages_are_a_sentence():
     builtins.__import__ = without
     try:
         fails(path, "Install Readers")
+        printed = SCRATCH / "printed.txt"
+        sys.stdout.flush()
+        before = os.dup(1)
+        os.dup2(os.open(printed, os.O_CREAT | os.O_WRONLY | os.O_TRUNC), 1)
+        try:
+            fails(path, "Install Readers", link=True)
+        finally:
+            sys.stdout.flush()
+            os.dup2(before, 1)
+        check("Linked" not in printed.read_text(), f"the error, and after it: {printed.read_text()}")
         try:
             e57.read(Path("a.e57"), importers.Filter(), importers.Progress())
         except importers.PatinaError as error:
