@@ -202,7 +202,7 @@ def _known_gap(group: PropertyGroup) -> float:
 
 def _linked_file(group: PropertyGroup) -> str:
     from ..sync import files  # which needs these properties
-    return files.text_of(group.id_data)
+    return files.told(files.text_of(group.id_data))  # Blender takes no other text from Python
 
 
 def _link_file(group: PropertyGroup, path: str) -> None:

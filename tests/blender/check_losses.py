@@ -10,7 +10,21 @@ import bpy
 from check_import import import_ply
 from check_linked import dense
 from check_sequence import link, scans, shown
-from harness import REPOSITORY, SCRATCH, Skip, add_light, add_points, check, drawn, failing_render, new_scene, render, reports, sphere, written
+from harness import (
+    REPOSITORY,
+    SCRATCH,
+    Skip,
+    add_light,
+    add_points,
+    check,
+    drawn,
+    failing_render,
+    new_scene,
+    render,
+    reports,
+    sphere,
+    written,
+)
 from mathutils import Matrix
 
 
