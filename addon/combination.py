@@ -33,8 +33,8 @@ def take_out(scene: Scene) -> bool:
     under = tree.nodes.get(_UNDER) if tree and scene.library is None else None
     if under is None or NODE not in tree.nodes:
         return False
-    gone = [node for node in tree.nodes if node.type == 'R_LAYERS' and node.scene is None]
-    if not gone:
+    gone = {link.from_node for link in under.inputs[_BELOW].links}
+    if not gone or any(node.type != 'R_LAYERS' or node.scene for node in gone):
         return False
     images = [link.from_socket for link in under.inputs[_BELOW + 1].links]
     for target in [link.to_socket for link in tree.nodes[NODE].outputs[0].links]:

@@ -63,7 +63,8 @@ def follow(points: Scene, first: Scene) -> None:
 def bring_own(points: Scene, old: Scene) -> None:
     """What lies at the root of the old scene of points, and not of the new one, lies there too."""
     for theirs, ours in _roots(old, points):
-        for item in set(theirs) - set(ours):
+        have = set(ours)
+        for item in [item for item in theirs if item not in have]:
             ours.link(item)
 
 
@@ -77,10 +78,11 @@ def _follow_root(points: Scene, first: Scene) -> None:
     """What comes to the first scene's root comes here, and what leaves it leaves; what was put here alone stays."""
     known, now = _known.get(points.name, set()), set()
     for theirs, ours in _roots(first, points):
-        wanted, have = set(theirs), set(ours)
-        for item in wanted - have:
-            ours.link(item)
-        for item in have - wanted:
+        wanted, have = list(theirs), set(ours)
+        for item in wanted:
+            if item not in have:
+                ours.link(item)
+        for item in have.difference(wanted):
             if _key(item) in known:
                 ours.unlink(item)
         now.update(map(_key, wanted))
