@@ -16,8 +16,10 @@ import tempfile
 import traceback
 from pathlib import Path
 
-import addon_utils  # is there once bpy is
 import bpy
+
+# isort: split
+import addon_utils  # is there once bpy is
 
 ROOT = Path(__file__).resolve().parents[2]
 LEGACY = bpy.app.version < (4, 2, 0)
