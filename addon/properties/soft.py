@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 from bpy.types import PropertyGroup
 
+from .heard import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 from .numbers import attribute_names
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}

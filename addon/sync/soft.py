@@ -11,13 +11,13 @@ import numpy as np
 from mathutils import Matrix
 
 from .. import native
+from ..native.abi import FIELD_SOURCE, SOFT
 from ..native.points import Field
 from ..properties import enum_number
 from .camera import row_major
 from .colors import class_bits
 from .edits import keep
 
-OFF, ALL, FIELD = 0, 1, 2  # patina_soft
 _MISSING = {'ATTRIBUTE': "attribute '{name}'", 'LUMINANCE': "colors", 'CLASSES': "classes"}
 Desc = tuple[tuple[str, Any], ...]  # of patina_field_desc
 
@@ -50,7 +50,7 @@ def soft_of(obj: bpy.types.Object, matrix: Matrix, scene: bpy.types.Scene) -> So
     if not group.use:
         return None
     style = {
-        "soft": ALL if group.by == 'ALL' else FIELD,
+        "soft": SOFT["ALL" if group.by == 'ALL' else "FIELD"],
         "soft_model": enum_number(scene.patina, "soft_model"),
         "soft_radius": group.radius if group.use_radius else 0.0,
         "soft_opacity": group.opacity,
@@ -82,4 +82,4 @@ def field_of(cloud: native.Cloud, soft: Soft) -> Field | None:
 
 
 def _make(cloud: native.Cloud, values: np.ndarray | None, **desc: Any) -> Field:
-    return Field(cloud, values, **desc | ({"source": 0} if values is not None else {}))
+    return Field(cloud, values, **desc | ({"source": FIELD_SOURCE["VALUES"]} if values is not None else {}))

@@ -2,12 +2,14 @@
 """What the artist sees of properties: each is in a panel, has a name and a tooltip, and is written as the others are."""
 
 import re
+import sys
 from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import patina
 from harness import REPOSITORY, add_points, check, new_scene
+from patina.properties import heard
 
 GROUPS = (bpy.types.Scene, bpy.types.Object, bpy.types.ViewLayer, bpy.types.World)
 SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "per", "the", "to", "with"}
@@ -329,6 +331,16 @@ def test_overridable():
     for path, kind in properties():
         shown = path == "Object.patina.linked_file"  # says what linked_data holds, which is overridable
         check(kind.is_overridable or shown or ".style." in path or path.startswith("ViewLayer.patina.use_pass"), path)
+
+
+def test_properties_are_heard():
+    """Each tells what shows it where a script sets it: their modules take Blender's kinds from `heard`, and none past it."""
+    kinds = {name: getattr(bpy.props, name) for name in vars(heard) if name.endswith("Property")}
+    modules = [module for name, module in sys.modules.items() if name.startswith("patina.properties.") and module is not heard]
+    check(len(kinds) == 8 and len(modules) > 8, f"{kinds}, {modules}")
+    for module in [*modules, sys.modules["patina.properties"]]:
+        for name, kind in kinds.items():
+            check(getattr(module, name, None) is not kind, f"{module.__name__} takes {name} from Blender")
 
 
 def test_labels():
