@@ -14,6 +14,7 @@ from bpy_extras.io_utils import ExportHelper
 from .. import exporters, importers, jobs, native
 from ..importers import origin
 from ..sync import attributes, edits, linked
+from . import set_up
 
 
 class PATINA_OT_export_points(Operator, ExportHelper):
@@ -85,7 +86,7 @@ class PATINA_OT_export_points(Operator, ExportHelper):
         depsgraph = context.evaluated_depsgraph_get()
         found = [obj.evaluated_get(depsgraph) for obj in context.view_layer.objects
                  if obj.type in {'MESH', 'POINTCLOUD'} and obj.visible_get() and (obj.select_get() or not self.selected)]
-        points = [obj for obj in found if obj.patina.linked_file or obj.type != 'MESH' or not len(obj.data.polygons)]
+        points = [obj for obj in found if set_up.is_points(obj)]
         return (points, len(found) - len(points)) if points else (found, 0)
 
 

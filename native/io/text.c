@@ -15,6 +15,7 @@
 // 5. Columns were left out, and a row has not as many words as the first: refused, since which is which cannot be told.
 // 6. Without names, a first column of whole numbers that count up by one, at least four columns of numbers and words at the
 //    row's end: it numbers the points and is left out; where that is not so, what was taken as x, y and z is told.
+#include "base/color.h"
 #include "base/progress.h"
 #include "cells.h"
 #include "file.h"
@@ -262,9 +263,7 @@ static void store(struct text *t, uint64_t i, const double values[MOST_COLUMNS])
             file->normal[3 * i + (role - NX)] = (float)v;
         } else if (t->float_colors) {
             double s = v > 0.0 ? v : 0.0; // text colours of 0..1 are sRGB too
-            ((float *)file->color)[4 * i + (role - RED)] = (float)(role == ALPHA  ? s
-                                                                   : s <= 0.04045 ? s / 12.92
-                                                                                  : pow((s + 0.055) / 1.055, 2.4));
+            ((float *)file->color)[4 * i + (role - RED)] = (float)(role == ALPHA ? s : pt_linear_of_srgb(s));
         } else {
             double clamped = v > 0.0 ? (v < t->maximum ? v + 0.5 : t->maximum) : 0.0;
             if (file->color_type == PATINA_UINT8)

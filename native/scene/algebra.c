@@ -2,6 +2,7 @@
 #include "scene.h"
 
 #include <math.h>
+#include <string.h>
 
 void pt_cofactors(const double m[9], double out[9])
 {
@@ -35,6 +36,17 @@ void pt_multiply(const double a[9], const double b[9], double out[9])
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++)
             out[3 * r + c] = a[3 * r] * b[c] + a[3 * r + 1] * b[3 + c] + a[3 * r + 2] * b[6 + c];
+}
+
+int pt_take_matrix(double matrix[16])
+{
+    static const double zero[16], identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    if (!memcmp(matrix, zero, sizeof zero))
+        memcpy(matrix, identity, sizeof identity);
+    for (int k = 0; k < 16; k++)
+        if (!isfinite(matrix[k]))
+            return 0;
+    return 1;
 }
 
 void pt_split_matrix(const double matrix[16], double linear[9], double translation[3])

@@ -3,6 +3,7 @@
 #include "beams.h"
 #include "free_space.h"
 #include "kernel_args.h"
+#include "base/compare.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "orient.h"
@@ -215,12 +216,6 @@ static void write_point(struct walk *walk, uint32_t chunk_index, uint32_t slot, 
     walk->out->shapes[slot] = pt_pack_shape(hood, bits, walk->out->spacing_base);
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static void finish_chunk(struct walk *walk, struct pt_chunk *chunk, float *spacings, uint32_t known)
 {
     uint32_t *surface = walk->out->surface + chunk->first, *shapes = walk->out->shapes + chunk->first;
@@ -233,7 +228,7 @@ static void finish_chunk(struct walk *walk, struct pt_chunk *chunk, float *spaci
         ;
     chunk->reach = (float)(walk->out->spacing_base * pt_spacing_of_class(most));
     chunk->footprint = (float)(walk->out->spacing_base * pt_spacing_of_class(at));
-    qsort(spacings, known, sizeof *spacings, compare_floats);
+    qsort(spacings, known, sizeof *spacings, pt_compare_floats);
     chunk->spacing = known ? spacings[known / 2] : chunk->spacing;
     for (uint32_t i = chunk->count; i < chunk->padded; i++) {
         surface[i] = surface[chunk->count - 1];

@@ -2,6 +2,7 @@
 // What an analysed cloud knows, back in the caller's order; neighbours themselves, and [S]'s radius and uncertainty from them.
 #include "analysis.h"
 #include "kernel_args.h"
+#include "base/compare.h"
 #include "base/descriptor.h"
 #include "base/platform.h"
 #include "base/progress.h"
@@ -111,12 +112,6 @@ static void read_leaves(void *context, uint32_t begin, uint32_t end, uint32_t th
     }
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 // In parts of the 99th percentile, at most 1. At most a million points are looked at for it.
 static int normalize(float *values, const uint32_t *order, const patina_cloud *cloud)
 {
@@ -127,7 +122,7 @@ static int normalize(float *values, const uint32_t *order, const patina_cloud *c
         return PATINA_ERROR_MEMORY;
     for (uint64_t slot = 0; slot < cloud->slots; slot += step)
         sorted[count++] = values[order[slot]];
-    qsort(sorted, count, sizeof *sorted, compare_floats);
+    qsort(sorted, count, sizeof *sorted, pt_compare_floats);
     const float most = count ? sorted[(count - 1) * 99 / 100] : 0.0f;
     free(sorted);
     for (uint64_t i = 0; i < cloud->info.count; i++)

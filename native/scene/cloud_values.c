@@ -4,6 +4,7 @@
 #include "cloud.h"
 #include "fingerprint.h"
 #include "io/file.h"
+#include "base/compare.h"
 #include "base/platform.h"
 
 #include <math.h>
@@ -100,12 +101,6 @@ int patina_cloud_set_scalars(patina_cloud *cloud, const patina_array *scalar)
     return PATINA_OK;
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float range[2])
 {
     if (!cloud || !range || !(share >= 0.0 && share < 0.5))
@@ -126,7 +121,7 @@ int patina_cloud_scalar_range(const patina_cloud *cloud, double share, float ran
     for (uint64_t i = 0; i < cloud->slots; i++)
         if (isfinite(cloud->scalars[i]) && seen++ % step == 0)
             values[taken++] = cloud->scalars[i];
-    qsort(values, taken, sizeof *values, compare_floats);
+    qsort(values, taken, sizeof *values, pt_compare_floats);
     size_t below = (size_t)(share * (double)(taken - 1));
     range[0] = values[below];
     range[1] = values[taken - 1 - below];

@@ -3,6 +3,7 @@
 // threshold.
 #include "mask.h"
 
+#include "base/compare.h"
 #include "base/descriptor.h"
 #include "base/error.h"
 #include "base/platform.h"
@@ -84,12 +85,6 @@ static void find_numbers(void *context, uint32_t begin, uint32_t end, uint32_t t
 
 // ---- their range ---------------------------------------------------------------------------------------------------------
 
-static int compare_floats(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 // 0, or PATINA_ERROR_MEMORY.
 static int find_range(struct fill *fill)
 {
@@ -109,7 +104,7 @@ static int find_range(struct fill *fill)
         for (uint64_t i = 0; i < slots; i += step)
             if (isfinite(fill->numbers[i]))
                 sample[count++] = fill->numbers[i];
-        qsort(sample, count, sizeof *sample, compare_floats);
+        qsort(sample, count, sizeof *sample, pt_compare_floats);
         from = count ? (double)sample[count / 100] : 0.0;
         to = count ? (double)sample[count - 1 - count / 100] : 0.0;
         free(sample);
@@ -145,26 +140,12 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
 
 // ---- the handle ----------------------------------------------------------------------------------------------------------
 
-static int is_finite(const double matrix[16])
-{
-    int finite = 1;
-    for (int k = 0; k < 16; k++)
-        finite &= isfinite(matrix[k]) != 0;
-    return finite;
-}
-
-static void take_matrix(const double given[16], double linear[9], double translation[3])
-{
-    static const double zero[16], identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    pt_split_matrix(memcmp(given, zero, sizeof zero) ? given : identity, linear, translation);
-}
-
 // Distances in world units: the shape's axes are made unit, and z square to x and y. 0 where it has none.
 static int place_shape(struct fill *fill)
 {
     double object[9], object_at[3], shape[9], shape_at[3], axes[9], from[3];
-    take_matrix(fill->desc->world_from_object, object, object_at);
-    take_matrix(fill->desc->world_from_shape, shape, shape_at);
+    pt_split_matrix(fill->desc->world_from_object, object, object_at);
+    pt_split_matrix(fill->desc->world_from_shape, shape, shape_at);
     double x[3] = {shape[0], shape[3], shape[6]}, y[3] = {shape[1], shape[4], shape[7]}, z[3] = {shape[2], shape[5], shape[8]};
     double *third = fill->desc->shape == PATINA_FIELD_FROM_AXIS ? z : NULL, across[3];
     if (!third)
@@ -191,7 +172,7 @@ static int place_shape(struct fill *fill)
     return 1;
 }
 
-static int check(const patina_cloud *cloud, const patina_field_desc *desc)
+static int check(const patina_cloud *cloud, patina_field_desc *desc)
 {
     const int source = (int)desc->source;
     if (desc->source > PATINA_FIELD_DENSITY || desc->shape > PATINA_FIELD_FROM_AXIS || desc->invert > 1)
@@ -199,8 +180,8 @@ static int check(const patina_cloud *cloud, const patina_field_desc *desc)
     if (source == PATINA_FIELD_VALUES && (desc->count != cloud->info.count || (desc->count && !desc->values)))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: %llu values for %llu points",
                        desc->values ? (unsigned long long)desc->count : 0, (unsigned long long)cloud->info.count);
-    if (!isfinite(desc->range[0]) || !isfinite(desc->range[1]) || !is_finite(desc->world_from_object) ||
-        !is_finite(desc->world_from_shape))
+    if (!isfinite(desc->range[0]) || !isfinite(desc->range[1]) || !pt_take_matrix(desc->world_from_object) ||
+        !pt_take_matrix(desc->world_from_shape))
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_create: range and matrices must be finite");
     const char *missing = source == PATINA_FIELD_SCALAR && !cloud->scalars     ? "scalars"
                           : source == PATINA_FIELD_LUMINANCE && !cloud->colors ? "colours"

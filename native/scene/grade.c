@@ -3,6 +3,7 @@
 // follow a slider: 32 ns a point of one core, a second for 30 million shared by all cores.
 #include "mask.h"
 
+#include "base/color.h"
 #include "base/platform.h"
 
 #include <math.h>
@@ -30,8 +31,6 @@ struct grading {
 };
 
 static double to_srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055; }
-
-static double to_linear(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4); }
 
 // Warm: more red and less blue, at the luminance of white.
 static void set_factors(const patina_scan_grade *grade, struct tone *tone)
@@ -126,7 +125,7 @@ static int check(const patina_cloud *cloud, const patina_scan_grade *grades, uin
 static int set_tones(struct grading *grading, const patina_scan_grade *grades)
 {
     for (int i = 0; i < 256; i++)
-        grading->linear[i] = (float)to_linear(i / 255.0);
+        grading->linear[i] = (float)pt_linear_of_srgb(i / 255.0);
     grading->tones = calloc(grading->tone_count, sizeof *grading->tones);
     for (uint32_t i = 0; grading->tones && i < grading->tone_count; i++) {
         struct tone *tone = &grading->tones[i];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every sum is of integers, so that threads do not show.
 #include "interval.h"
+#include "base/compare.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -141,12 +142,6 @@ static void count_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
 
 // ---- from density ----------------------------------------------------------------------------------------------------------
 
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 // On a grid of equal steps d in elevation and azimuth, N samples in the solid angle W at elevation e: d^2 = W / (N cos(e));
 // on an even one d^2 = W / N. Bins that hold an edge of what was seen, or dropped samples, tell too wide a step: the lower quartile
 // counts. spread: of the squares, from quartile to quartile. bins: of a level, each 4^level of the first.
@@ -162,7 +157,7 @@ static double step_on(const uint32_t *bins, int level, int even, double *squares
     *spread = 1.0;
     if (!count)
         return 0.0;
-    qsort(squares, count, sizeof *squares, compare_doubles);
+    qsort(squares, count, sizeof *squares, pt_compare_doubles);
     *spread = squares[3 * (size_t)count / 4] / squares[count / 4];
     return sqrt(squares[count / 4]);
 }
@@ -185,7 +180,7 @@ static double middling(const uint32_t *bins, int level, double *room)
     for (uint32_t b = 0; b < all; b++)
         if (bins[b])
             room[count++] = bins[b];
-    qsort(room, count, sizeof *room, compare_doubles);
+    qsort(room, count, sizeof *room, pt_compare_doubles);
     return count ? room[count / 2] : 0.0;
 }
 
@@ -220,7 +215,7 @@ static double line_interval(const struct line *lines, uint32_t count, int round,
         step = round && step > PI ? step - 2.0 * PI : round && step < -PI ? step + 2.0 * PI : step;
         steps[found++] = fabs(step);
     }
-    qsort(steps, found, sizeof *steps, compare_doubles);
+    qsort(steps, found, sizeof *steps, pt_compare_doubles);
     return found >= LINE_STEPS ? steps[found / 2] : 0.0;
 }
 

@@ -11,8 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-
 static int fail(const patina_scene *scene, const char *what)
 {
     return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "%s", what);
@@ -116,15 +114,6 @@ static int check_color(const patina_scene *scene, patina_cloud_style *style, con
     return PATINA_OK;
 }
 
-// All zero becomes the identity.
-static int check_matrix(double matrix[16])
-{
-    static const double zero[16];
-    if (!memcmp(matrix, zero, sizeof zero))
-        memcpy(matrix, identity, sizeof identity);
-    return all_finite(matrix, 16);
-}
-
 static void default_grey(float color[3])
 {
     if (pt_is_zero(color))
@@ -179,7 +168,7 @@ static int check_soft(const patina_scene *scene, patina_cloud_style *style, cons
 static int check_style(const patina_scene *scene, patina_cloud_style *style, const patina_cloud *cloud)
 {
     const float *c = style->color;
-    if (!check_matrix(style->world_from_object))
+    if (!pt_take_matrix(style->world_from_object))
         return fail(scene, "cloud style: world_from_object is not finite");
     if (!(style->d_min >= 0.0f) || !isfinite(style->d_min))
         return fail(scene, "cloud style: d_min must be 0 or more");
@@ -253,7 +242,7 @@ int patina_scene_add_mesh(patina_scene *scene, const patina_mesh *mesh, const pa
     int error = pt_take(&scene->handle, "patina_scene_add_mesh", style, &checked, sizeof checked);
     if (error)
         return error;
-    if (!check_matrix(checked.world_from_object))
+    if (!pt_take_matrix(checked.world_from_object))
         return fail(scene, "mesh style: world_from_object is not finite");
     if (!isfinite(checked.color[0] + checked.color[1] + checked.color[2]))
         return fail(scene, "mesh style: colour must be finite");
@@ -337,16 +326,13 @@ int patina_scene_add_light(patina_scene *scene, const patina_light_desc *light)
 
 int patina_scene_add_clip(patina_scene *scene, const patina_clip *clip)
 {
-    static const double zero[16];
     patina_clip checked;
     if (!scene || !clip)
         return fail(scene, "patina_scene_add_clip: scene or clip is NULL");
     const int error = pt_take(&scene->handle, "patina_scene_add_clip", clip, &checked, sizeof checked);
     if (error)
         return error;
-    if (!memcmp(checked.world_from_clip, zero, sizeof zero))
-        memcpy(checked.world_from_clip, identity, sizeof identity);
-    if (!all_finite(checked.world_from_clip, 16))
+    if (!pt_take_matrix(checked.world_from_clip))
         return fail(scene, "clip: world_from_clip is not finite");
     if (checked.shape > PATINA_CLIP_PLANE || checked.cut > 1)
         return fail(scene, "clip: no such shape, or cut is neither 0 nor 1");

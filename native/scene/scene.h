@@ -61,6 +61,8 @@ static inline void pt_apply(const double m[9], const double v[3], double out[3])
 
 // The camera's axes (unit, rows x, y, z) and position from world_from_camera. PATINA_ERROR_ARGUMENT when singular.
 int pt_camera_axes(const patina_camera *camera, double axes[9], double position[3]);
+// A 4 x 4 matrix of the caller's: all zero becomes the identity. Whether it is finite.
+int pt_take_matrix(double matrix[16]);
 // The linear part (row-major 3 x 3) and translation of a 4 x 4 matrix.
 void pt_split_matrix(const double matrix[16], double linear[9], double translation[3]);
 

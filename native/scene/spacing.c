@@ -4,6 +4,7 @@
 // and a few duplicate points do not fool it. What a cloud makes of its chunks' spacings, and their classes.
 #include "cloud.h"
 #include "kernel_args.h"
+#include "base/compare.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -29,12 +30,6 @@ static float kth_nearest(const float *x, const float *y, const float *z, uint32_
     return nearest[k - 1];
 }
 
-static int compare_floats(const void *a, const void *b)
-{
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32_t count)
 {
     if (count < 2)
@@ -44,20 +39,14 @@ float pt_spacing_estimate(const float *x, const float *y, const float *z, uint32
     float distance[SAMPLES];
     for (uint32_t s = 0; s < samples; s++)
         distance[s] = kth_nearest(x, y, z, count, (uint32_t)((uint64_t)count * s / samples), k);
-    qsort(distance, samples, sizeof *distance, compare_floats);
+    qsort(distance, samples, sizeof *distance, pt_compare_floats);
     return (float)sqrt((double)distance[samples / 2] * 3.14159265358979323846 / k);
 }
 
 // ---- of a whole cloud ----------------------------------------------------------------------------------------------------
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 struct counted {
-    double spacing; // first: compare_doubles sorts by it
+    double spacing; // first: pt_compare_doubles sorts by it
     uint64_t points;
 };
 
@@ -79,7 +68,7 @@ static int tame_strays(struct patina_cloud *cloud)
             list[count++] = (struct counted){(double)cloud->chunks[c].spacing, cloud->chunks[c].count};
             points += cloud->chunks[c].count;
         }
-    qsort(list, count, sizeof *list, compare_doubles);
+    qsort(list, count, sizeof *list, pt_compare_doubles);
     while (at < count && (below += list[at].points) < points - points / STRAYS)
         at++;
     const double usual = at < count ? list[at].spacing : 0.0;
@@ -100,7 +89,7 @@ int pt_cloud_settle_spacing(struct patina_cloud *cloud)
     for (uint32_t c = 0; c < cloud->chunk_count; c++)
         if (cloud->chunks[c].count > 1)
             known[count++] = (double)cloud->chunks[c].spacing;
-    qsort(known, count, sizeof *known, compare_doubles);
+    qsort(known, count, sizeof *known, pt_compare_doubles);
     cloud->info.spacing = count ? known[count / 2] : 0.0;
     cloud->info.spacing_min = count ? known[0] : 0.0;
     cloud->info.spacing_max = count ? known[count - 1] : 0.0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Takes an image in, and makes the coarser levels that it is drawn from where it is small on screen.
 #include "texture.h"
+#include "base/color.h"
 #include "base/descriptor.h"
 
 #include "fingerprint.h"
@@ -13,8 +14,6 @@ enum { MOST_TEXELS = 1 << (PT_TEXTURE_LEVELS - 1) }; // on a side
 
 static int fail(const char *what) { return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_texture_create: %s", what); }
 
-static double linear_of_srgb(double s) { return s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4); }
-
 // Linear values of an sRGB byte, and halfway to the next.
 struct curve {
     float value[256], until[255];
@@ -23,9 +22,9 @@ struct curve {
 static void fill_curve(struct curve *curve)
 {
     for (int i = 0; i < 256; i++)
-        curve->value[i] = (float)linear_of_srgb(i / 255.0);
+        curve->value[i] = (float)pt_linear_of_srgb(i / 255.0);
     for (int i = 0; i < 255; i++)
-        curve->until[i] = (float)linear_of_srgb((i + 0.5) / 255.0);
+        curve->until[i] = (float)pt_linear_of_srgb((i + 0.5) / 255.0);
 }
 
 static uint32_t byte_of(float value) { return (uint32_t)(value * 255.0f + 0.5f); } // within 0..1
@@ -94,7 +93,7 @@ static void take_floats(const patina_texture_desc *desc, struct patina_texture *
             continue;
         }
         memcpy(&word, from + 2 * k, 2);
-        c[k] = (float)(k < 3 && !desc->raw ? linear_of_srgb(word / 65535.0) : word / 65535.0);
+        c[k] = (float)(k < 3 && !desc->raw ? pt_linear_of_srgb(word / 65535.0) : word / 65535.0);
     }
     c[3] = fminf(fmaxf(c[3], 0.0f), 1.0f);
     texture->opaque &= c[3] == 1.0f;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // --pass: a pass in place of the colours. Numbers go through a ramp, normals turn to colours as is usual, (n + 1) / 2.
 #include "tool.h"
+#include "base/color.h"
 
 #include <ctype.h>
 #include <math.h>
@@ -79,10 +80,7 @@ static void color_number(float value, const double range[2], float table[PATINA_
 }
 
 // A colour of a PNG, from 0 to 1, linear.
-static float linear(double encoded)
-{
-    return (float)(encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4));
-}
+static float linear(double encoded) { return (float)pt_linear_of_srgb(encoded); }
 
 static void color_pixels(uint32_t pass, const float *values, const float *depth, size_t count, const double range[2],
                          float table[PATINA_MAX_RAMP][3], float *pixels)
