@@ -76,7 +76,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
     def _render_eye(self, depsgraph: bpy.types.Depsgraph, eye: str) -> None:
         """One picture, the mean of its moments where motion is blurred."""
         frame, moments = depsgraph.scene_eval.frame_current_final, motion.moments(depsgraph.scene_eval)
-        done, color, ms, told, ranks = 0, 0.0, 0.0, set(), {}
+        done, color, ms, told, ranks = 0, None, 0.0, set(), {}
         least = most = 0  # samples of a pixel
         self._asked = sum(moment.samples for moment in moments)
         data: tuple[sync.SceneDescription, render.Picture] | None = None
@@ -94,7 +94,8 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
                         if not done:
                             raise
                         break  # those that there are stay
-                    done, color, ms = done + 1, color + picture.planes["COMBINED"], ms + picture.stats["ms"]
+                    seen = picture.planes["COMBINED"]
+                    done, color, ms = done + 1, seen if color is None else color + seen, ms + picture.stats["ms"]
                     most += picture.stats["pixel_samples"]
                     least += picture.stats.get("pixel_samples_least", picture.stats["pixel_samples"])
                     cryptomatte.gather(ranks, picture.ranks)

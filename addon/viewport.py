@@ -21,7 +21,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import backdrop, mattes, native, pace, render, sky, sync
+from . import backdrop, dots, mattes, native, pace, render, sky, sync
 from .jobs import Pause, Steps
 from .native.points import highlight
 from .sync import analysis, edits
@@ -48,6 +48,7 @@ class Wish:
     view: sync.View
     level: pace.Level
     asked: float  # when
+    clips: tuple[sync.Clip, ...] = ()  # of the scene's, those of the view itself: they cut what Blender draws too
 
     def description(self, clouds: list[sync.CloudItem]) -> sync.SceneDescription:
         shrink = self.level.shrink
@@ -73,7 +74,7 @@ class Shown:
     wish: Wish
     clouds: list[sync.CloudItem]  # built
     color: np.ndarray  # (height, width, 4), premultiplied, scene-linear; the next picture but one overwrites it
-    depth: np.ndarray  # (height, width, 1), linear z
+    depth: np.ndarray  # (height, width, 1), linear z; nearer where points lie that the picture leaves out and Blender draws
     behind: sync.World | None  # what lies behind it
     pixel: float  # its width, at distance 1 in perspective
     place: tuple[float, float, float, float]  # of the viewport that it covers, 0..1
@@ -130,6 +131,7 @@ class Viewport:
         self._news = False
         self._frame: tuple[native.Device, native.Frame] | None = None
         self._others: list[tuple[native.Device, native.Frame]] = []  # for mattes
+        self._dots: tuple[native.Device, native.Frame] | None = None  # for what the picture leaves out
         self._sky = sky.Sky()
         self._bettered: Bettered | None = None  # what is shown, while samples of it are pending
         self._drawn: tuple[Shown, gpu.types.GPUTexture, gpu.types.GPUTexture | None] | None = None  # colour; depth for overlays
@@ -200,7 +202,7 @@ class Viewport:
             self._steps.close()
         self._others = []
         self._sky = sky.Sky()
-        self._drawn = self._frame = self._steps = self._task = self._bettered = None  # here, for textures go on Blender's thread
+        self._drawn = self._frame = self._dots = self._steps = self._task = self._bettered = None  # here, for textures go on Blender's thread
         ANALYSES.wish(self, [])
         _VIEWPORTS.discard(self)
         if self in _TURNS:
@@ -213,7 +215,7 @@ class Viewport:
         if self._closed:
             return
         scene = replace(self._scene, clips=[*self._scene.clips, *self._clips])
-        self._wanted = self._last = Wish(scene, self._view, level, time.monotonic())
+        self._wanted = self._last = Wish(scene, self._view, level, time.monotonic(), tuple(self._clips))
         # a quick picture of the moment before is worth its end, a whole one is not
         if self._rendering and self._working.level == pace.FULL:
             self._rendering.cancel()
@@ -368,7 +370,7 @@ class Viewport:
         """From now on the processor draws, until another device is asked for."""
         self._lost = (choice, f"{self._frame[0].label} failed, the processor draws: {reason}")
         self.notices = [*self.notices, self._lost[1]]
-        self._frame, self._others = None, []
+        self._frame, self._dots, self._others = None, None, []
         render.forget_device()
 
     def _render_on(self, device: native.Device, wish: Wish, description: sync.SceneDescription) -> Steps[Shown]:
@@ -390,6 +392,7 @@ class Viewport:
         colors = [color]
         for beside, other in parts[1:]:
             colors += yield from self._draw_frame(beside, other, ("COMBINED",), [])
+        yield from self._hide_dots(device, dots.left_out(description, wish.clips), depth)
         stats, passes = frame.stats(), frame.pass_stats()
         points = passes["passes"].get("scatter", 0.0) / 1000.0
         self.pace.note(wish.level, points, max(stats["ms"] / 1000.0 - points, 1e-4))
@@ -400,6 +403,19 @@ class Viewport:
                      (wish.view.camera.right - wish.view.camera.left) / settings.width,
                      (x0 / settings.width, y0 / settings.height, x1 / settings.width, y1 / settings.height),
                      stats, passes, device.label)
+
+    def _hide_dots(self, device: native.Device, left_out: sync.SceneDescription | None, depth: np.ndarray) -> Steps[None]:
+        """Of points that Blender draws though the picture leaves them out: depth becomes theirs where it is nearer."""
+        if left_out is None:
+            self._dots = None
+            return
+        if self._dots is None or self._dots[0] is not device:
+            self._dots = (device, native.Frame(device))
+        try:
+            found, = yield from self._draw_frame(self._dots[1], left_out, ("DEPTH",), [])
+        except native.PatinaCancelled:  # the picture itself is there
+            return
+        np.minimum(depth, found, out=depth)
 
     def _keep_bettering(self, bettered: Bettered) -> None:
         """Where samples are pending."""

@@ -168,10 +168,9 @@ class Analyses:
             job.claimed = True
         took(job.progress)
         try:
-            pause = 0.0005  # a small cloud takes no longer
-            while not job.task.done():
-                time.sleep(pause)
-                pause = min(2.0 * pause, jobs.INTERVAL)
+            begun = time.monotonic()
+            while not job.task.done():  # an eighth longer than it takes, at most: a small cloud is done in milliseconds
+                time.sleep(min(max((time.monotonic() - begun) / 8.0, 0.0005), jobs.INTERVAL))
             with self._lock:
                 self._lock.wait_for(lambda: not self._changing)
                 self._changing = True

@@ -139,6 +139,7 @@ class CloudItem:
     asset: str = ""  # of its topmost parent
     edits: edits.State = edits.State()
     soft: soft.Soft | None = None
+    dotted: bool = False  # Blender's overlays draw its points too
 
 
 class CloudCache:
@@ -313,7 +314,8 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
                 style = replace(style, lighting=LIT)
             edited = edits.state_of(obj) if link else edits.State()
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
-            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened))
+            dotted = obj.type == 'MESH' and not solid and not link
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item

@@ -181,8 +181,13 @@ static void limit_point(void *context, uint32_t place, const struct pt_sample *s
 // rows: bars, steps, louvres.
 static int lies_in_rows(const struct walk *walk)
 {
-    enum { LEAVES = 1024 };
-    const uint32_t leaves = walk->tree.leaf_count, step = leaves / LEAVES + 1;
+    enum {
+        MOST = 1024,
+        LEAST = 64,
+        SHARE = 8
+    }; // leaves that are looked at, and which share: each costs as much as its description
+    const uint32_t leaves = walk->tree.leaf_count, share = leaves / SHARE;
+    const uint32_t step = leaves / (share > MOST ? MOST : share < LEAST ? LEAST : share) + 1;
     struct pt_found found;
     struct pt_neighbourhood hoods[PT_LEAF];
     uint64_t flat = 0, uneven = 0;

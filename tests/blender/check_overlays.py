@@ -157,6 +157,42 @@ def test_points_hide_their_dots():
     view().view_perspective = 'PERSP'
 
 
+def test_what_is_left_out_shows_no_dots():
+    """Clips, hidden classes and certainty leave points out of the picture; their vertices are there for Blender."""
+    _, points = bright_scene()
+    layer = points.data.attributes.new("classification", 'INT', 'POINT')
+    layer.data.foreach_set("value", np.tile(np.int32([2, 5]), len(points.data.vertices) // 2))
+    bpy.ops.object.empty_add(type='CUBE', location=(0.0, 0.0, 2.0))
+    clip = bpy.context.object
+    points.select_set(False)
+    clip.select_set(False)
+    yield at_rest()
+    whole, counts = dark_pixels(), {}
+
+    def seen(name):
+        points.select_set(False)
+        yield at_rest()
+        counts[name] = dark_pixels()
+
+    space = area().spaces[0]
+    space.overlay.show_overlays = False
+    yield at_rest()
+    before = view_pixels()
+    clip.patina.clip.shape = 'BOX'
+    yield at_rest()
+    check((view_pixels() != before).any(axis=2).mean() > 0.02, "the clip cuts nothing that is seen")
+    space.overlay.show_overlays = True
+    yield from seen("clip")
+    do(bpy.ops.view3d.view_orbit, angle=0.5, type='ORBITUP')
+    yield from seen("clip, orbited")
+    clip.patina.clip.shape = 'NONE'
+    points.patina.colors.hidden[5] = True
+    yield from seen("hidden class")
+    points.patina.colors.hidden[5] = False
+    yield from seen("whole again")
+    check(max(counts.values()) < LETTERS and whole < LETTERS, f"dark pixels: whole {whole}, {counts}")
+
+
 def orange_pixels():
     """Of the screen: what Blender draws selected vertices with."""
     red, green, blue = np.moveaxis(screen.pixels().astype(np.int16), 2, 0)
