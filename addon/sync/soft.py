@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,8 @@ from .camera import row_major
 from .colors import class_bits
 from .edits import keep
 
-_MISSING = {'ATTRIBUTE': "attribute '{name}'", 'LUMINANCE': "colors", 'CLASSES': "classes"}
+_MISSING = {'ATTRIBUTE': "attribute '{name}'", 'LUMINANCE': "colors", 'CLASSES': "classes",
+            'DISTANCE': "object at a place that is a number"}
 Desc = tuple[tuple[str, Any], ...]  # of patina_field_desc
 
 
@@ -30,11 +32,12 @@ class Soft:
     name: str  # of the attribute
     style: tuple[tuple[str, Any], ...]  # of patina_cloud_style
     desc: Desc = ()
+    placed: bool = True  # what a distance is measured to
 
     def missing(self, cloud: native.Cloud) -> str:
         """What the cloud lacks for it, for the artist; "": nothing."""
         lacks = {'ATTRIBUTE': cloud.numbers is None and not cloud.has_scalars, 'LUMINANCE': not cloud.has_colors,
-                 'CLASSES': not cloud.has_classes}
+                 'CLASSES': not cloud.has_classes, 'DISTANCE': not self.placed}
         return _MISSING[self.by].format(name=self.name) if lacks.get(self.by) else ""
 
 
@@ -62,14 +65,16 @@ def soft_of(obj: bpy.types.Object, matrix: Matrix, scene: bpy.types.Scene) -> So
     desc: dict[str, Any] = {"source": enum_number(group, "by")}
     if group.by == 'CLASSES':
         desc["classes"] = class_bits(group.classes)
+    placed = True
     if group.by == 'DISTANCE':
         target = group.target or scene.camera
+        placed = not target or math.isfinite(sum(map(sum, target.matrix_world)))
         desc["shape"] = enum_number(group, "shape")
         desc["world_from_object"] = row_major(matrix)
         desc["world_from_shape"] = row_major(target.matrix_world if target else Matrix())
     if group.use_range:
         desc["range"] = (group.range_min, group.range_max)
-    return Soft(group.by, group.attribute, tuple(style.items()), (*desc.items(), ("invert", group.invert)))
+    return Soft(group.by, group.attribute, tuple(style.items()), (*desc.items(), ("invert", group.invert)), placed)
 
 
 def field_of(cloud: native.Cloud, soft: Soft) -> Field | None:

@@ -109,6 +109,11 @@ def test_distance():
     check(soft(scene, points) == [3, 4, 5, 6, 7, 8], "far from an object")
     target.location.x = 0.8
     check(soft(scene, points) == [0, 1, 2, 3, 4, 5], "that moved")
+    target.location.z = float('nan')
+    reports.clear()
+    check(soft(scene, points) == [], "far from nowhere: surface")
+    check(any("has no object at a place that is a number to be soft by" in text for _, text in reports), f"said so: {reports}")
+    target.location.z = -3.0
     target.rotation_euler = (0.0, 1.5707963, 0.0)  # its z along x
     by(obj, 'DISTANCE', shape='PLANE', range_min=-1.5, range_max=0.5)
     check(soft(scene, points) == [6, 7, 8], "beyond a plane")  # x - 0.8 > -0.5
