@@ -343,6 +343,10 @@ class PatinaViewLayerProperties(PropertyGroup):
         name="Thickness", default=False, update=_update_passes, override=_OVERRIDE,
         description="Sigma of the nearest point's surface, in the scene's units: noise, and how far scans disagree; "
                     "0 where nothing is, or nothing is known")
+    use_pass_density: BoolProperty(
+        name="Density", default=False, update=_update_passes, override=_OVERRIDE,
+        description="How many soft points lie before the surface, for each square of the scene's unit across the view: what an "
+                    "X-ray shows. 0 where there are none")
     pass_layers: IntProperty(
         name="Layers", default=0, min=0, max=MOST_LAYERS, update=_update_passes, override=_OVERRIDE,
         description="Color, depth and normal of so many layers of surface, the nearest first, as passes of their own; "

@@ -165,6 +165,7 @@ class PATINA_PT_passes(PatinaPanel, Panel):
         column.prop(layer.patina, "use_pass_line")
         column.prop(layer.patina, "use_pass_certainty")
         column.prop(layer.patina, "use_pass_thickness")
+        column.prop(layer.patina, "use_pass_density")
         layout.prop(layer.patina, "pass_layers")
 
 

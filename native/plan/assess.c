@@ -44,8 +44,8 @@ void pt_plan_assess(struct pt_builder *builder)
                   "of instance %u are asked for:%s%s", i, args.certainty ? " certainty" : "",
                   args.thickness ? " thickness" : "");
         args.first = 0;
-        plan->assessed = asked;
+        plan->assessed |= asked;
     }
-    if (!plan->assessed)
+    if (args.first)
         pt_skip(builder, "assess", asked ? "no cloud in view was analysed" : "neither certainty nor thickness is asked for");
 }

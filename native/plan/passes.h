@@ -116,7 +116,8 @@ void pt_close_step(struct pt_builder *builder, uint32_t at);
 void pt_add_passes_step(struct pt_builder *builder, enum pt_step_of of);
 // What is cleared before the layer at hand; shown: what pixels show of meshes too.
 void pt_plan_clears(struct pt_builder *builder, int shown);
-void pt_plan_peeling(struct pt_builder *builder); // and before the first of several
+void pt_plan_no_density(struct pt_builder *builder); // before soft points are counted in the pass
+void pt_plan_peeling(struct pt_builder *builder);    // and before the first of several
 void pt_plan_light_steps(struct pt_builder *builder);
 
 // plan.c: the passes of a depth map with its holes filled, and no more: scatter to fill. builder->behind: only of what lies behind the

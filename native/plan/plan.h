@@ -64,6 +64,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(SOFT_BINS, bins, BINS, ONE, 0)                                                                                           \
     X(CERTAINTY, f32, CROP, ONE, 0)                                                                                            \
     X(THICKNESS, f32, CROP, ONE, 0)                                                                                            \
+    X(DENSITY, f32, CROP, ONE, 0)                                                                                              \
     X(LAYER_COMBINED, f32x4, CROP, LAYERS, 0)                                                                                  \
     X(LAYER_DEPTH, f32, CROP, LAYERS, 0)                                                                                       \
     X(LAYER_NORMALS, f32x3, CROP, LAYERS, 0)
@@ -283,7 +284,8 @@ struct pt_plan {
     int transparent;   // something in view lets light through
     float line_radius; // of the widest line, pixels; 0: none
     uint32_t reopens;  // how often points are drawn where closed pixels are taken back: 2; 0: none are
-    uint32_t assessed; // of PATINA_PASS_CERTAINTY and _THICKNESS, bits 1 << those that are asked for and known of something
+    uint32_t
+        assessed; // of PATINA_PASS_CERTAINTY, _THICKNESS, _DENSITY, bits 1 << those that are asked for and known of something
     struct pt_arena *arena;
 };
 

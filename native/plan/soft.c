@@ -296,7 +296,8 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
               args.shade.instance.lit ? "lit" : "unlit");
 }
 
-static void plan_part(struct pt_builder *builder, const struct pt_soft_part *part, uint32_t number)
+// counted: for the density's pass.
+static void plan_part(struct pt_builder *builder, const struct pt_soft_part *part, uint32_t number, int counted)
 {
     const struct pt_plan *plan = builder->plan;
     const patina_cloud_style *style = &plan->instances[part->first].instance->style;
@@ -313,12 +314,13 @@ static void plan_part(struct pt_builder *builder, const struct pt_soft_part *par
                              .z_to = part->z_to,
                              .crop_x = plan->crop[0],
                              .crop_y = plan->crop[1],
-                             .crop_width = plan->crop[2]};
+                             .crop_width = plan->crop[2],
+                             .density = counted ? 2 : 0};
     const uint32_t rect[4] = {plan->crop[0], part->rows[0], plan->crop[0] + plan->crop[2], part->rows[1]};
     memcpy(args.view.rect, rect, sizeof rect);
     PT_REASON(PT_ADD(builder, soft, args,
                      {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_plane_at(PT_PLANE_SOFT_BINS, 0),
-                      pt_nothing(), pt_plane_at(PT_PLANE_COMBINED, 0), pt_nothing()}),
+                      pt_nothing(), pt_plane_at(PT_PLANE_COMBINED, 0), pt_plane_if(counted, PT_PLANE_DENSITY, 0)}),
               "%s, part %u of %u, z %.4g to %.4g, rows %u to %u: %u records", models[style->soft_model], number + 1,
               plan->soft_part_count, fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1],
               part->rows[1] - plan->crop[1], part->records);
@@ -326,7 +328,8 @@ static void plan_part(struct pt_builder *builder, const struct pt_soft_part *par
 
 void pt_plan_soft(struct pt_builder *builder)
 {
-    const struct pt_plan *plan = builder->plan;
+    struct pt_plan *plan = builder->plan;
+    const int counted = plan->soft_part_count && builder->scene->settings.passes >> PATINA_PASS_DENSITY & 1u;
     uint32_t soft = 0;
     for (uint32_t i = 0; i < builder->scene->instance_count; i++)
         soft += builder->scene->instances[i].style.soft != PATINA_SOFT_OFF;
@@ -335,6 +338,10 @@ void pt_plan_soft(struct pt_builder *builder)
         pt_skip(builder, "gather", reason);
         pt_skip(builder, "soft", reason);
     }
+    if (counted) {
+        pt_plan_no_density(builder);
+        plan->assessed |= 1u << PATINA_PASS_DENSITY;
+    }
     for (uint32_t k = 0; k < plan->soft_part_count; k++)
-        plan_part(builder, &plan->soft_parts[k], k);
+        plan_part(builder, &plan->soft_parts[k], k, counted);
 }

@@ -83,6 +83,11 @@ void pt_plan_clears(struct pt_builder *builder, int shown)
         add_clear(builder, pt_plane_at(PT_PLANE_MESH_PLACES, 0), NOWHERE, 4, "pixels without a mesh lie nowhere");
 }
 
+void pt_plan_no_density(struct pt_builder *builder)
+{
+    add_clear(builder, pt_plane_at(PT_PLANE_DENSITY, 0), 0, 4, "no soft point is counted");
+}
+
 void pt_plan_peeling(struct pt_builder *builder)
 {
     if (builder->plan->line_radius > 0.0f)

@@ -48,7 +48,13 @@ static int compare_floats(const void *a, const void *b)
 // Zero says that nothing is known.
 static int is_known(uint32_t pass, float value) { return pass != PATINA_PASS_THICKNESS || value > 0.0f; }
 
-// Shares go from 0 to 1; others from the least to the greatest but a hundredth of the pixels, thickness from 0.
+// Soft points have no depth.
+static int shows(uint32_t pass, float value, float depth)
+{
+    return pass == PATINA_PASS_DENSITY ? value > 0.0f : isfinite(depth);
+}
+
+// Shares go from 0 to 1; others from the least to the greatest but a hundredth of the pixels, thickness and density from 0.
 static int find_range(uint32_t pass, const float *values, const float *depth, size_t count, double range[2])
 {
     range[0] = 0.0;
@@ -60,11 +66,11 @@ static int find_range(uint32_t pass, const float *values, const float *depth, si
     if (!sorted)
         return PATINA_ERROR_MEMORY;
     for (size_t i = 0; i < count; i++)
-        if (isfinite(depth[i]) && is_known(pass, values[i]))
+        if (shows(pass, values[i], depth[i]) && is_known(pass, values[i]))
             sorted[known++] = fabsf(values[i]);
     qsort(sorted, known, sizeof *sorted, compare_floats);
     if (known) {
-        range[0] = pass == PATINA_PASS_THICKNESS ? 0.0 : (double)sorted[known / 100];
+        range[0] = pass == PATINA_PASS_THICKNESS || pass == PATINA_PASS_DENSITY ? 0.0 : (double)sorted[known / 100];
         range[1] = (double)sorted[known - 1 - known / 100];
     }
     free(sorted);
@@ -88,7 +94,7 @@ static void color_pixels(uint32_t pass, const float *values, const float *depth,
     static const float unknown[4] = {0.05f, 0.05f, 0.05f, 1.0f};
     for (size_t i = 0; i < count; i++) {
         float *out = pixels + 4 * i;
-        if (!isfinite(depth[i]))
+        if (!shows(pass, values[i], depth[i]))
             continue; // the background stays
         if (pass == PATINA_PASS_NORMAL) {
             for (size_t k = 0; k < 3; k++)

@@ -209,7 +209,8 @@ void add_disc(uint k, vec2 here, inout pixel own)
     precise float dx = place.x - here.x, dy = place.y - here.y;
     precise float q = (shape.x * dx + shape.y * dy) * dx + shape.z * (dy * dy);
     q = pt_max(q, 0.0);
-    if (!(q < 1.0 && PT_SOFT_SPENT <= own.through && own.from < place.z && place.z <= own.to))
+    bool open_here = PT_SOFT_SPENT <= own.through;
+    if (!(q < 1.0 && (open_here || args.density != 0u) && own.from < place.z && place.z <= own.to))
         return;
     precise float f = PT_SOFT_COSINE_5 * q + PT_SOFT_COSINE_4;
     f = f * q + PT_SOFT_COSINE_3;
@@ -217,16 +218,19 @@ void add_disc(uint k, vec2 here, inout pixel own)
     f = f * q + PT_SOFT_COSINE_1;
     f = f * q + PT_SOFT_COSINE_0;
     f = f * q + 1.0;
+    precise float sum = own.density + look.w * f;
+    own.density = sum;
+    if (!open_here)
+        return;
     precise float share = f;
     if (shape.w < 1.0) {
         float root = q * pt_rsqrt(pt_max(q, 1e-20));
         share = (1.0 - root) * (1.0 - shape.w) + f * shape.w;
     }
-    precise float part = own.through * (share * place.w), through = own.through - part, sum = own.density + look.w * f;
+    precise float part = own.through * (share * place.w), through = own.through - part;
     precise vec3 color = own.color + part * look.xyz;
     own.through = through;
     own.color = color;
-    own.density = sum;
     own.fragments++;
 }
 
@@ -239,7 +243,7 @@ void draw(view_args view, uint begin, uint count, ivec2 corner, bool inside, ino
         if (lane == 0u)
             open = 0u;
         barrier();
-        if (inside && PT_SOFT_SPENT <= own.through && own.from < own.to)
+        if (inside && (PT_SOFT_SPENT <= own.through || args.density != 0u) && own.from < own.to)
             atomicOr(open, 1u);
         if (i + lane < end)
             set_disc(view, lane, lists[begin + i + lane].x, corner);

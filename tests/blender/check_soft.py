@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 from check_points import pixel
-from harness import SCRATCH, add_points, check, new_scene, patina, render, reports
+from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, reports
 
 COUNT = 9
 
@@ -51,6 +51,25 @@ def test_all():
     obj.patina.soft.use = False
     alpha = render()["Combined"][..., 3]
     check(set(np.unique(alpha)) <= {0.0, 1.0}, "off: surface")
+
+
+def test_density():
+    """Each point is shared out over its ball: across a parallel view they add up to how many there are."""
+    scene, obj, _ = row()
+    layer = bpy.context.view_layer
+    layer.patina.use_pass_density = True
+    obj.patina.soft.radius = 0.3  # many pixels
+    scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', 4.0
+    pixel = 4.0 / max(scene.render.resolution_x, scene.render.resolution_y)
+    for model in ('BASE', 'CONCENTRIC', 'EXPRESS'):
+        scene.patina.soft_model = model
+        density = render()["Density"][..., 0]
+        check_close(float(density.sum()) * pixel * pixel, COUNT, 0.02 * COUNT, f"{model}: points")
+        check(density.min() == 0.0, f"{model}: beside them there are none")
+    obj.patina.soft.use = False
+    check(not render()["Density"].any(), "surfaces are not counted")
+    layer.patina.use_pass_density = False
+    check("Density" not in render(), "nor is the pass there, unless it is asked for")
 
 
 def test_attribute():

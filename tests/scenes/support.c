@@ -217,6 +217,7 @@ struct picture picture_read_passes(const patina_frame *frame)
     picture.source = read_pass(frame, PATINA_PASS_SOURCE, pixels, 1);
     picture.certainty = read_pass(frame, PATINA_PASS_CERTAINTY, pixels, 1);
     picture.thickness = read_pass(frame, PATINA_PASS_THICKNESS, pixels, 1);
+    picture.density = read_pass(frame, PATINA_PASS_DENSITY, pixels, 1);
     return picture;
 }
 
@@ -275,6 +276,7 @@ void picture_free(struct picture *picture)
     free(picture->source);
     free(picture->certainty);
     free(picture->thickness);
+    free(picture->density);
     free(picture->layer_combined);
     free(picture->layer_depth);
     free(picture->layer_normal);
@@ -317,6 +319,7 @@ void picture_assert_identical(const struct picture *part, const struct picture *
     assert_same_bytes(part->source, whole->source, 4, part, whole, x, y, "source", what);
     assert_same_bytes(part->certainty, whole->certainty, 4, part, whole, x, y, "certainty", what);
     assert_same_bytes(part->thickness, whole->thickness, 4, part, whole, x, y, "thickness", what);
+    assert_same_bytes(part->density, whole->density, 4, part, whole, x, y, "density", what);
     assert_same_bytes(part->normal, whole->normal, 12, part, whole, x, y, "normal", what);
     assert_same_bytes(part->combined, whole->combined, 16, part, whole, x, y, "combined", what);
     assert_int_equal(part->layers, whole->layers);

@@ -202,7 +202,7 @@ static void hold(patina_device *device, const char *device_name, int which, int 
     const patina_camera camera = camera_of(&scene, parallel, s);
     const patina_settings settings = plain_settings();
     struct picture picture = picture_render(device, drawn, &camera, &settings);
-    double worst = 0.0, marched = 0.0;
+    double worst = 0.0, marched = 0.0, density_off = 0.0, densest = 0.0;
     const double w = round((1.0 - (double)modulation) * 255.0) / 255.0;
     for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
         double origin[3], ray[3];
@@ -210,13 +210,18 @@ static void hold(patina_device *device, const char *device_name, int which, int 
         const double length = sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]);
         const struct ref_soft expected = exactly(&scene, &camera, origin, ray, model, 12, w, 50.0 * s * length);
         worst = fmax(worst, check_pixel(&expected, picture.combined + 4 * i, behind));
+        density_off = fmax(density_off, fabs((double)picture.density[i] - expected.density));
+        densest = fmax(densest, expected.density);
         if (i % 211 || model != PATINA_SOFT_BASE || modulation > 0.0f)
             continue;
         const struct ref_soft sum = march(&scene, origin, ray, (parallel ? 0.0 : 0.01 * s) * length, 8.0 * s * length);
         marched = fmax(marched, check_pixel(&sum, picture.combined + 4 * i, behind));
     }
-    printf("  %s, %s%s, model %u, scale %g, modulation %g: %.2g from the reference, %.2g from quadrature\n", device_name,
-           scene.name, parallel ? ", parallel" : "", model, s, (double)modulation, worst, marched);
+    printf(
+        "  %s, %s%s, model %u, scale %g, modulation %g: %.2g from the reference, %.2g from quadrature, density %.2g of %.4g\n",
+        device_name, scene.name, parallel ? ", parallel" : "", model, s, (double)modulation, worst, marched, density_off,
+        densest);
+    assert_true(densest > 0.0 && density_off <= 1e-4 * densest);
     assert_true(worst <= 1e-4);
     assert_true(marched <= 1e-4);
     assert_int_equal(picture_count(&picture), 0); // keys tell of what is opaque
@@ -548,10 +553,10 @@ static void test_parts(void **state)
         struct picture picture = draw(device, &many, 0);
         struct points torus = points_torus(POINTS, 1.0, 0.4, POINTS_ALL, 6);
         const struct ref_soft_model base = {PT_SOFT_BASE, PT_SOFT_EVEN};
-        double worst = 0.0;
+        double worst = 0.0, sums_off = 0.0;
         for (uint32_t k = 0; k < 12 && model == PATINA_SOFT_BASE; k++) {
             const uint32_t x = 7 + 7 * k, y = 12 + 4 * k;
-            double origin[3], ray[3], through = 1.0;
+            double origin[3], ray[3], through = 1.0, density = 0.0;
             camera_ray(&many.camera, WIDTH, HEIGHT, x + 0.5, y + 0.5, origin, ray);
             const double square = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2];
             for (uint64_t i = 0; i < torus.count; i += SHOWN) {
@@ -565,12 +570,15 @@ static void test_parts(void **state)
                 if (d >= 1.0)
                     continue;
                 struct ref_ball ball = {.d = d, .along = 2.0, .r = 0.08, .a = 0.05, .w = 1.0};
-                through *= ref_soft_ray(&ball, 1, &base, 0.0, 100.0).through;
+                const struct ref_soft alone = ref_soft_ray(&ball, 1, &base, 0.0, 100.0);
+                through *= alone.through;
+                density += alone.density;
             }
+            sums_off = fmax(sums_off, fabs((double)picture.density[y * WIDTH + x] - density) / fmax(density, 1.0));
             worst = fmax(worst, fabs(1.0 - through - (double)picture.combined[4 * (y * WIDTH + x) + 3]));
         }
-        printf("  model %u: %.2g from the product\n", model, worst);
-        assert_true(worst <= 3e-4);
+        printf("  model %u: %.2g from the product, density off by %.2g\n", model, worst, sums_off);
+        assert_true(worst <= 3e-4 && sums_off <= 1e-4);
         points_free(&torus);
         picture_free(&picture);
         mixed_free(&many);

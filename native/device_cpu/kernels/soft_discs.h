@@ -75,6 +75,7 @@ static inline void pt_soft_set_discs(const struct pt_soft_tile *tile, const uint
 static inline void pt_soft_add_disc(struct pt_soft_tile *tile, const struct pt_soft_disc *d)
 {
     const vf one = vf_set(1.0f), zero = vf_zero(), z = vf_set(d->z), spent = vf_set(PT_SOFT_SPENT), a = vf_set(d->a);
+    const int counted = tile->bins->args->density != 0;
     for (int32_t y = d->y0; y < d->y1; y++) {
         const float dy = d->y - (float)y;
         const vf below = vf_set(d->b * dy), least = vf_set(d->c * (dy * dy));
@@ -82,9 +83,9 @@ static inline void pt_soft_add_disc(struct pt_soft_tile *tile, const struct pt_s
             const uint32_t at = (uint32_t)y * PT_SOFT_TILE + (uint32_t)x;
             const vf dx = vf_set(d->x) - vi_convert(vi_add(vi_set((uint32_t)x), vi_lanes()));
             const vf q = vf_max((a * dx + below) * dx + least, zero), through = vf_load(tile->through + at);
-            vm some = vm_and(vf_lt(q, one), vf_le(spent, through));
-            some = vm_and(some, vm_and(vf_lt(vf_load(tile->from + at), z), vf_le(z, vf_load(tile->to + at))));
-            if (!vm_bits(some))
+            const vm within = vm_and(vf_lt(vf_load(tile->from + at), z), vf_le(z, vf_load(tile->to + at)));
+            const vm there = vm_and(vf_lt(q, one), within), some = vm_and(there, vf_le(spent, through));
+            if (!vm_bits(counted ? there : some))
                 continue;
             vf f = vf_set(PT_SOFT_COSINE_5) * q + vf_set(PT_SOFT_COSINE_4);
             f = f * q + vf_set(PT_SOFT_COSINE_3);
@@ -101,8 +102,8 @@ static inline void pt_soft_add_disc(struct pt_soft_tile *tile, const struct pt_s
             vf_store(tile->through + at, through - part);
             for (int k = 0; k < 3; k++)
                 vf_store(tile->color[k] + at, vf_load(tile->color[k] + at) + part * vf_set(d->color[k]));
-            if (tile->bins->args->density)
-                vf_store(tile->density + at, vf_load(tile->density + at) + vf_mul_where(some, vf_set(d->density), f));
+            if (counted) // whatever light is left
+                vf_store(tile->density + at, vf_load(tile->density + at) + vf_mul_where(there, vf_set(d->density), f));
             tile->fragments += (uint32_t)__builtin_popcount(vm_bits(some));
         }
     }
@@ -113,7 +114,7 @@ static void pt_soft_discs(struct pt_soft_tile *tile, const uint32_t *list, uint3
     struct pt_soft_disc discs[PT_LANES];
     for (uint32_t i = 0; i < count; i += PT_LANES) {
         const uint32_t some = pt_lanes_left(i, count);
-        if (i % 64 == 0 && pt_soft_spent(tile))
+        if (i % 64 == 0 && !tile->bins->args->density && pt_soft_spent(tile))
             return;
         pt_soft_set_discs(tile, list + i, some, discs);
         for (uint32_t k = 0; k < some; k++)
