@@ -17,7 +17,7 @@ from .importers import told
 from .sync import losses, motion
 from .sync.kept import CHECKS
 
-BUILDING = 0.5  # share of the progress bar for reading the scene; the rest is the picture
+BUILDING = 0.1  # share of the progress bar for reading the scene; the rest is the picture
 
 
 class PatinaRenderEngine(bpy.types.RenderEngine):
@@ -57,7 +57,7 @@ class PatinaRenderEngine(bpy.types.RenderEngine):
         self._guard(lambda: self._viewport.update(context, depsgraph))
 
     def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
-        """Draws the last finished picture; never waits for one."""
+        """Draws the last finished picture; waits a moment for one of a new size, and never else."""
         if self._viewport:
             self._guard(lambda: self.update_stats("Patina", self._viewport.draw(context, depsgraph)))
 

@@ -34,6 +34,7 @@ STAY = 0.004  # seconds that a look lasts at most waiting for tasks that it star
 HIDDEN, SHOWN = 4.0, -8.0  # pixels' width that overlays' depth is nearer than the surface: Blender's dots of vertices are hidden, or not
 ROUNDING = 4.0 * 2.0 ** -24  # and by so many steps of Blender's depths of 24 bits: each may be meters, far away in a view that begins near
 REST = 0.12  # seconds without motion after which the whole picture is drawn
+RESIZED = 0.25  # seconds that a redraw waits for the first picture, or that of a new size
 BETTER = 200.0  # milliseconds of further samples between two pictures of a view at rest
 
 SELECTED = (1.0, 0.35, 0.02)  # linear, and its share of the pixel: of selected points
@@ -164,9 +165,19 @@ class Viewport:
             self._view, self._clips = view, clips
             self._moved = time.monotonic()
             self._ask(self.pace.level)
+        self._await_size()
         if self.shown:
             self._draw_picture(context)
         return self._status()
+
+    def _await_size(self) -> None:
+        """A picture of another size would be stretched, and Blender's dots stand beside it: a moment is given to the next one."""
+        until = time.monotonic() + RESIZED
+        while _TURNS and self._view and time.monotonic() < until:
+            seen = self.shown.wish.view if self.shown else None
+            if seen and (seen.width, seen.height) == (self._view.width, self._view.height):
+                break
+            _work(until)
 
     def tick(self) -> bool:
         """Called by the timer. Whether it has to come again."""

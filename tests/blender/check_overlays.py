@@ -193,6 +193,30 @@ def test_what_is_left_out_shows_no_dots():
     check(max(counts.values()) < LETTERS and whole < LETTERS, f"dark pixels: whole {whole}, {counts}")
 
 
+def test_a_new_size_shows_no_stretched_picture():
+    """The redraw after it waits for the picture; here as long as a machine with other work may need."""
+    bright_scene()
+    yield at_rest()
+    stretched, drawn = [], viewport.Viewport._draw_picture
+
+    def draw(self, context):
+        stretched.append((self.shown.wish.view.width, self.shown.wish.view.height) != (self._view.width, self._view.height))
+        drawn(self, context)
+
+    waits, viewport.RESIZED, viewport.Viewport._draw_picture = viewport.RESIZED, 20.0, draw
+    try:
+        for operator, options in ((bpy.ops.screen.area_split, {"direction": 'VERTICAL', "factor": 0.6}),
+                                  (bpy.ops.screen.screen_full_area, {}), (bpy.ops.screen.screen_full_area, {})):
+            do(operator, **options)
+            yield at_rest()
+        views = [place for place in bpy.context.window.screen.areas if place.type == 'VIEW_3D']
+        do(bpy.ops.screen.area_close, min(views, key=lambda place: place.width))
+        yield at_rest()
+    finally:
+        viewport.RESIZED, viewport.Viewport._draw_picture = waits, drawn
+    check(len(stretched) >= 4 and not any(stretched), f"{sum(stretched)} of {len(stretched)} redraws stretch a picture")
+
+
 def orange_pixels():
     """Of the screen: what Blender draws selected vertices with."""
     red, green, blue = np.moveaxis(screen.pixels().astype(np.int16), 2, 0)
