@@ -165,6 +165,9 @@ static inline struct pt_ref pt_field_of(const struct pt_plan_instance *instance,
 }
 // soft.c: soft points over the picture.
 void pt_plan_soft(struct pt_builder *builder);
+// Of several layers, before one is shaded: those between it and the layer before; and behind the last.
+void pt_plan_soft_layer(struct pt_builder *builder);
+void pt_plan_soft_beyond(struct pt_builder *builder);
 
 // assess.c: certainty and thickness of what the picture shows.
 void pt_plan_assess(struct pt_builder *builder);

@@ -577,6 +577,7 @@ static enum pt_plane plan_layer(struct pt_builder *builder)
     pt_plan_meshes(builder, 1);
     pt_plan_average(builder);
     pt_plan_lines(builder);
+    pt_plan_soft_layer(builder);
     plan_shadows(builder);
     uint32_t finish = plan->pass_count;
     for (int own = pt_effects_want_albedo(builder->scene); own >= 0; own--) { // normals are shown by the last
@@ -683,6 +684,7 @@ static void plan_points(struct pt_builder *builder)
     if (plan->layers > 1)
         pt_close_step(builder, loop);
     builder->layer = 0;
+    pt_plan_soft_beyond(builder);
     if (plan->layers == 1)
         pt_skip(builder, "peel",
                 plan->transparent ? "the settings ask for one layer" : "everything in view is opaque: one layer");

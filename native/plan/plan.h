@@ -62,6 +62,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(LINES, f32, CROP, ONE, 0)                                                                                                \
     X(SOFT_POINTS, record, RECORDS, ONE, 0)                                                                                    \
     X(SOFT_BINS, bins, BINS, ONE, 0)                                                                                           \
+    X(SOFT_REACHED, f32, WINDOW, ONE, 0)                                                                                       \
     X(CERTAINTY, f32, CROP, ONE, 0)                                                                                            \
     X(THICKNESS, f32, CROP, ONE, 0)                                                                                            \
     X(DENSITY, f32, CROP, ONE, 0)                                                                                              \

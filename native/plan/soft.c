@@ -296,13 +296,18 @@ static void plan_gather(struct pt_builder *builder, uint32_t i)
               args.shade.instance.lit ? "lit" : "unlit");
 }
 
-// counted: for the density's pass.
-static void plan_part(struct pt_builder *builder, const struct pt_soft_part *part, uint32_t number, int counted)
+// Where what a part draws goes.
+enum into {
+    BEFORE,  // the picture: what lies before the first layer
+    BETWEEN, // what lies over: between the layer before and the one at hand
+    BEYOND   // the same, whatever the last one covers
+};
+
+static const char *const places[] = {"in front", "between layers", "behind all"};
+
+static struct soft_args part_args(const struct pt_plan *plan, const struct pt_soft_part *part, enum into into)
 {
-    const struct pt_plan *plan = builder->plan;
     const patina_cloud_style *style = &plan->instances[part->first].instance->style;
-    for (uint32_t k = 0; k < part->count; k++)
-        plan_gather(builder, part->first + k);
     struct soft_args args = {.view = plan->view,
                              .records = part->records,
                              .model = style->soft_model == PATINA_SOFT_BASE         ? PT_SOFT_BASE
@@ -312,18 +317,72 @@ static void plan_part(struct pt_builder *builder, const struct pt_soft_part *par
                              .shells = style->soft_shells,
                              .z_from = part->z_from,
                              .z_to = part->z_to,
+                             .layered = (uint32_t)into,
                              .crop_x = plan->crop[0],
                              .crop_y = plan->crop[1],
-                             .crop_width = plan->crop[2],
-                             .density = counted ? 2 : 0};
+                             .crop_width = plan->crop[2]};
     const uint32_t rect[4] = {plan->crop[0], part->rows[0], plan->crop[0] + plan->crop[2], part->rows[1]};
     memcpy(args.view.rect, rect, sizeof rect);
+    return args;
+}
+
+static void plan_gathers(struct pt_builder *builder, const struct pt_soft_part *part)
+{
+    for (uint32_t k = 0; k < part->count; k++)
+        plan_gather(builder, part->first + k);
+}
+
+// counted: for the density's pass.
+static void plan_part(struct pt_builder *builder, uint32_t number, enum into into, int counted)
+{
+    const struct pt_plan *plan = builder->plan;
+    const struct pt_soft_part *part = &plan->soft_parts[number];
+    struct soft_args args = part_args(plan, part, into);
+    args.density = counted ? 2 : 0;
+    if (plan->soft_part_count > 1 || (into == BEFORE && plan->layers == 1)) // else they are there since the first layer
+        plan_gathers(builder, part);
+    PT_REASON(
+        PT_ADD(builder, soft, args,
+               {into == BETWEEN ? pt_keys_of(builder, 0) : pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0),
+                pt_plane_at(PT_PLANE_SOFT_BINS, 0), pt_plane_if(into != BEFORE, PT_PLANE_SOFT_REACHED, 0),
+                pt_plane_at(into == BEFORE ? PT_PLANE_COMBINED : PT_PLANE_OVER, 0), pt_plane_if(counted, PT_PLANE_DENSITY, 0)}),
+        "%s %s, part %u of %u, z %.3g to %.3g, rows %u to %u: %u records",
+        models[plan->instances[part->first].instance->style.soft_model], places[into], number + 1, plan->soft_part_count,
+        fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1], part->rows[1] - plan->crop[1],
+        part->records);
+}
+
+// What lies behind the layer at hand lies behind its keys.
+static void plan_reached(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    struct soft_args args = part_args(plan, &plan->soft_parts[0], BETWEEN);
+    args.records = 0;
+    args.last = 1;
+    args.view.rect[1] = plan->crop[1];
+    args.view.rect[3] = plan->crop[1] + plan->crop[3];
     PT_REASON(PT_ADD(builder, soft, args,
-                     {pt_plane_at(PT_PLANE_KEYS, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_plane_at(PT_PLANE_SOFT_BINS, 0),
-                      pt_nothing(), pt_plane_at(PT_PLANE_COMBINED, 0), pt_plane_if(counted, PT_PLANE_DENSITY, 0)}),
-              "%s, part %u of %u, z %.4g to %.4g, rows %u to %u: %u records", models[style->soft_model], number + 1,
-              plan->soft_part_count, fmax((double)part->z_from, 0.0), (double)part->z_to, part->rows[0] - plan->crop[1],
-              part->rows[1] - plan->crop[1], part->records);
+                     {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_SOFT_POINTS, 0), pt_plane_at(PT_PLANE_SOFT_BINS, 0),
+                      pt_plane_at(PT_PLANE_SOFT_REACHED, 0), pt_plane_at(PT_PLANE_OVER, 0), pt_nothing()}),
+              "how far layer %u reaches", builder->layer);
+}
+
+void pt_plan_soft_layer(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    if (plan->layers == 1 || !plan->soft_part_count)
+        return;
+    if (builder->layer == 1 && plan->soft_part_count == 1)
+        plan_gathers(builder, &plan->soft_parts[0]);
+    for (uint32_t k = plan->soft_part_count; k-- > 0 && builder->layer > 1;) // the nearest first
+        plan_part(builder, k, BETWEEN, 0);
+    plan_reached(builder);
+}
+
+void pt_plan_soft_beyond(struct pt_builder *builder)
+{
+    for (uint32_t k = builder->plan->soft_part_count; k-- > 0 && builder->plan->layers > 1;)
+        plan_part(builder, k, BEYOND, 0);
 }
 
 void pt_plan_soft(struct pt_builder *builder)
@@ -343,5 +402,5 @@ void pt_plan_soft(struct pt_builder *builder)
         plan->assessed |= 1u << PATINA_PASS_DENSITY;
     }
     for (uint32_t k = 0; k < plan->soft_part_count; k++)
-        plan_part(builder, &plan->soft_parts[k], k, counted);
+        plan_part(builder, k, BEFORE, counted);
 }

@@ -88,8 +88,15 @@ void pt_plan_no_density(struct pt_builder *builder)
     add_clear(builder, pt_plane_at(PT_PLANE_DENSITY, 0), 0, 4, "no soft point is counted");
 }
 
+static void nothing_reached(struct pt_builder *builder)
+{
+    add_clear(builder, pt_plane_at(PT_PLANE_SOFT_REACHED, 0), 0xBF800000u, 4, "no layer is taken"); // -1
+}
+
 void pt_plan_peeling(struct pt_builder *builder)
 {
+    if (builder->plan->soft_part_count)
+        nothing_reached(builder);
     if (builder->plan->line_radius > 0.0f)
         add_clear(builder, pt_plane_at(PT_PLANE_OVER, 0), 0, 4, "lines find nothing before them");
     add_clear(builder, pt_plane_at(PT_PLANE_THROUGH, 0), 0x3F800000u, 4,

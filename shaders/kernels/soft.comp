@@ -408,7 +408,7 @@ void save(view_args view, uvec2 here, pixel own)
     else if (args.density != 0u)
         density[crop] += own.density;
     if (args.layered != 0u && args.last != 0u)
-        reached[at] = pt_float(keys[at].y);
+        reached[at] = pt_max(reached[at], pt_float(keys[at].y));
 }
 
 // What a pixel has come to, from part to part.
@@ -455,7 +455,7 @@ void main()
         own.from = args.z_from;
         if (args.layered != 0u)
             own.from = pt_max(reached[at], args.z_from);
-        own.to = pt_min(pt_float(keys[at].y), args.z_to);
+        own.to = args.layered == 2u ? args.z_to : pt_min(pt_float(keys[at].y), args.z_to);
     }
     if (part != 0u)
         own = restored(state, own);

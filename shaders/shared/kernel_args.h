@@ -855,8 +855,8 @@ struct soft_args {
     uint32_t shells;        // of every ball; 0: as PT_SOFT_RING says
     float z_from, z_to;     // only what lies beyond z_from, and not beyond z_to
     uint32_t layered;       // 1: only what lies beyond the reached plane, too; and it goes behind what target holds, of the plane's
-                            // size. 0: it goes before what target holds, of the crop's size
-    uint32_t last;          // layered: the keys' z becomes the reached one
+                            // size. 2: the same, whatever the keys' z. 0: it goes before what target holds, of the crop's size
+    uint32_t last;          // layered: the keys' z becomes the reached one, where it lies beyond that
     uint32_t crop_x, crop_y, crop_width; // of density, and of target unless layered
     uint32_t density;       // 0: none; 1: written; 2: added to
 };

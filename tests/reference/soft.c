@@ -183,7 +183,7 @@ struct ref_soft ref_soft(const struct soft_args *args, const uint32_t *records, 
     const double px = view->origin_x + x + 0.5, py = view->origin_y + y + 0.5;
     const double u = (double)view->ray_x0 + (double)view->ray_xs * px, v = (double)view->ray_y0 + (double)view->ray_ys * py;
     const double root = view->perspective ? sqrt(1.0 + u * u + v * v) : 1.0;
-    double from = (double)args->z_from, to = fmin((double)args->z_to, z);
+    double from = (double)args->z_from, to = args->layered == 2 ? (double)args->z_to : fmin((double)args->z_to, z);
     if (args->layered)
         from = fmax(from, reached);
     struct ref_ball *balls = calloc(args->records + 1, sizeof *balls);

@@ -587,6 +587,103 @@ static void test_parts(void **state)
     patina_device_destroy(device);
 }
 
+// ---- behind glass ---------------------------------------------------------------------------------------------------------
+
+struct glass {
+    struct mixed mixed;
+    patina_scene *soft; // without the wall
+};
+
+static struct glass glaze(uint32_t model, double move, float transparency)
+{
+    struct glass glass = {mix(3000, model, move), NULL};
+    patina_scene *scenes[] = {glass.mixed.scene, glass.mixed.bare};
+    patina_cloud_style wall = {.struct_size = sizeof wall, .transparency = transparency, .lighting = PATINA_LIGHTING_UNLIT};
+    patina_cloud_style soft = soft_style(model);
+    soft.soft_opacity = 0.3f;
+    soft.soft_radius = 0.05f;
+    soft.lighting = PATINA_LIGHTING_UNLIT;
+    for (int k = 0; k < 2; k++) {
+        patina_scene_clear(scenes[k]);
+        CHECK(patina_scene_add_cloud(scenes[k], glass.mixed.wall, &wall), scenes[k]);
+    }
+    CHECK(patina_scene_add_cloud(glass.mixed.scene, glass.mixed.soft, &soft), glass.mixed.scene);
+    glass.soft = scene_of(glass.mixed.soft, &soft);
+    glass.mixed.settings = plain_settings();
+    return glass;
+}
+
+static void glass_free(struct glass *glass)
+{
+    mixed_free(&glass->mixed);
+    patina_scene_destroy(glass->soft);
+}
+
+// Whether pixels beside one are of the wall where it is not, or the reverse: colours are mixed there.
+static int is_edge(const struct picture *pane, uint32_t x, uint32_t y)
+{
+    const int own = pane->keys[y * WIDTH + x] == KEY_EMPTY;
+    int edge = 0;
+    for (uint32_t k = 0; k < 25; k++)
+        edge |= own != (pane->keys[(y + k / 5 - 2) * WIDTH + x + k % 5 - 2] == KEY_EMPTY);
+    return edge;
+}
+
+// What lies behind a pane changes colours as without the pane, times what the pane lets through.
+static void see_through(patina_device *device, const char *name)
+{
+    for (uint32_t model = 0; model < 3; model++) {
+        struct glass glass = glaze(model, 2.8, 0.5f);
+        struct picture both = draw(device, &glass.mixed, 0), pane = draw(device, &glass.mixed, 1);
+        struct picture soft = picture_render(device, glass.soft, &glass.mixed.camera, &glass.mixed.settings);
+        double worst = 0.0;
+        uint32_t seen = 0;
+        for (uint32_t y = 2; y + 2 < HEIGHT; y++)
+            for (uint32_t x = 2; x + 2 < WIDTH; x++) {
+                const uint32_t i = y * WIDTH + x;
+                const double through = pane.keys[i] == KEY_EMPTY ? 1.0 : 0.5;
+                for (int c = 0; c < 3 && !is_edge(&pane, x, y); c++) {
+                    const double change = (double)soft.combined[4 * i + c] - (double)background[c];
+                    worst = fmax(worst,
+                                 fabs((double)pane.combined[4 * i + c] + through * change - (double)both.combined[4 * i + c]));
+                    seen += through < 1.0 && fabs(change) > 0.02;
+                }
+            }
+        printf("  %s, model %u behind a pane: off by %.2g at most, %u values seen through it\n", name, model, worst, seen);
+        assert_true(seen > 300);
+        assert_true(worst <= 2e-3);
+        picture_free(&both);
+        picture_free(&pane);
+        picture_free(&soft);
+        glass_free(&glass);
+    }
+}
+
+// A pane that is hardly there changes nothing, though it divides the balls: none is lost, none counts twice.
+static void divide(patina_device *device, const char *name)
+{
+    for (uint32_t model = 0; model < 3; model++) {
+        struct glass glass = glaze(model, 0.6, 0.999f);
+        struct picture both = draw(device, &glass.mixed, 0);
+        struct picture soft = picture_render(device, glass.soft, &glass.mixed.camera, &glass.mixed.settings);
+        double worst = 0.0;
+        for (uint32_t i = 0; i < 4 * WIDTH * HEIGHT; i++)
+            worst = fmax(worst, fabs((double)both.combined[i] - (double)soft.combined[i]));
+        printf("  %s, model %u divided by a pane: off by %.2g at most\n", name, model, worst);
+        assert_true(worst <= 4e-3);
+        picture_free(&both);
+        picture_free(&soft);
+        glass_free(&glass);
+    }
+}
+
+static void test_glass(void **state)
+{
+    (void)state;
+    each_device(see_through);
+    each_device(divide);
+}
+
 // ---- what is asked for -----------------------------------------------------------------------------------------------------
 
 static void refuse(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style, const char *word)
@@ -708,10 +805,10 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_quadrature), cmocka_unit_test(test_wall),     cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_threads),    cmocka_unit_test(test_regions),  cmocka_unit_test(test_devices),
-        cmocka_unit_test(test_parts),      cmocka_unit_test(test_refusals), cmocka_unit_test(test_sifted),
-        cmocka_unit_test(test_units),
+        cmocka_unit_test(test_quadrature), cmocka_unit_test(test_wall),    cmocka_unit_test(test_glass),
+        cmocka_unit_test(test_cut),        cmocka_unit_test(test_threads), cmocka_unit_test(test_regions),
+        cmocka_unit_test(test_devices),    cmocka_unit_test(test_parts),   cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_sifted),     cmocka_unit_test(test_units),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

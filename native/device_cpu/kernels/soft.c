@@ -24,7 +24,7 @@ static void load(struct pt_soft_tile *tile)
         if (x >= tile->width || y >= tile->height)
             continue;
         tile->from[i] = args->layered ? pt_max(reached[at], args->z_from) : args->z_from;
-        tile->to[i] = pt_min(pt_float((uint32_t)(keys[at] >> 32)), args->z_to);
+        tile->to[i] = args->layered == 2 ? args->z_to : pt_min(pt_float((uint32_t)(keys[at] >> 32)), args->z_to);
     }
 }
 
@@ -43,9 +43,10 @@ static void save_pixel(const struct pt_soft_tile *tile, uint32_t i, uint32_t x, 
         ((float *)PT_DATA(call, soft, density))[crop] = tile->density[i];
     else if (args->density)
         ((float *)PT_DATA(call, soft, density))[crop] += tile->density[i];
-    if (args->layered && args->last)
-        ((float *)PT_DATA(call, soft, reached))[at] = pt_float(
-            (uint32_t)(((const uint64_t *)PT_DATA(call, soft, keys))[at] >> 32));
+    if (args->layered && args->last) {
+        float *reached = (float *)PT_DATA(call, soft, reached) + at;
+        *reached = pt_max(*reached, pt_float((uint32_t)(((const uint64_t *)PT_DATA(call, soft, keys))[at] >> 32)));
+    }
 }
 
 static void draw_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thread)
