@@ -193,7 +193,7 @@ static int disc_programs(struct pt_gl_device *d, enum pt_kernel kernel, uint32_t
 {
     int result = PATINA_OK;
     for (uint32_t large = 0; large < 2 && result == PATINA_OK; large++) {
-        char definitions[64];
+        char definitions[96];
         snprintf(definitions, sizeof definitions, "%s#define LARGE %u\n", definition, large);
         result = pt_gl_kernel_program(d, kernel, pass + LARGE * large, definitions);
     }
@@ -228,7 +228,7 @@ int pt_gl_splat(struct pt_gl_device *d, const struct pt_gl_work *work)
     return result;
 }
 
-enum { ADD = 0, MEAN = 1, BAND_BYTES = 1 << 26, SUM_BYTES = 80 }; // blend sums ten, two words each
+enum { ADD = 0, MEAN = 1, PART = 2 * LARGE, BAND_BYTES = 1 << 26, SUM_BYTES = 80 }; // blend sums ten, two words each
 
 // Room for the sums of as many rows as fit, at most `height`; bound.
 static int make_sums(struct pt_gl_device *d, uint32_t width, uint32_t height, uint32_t binding, const char *what,
@@ -254,29 +254,52 @@ static void clear_sums(struct pt_gl_device *d, uint32_t width, uint32_t rows)
 static int blend_band(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t first, uint32_t end)
 {
     const struct blend_args *args = work->arguments;
-    const uint32_t width = args->view.width;
+    const uint32_t width = args->view.width, part = PART * args->part;
     int result = PATINA_OK;
     clear_sums(d, width, end - first);
     for (uint32_t step = 0; step < 3; step++) {
-        const GLuint program = d->programs[PT_KERNEL_blend][step == 2 ? ADD + LARGE : step];
+        const GLuint program = d->programs[PT_KERNEL_blend][part + (step == 2 ? ADD + LARGE : step)];
         d->gl.ProgramUniform1i(program, 3, (GLint)first);
         d->gl.ProgramUniform1i(program, 4, (GLint)end);
     }
     for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
-        result = run_discs(d, work, PT_BUF_blend_chunks, ADD, i, width, end - first);
+        result = run_discs(d, work, PT_BUF_blend_chunks, part + ADD, i, width, end - first);
     if (result == PATINA_OK) // large discs were bound there
         result = pt_gl_bind_rows(d, work, PT_BUF_blend_offset, 1, work->buffers + PT_BUF_blend_offset);
-    return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_blend, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
+    if (result != PATINA_OK)
+        return result;
+    return pt_gl_dispatch(d, PT_KERNEL_blend, part + MEAN, (width + 31) / 32, (end - first + 7) / 8);
+}
+
+// Sums nothing.
+static int blend_marks(struct pt_gl_device *d, const struct pt_gl_work *work)
+{
+    const struct blend_args *args = work->arguments;
+    const uint32_t part = PART * PT_BLEND_MARKS + ADD, width = args->view.width, height = args->view.height;
+    int result = PATINA_OK;
+    for (uint32_t large = 0; large <= LARGE; large += LARGE) {
+        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_blend][part + large], 3, 0);
+        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_blend][part + large], 4, (GLint)height);
+    }
+    for (uint32_t i = 0; i < args->instances && result == PATINA_OK; i++)
+        result = run_discs(d, work, PT_BUF_blend_chunks, part, i, width, height);
+    return result;
 }
 
 int pt_gl_blend(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
     const struct blend_args *args = work->arguments;
     const uint32_t height = args->view.height;
+    const uint32_t part = PART * args->part;
     uint32_t rows = height;
-    int result = disc_programs(d, PT_KERNEL_blend, ADD, "#define STEP 0\n");
+    char step[2][64];
+    for (int i = 0; i < 2; i++)
+        snprintf(step[i], sizeof step[i], "#define STEP %d\n#define PART %u\n", i, args->part);
+    int result = disc_programs(d, PT_KERNEL_blend, part + ADD, step[0]);
+    if (args->part == PT_BLEND_MARKS)
+        return result == PATINA_OK ? blend_marks(d, work) : result;
     if (result == PATINA_OK)
-        result = pt_gl_kernel_program(d, PT_KERNEL_blend, MEAN, "#define STEP 1\n");
+        result = pt_gl_kernel_program(d, PT_KERNEL_blend, part + MEAN, step[1]);
     if (result == PATINA_OK)
         result = make_sums(d, args->view.width, height, PT_BIND_blend_sums, "blend", &rows);
     for (uint32_t y = 0; y < height && result == PATINA_OK; y += rows)

@@ -153,6 +153,9 @@ void pt_plan_splat(struct pt_builder *builder);
 int pt_tells_surfaces(const struct pt_builder *builder); // the depth asked for is that of the surface
 int pt_tells_depths(const struct pt_builder *builder);   // and discs, in the mean, tell how far off it is
 void pt_plan_blend(struct pt_builder *builder);          // after pt_plan_surface of every instance
+int pt_blends_light(const struct pt_builder *builder);   // light arrives at all discs of a pixel: at the mean of their words
+void pt_plan_blend_marks(struct pt_builder *builder);    // in place of mark
+void pt_plan_blend_light(struct pt_builder *builder);    // once shadow words are known
 
 // average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
 void pt_plan_average(struct pt_builder *builder);

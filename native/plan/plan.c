@@ -240,6 +240,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && (!discs || plan->iterations))
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     pt_own_colors(color, &args);
+    args.of_pixels = discs && args.light_count && pt_blends_light(builder);
     if (shown)
         pt_plan_recolor(builder, instance, &args);
     int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
@@ -248,7 +249,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
                                   {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_plane_at(PT_PLANE_NORMAL, 0),
                                    pt_span_of(plan), of_plane ? pt_plane_at(PT_PLANE_ALBEDO, 0) : pt_buffer_of(colors, i),
                                    pt_shading_of(builder), pt_plane_at(color, 0), pt_buffer_of(PT_OPACITIES, i),
-                                   pt_buffer_of(PT_SHADOWS, instance->of),
+                                   args.of_pixels ? pt_plane_at(PT_PLANE_LIGHT, 0) : pt_buffer_of(PT_SHADOWS, instance->of),
                                    pt_plane_if(args.arrived != 0, PT_PLANE_ARRIVED, 0)});
     pass->late = pt_shade_late(&args, PT_LATE_POINTS);
     PT_REASON(pass, "instance %u, %s, %u lights, filled normals blended over %u pixels%s", i,
@@ -446,6 +447,11 @@ static void plan_marks(struct pt_builder *builder)
         pt_skip(builder, "lit", none);
     if (none || !pt_casts_in_layers(builder->scene))
         pt_skip(builder, "limit", none ? none : "the points of no cloud that casts have opacities of their own");
+    if (!none && lazy && pt_blends_light(builder) && draws_discs(plan)) {
+        pt_skip(builder, "mark", "the discs that pixels show are marked");
+        pt_plan_blend_marks(builder);
+        return;
+    }
     for (uint32_t i = 0; i < plan->instance_count && !none && lazy; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         if (!instance->chunk_count || !pt_receives(instance->instance))
@@ -567,6 +573,8 @@ static void plan_shadows(struct pt_builder *builder)
         pt_add_passes_step(builder, PT_STEP_MARK);
     if (plan->light_count && (builder->layer == 1 || plan->mesh_shadows))
         pt_plan_light_steps(builder);
+    if (pt_blends_light(builder) && draws_discs(plan))
+        pt_plan_blend_light(builder);
 }
 
 // Returns the plane that holds the layer's colour.

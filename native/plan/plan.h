@@ -17,8 +17,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 // Layers behind the first have keys, from and shading of their own: the passes of the picture show the first. Coarser levels
 // serve one layer after another. What a plane holds says kernels.def. No order here means anything.
 // X(name, format, size, slots, carried)
-//   size: WINDOW: the view's; CROP: the picture that callers read; TILES: of 16 x 16 pixels of the window; RECORDS: no pixels, but
-//         plan->soft_records of them; BINS: as many as these need
+//   size: WINDOW: the view's; LIGHTS: one of these for each light that casts shadows; CROP: the picture that callers read; TILES: of
+//         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft_records of them; BINS: as many as these need
 //   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
 //   carried: from layer to layer
 #define PT_PLANES(X)                                                                                                           \
@@ -31,6 +31,7 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(ARRIVED, f32, WINDOW, ONE, 0)                                                                                            \
     X(ALBEDO, f32x4, WINDOW, ONE, 0)                                                                                           \
     X(AWAY, f32, WINDOW, ONE, 0)                                                                                               \
+    X(LIGHT, u32, LIGHTS, ONE, 0)                                                                                              \
     X(OFFSET, f32, WINDOW, ONE, 0)                                                                                             \
     X(OBSCURED, f32, WINDOW, ONE, 0)                                                                                           \
     X(UNLIT, f32x4, WINDOW, ONE, 0)                                                                                            \
@@ -77,7 +78,7 @@ enum pt_plane {
         PT_PLANE_COUNT
 };
 
-enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_CROP, PT_SIZE_TILES, PT_SIZE_RECORDS, PT_SIZE_BINS };
+enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_LIGHTS, PT_SIZE_CROP, PT_SIZE_TILES, PT_SIZE_RECORDS, PT_SIZE_BINS };
 enum pt_plane_slots { PT_SLOTS_ONE, PT_SLOTS_LEVELS, PT_SLOTS_LAYERS };
 
 struct pt_plane_row {

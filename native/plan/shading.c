@@ -103,10 +103,29 @@ enum pt_late pt_shade_late(const struct shade_args *args, enum pt_late words)
     return PT_LATE_NOTHING;
 }
 
+// Of a sum of so many samples, what one of it is of all light.
+static float scale_of(uint32_t samples) { return 1.0f / (255.0f * (float)samples); }
+
+static void set_blend(const uint32_t samples[PT_MAX_LIGHTS], struct blend_args *args)
+{
+    for (uint32_t i = 0; i < args->lights; i++)
+        args->scales[i] = scale_of(samples[args->first + i]);
+}
+
+static void set_shade(const uint32_t samples[PT_MAX_LIGHTS], struct shade_args *args)
+{
+    for (uint32_t i = 0; i < args->light_count; i++)
+        if (args->lights[i].shadow)
+            args->lights[i].shadow_scale = args->of_pixels ? 1.0f / (float)PT_SHADOW_SUM
+                                                           : scale_of(samples[args->lights[i].shadow - 1]);
+}
+
 void pt_plan_late(const struct pt_pass *pass, const uint32_t samples[PT_MAX_LIGHTS], void *arguments)
 {
-    struct shade_args *args = arguments;
-    for (uint32_t i = 0; i < args->light_count && pass->late != PT_LATE_NOTHING; i++)
-        if (args->lights[i].shadow)
-            args->lights[i].shadow_scale = 1.0f / (255.0f * (float)samples[args->lights[i].shadow - 1]);
+    if (pass->late == PT_LATE_NOTHING)
+        return;
+    if (pass->kernel == PT_KERNEL_blend)
+        set_blend(samples, arguments);
+    else
+        set_shade(samples, arguments);
 }

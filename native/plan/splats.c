@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The passes of discs: visibility, then (with the surfaces known) what the discs on the nearest surface show. SPEC 5, solid.
+// The passes of discs: visibility, then (with the surfaces known) what the discs on the nearest surface show, and once shadows are known
+// what light arrives at them. SPEC 5, solid.
 #include "passes.h"
 
 #include <string.h>
@@ -18,80 +19,138 @@ int pt_tells_depths(const struct pt_builder *builder)
     return builder->layer == 1 && pt_tells_surfaces(builder) && builder->scene->settings.surface == PATINA_SURFACE_SPLATS;
 }
 
-// Binds what both kernels read of an instance; `blend` reads colours too.
-static uint32_t bind_instance(struct pt_ref *refs, uint32_t i, int blend)
+int pt_blends_light(const struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    return builder->scene->settings.surface == PATINA_SURFACE_SPLATS && plan->light_count &&
+           (uint64_t)plan->view.width * plan->view.height * plan->light_count <= UINT32_MAX; // else words of the nearest disc's
+}
+
+// Binds what both kernels read of an instance; `blend`, if there is one, reads colours too, or marks or shadows.
+static uint32_t bind_instance(struct pt_ref *refs, const struct pt_plan *plan, uint32_t i, const struct blend_args *blend)
 {
     static const enum pt_instance_buffer list[] = {PT_CHUNKS, PT_POSITIONS, PT_SURFACE, PT_RADII, PT_COLORS, PT_OPACITIES};
-    const uint32_t count = blend ? 6 : 4;
+    const uint32_t count = blend ? 6 : 4, of = plan->instances[i].of;
     for (uint32_t k = 0; k < count; k++)
         refs[k] = pt_buffer_of(list[k], i);
+    if (blend && blend->part != PT_BLEND_COLORS)
+        refs[4] = pt_buffer_of(blend->part == PT_BLEND_MARKS ? PT_MARKS : PT_SHADOWS, of);
     return count;
 }
 
-// Arguments with the discs of every instance in view behind them. behind: of splat, the limit holds.
-static void add_discs(struct pt_builder *builder, int blend, const struct pt_ref *planes, uint32_t plane_count, int behind)
+// What a pass of discs is made of.
+struct disc_pass {
+    struct pt_ref *refs; // the planes, then each instance's
+    char *args;          // the head, and a struct disc_args an instance behind it
+    size_t arg_size;
+    uint32_t ref_count, instances;
+    uint64_t points, chunks;
+};
+
+// Every instance in view, behind a head of `head` bytes that is still to be written; blend: NULL for splat. 0: memory lacks.
+static int list_discs(struct pt_builder *builder, const struct blend_args *blend, size_t head, const struct pt_ref *planes,
+                      uint32_t plane_count, struct disc_pass *out)
 {
     struct pt_plan *plan = builder->plan;
-    const size_t head = blend ? sizeof(struct blend_args) : sizeof(struct splat_args);
-    struct pt_ref *refs = pt_arena_take(&plan->arena, (plane_count + 1 + 6 * (size_t)plan->instance_count) * sizeof *refs);
-    char *args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args));
-    if (!refs || !args) {
+    *out = (struct disc_pass){
+        .refs = pt_arena_take(&plan->arena, (plane_count + 1 + 6 * (size_t)plan->instance_count) * sizeof *out->refs),
+        .args = pt_arena_take(&plan->arena, head + plan->instance_count * sizeof(struct disc_args)),
+        .ref_count = plane_count};
+    if (!out->refs || !out->args) {
         builder->failed = PATINA_ERROR_MEMORY;
-        return;
+        return 0;
     }
-    struct disc_args *discs = (struct disc_args *)(void *)(args + head);
-    uint64_t points = 0, chunks = 0;
-    uint32_t instances = 0, count = plane_count;
-    memcpy(refs, planes, plane_count * sizeof *planes);
-    refs[count++] = plan->drawn_words ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
+    struct disc_args *discs = (struct disc_args *)(void *)(out->args + head);
+    memcpy(out->refs, planes, plane_count * sizeof *planes);
+    out->refs[out->ref_count++] = plan->drawn_words ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         const struct patina_cloud *cloud = instance->instance->cloud;
         if (!instance->chunk_count || !instance->discs)
             continue;
-        discs[instances++] = (struct disc_args){.instance = instance->args,
-                                                .has_radii = cloud->info.has_radii ? PT_RADII_FLOATS
-                                                             : cloud->shapes       ? PT_RADII_SHAPES
-                                                                                   : PT_RADII_NONE,
-                                                .radius = instance->radius,
-                                                .radius_scale = instance->radius_scale,
-                                                .radius_most = instance->radius_most,
-                                                .surface_scale = instance->surface_scale};
-        chunks += instance->chunk_count;
-        points += instance->points;
-        count += bind_instance(refs + count, i, blend);
+        discs[out->instances++] = (struct disc_args){.instance = instance->args,
+                                                     .has_radii = cloud->info.has_radii ? PT_RADII_FLOATS
+                                                                  : cloud->shapes       ? PT_RADII_SHAPES
+                                                                                        : PT_RADII_NONE,
+                                                     .radius = instance->radius,
+                                                     .radius_scale = instance->radius_scale,
+                                                     .radius_most = instance->radius_most,
+                                                     .surface_scale = instance->surface_scale,
+                                                     .shadowed = (uint32_t)pt_receives(instance->instance)};
+        out->chunks += instance->chunk_count;
+        out->points += instance->points;
+        out->ref_count += bind_instance(out->refs + out->ref_count, plan, i, blend);
     }
-    struct splat_args splat = {
-        .view = plan->view, .instances = instances, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
-    struct blend_args mix = {.view = plan->view,
-                             .instances = instances,
-                             .sifted = plan->drawn_words > 0,
-                             .depths = (uint32_t)pt_tells_depths(builder)};
-    memcpy(args, blend ? (void *)&mix : (void *)&splat, head);
-    struct pt_pass *pass = pt_add(builder, blend ? PT_KERNEL_blend : PT_KERNEL_splat, blend ? "blend" : "splat", args,
-                                  head + instances * sizeof *discs, refs, count);
-    if (blend)
-        PT_REASON(pass, "discs within a layer distance of the nearest, %u instances", instances);
-    else if (behind && builder->layer <= 1)
-        PT_REASON(pass, "discs behind what is drawn already, %u instances", instances);
-    else if (behind)
-        PT_REASON(pass, "layer %u: discs behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
-    else
-        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view, as discs", (unsigned long long)points,
-                  (unsigned long long)chunks, instances);
+    out->arg_size = head + out->instances * sizeof *discs;
+    return 1;
 }
 
 void pt_plan_splat(struct pt_builder *builder)
 {
+    const struct pt_plan *plan = builder->plan;
     const int behind = builder->layer > 1 || builder->behind;
     const struct pt_ref planes[] = {pt_keys_of(builder, 0), pt_plane_if(behind, PT_PLANE_LIMIT, 0)};
-    add_discs(builder, 0, planes, 2, behind);
+    struct disc_pass discs;
+    if (!list_discs(builder, NULL, sizeof(struct splat_args), planes, sizeof planes / sizeof *planes, &discs))
+        return;
+    const struct splat_args args = {
+        .view = plan->view, .instances = discs.instances, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
+    memcpy(discs.args, &args, sizeof args);
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_splat, "splat", discs.args, discs.arg_size, discs.refs, discs.ref_count);
+    if (behind && builder->layer <= 1)
+        PT_REASON(pass, "discs behind what is drawn already, %u instances", discs.instances);
+    else if (behind)
+        PT_REASON(pass, "layer %u: discs behind layer %u in unfinished pixels", builder->layer, builder->layer - 1);
+    else
+        PT_REASON(pass, "%llu points in %llu chunks of %u instances are in view, as discs", (unsigned long long)discs.points,
+                  (unsigned long long)discs.chunks, discs.instances);
+}
+
+// args: but for view, instances and sifted. NULL: the plan failed.
+static struct pt_pass *add_blend(struct pt_builder *builder, struct blend_args args, const struct pt_ref planes[6])
+{
+    struct disc_pass discs;
+    if (!list_discs(builder, &args, sizeof args, planes, 6, &discs))
+        return NULL;
+    args.view = builder->plan->view;
+    args.instances = discs.instances;
+    args.sifted = builder->plan->drawn_words > 0;
+    memcpy(discs.args, &args, sizeof args);
+    struct pt_pass *pass = pt_add(builder, PT_KERNEL_blend, "blend", discs.args, discs.arg_size, discs.refs, discs.ref_count);
+    PT_REASON(pass, "discs within a layer distance of the nearest, %u instances", discs.instances);
+    return pass;
 }
 
 void pt_plan_blend(struct pt_builder *builder)
 {
+    const int depths = pt_tells_depths(builder);
     const struct pt_ref planes[] = {pt_keys_of(builder, 0),          pt_plane_at(PT_PLANE_DEFF, 0),
                                     pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_ALBEDO, 0),
-                                    pt_plane_at(PT_PLANE_AWAY, 0),   pt_plane_if(pt_tells_depths(builder), PT_PLANE_OFFSET, 0)};
-    add_discs(builder, 1, planes, 6, 0);
+                                    pt_plane_at(PT_PLANE_AWAY, 0),   pt_plane_if(depths, PT_PLANE_OFFSET, 0)};
+    add_blend(builder, (struct blend_args){.depths = (uint32_t)depths}, planes);
+}
+
+void pt_plan_blend_marks(struct pt_builder *builder)
+{
+    const struct pt_ref none = pt_nothing(),
+                        planes[6] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), none, none, none, none};
+    struct pt_pass *pass = add_blend(builder, (struct blend_args){.part = PT_BLEND_MARKS}, planes);
+    if (pass)
+        PT_REASON(pass, "only points whose discs the picture shows need shadows");
+}
+
+void pt_plan_blend_light(struct pt_builder *builder)
+{
+    const uint32_t casting = builder->plan->light_count;
+    const struct pt_ref none = pt_nothing(), light = pt_plane_at(PT_PLANE_LIGHT, 0);
+    const struct pt_ref planes[6] = {pt_keys_of(builder, 0), pt_plane_at(PT_PLANE_DEFF, 0), none, light, none, none};
+    for (uint32_t first = 0; first < casting; first += PT_BLEND_LIGHTS) {
+        const uint32_t left = casting - first, lights = left < PT_BLEND_LIGHTS ? left : PT_BLEND_LIGHTS;
+        const struct blend_args args = {.part = PT_BLEND_LIGHT, .first = first, .lights = lights};
+        struct pt_pass *pass = add_blend(builder, args, planes);
+        if (!pass)
+            return;
+        pass->late = PT_LATE_POINTS;
+        PT_REASON(pass, "what arrives at the same discs of %u lights from light %u on", lights, first);
+    }
 }

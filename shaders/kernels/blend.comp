@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// blend: normal and colour of the discs that lie on the nearest surface of each pixel. SPEC 5, solid; twin of
-// native/device_cpu/kernels/blend.c
+// blend: normal and colour of the discs that lie on the nearest surface of each pixel, or which they are, or the light that arrives at
+// them. SPEC 5, solid; twin of native/device_cpu/kernels/blend.c
 //
-// Over a band of rows, as many as the sums have room for. STEP 0: discs are added up; STEP 1: means.
+// Over a band of rows, as many as the sums have room for. STEP 0: discs are added up; STEP 1: means. PART: see PT_BLEND_*; of
+// marks there are no means.
 #version 430 core
 #include "shared/kernel_args.h"
 
@@ -12,15 +13,26 @@ layout(local_size_x = 64) in;
 layout(local_size_x = 32, local_size_y = 8) in;
 #endif
 
-// Colour 3, opacity, normal 3, weight: two words each, the low one first; with depths, weight and share of the reach.
+// Colour 3, opacity, normal 3, weight: two words each, the low one first; with depths, weight and share of the reach. Of light: what
+// PT_BLEND_LIGHTS lights lose, and opacity.
 #define SUMS (args.depths != 0u ? 10u : 8u)
 
 layout(std430, binding = BIND_arguments) readonly buffer arguments_block { blend_args args; disc_args discs[]; };
 layout(std430, binding = BIND_sums) buffer sums_block { uint sums[]; };
+#if PART == PT_BLEND_COLORS
 layout(std430, binding = BIND_colors) readonly buffer colors_block { uint point_colors[]; };
+#elif PART == PT_BLEND_MARKS
+layout(std430, binding = BIND_colors) buffer colors_block { uint marks[]; }; // four a word
+#else
+layout(std430, binding = BIND_colors) readonly buffer colors_block { uint words[]; };
+#endif
 layout(std430, binding = BIND_opacities) readonly buffer opacities_block { uint opacities[]; }; // four bytes a word
 layout(std430, binding = BIND_normal) buffer normal_block { vec4 normal[]; };
+#if PART == PT_BLEND_LIGHT
+layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { uint lost[]; }; // of each light, a plane
+#else
 layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albedo[]; };
+#endif
 layout(std430, binding = BIND_away) writeonly buffer away_block { float away_from[]; }; // how many pixels the key's point fell away
 
 #if STEP == 1
@@ -46,6 +58,7 @@ float reach_of(uint pixel)
 
 #if STEP == 0
 
+#if PART == PT_BLEND_COLORS
 vec3 albedo_of(uint id)
 {
     uint format = discs[instance].instance.color_format;
@@ -60,6 +73,7 @@ vec3 albedo_of(uint id)
     }
     return vec3(discs[instance].instance.color[0], discs[instance].instance.color[1], discs[instance].instance.color[2]);
 }
+#endif
 
 float opacity_of(uint id)
 {
@@ -81,6 +95,22 @@ void add(uint at, float weight, float term)
         atomicAdd(sums[at + 1u], high);
 }
 
+// What a point's disc adds at weight 1.
+#if PART == PT_BLEND_COLORS
+struct look {
+    vec4 color; // w: opacity
+    vec3 n;
+};
+#elif PART == PT_BLEND_MARKS
+struct look {
+    uint mark; // of its point, in its word
+};
+#else
+struct look {
+    float lost[PT_BLEND_LIGHTS], opaque;
+};
+#endif
+
 void add_depth(view_args view, disc d, uint pixel, int x, int y, float nearest, float z, float square, bool beside)
 {
     float reach = reach_of(pixel);
@@ -94,7 +124,28 @@ void add_depth(view_args view, disc d, uint pixel, int x, int y, float nearest, 
     add(at + 2u, share, PT_SUM_SCALE);
 }
 
-void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color, precise vec3 n)
+#if PART == PT_BLEND_COLORS
+void add_look(uint at, float weight, look l)
+{
+    add(at, weight, l.color.x);
+    add(at + 2u, weight, l.color.y);
+    add(at + 4u, weight, l.color.z);
+    add(at + 6u, weight, l.color.w);
+    add(at + 8u, weight, l.n.x);
+    add(at + 10u, weight, l.n.y);
+    add(at + 12u, weight, l.n.z);
+    add(at + 14u, weight, PT_SUM_SCALE);
+}
+#elif PART == PT_BLEND_LIGHT
+void add_look(uint at, float weight, look l)
+{
+    for (uint k = 0u; k < args.lights; k++)
+        add(at + 2u * k, weight, l.lost[k]);
+    add(at + 14u, weight, l.opaque);
+}
+#endif
+
+void add_pixel(view_args view, disc d, uint id, int x, int y, look l)
 {
     float z, square;
     bool beside;
@@ -109,34 +160,51 @@ void add_pixel(view_args view, disc d, uint id, int x, int y, precise vec4 color
         add_depth(view, d, pixel, x, y, pt_float(key.y), z, square, beside);
     if (!(pt_float(key.y) <= z && z <= farthest))
         return;
+#if PART == PT_BLEND_MARKS
+    atomicOr(marks[d.id >> 2], l.mark);
+#else
+#if PART == PT_BLEND_COLORS
     if (key.x == id) {
         precise float dx = float(x - d.own.x), dy = float(y - d.own.y);
         precise float away = dx * dx + dy * dy;
         precise float distance_to = away * pt_rsqrt(pt_max(away, 1.0));
         away_from[pixel] = distance_to;
     }
+#endif
     float weight = disc_weight(view, d, x, y, square, beside);
-    uint at = 2u * SUMS * (pixel - uint(band_first) * view.width);
-    add(at, weight, color.x);
-    add(at + 2u, weight, color.y);
-    add(at + 4u, weight, color.z);
-    add(at + 6u, weight, color.w);
-    add(at + 8u, weight, n.x);
-    add(at + 10u, weight, n.y);
-    add(at + 12u, weight, n.z);
-    add(at + 14u, weight, PT_SUM_SCALE);
+    add_look(2u * SUMS * (pixel - uint(band_first) * view.width), weight, l);
+#endif
 }
 
-// What the point's disc adds at weight 1, but for its normal.
-vec4 color_of(uint id)
+#if PART == PT_BLEND_LIGHT
+look look_of(disc d)
 {
-    vec3 rgb = albedo_of(id);
-    precise float opacity = opacity_of(id) * PT_SUM_SCALE;
+    look l;
+    precise float opaque = opacity_of(d.id) * PT_SUM_SCALE;
+    l.opaque = opaque;
+    for (uint k = 0u; k < PT_BLEND_LIGHTS; k++) {
+        bool known = k < args.lights && discs[instance].shadowed != 0u;
+        uint at = (args.first + k) * discs[instance].instance.id_count + d.id;
+        precise float share = known ? float(words[at] & PT_SHADOW_SUM) * args.scales[k] : 0.0;
+        precise float lost = pt_min(share, 1.0) * opaque;
+        l.lost[k] = lost;
+    }
+    return l;
+}
+#elif PART == PT_BLEND_MARKS
+look look_of(disc d) { return look(discs[instance].shadowed << 8u * (d.id & 3u)); }
+#else
+look look_of(disc d)
+{
+    vec3 rgb = albedo_of(d.id);
+    precise float opacity = opacity_of(d.id) * PT_SUM_SCALE;
     precise vec4 color = vec4(pt_max(pt_min(rgb.x, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
                               pt_max(pt_min(rgb.y, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity,
                               pt_max(pt_min(rgb.z, PT_SUM_BRIGHTEST), -PT_SUM_BRIGHTEST) * opacity, opacity);
-    return color;
+    precise vec3 n = d.n * PT_SUM_SCALE;
+    return look(color, n);
 }
+#endif
 
 // Its box in the band.
 ivec4 box_of(disc d) { return ivec4(d.box.x, max(d.box.y, band_first), d.box.z, min(d.box.w, band_end - 1)); }
@@ -156,11 +224,10 @@ void main()
         ivec4 box = box_of(d);
         if (disc_listed(box, at, i))
             continue;
-        vec4 color = color_of(d.id);
-        precise vec3 n = d.n * PT_SUM_SCALE;
+        look l = look_of(d);
         for (int y = box.y; y <= box.w; y++)
             for (int x = box.x; x <= box.z; x++)
-                add_pixel(view, d, chunk.id_base + d.id, x, y, color, n);
+                add_pixel(view, d, chunk.id_base + d.id, x, y, l);
     }
 }
 
@@ -177,12 +244,11 @@ void main()
     if (!disc_of(view, chunk, large[2u * at + 1u], d))
         return;
     ivec4 box = box_of(d);
-    vec4 color = color_of(d.id);
-    precise vec3 n = d.n * PT_SUM_SCALE;
+    look l = look_of(d);
     ivec2 own = ivec2(gl_LocalInvocationID.x & 7u, 8u * part + (gl_LocalInvocationID.x >> 3));
     for (int y = box.y + own.y; y <= box.w; y += 8 * int(parts))
         for (int x = box.x + own.x; x <= box.z; x += 8)
-            add_pixel(view, d, chunk.id_base + d.id, x, y, color, n);
+            add_pixel(view, d, chunk.id_base + d.id, x, y, l);
 }
 
 #endif
@@ -237,6 +303,13 @@ void main()
     uint of = instance_of(key.x);
     if (key.y == PT_KEY_EMPTY_Z || of == args.instances)
         return;
+#if PART == PT_BLEND_LIGHT
+    precise float inverse = pt_rcp(pt_max(sum_of(at + 14u), 1.0));
+    for (uint k = 0u; k < args.lights; k++) {
+        precise float mean = pt_min(sum_of(at + 2u * k) * inverse, 1.0) * float(PT_SHADOW_SUM) + 0.5;
+        lost[(args.first + k) * view.width * view.height + pixel] = uint(mean);
+    }
+#else
     if (args.depths != 0u) {
         float weights = sum_of(at + 16u);
         precise float mean = (sum_of(at + 18u) * pt_rcp(pt_max(weights, 1.0))) * reach_of(pixel);
@@ -252,6 +325,7 @@ void main()
     albedo[pixel] = vec4(color, opacity < weight ? pt_min(share, 1.0) : 1.0); // opaque: 1 exactly
     if (discs[of].instance.has_normals != 0u)
         normal[pixel].xyz = mean_normal(view, vec3(sum_of(at + 8u), sum_of(at + 10u), sum_of(at + 12u)), x, y, normal[pixel].xyz);
+#endif
 }
 
 #endif

@@ -201,7 +201,9 @@ void main()
             // 3. light
             float shadow = 1.0;
 #if LIT
-            vec3 c = phong(view, eye_z, factors, shininess, world, id, id_count, p, shadow);
+            bool of_pixels = args.of_pixels != 0u;
+            vec3 c = phong(view, eye_z, factors, shininess, world, of_pixels ? own.source : id,
+                           of_pixels ? view.width * view.height : id_count, p, shadow);
 #else
             vec3 c = p.albedo;
 #endif

@@ -84,8 +84,8 @@ float ambient_of(uint k, vec3 n)
 #endif
 
 // c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
-// the light. shadow: the mean m of lights that cast.
-vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint id, uint id_count, pixel p,
+// the light. word: which is the point's, of those of a light, which lie `stride` apart. shadow: the mean m of lights that cast.
+vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world, uint word, uint stride, pixel p,
            out float shadow)
 {
     precise vec3 point = vec3(p.ray, pt_negate(p.z + eye_z));
@@ -109,7 +109,7 @@ vec3 phong(view_args view, float eye_z, vec3 factors, uint shininess, vec3 world
 #else
         vec4 extra = lights[3u * i + 2u];
         if (extra.z != 0.0) {
-            uint lost = shadows[(uint(extra.z) - 1u) * id_count + id] & PT_SHADOW_SUM;
+            uint lost = shadows[(uint(extra.z) - 1u) * stride + word] & PT_SHADOW_SUM;
             share = 1.0 - float(lost) * extra.w;
             sum = sum + share;
             casting++;

@@ -121,6 +121,11 @@
 #define PT_SUM_SCALE 262144.0f // 2^18: weights, and what they weigh, are summed as integers
 #define PT_DISC_DEPTHS 2.0f // layer distances behind the nearest disc: whose depths are averaged. Four spacings hold noise of one
 #define PT_SUM_BRIGHTEST 4096.0f // colours above blend as this, so that a term fits 31 bits
+// What blend makes of the discs that count.
+#define PT_BLEND_COLORS 0 // #if reads them
+#define PT_BLEND_MARKS 1
+#define PT_BLEND_LIGHT 2
+#define PT_BLEND_LIGHTS 7 // of PT_BLEND_LIGHT, at once
 #define PT_COLOR_OF_SCALAR 4u // color_format: a float a point, for a ramp
 #define PT_COLOR_OF_PLANE 3u  // color_format: the colours buffer is a plane, four floats a pixel, opacity last
 #define PT_COLOR_OF_PIXEL 5u  // the same, of the pixel itself, not of the one that its surface was measured at
@@ -316,6 +321,7 @@ struct disc_args {
     float radius_scale; // object units -> world, times what strata leave out
     float radius_most;  // world units: no half axis is longer; 0: as long as it is
     float surface_scale; // of half axes of shapes whose kind is PT_KIND_SURFACE, before that
+    uint32_t shadowed;   // blend: 1: the instance receives shadows
 };
 
 // splat: points -> least key of every pixel that their discs cover. SPEC 5, solid; the visibility pass. A disc is flat, has the
@@ -334,11 +340,19 @@ struct splat_args {
 //   normal.xyz: unit mean; of instances without normals as it was. away: how many pixels off the point of the key fell.
 //   albedo: mean colour, each disc weighted by its opacity too, and the mean opacity.
 //   offset: with `depths`, how far behind the nearest surface the discs within PT_DISC_DEPTHS d_eff lie in the mean, by the same weights.
+// Other parts of it, of the same discs:
+//   MARKS: a byte of 1 for every point whose disc counts anywhere, in place of colours, and for what others a device likes. No plane is
+//   written.
+//   LIGHT: shadow words in place of colours; albedo: a plane a casting light of the share that does not arrive, in the mean, by the
+//   weights that colours have, in 1 / PT_SHADOW_SUM. Instances that receive no shadows lose nothing.
 struct blend_args {
     struct view_args view;
     uint32_t instances;
     uint32_t sifted; // as in scatter_args
     uint32_t depths; // 1: the offset plane is written
+    uint32_t part;   // PT_BLEND_*
+    uint32_t first, lights;        // LIGHT: of so many casting lights from this one on
+    float scales[PT_BLEND_LIGHTS]; // of a word's sum, 1 / (255 samples)
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Its radius is d /
@@ -443,6 +457,7 @@ struct shade_args {
     float eye_z;        // orthographic: near, so that view z = -(z + near); perspective: 0
     uint32_t blend;     // the window's radius at most, 0..8
     uint32_t arrived;   // 1: written
+    uint32_t of_pixels; // 1: shadow words are those that discs blended to, of the pixel where the surface was measured
     uint32_t light_count;
     struct light_args lights[PT_MAX_LIGHTS];
     struct recolor_args recolor;

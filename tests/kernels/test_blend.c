@@ -6,11 +6,18 @@
 #include <string.h>
 
 static const uint32_t sizes[] = {1, 15, 16, 17, 300, 500, 31, 2};
-enum { SIZES = sizeof sizes / sizeof sizes[0] };
+enum {
+    SIZES = sizeof sizes / sizeof sizes[0],
+    PLANES = 7,
+    LIGHTS = PT_BLEND_LIGHTS + 2,
+    SAMPLES = 8,
+    BARE = 1
+}; // BARE: an instance without shadows
 
 struct planes {
     uint64_t *keys;
     float *deff, *normal, *albedo, *away, *offset;
+    size_t marked; // points
 };
 
 // What blend reads of the points beside their discs.
@@ -63,13 +70,150 @@ static struct ref_look look_of(const struct disc_scene *scene, const struct pain
     return look;
 }
 
+// What the parts of blend are run on, and what is known of it.
+struct scenery {
+    const struct disc_scene *scene;
+    const struct paint *paint;
+    const struct planes *planes;
+    const struct ref_disc *discs;
+    uint32_t count;
+    struct pt_buffer *buffers[PLANES + 6 * MOST_INSTANCES];
+    uint32_t buffer_count;
+    double open;
+};
+
+static const struct ref_disc *nearest_of(const struct scenery *s, size_t p)
+{
+    return s->planes->keys[p] == REF_EMPTY_KEY ? NULL : discs_find(s->discs, s->count, ref_key_id(s->planes->keys[p]));
+}
+
+// lists: of each instance, in place of its colours. plane: in place of albedo, or NULL.
+static void run_part(struct harness *h, const struct scenery *s, struct blend_args blend, struct pt_buffer *const *lists,
+                     struct pt_buffer *plane)
+{
+    char args[sizeof(struct blend_args) + sizeof s->scene->discs];
+    struct pt_buffer *buffers[PLANES + 6 * MOST_INSTANCES];
+    struct disc_args discs[MOST_INSTANCES];
+    const uint32_t instances = s->scene->points.count;
+    memcpy(buffers, s->buffers, sizeof buffers);
+    for (uint32_t k = PT_BUF_blend_normal; k <= PT_BUF_blend_offset; k++)
+        buffers[k] = k == PT_BUF_blend_albedo ? plane : NULL;
+    memcpy(discs, s->scene->discs, sizeof discs);
+    for (uint32_t i = 0; i < instances; i++) {
+        buffers[PT_BUF_blend_colors + PT_EACH_blend * i] = lists[i];
+        discs[i].shadowed = i != BARE;
+    }
+    blend.view = s->scene->points.view;
+    blend.instances = instances;
+    memcpy(args, &blend, sizeof blend);
+    memcpy(args + sizeof blend, discs, instances * sizeof *discs);
+    harness_run(h, PT_KERNEL_blend, args, sizeof blend + instances * sizeof *discs, buffers, s->buffer_count);
+}
+
+// Every point is marked whose disc counts somewhere, of instances that receive shadows; of others none. Returns how many are.
+static size_t check_marks(struct harness *h, const struct scenery *s)
+{
+    const struct scene *points = &s->scene->points;
+    struct pt_buffer *marks[MOST_INSTANCES];
+    uint8_t *counts = harness_alloc(h, s->count + 1);
+    size_t marked = 0;
+    for (uint32_t i = 0; i < points->count; i++)
+        marks[i] = harness_buffer(h, harness_alloc(h, points->clouds[i].slots + 4), (points->clouds[i].slots + 3) / 4 * 4);
+    run_part(h, s, (struct blend_args){.part = PT_BLEND_MARKS}, marks, NULL);
+    for (size_t p = 0; p < (size_t)points->view.width * points->view.height; p++) {
+        const struct ref_disc *nearest = nearest_of(s, p);
+        const int x = (int)(p % points->view.width), y = (int)(p / points->view.width);
+        for (uint32_t k = 0; k < s->count && nearest; k++) {
+            const struct ref_met cover = ref_disc_at(&points->view, &s->discs[k], x, y);
+            counts[k] |= ref_blend_takes(&s->discs[k], &cover, nearest == &s->discs[k], ref_key_z(s->planes->keys[p]),
+                                         (double)s->planes->deff[p]) == REF_YES;
+        }
+    }
+    for (uint32_t i = 0; i < points->count; i++) {
+        const uint8_t *got = harness_read(h, marks[i]);
+        const struct instance_args *args = &s->scene->discs[i].instance;
+        for (uint32_t k = 0; k < s->count; k++) {
+            const uint32_t at = s->discs[k].id - args->id_base;
+            if (at >= args->id_count)
+                continue;
+            marked += got[at];
+            if (got[at] > (i != BARE) || got[at] < (i != BARE && counts[k]))
+                harness_fail(h, "marks", (int)at, (int)i, "got %u where %u counts", got[at], counts[k]);
+        }
+    }
+    return marked;
+}
+
+// Of three of the lights, what arrives is a mean that is weighted as colours are: share of light that a point's disc loses of each.
+static struct ref_look light_of(const struct scenery *s, uint32_t *const *words, const uint32_t lights[3], uint32_t id)
+{
+    struct ref_look look = look_of(s->scene, s->paint, id);
+    for (uint32_t i = 0; i < s->scene->points.count; i++) {
+        const uint32_t at = id - s->scene->discs[i].instance.id_base, slots = s->scene->points.clouds[i].slots;
+        for (uint32_t k = 0; k < 3 && at < slots; k++)
+            look.color[k] = i == BARE ? 0.0 : (words[i][lights[k] * (size_t)slots + at] & PT_SHADOW_SUM) / (255.0 * SAMPLES);
+    }
+    return look;
+}
+
+static void check_light(struct harness *h, const struct scenery *s)
+{
+    enum { EVERY = 3 }; // pixel is looked at
+    static const uint32_t lights[3] = {0, PT_BLEND_LIGHTS - 1, LIGHTS - 1};
+    const struct scene *points = &s->scene->points;
+    const size_t pixels = (size_t)points->view.width * points->view.height, size = LIGHTS * pixels * 4;
+    struct rng rng = {pixels};
+    uint32_t *words[MOST_INSTANCES];
+    struct pt_buffer *lists[MOST_INSTANCES], *plane = harness_buffer(h, harness_alloc(h, size), size);
+    struct ref_look *looks = harness_alloc(h, (s->count + 1) * sizeof *looks);
+    for (uint32_t i = 0; i < points->count; i++) {
+        const size_t count = LIGHTS * (size_t)points->clouds[i].slots;
+        words[i] = harness_alloc(h, count * 4);
+        for (size_t k = 0; k < count; k++)
+            words[i][k] = (rng_below(&rng, 3) ? rng_below(&rng, 255 * SAMPLES + 1) : k % 2 * 255 * SAMPLES) |
+                          (uint32_t)rng_next(&rng) << PT_SHADOW_SHIFT;
+        lists[i] = harness_buffer(h, words[i], count * 4);
+    }
+    struct blend_args args = {.part = PT_BLEND_LIGHT};
+    for (uint32_t k = 0; k < PT_BLEND_LIGHTS; k++)
+        args.scales[k] = 1.0f / (255.0f * SAMPLES);
+    for (; args.first < LIGHTS; args.first += args.lights) {
+        args.lights = LIGHTS - args.first < PT_BLEND_LIGHTS ? LIGHTS - args.first : PT_BLEND_LIGHTS;
+        run_part(h, s, args, lists, plane);
+    }
+    const uint32_t *got = harness_read(h, plane);
+    harness_same(h, "light", got, LIGHTS * pixels, 4, 1, points->view.width);
+    for (uint32_t d = 0; d < s->count; d++)
+        looks[d] = light_of(s, words, lights, s->discs[d].id);
+    size_t unsure = 0, shown = 0;
+    for (size_t p = 0; p < pixels; p += EVERY) {
+        const struct ref_disc *nearest = nearest_of(s, p);
+        const int x = (int)(p % points->view.width), y = (int)(p / points->view.width);
+        const float n[3] = {0.0f, 0.0f, 1.0f};
+        if (!nearest)
+            continue;
+        const struct ref_blend expected = ref_blend(&points->view, s->discs, looks, s->count, (uint32_t)(nearest - s->discs),
+                                                    (float)ref_key_z(s->planes->keys[p]), s->planes->deff[p], n, x, y);
+        shown++;
+        unsure += expected.unsure != 0;
+        for (uint32_t k = 0; k < 3; k++) {
+            const double lost = got[lights[k] * pixels + p] / (double)PT_SHADOW_SUM;
+            const double error = expected.color_error[k] + 1.0 / (double)PT_SHADOW_SUM;
+            if (!(lost <= 1.0) || (!expected.unsure && !harness_near(lost, expected.color[k], error)))
+                harness_fail(h, "light", x, y, "light %u: got %.9g, expected %.9g +- %.2g", lights[k], lost, expected.color[k],
+                             error);
+        }
+    }
+    harness_unsure(h, unsure, shown, s->open);
+}
+
 // open: share of the pixels that float32 may leave open. depths: means of depth too.
 static struct planes run_hard(struct harness *h, struct disc_scene *scene, const struct paint *paint, double open,
                               uint32_t depths)
 {
     const struct scene *points = &scene->points;
     const size_t pixels = (size_t)points->view.width * points->view.height, head = sizeof(struct blend_args);
-    struct pt_buffer *buffers[7 + 6 * MOST_INSTANCES];
+    struct pt_buffer *buffers[PLANES + 6 * MOST_INSTANCES];
     char args[sizeof(struct blend_args) + sizeof scene->discs];
     struct planes out;
     struct pt_buffer *keys = discs_splat(h, scene);
@@ -175,6 +319,11 @@ static struct planes run_hard(struct harness *h, struct disc_scene *scene, const
     }
     harness_unsure(h, unsure, shown, open);
     harness_unsure(h, unsure_depth, shown, open);
+    struct scenery scenery = {
+        .scene = scene, .paint = paint, .planes = &out, .discs = discs, .count = count, .buffer_count = n, .open = open};
+    memcpy(scenery.buffers, buffers, n * sizeof *buffers);
+    out.marked = check_marks(h, &scenery);
+    check_light(h, &scenery);
     return out;
 }
 
@@ -276,6 +425,30 @@ static void sheet(struct harness *h)
     }
 }
 
+// Of two sheets that lie one unit apart, points of the nearer alone are marked, as far as they are in view: 0.6 of 3000.
+static void hidden(struct harness *h)
+{
+    static const uint32_t many[] = {3000, 3000};
+    struct rng rng = {11};
+    struct disc_scene scene = {.points = {.view = discs_window(67, 45, 0, 20.0)}};
+    struct camera camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .shift = {0, 0, -4}, .focal = 20.0};
+    camera.center_x = scene.points.view.origin_x + 33.5;
+    camera.center_y = scene.points.view.origin_y + 22.5;
+    struct cloud *cloud = points_add_cloud(h, &rng, &scene.points, &camera, many, 2, 0, 0);
+    for (uint32_t c = 0; c < 2; c++)
+        for (uint32_t i = 0; i < many[c]; i++) {
+            *points_coordinate(cloud, c, i, 0) = (float)rng_range(&rng, -2.0, 2.0);
+            *points_coordinate(cloud, c, i, 1) = (float)rng_range(&rng, -2.0, 2.0);
+            *points_coordinate(cloud, c, i, 2) -= c ? 1.0f : 0.0f;
+        }
+    for (uint32_t i = 0; i < cloud->slots; i++)
+        cloud->surface[i] = 4095u | 4095u << 13;
+    discs_describe(h, &rng, &scene, 0, &camera, 0.2f, 0.0, 1);
+    const struct paint colors = paint(h, &rng, &scene);
+    const size_t marked = run(h, &scene, &colors).marked;
+    HARNESS_CHECK(h, marked > 1600 && marked < 2000);
+}
+
 // So many bright discs in one place that sums pass 32 bits.
 static void overflow(struct harness *h)
 {
@@ -352,6 +525,7 @@ int main(int argc, char **argv)
         {"leaves around the camera", camera_plane, 0},
         {"discs under a pixel", under_a_pixel, 0},
         {"a sheet of one colour", sheet, 0},
+        {"a sheet behind another", hidden, 0},
         {"sums beyond 32 bits", overflow, 0},
         {"plane sizes", plane_sizes, 0},
     };

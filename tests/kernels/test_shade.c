@@ -11,7 +11,7 @@ struct setup {
     void *colors;
     size_t colors_size;
     uint8_t *opacities;
-    uint32_t *shadows; // two lights
+    uint32_t *shadows; // two lights; room for as many pixels
     float *shading;    // before
 };
 
@@ -46,7 +46,7 @@ static struct setup make(struct harness *h, struct rng *rng, int perspective, en
         instance->color[c] = (float)rng_unit(rng);
         s.args.world[c] = (float)rng_unit(rng);
     }
-    s.shadows = harness_alloc(h, (size_t)instance->id_count * 8);
+    s.shadows = harness_alloc(h, s.picture.count * 8);
     for (size_t i = 0; i < (size_t)instance->id_count * 2; i++)
         s.shadows[i] = rng_below(rng, 255 * 8 + 1) | (uint32_t)rng_next(rng) << PT_SHADOW_SHIFT; // 8 samples
     s.args.arrived = format != 1;
@@ -80,7 +80,7 @@ static void check(struct harness *h, const struct setup *s, double most_open)
     struct pt_buffer *normal = harness_buffer(h, picture->normal, count * 16);
     struct pt_buffer *deff = harness_buffer(h, picture->deff, count * 4);
     struct pt_buffer *colors = harness_buffer(h, s->colors, s->colors_size);
-    struct pt_buffer *shadows = harness_buffer(h, s->shadows, (size_t)s->args.instance.id_count * 8);
+    struct pt_buffer *shadows = harness_buffer(h, s->shadows, count * 8);
     struct pt_buffer *shading = harness_buffer(h, s->shading, count * 16);
     struct pt_buffer *color = harness_buffer(h, unset, count * 16), *arrived = harness_buffer(h, unset, count * 4);
     struct pt_buffer *opacities = harness_buffer(h, s->opacities, s->opacities ? s->args.instance.id_count : 0);
@@ -266,6 +266,24 @@ static void shapes(struct harness *h)
     }
 }
 
+// What discs blended to in place of points' words, from none to all of the light.
+static void pixels(struct harness *h)
+{
+    for (uint64_t seed = 30; seed < 34; seed++) {
+        struct rng rng = {seed};
+        struct setup s = make(h, &rng, seed % 2 ? 1 : 0, PICTURE_SURFACES, 2);
+        s.args.of_pixels = 1;
+        s.args.blend = seed % 3;
+        for (size_t i = 0; i < 2 * s.picture.count; i++)
+            s.shadows[i] = rng_below(&rng, 4) ? rng_below(&rng, PT_SHADOW_SUM + 1) : i % 2 ? PT_SHADOW_SUM : 0;
+        for (uint32_t i = 0; i < s.args.light_count; i++) {
+            s.args.lights[i].shadow = i % 3;
+            s.args.lights[i].shadow_scale = 1.0f / (float)PT_SHADOW_SUM;
+        }
+        check(h, &s, TOL_UNSURE_SHARE);
+    }
+}
+
 // Ambient light by direction, bright and near nothing, with lights and alone.
 static void directed(struct harness *h)
 {
@@ -392,6 +410,7 @@ int main(int argc, char **argv)
         {"materials", materials, 0},
         {"lights", lights, 0},
         {"spots and panels", shapes, 0},
+        {"shadow words of pixels", pixels, 0},
         {"ambient light by direction", directed, 0},
         {"sanity of ramps", ramp_sanity, 1},
         {"ramps, exposure, contrast", ramps, 0},

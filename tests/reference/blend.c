@@ -25,6 +25,17 @@ static double weight_of(const struct view_args *view, const struct ref_disc *dis
     return 0.5 * (most + least);
 }
 
+enum ref_truth ref_blend_takes(const struct ref_disc *disc, const struct ref_met *cover, int nearest, double z, double deff)
+{
+    const double farthest = z + deff, slack = 2.0 * TOL_UNIT * farthest;
+    if (!disc->possible || cover->covered == REF_NO || (!nearest && cover->z.lo > farthest + slack))
+        return REF_NO;
+    if (disc->edge_on && disc->radius > 0.0)
+        return REF_UNSURE;
+    return !nearest && (cover->covered == REF_UNSURE || cover->z.hi > farthest - slack || !disc->definite) ? REF_UNSURE
+                                                                                                           : REF_YES;
+}
+
 // The mean of how far the discs within PT_DISC_DEPTHS d_eff lie behind z.
 static void mean_depth(const struct view_args *view, const struct ref_disc *discs, uint32_t count, uint32_t nearest, double z,
                        double deff, int x, int y, struct ref_blend *out)
@@ -56,19 +67,16 @@ struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *
                            uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int x, int y)
 {
     struct ref_blend out = {.color_error = {0}};
-    const double farthest = (double)z + deff, slack = 2.0 * TOL_UNIT * farthest;
     double weights = 0.0, weights_error = 0.0, opaque = 0.0, opaque_error = 0.0, color[3] = {0}, color_error[3] = {0};
     double terms = 0.0, normal_error = 0.0;
     struct ref_vec normal = {0, 0, 0};
     for (uint32_t i = 0; i < count; i++) {
         const struct ref_met cover = ref_disc_at(view, &discs[i], x, y);
+        const enum ref_truth taken = ref_blend_takes(&discs[i], &cover, i == nearest, (double)z, (double)deff);
         double error, w;
-        if (!discs[i].possible || cover.covered == REF_NO || (i != nearest && cover.z.lo > farthest + slack))
+        if (taken == REF_NO)
             continue;
-        if (i != nearest && (cover.covered == REF_UNSURE || cover.z.hi > farthest - slack || !discs[i].definite))
-            out.unsure = 1;
-        if (discs[i].edge_on && discs[i].radius > 0.0)
-            out.unsure = 1;
+        out.unsure |= taken == REF_UNSURE;
         w = weight_of(view, &discs[i], &cover, x, y, &error);
         error += 2.0 / (double)PT_SUM_SCALE; // cut to whole numbers
         weights += w;

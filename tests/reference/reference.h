@@ -158,6 +158,8 @@ struct ref_blend {
     double offset, offset_error; // of the depths' mean behind z
     int unsure, unsure_offset;
 };
+// Whether a disc that covers a pixel so counts there. z: of the key; nearest: it is the key's.
+enum ref_truth ref_blend_takes(const struct ref_disc *disc, const struct ref_met *cover, int nearest, double z, double deff);
 // nearest: the key's disc, by its place in the list; z, deff: of the pixel; n: its normal before, w aside.
 struct ref_blend ref_blend(const struct view_args *view, const struct ref_disc *discs, const struct ref_look *looks,
                            uint32_t count, uint32_t nearest, float z, float deff, const float n[3], int x, int y);

@@ -302,7 +302,10 @@ struct ref_shade ref_shade(const struct shade_args *args, const struct ref_plane
         const struct light_args *light = &args->lights[i];
         double share = 1.0;
         if (light->shadow) {
-            size_t word = (light->shadow - 1) * (size_t)instance->id_count + (ref_key_id(key) - instance->id_base);
+            size_t word = args->of_pixels
+                              ? (light->shadow - 1) * (size_t)view->width * view->height +
+                                    (planes->from[pixel] & ~PT_FROM_MIXED)
+                              : (light->shadow - 1) * (size_t)instance->id_count + (ref_key_id(key) - instance->id_base);
             share -= (planes->shadows[word] & PT_SHADOW_SUM) * (double)light->shadow_scale;
             arrived += share;
             casting++;

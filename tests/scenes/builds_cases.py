@@ -121,6 +121,8 @@ def _lights(to: _List) -> None:
     to.add("shadow progressive", FLOOR, TORUS, light=casting, settings={"shadow_progressive": 1, "shadow_samples": 8}, do="again")
     to.add("shadow of few texels", FLOOR, TORUS, light=casting, settings={"shadow_resolution": 64})
     to.add("shadow of discs", {"of": "wide analysed", **LIT}, FLOOR, light=casting, settings={"surface": "SURFACE.SPLATS"})
+    to.add("shadow of discs that show", TORUS, FLOOR, light=casting, settings={"surface": "SURFACE.SPLATS", "shadow_lazy": 1})
+    to.add("shadow of discs of glass", GLASS_TORUS, FLOOR, light=casting, settings={"surface": "SURFACE.SPLATS"})
     to.add("shadow of glass", {**TORUS, "transparency": 0.5}, FLOOR, light=casting)
     to.add("shadow of opacities", "attributes", FLOOR, light=casting, settings={"shadow_samples": 4})
     to.add("shadow not cast", {**TORUS, "shadow_off": "SHADOW_OFF.NO_CAST"}, FLOOR, light=casting)

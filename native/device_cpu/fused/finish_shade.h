@@ -19,7 +19,7 @@ static void ask_for_colors(const struct finish *finish, const struct pt_seen_row
         const uint32_t *words[PT_MAX_LIGHTS];
         uint32_t casting = 0;
         for (uint32_t l = 0; l < args->light_count; l++)
-            if (args->lights[l].shadow)
+            if (args->lights[l].shadow && !args->of_pixels) // those lie as the pixels do
                 words[casting++] = (const uint32_t *)PT_DATA(&finish->passes[i].call, shade, shadows) +
                                    (size_t)(args->lights[l].shadow - 1) * args->instance.id_count;
         for (uint32_t x = seen->first; (size || casting) && x < seen->end; x += PT_LANES) {

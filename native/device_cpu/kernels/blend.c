@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// blend: normal and colour of the discs that lie on the nearest surface of each pixel. SPEC 5, solid; twin of
-// shaders/kernels/blend.comp
+// blend: normal and colour of the discs that lie on the nearest surface of each pixel, or which they are, or the light that arrives at
+// them. SPEC 5, solid; twin of shaders/kernels/blend.comp
 //
 // Tile by tile. The sums of a pixel lie side by side, one vector whatever the level; they are 32 bits wide and emptied into
 // 64 before they could overflow.
 #include "bins.h"
 #include "sums.h"
 
-enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = PT_SUMS }; // colour 3, opacity, normal 3, weight
+// Of a pixel: colour 3, opacity, normal 3, weight; or what PT_BLEND_LIGHTS lights lose, and opacity.
+enum { TILE_PIXELS = PT_DISC_TILE * PT_DISC_TILE, SUMS = PT_SUMS };
 
 // That sums take before they are emptied: 2^31, less what float32 may count wrong.
 #define SUM_ROOM 2147352576.0f
@@ -47,6 +48,28 @@ struct tile {
 
 // ---- discs ---------------------------------------------------------------------------------------------------------------
 
+static const struct blend_args *arguments_of(const struct pt_bins *bins) { return bins->call->arguments; }
+
+// Their opacity, PT_SUM_SCALE a unit.
+static inline vf opaque_of(const struct pt_bins *bins, uint32_t instance, const struct pt_discs *discs)
+{
+    return pt_opacity(&bins->discs[instance].instance, NULL, PT_DATA_EACH(bins->call, blend, opacities, instance), discs->id,
+                      vi_set(0), discs->drawn) *
+           vf_set(PT_SUM_SCALE);
+}
+
+// first, last: terms 0 to 3 and 4 to 7. most: of their sizes.
+static inline void store_terms(vf first[4], vf last[4], vf most, struct terms *out)
+{
+    float halves[2][PT_LANES][4];
+    vf_store4(halves[0][0], first, PT_ALL);
+    vf_store4(halves[1][0], last, PT_ALL);
+    for (uint32_t i = 0; i < PT_LANES; i++)
+        for (uint32_t k = 0; k < 2; k++)
+            memcpy(out->each[i] + 4 * k, halves[k][i], sizeof halves[k][i]);
+    vf_store(out->most, most);
+}
+
 static inline void set_terms(const struct pt_bins *bins, uint32_t instance, const struct pt_discs *discs, struct terms *out)
 {
     const struct instance_args *args = &bins->discs[instance].instance;
@@ -54,22 +77,35 @@ static inline void set_terms(const struct pt_bins *bins, uint32_t instance, cons
     const vf scale = vf_set(PT_SUM_SCALE), most = vf_set(PT_SUM_BRIGHTEST);
     vf color[4], normal[4], largest = scale;
     pt_albedo(args, colors, discs->id, vi_set(0), discs->drawn, color);
-    color[3] = pt_opacity(args, colors, PT_DATA_EACH(bins->call, blend, opacities, instance), discs->id, vi_set(0),
-                          discs->drawn) *
-               scale;
+    color[3] = opaque_of(bins, instance, discs);
     for (int k = 0; k < 3; k++) {
         color[k] = vf_max(vf_min(color[k], most), vf_zero() - most) * color[3];
         largest = vf_max(largest, vf_abs(color[k]));
         normal[k] = discs->n[k] * scale;
     }
     normal[3] = scale;
-    float halves[2][PT_LANES][4];
-    vf_store4(halves[0][0], color, PT_ALL);
-    vf_store4(halves[1][0], normal, PT_ALL);
-    for (uint32_t i = 0; i < PT_LANES; i++)
-        for (uint32_t k = 0; k < 2; k++)
-            memcpy(out->each[i] + 4 * k, halves[k][i], sizeof halves[k][i]);
-    vf_store(out->most, largest);
+    store_terms(color, normal, largest, out);
+}
+
+// What does not arrive of each light.
+static inline void set_light_terms(const struct pt_bins *bins, uint32_t instance, const struct pt_discs *discs,
+                                   struct terms *out)
+{
+    const struct blend_args *args = arguments_of(bins);
+    const struct disc_args *disc = &bins->discs[instance];
+    const uint32_t *words = PT_DATA_EACH(bins->call, blend, colors, instance);
+    const vf opaque = opaque_of(bins, instance, discs);
+    vf terms[SUMS];
+    for (uint32_t k = 0; k < PT_BLEND_LIGHTS; k++) {
+        terms[k] = vf_zero();
+        if (k >= args->lights || !disc->shadowed)
+            continue;
+        const vi word = vi_gather(words + (size_t)(args->first + k) * disc->instance.id_count, discs->id, discs->drawn);
+        const vf lost = vi_convert(vi_and(word, vi_set(PT_SHADOW_SUM))) * vf_set(args->scales[k]);
+        terms[k] = vf_min(lost, vf_set(1.0f)) * opaque;
+    }
+    terms[PT_BLEND_LIGHTS] = opaque;
+    store_terms(terms, terms + 4, vf_set(PT_SUM_SCALE), out);
 }
 
 static void empty_sums(struct tile *tile)
@@ -169,12 +205,26 @@ static inline void take_room(struct tile *tile, float size)
     tile->left -= size;
 }
 
+// Those that are left lie before something that counts near them: to look at their pixels would take longer than to light some more.
+static inline void draw_marks(void *context, uint32_t instance, const struct pt_discs *discs)
+{
+    const struct tile *tile = context;
+    uint8_t *marks = PT_DATA_EACH(tile->bins->call, blend, colors, instance);
+    uint32_t ids[PT_LANES];
+    vi_store(ids, discs->id);
+    for (uint32_t some = tile->bins->discs[instance].shadowed ? vm_bits(discs->drawn) : 0; some; some &= some - 1)
+        __atomic_store_n(marks + ids[__builtin_ctz(some)], 1, __ATOMIC_RELAXED);
+}
+
 static inline void draw(void *context, uint32_t instance, const struct pt_discs *discs)
 {
     struct tile *tile = context;
     vi places[2];
     float size = 0.0f;
-    set_terms(tile->bins, instance, discs, &tile->terms);
+    if (arguments_of(tile->bins)->part == PT_BLEND_LIGHT)
+        set_light_terms(tile->bins, instance, discs, &tile->terms);
+    else
+        set_terms(tile->bins, instance, discs, &tile->terms);
     for (uint32_t i = 0; i < PT_LANES; i++)
         size += tile->terms.most[i] + 1.0f;
     vi_store(tile->ids, vi_add(discs->id, vi_set(tile->bins->discs[instance].instance.id_base)));
@@ -305,28 +355,73 @@ static void save_depths(const struct tile *tile, float *offsets)
         }
 }
 
+// Of each light, the mean share that does not arrive.
+static void save_light(const struct tile *tile, const uint64_t *keys, uint32_t *planes)
+{
+    const struct pt_bins *bins = tile->bins;
+    const struct blend_args *args = arguments_of(bins);
+    const vf one = vf_set(1.0f), scale = vf_set((float)PT_SHADOW_SUM), half = vf_set(0.5f);
+    const size_t plane = (size_t)args->view.width * args->view.height;
+    for (int32_t y = 0; y < tile->patches.tile.height; y++)
+        for (uint32_t x = 0; x < (uint32_t)tile->patches.tile.width; x += PT_LANES) {
+            const size_t at = (size_t)(tile->patches.tile.y + y) * args->view.width + (uint32_t)tile->patches.tile.x + x;
+            const uint32_t pixel = (uint32_t)y * PT_DISC_TILE + x;
+            const uint32_t count = pt_lanes_left(x, (uint32_t)tile->patches.tile.width);
+            vm some = vm_and(vm_first(count), vf_lt(vf_load(tile->nearest + pixel), vf_set(pt_float(PT_KEY_EMPTY_Z))));
+            some = of_discs(bins, vi_load_id(keys + at), some, 0);
+            if (!vm_bits(some))
+                continue;
+            vf sums[SUMS];
+            pt_take_sums(tile->sums[pixel], tile->emptied ? tile->wide[pixel] : NULL, some, sums);
+            const vf opaque = vf_select(some, vf_max(sums[PT_BLEND_LIGHTS], one), one), share = vf_rcp(opaque);
+            for (uint32_t k = 0; k < args->lights; k++) {
+                const vf lost = vf_min(sums[k] * share, one) * scale + half;
+                vi_store_where(planes + (args->first + k) * plane + at, vf_int(vf_select(some, lost, half)), some);
+            }
+        }
+}
+
+// The discs of a tile, its own and the large ones.
+static inline __attribute__((always_inline)) void walk(const struct pt_bins *bins, uint32_t thread, uint32_t t,
+                                                       struct tile *tile, int colors, pt_bin_work *work)
+{
+    pt_bin_walk(bins, thread, t, &tile->patches.tile, &tile->farthest, colors, work, tile);
+    pt_bin_walk(bins, thread, bins->bins - 1, &tile->patches.tile, &tile->farthest, colors, work, tile);
+}
+
+static void blend_tile(const struct pt_bins *bins, uint32_t thread, uint32_t t, struct tile *tile)
+{
+    const struct pt_cpu_call *call = bins->call;
+    const uint32_t part = arguments_of(bins)->part;
+    memset(tile->sums, 0, sizeof tile->sums);
+    if (tile->deep)
+        memset(tile->depth_sums, 0, sizeof tile->depth_sums);
+    tile->left = SUM_ROOM;
+    tile->emptied = 0;
+    walk(bins, thread, t, tile, part == PT_BLEND_COLORS, draw);
+    if (part == PT_BLEND_LIGHT)
+        save_light(tile, PT_DATA(call, blend, keys), PT_DATA(call, blend, albedo));
+    else
+        save(tile, PT_DATA(call, blend, keys), PT_DATA(call, blend, normal), PT_DATA(call, blend, albedo),
+             PT_DATA(call, blend, away));
+    if (tile->deep)
+        save_depths(tile, PT_DATA(call, blend, offset));
+}
+
 static void blend_tiles(void *context, uint32_t begin, uint32_t end, uint32_t thread)
 {
     const struct pt_bins *bins = context;
-    const uint32_t large = bins->bins - 1;
     struct tile *tile = (struct tile *)bins->call->scratch[1].memory + thread;
     tile->bins = bins;
     for (uint32_t t = begin; t < end && !pt_cpu_cancelled(bins->call); t++) {
         pt_patches_turn(&tile->patches, bins->view, pt_bin_tile(bins, t));
-        tile->deep = ((const struct blend_args *)bins->call->arguments)->depths != 0;
+        tile->deep = arguments_of(bins)->depths != 0;
         if (!load(tile, PT_DATA(bins->call, blend, keys), PT_DATA(bins->call, blend, deff)))
             continue;
-        memset(tile->sums, 0, sizeof tile->sums);
-        if (tile->deep)
-            memset(tile->depth_sums, 0, sizeof tile->depth_sums);
-        tile->left = SUM_ROOM;
-        tile->emptied = 0;
-        pt_bin_walk(bins, thread, t, &tile->patches.tile, &tile->farthest, 1, draw, tile);
-        pt_bin_walk(bins, thread, large, &tile->patches.tile, &tile->farthest, 1, draw, tile);
-        save(tile, PT_DATA(bins->call, blend, keys), PT_DATA(bins->call, blend, normal), PT_DATA(bins->call, blend, albedo),
-             PT_DATA(bins->call, blend, away));
-        if (tile->deep)
-            save_depths(tile, PT_DATA(bins->call, blend, offset));
+        if (arguments_of(bins)->part == PT_BLEND_MARKS)
+            walk(bins, thread, t, tile, 0, draw_marks);
+        else
+            blend_tile(bins, thread, t, tile);
     }
 }
 

@@ -71,7 +71,8 @@ static inline void light(const struct gather *gather, const struct points *point
     const vf scale = vf_rsqrt(vf_select(known, square, one));
     for (int k = 0; k < 3; k++) // without one: across the view
         n[k] = vf_select(known, n[k] * scale, k == 2 ? one : zero);
-    pt_phong(args, 0, PT_DATA(gather->call, gather, shadows), ray, points->id, points->some, points->z, n, color);
+    const struct pt_words words = {PT_DATA(gather->call, gather, shadows), args->instance.id_count};
+    pt_phong(args, 0, &words, ray, points->id, points->some, points->z, n, color);
 }
 
 // 3. W of [S Eq. 22] in the lowest byte, and opacity above it.

@@ -105,11 +105,17 @@ static inline vf pt_power(vf x, uint32_t exponent)
     return result;
 }
 
+// Shadow words: a light's lie `stride` apart from the next one's.
+struct pt_words {
+    const uint32_t *words;
+    size_t stride;
+};
+
 // The share of a light that arrives at points, by their shadow words [D 6].
-static inline vf pt_arrives(const struct light_args *light, const uint32_t *shadows, uint32_t id_count, vi id, vm ours)
+static inline vf pt_arrives(const struct light_args *light, const struct pt_words *shadows, vi at, vm ours)
 {
-    const uint32_t *words = shadows + (size_t)(light->shadow - 1) * id_count;
-    vi sum = vi_and(vi_gather(words, id, ours), vi_set(PT_SHADOW_SUM));
+    const uint32_t *words = shadows->words + (light->shadow - 1) * shadows->stride;
+    vi sum = vi_and(vi_gather(words, at, ours), vi_set(PT_SHADOW_SUM));
     return vf_set(1.0f) - vi_convert(sum) * vf_set(light->shadow_scale);
 }
 
@@ -208,10 +214,12 @@ static inline vf pt_ambient(const float *k, const vf n[3])
 }
 
 // c = albedo (k_a world + k_d sum m E max(n.l, 0) / pi) + albedo k_s sum m E max(r.v, 0)^shininess / pi, m what arrives of
-// the light. In and out: albedo. Returns the mean m of the lights that cast; 1 where none does.
+// the light. at: which of their words are those of the points. In and out: albedo. Returns the mean m of the lights that cast; 1 where
+// none does.
 // plain: what pt_plain says, as a constant: the compiler leaves out all else, and spills nothing. Shading takes a tenth less.
-static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args *args, int plain, const uint32_t *shadows,
-                                                         const vf ray[2], vi id, vm ours, vf z, const vf n[3], vf color[3])
+static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args *args, int plain,
+                                                         const struct pt_words *shadows, const vf ray[2], vi at, vm ours, vf z,
+                                                         const vf n[3], vf color[3])
 {
     const struct instance_args *instance = &args->instance;
     struct pt_surface_point point;
@@ -228,7 +236,7 @@ static inline __attribute__((always_inline)) vf pt_phong(const struct shade_args
         if (plain && (light->type != 1 || light->shadow))
             __builtin_unreachable();
         if (light->shadow) {
-            share = pt_arrives(light, shadows, instance->id_count, id, ours);
+            share = pt_arrives(light, shadows, at, ours);
             arrived = arrived + share;
             casting++;
         }
@@ -281,7 +289,10 @@ static inline __attribute__((always_inline)) vf pt_shade_pixels(const struct sha
         return vf_set(1.0f);
     vf ray[2];
     vf_ray(&args->view, x, y, ray);
-    return pt_phong(args, plain, shadows, ray, id, ours, vf_load(own->z + x), normal, color);
+    const size_t pixels = (size_t)args->view.width * args->view.height;
+    const struct pt_words words = {shadows, args->of_pixels ? pixels : args->instance.id_count};
+    return pt_phong(args, plain, &words, ray, args->of_pixels ? pt_source(planes, at) : id, ours, vf_load(own->z + x), normal,
+                    color);
 }
 
 #endif
