@@ -373,7 +373,7 @@ enum patina_free_space { PATINA_FREE_SPACE_OFF = 0, PATINA_FREE_SPACE_SHOW = 1, 
 
 // What points are. ALL: every one is a ball of density, drawn in the order of depth with those of all soft clouds, over what is opaque
 // and behind it, hidden by what is opaque before it. Keys, depth, picks, lines and other passes tell of the rest of the scene; soft
-// points neither cast nor take shadows yet, and what lies behind a transparent surface is hidden by its first layer. FIELD: so are
+// points neither cast nor take shadows yet. FIELD: so are
 // points whose field is above soft_threshold; the others are as with OFF.
 enum patina_soft { PATINA_SOFT_OFF = 0, PATINA_SOFT_ALL = 1, PATINA_SOFT_FIELD = 2 };
 // BASE: the density along the ray, exactly, through balls that intersect. CONCENTRIC: by shells of even density, which come to BASE as
