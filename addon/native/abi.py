@@ -33,7 +33,7 @@ LIGHT_TYPE = {"SUN": 1, "POINT": 2, "SPOT": 3, "AREA": 4}
 AREA_SHAPE = {"RECTANGLE": 0, "ELLIPSE": 1}
 QUALITY = {"REFINED": 0, "PAPER": 1}
 FILL = {"CLOSED": 0, "PAPER": 1, "OFF": 2}
-SURFACE = {"AUTO": 0, "SPLATS": 1, "FILL": 2}
+SURFACE = {"AUTO": 0, "SPLATS": 1, "FILL": 2, "RANGES": 3}
 DEPTH = {"POINT": 0, "SURFACE": 1}
 SMOOTH = {"ALLEVIATED": 0, "GAUSSIAN": 1, "BOX": 2, "OFF": 3}
 ANTIALIAS = {"LAYERS": 0, "BACKGROUND": 1, "OFF": 2}
@@ -128,7 +128,9 @@ class CloudStyle(Descriptor):
                 ("hidden_kinds", c_uint32), ("least_certainty", c_float), ("largest_gap", c_float), ("mask", c_void_p),
                 ("grade", c_void_p), ("exact", c_uint32), ("was_padding", c_uint32), ("soft", c_uint32),
                 ("soft_model", c_uint32), ("soft_shells", c_uint32), ("soft_radius", c_float), ("soft_opacity", c_float),
-                ("soft_modulation", c_float), ("field", c_void_p), ("soft_threshold", c_float), ("soft_unused", c_float)]
+                ("soft_modulation", c_float), ("field", c_void_p), ("soft_threshold", c_float), ("soft_unused", c_float),
+                ("scans", c_void_p), ("surface", c_uint32), ("range_gamma", c_float), ("range_pixel", c_float),
+                ("range_sharpness", c_float), ("range_cull", c_float), ("range_unused", c_uint32)]
 
 
 class Clip(Descriptor):
@@ -225,6 +227,10 @@ class MeshStyle(Descriptor):
 
 class ScanGrade(Structure):
     _fields_ = [("gain", c_float), ("gamma", c_float), ("saturation", c_float), ("temperature", c_float)]
+
+
+class Scan(Structure):
+    _fields_ = [("direction", c_double * 3), ("interval", c_double)]
 
 
 class FieldDesc(Descriptor):
@@ -325,6 +331,8 @@ CALLS = {
     "patina_mask_destroy": (c_void_p,),
     "patina_grade_create": (c_void_p, c_void_p, POINTER(ScanGrade), c_uint32, POINTER(c_void_p)),
     "patina_grade_destroy": (c_void_p,),
+    "patina_scans_create": (c_void_p, c_void_p, POINTER(Scan), c_uint32, POINTER(c_void_p)),
+    "patina_scans_destroy": (c_void_p,),
     "patina_field_create": (c_void_p, POINTER(FieldDesc), c_void_p, POINTER(c_void_p)),
     "patina_field_destroy": (c_void_p,),
     "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
@@ -352,8 +360,8 @@ RESULTS = {"patina_version": c_char_p, "patina_error_text": c_char_p, "patina_me
            "patina_file_destroy": None, "patina_scene_destroy": None, "patina_frame_destroy": None,
            "patina_frame_cancel": None, "patina_frame_progress": c_float, "patina_frame_stats_json": c_size_t,
            "patina_frame_plan_text": c_size_t, "patina_mesh_destroy": None, "patina_texture_destroy": None,
-           "patina_mask_destroy": None, "patina_grade_destroy": None, "patina_field_destroy": None,
-           "patina_task_destroy": None}
+           "patina_mask_destroy": None, "patina_grade_destroy": None, "patina_scans_destroy": None,
+           "patina_field_destroy": None, "patina_task_destroy": None}
 
 # effects.def: what Blender shows of each effect, and how
 EFFECTS = (

@@ -4,6 +4,7 @@
 
 #include "clip.h"
 #include "mask.h"
+#include "scans.h"
 #include "kernel_args.h"
 
 #include <float.h>
@@ -196,7 +197,8 @@ static int check_style(const patina_scene *scene, patina_cloud_style *style, con
     if (style->shadow_off > 7)
         return fail(scene, "cloud style: shadow_off has unknown bits");
     style->shininess = style->shininess == 0 ? 32 : style->shininess > 4096 ? 4096 : style->shininess;
-    const int error = check_soft(scene, style, cloud);
+    int error = check_soft(scene, style, cloud);
+    error = error ? error : pt_check_ranges(scene, style, cloud);
     return error ? error : check_color(scene, style, cloud);
 }
 
@@ -397,8 +399,10 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
     if (s.quality > PATINA_QUALITY_PAPER || s.fill > PATINA_FILL_OFF || s.smooth > PATINA_SMOOTH_OFF ||
         s.antialias > PATINA_ANTIALIAS_OFF || s.fill_iterations > 64)
         return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
-    if (s.surface > PATINA_SURFACE_FILL)
+    if (s.surface > PATINA_SURFACE_RANGES)
         return fail(scene, "settings: no such surface");
+    if (s.surface == PATINA_SURFACE_RANGES)
+        return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED, "settings: range images are not drawn yet");
     if (!(s.error_target >= 0.0f) || !isfinite(s.error_target))
         return fail(scene, "settings: error_target is negative or not finite");
     if (s.strata > PT_STRATA)

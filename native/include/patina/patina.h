@@ -84,6 +84,7 @@ typedef struct patina_texture patina_texture;
 typedef struct patina_mask patina_mask;
 typedef struct patina_grade patina_grade;
 typedef struct patina_field patina_field;
+typedef struct patina_scans patina_scans;
 typedef struct patina_scene patina_scene;
 typedef struct patina_frame patina_frame;
 typedef struct patina_file patina_file;
@@ -435,6 +436,19 @@ typedef struct patina_cloud_style {
     const patina_field *field; // of this cloud, for FIELD. It must outlive what the mask must
     float soft_threshold;      // FIELD: 0..1; points with more are soft
     float soft_unused;         // says nothing
+    // Of points as range images [Kawata & Kanai], SPEC 6; nothing for others:
+    const patina_scans *scans; // of this cloud: the scans that it was made of. NULL = one. It must outlive what the mask must
+    uint32_t surface;          // patina_surface: 0 = as in the settings, RANGES = this cloud as range images whatever they say
+    float range_gamma; // object units: points so far behind the nearest in their pixel are one surface with it, as scans that do not
+                       // quite fit; neighbours with a greater step between them are not joined. 0 = automatic: twice the interval
+                       // of the samples, as the scans or else the spacings say, or two pixels of the image buffer
+    float range_pixel; // of the image buffer, on screen: 1..64 pixels of the picture. 0 = automatic: so that neighbouring samples
+                       // fall into neighbouring pixels
+    float range_sharpness; // 0 = none; else 0.5..0.95, range_pixel of a finer first pass in parts of itself, shown where many points
+                           // share a pixel or a surface is grazed. [K II.E] has 0.66 to 0.83
+    float range_cull;      // 0 = none; else radians, up to pi: scans whose direction is at a greater angle to the direction of view
+                           // are left out whole
+    uint32_t range_unused; // says nothing
 } patina_cloud_style;
 #define PATINA_CLOUD_STYLE_INIT                                                                                                \
     {                                                                                                                          \
@@ -491,7 +505,10 @@ enum patina_fill { PATINA_FILL_CLOSED = 0, PATINA_FILL_PAPER = 1, PATINA_FILL_OF
 // as wide as it, the others are filled; where fill is not CLOSED, and of clouds that were not, all are filled. FILL: image-space filling, as quality and fill say. SPLATS: each point is a flat disc across its
 // normal (without one: across the view), discs within a layer distance of the nearest one are blended; quality, fill, their
 // iterations and error_target say nothing then. Light maps of shadows are filled either way.
-enum patina_surface { PATINA_SURFACE_AUTO = 0, PATINA_SURFACE_SPLATS = 1, PATINA_SURFACE_FILL = 2 };
+// RANGES: points are merged in a coarser picture, the image buffer, and its pixels joined into faces, whose normals follow from them, as
+// the style's `range_` fields say; no normals, no analysis and no filling are needed, and scans that do not quite fit are one surface.
+// For clouds whose style has surface RANGES alone, too.
+enum patina_surface { PATINA_SURFACE_AUTO = 0, PATINA_SURFACE_SPLATS = 1, PATINA_SURFACE_FILL = 2, PATINA_SURFACE_RANGES = 3 };
 // What the depth pass tells of a pixel with points. POINT: z of the nearest point in it, wherever in the pixel that lies: as the
 // keys. SURFACE: z of that point's surface in the middle of the pixel; where surface is SPLATS, the mean of the discs there: of noisy
 // points the nearest lies in front. Meshes are exact either way.

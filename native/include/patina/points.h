@@ -37,6 +37,21 @@ PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *sc
                                    uint32_t count, patina_grade **out);
 PATINA_API void patina_grade_destroy(patina_grade *grade);
 
+// ---- scans: which range image each point is of -----------------------------------------------------------------------
+
+// One of the scans that a cloud was made of, in object units.
+typedef struct patina_scan {
+    double direction[3]; // in which the scanner looked, any length; 0 = not known, or all around: never culled by it
+    double interval;     // between neighbouring samples; 0 = not known: the cloud's spacings stand for it
+} patina_scan;
+
+// scan: of each point in the given order, info.count, as the attribute "scan" of files counts them from 0; NULL = all are of scan 0.
+// Points of scans from `count` on (1..65535) have neither direction nor interval. 2 bytes a point. Given to scenes by style.scans, for
+// PATINA_SURFACE_RANGES. It never changes. Any number of them of one cloud.
+PATINA_API int patina_scans_create(const patina_cloud *cloud, const uint16_t *scan, const patina_scan *scans, uint32_t count,
+                                   patina_scans **out);
+PATINA_API void patina_scans_destroy(patina_scans *scans);
+
 // ---- fields: which points are soft ---------------------------------------------------------------------------------
 
 enum patina_field_source {        // of a point's number
