@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runners of the kernels that walk points, in batches where a cloud is larger than a storage block. scatter: two 32-bit
-// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average: a pass a band of rows; lit, sift,
+// passes over all chunks of all instances (or one of 64 bits); splat: the same; blend, average, merge: a pass a band of rows; lit, sift,
 // center, average: one instance.
 #include "device_gl.h"
 
@@ -307,35 +307,46 @@ int pt_gl_blend(struct pt_gl_device *d, const struct pt_gl_work *work)
     return result;
 }
 
-static int average_band(struct pt_gl_device *d, const struct instance_buffers *b, uint32_t first, uint32_t end)
+// Of average and merge, whose arguments begin with their view.
+static int mean_band(struct pt_gl_device *d, const struct instance_buffers *b, uint32_t first, uint32_t end)
 {
-    const struct average_args *args = b->work->arguments;
-    const uint32_t width = args->view.width;
-    clear_sums(d, width, end - first);
+    const struct view_args *view = b->work->arguments;
+    const enum pt_kernel kernel = b->work->kernel;
+    clear_sums(d, view->width, end - first);
     for (uint32_t step = ADD; step <= MEAN; step++) {
-        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_average][step], 3, (GLint)first);
-        d->gl.ProgramUniform1i(d->programs[PT_KERNEL_average][step], 4, (GLint)end);
+        d->gl.ProgramUniform1i(d->programs[kernel][step], 3, (GLint)first);
+        d->gl.ProgramUniform1i(d->programs[kernel][step], 4, (GLint)end);
     }
     int result = run_instance(d, b, ADD);
-    return result == PATINA_OK ? pt_gl_dispatch(d, PT_KERNEL_average, MEAN, (width + 31) / 32, (end - first + 7) / 8) : result;
+    return result == PATINA_OK ? pt_gl_dispatch(d, kernel, MEAN, (view->width + 31) / 32, (end - first + 7) / 8) : result;
+}
+
+static int means(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t chunks, uint32_t sums)
+{
+    const struct view_args *view = work->arguments;
+    const uint32_t begin = view->rect[1], last = view->rect[3];
+    const struct instance_buffers b = instance_of(work, chunks, 0);
+    uint32_t rows = 1;
+    if (begin >= last)
+        return PATINA_OK;
+    int result = pt_gl_kernel_program(d, work->kernel, ADD, "#define STEP 0\n");
+    if (result == PATINA_OK)
+        result = pt_gl_kernel_program(d, work->kernel, MEAN, "#define STEP 1\n");
+    if (result == PATINA_OK)
+        result = make_sums(d, view->width, last - begin, sums, pt_kernels[work->kernel].name, &rows);
+    for (uint32_t y = begin; y < last && result == PATINA_OK; y += rows)
+        result = mean_band(d, &b, y, y + rows < last ? y + rows : last);
+    return result;
 }
 
 int pt_gl_average(struct pt_gl_device *d, const struct pt_gl_work *work)
 {
-    const struct average_args *args = work->arguments;
-    const uint32_t begin = args->view.rect[1], last = args->view.rect[3];
-    const struct instance_buffers b = instance_of(work, PT_BUF_average_chunks, 0);
-    uint32_t rows = 1;
-    if (begin >= last || !chunks_of(&b)->size)
-        return PATINA_OK;
-    int result = pt_gl_kernel_program(d, PT_KERNEL_average, ADD, "#define STEP 0\n");
-    if (result == PATINA_OK)
-        result = pt_gl_kernel_program(d, PT_KERNEL_average, MEAN, "#define STEP 1\n");
-    if (result == PATINA_OK)
-        result = make_sums(d, args->view.width, last - begin, PT_BIND_average_sums, "average", &rows);
-    for (uint32_t y = begin; y < last && result == PATINA_OK; y += rows)
-        result = average_band(d, &b, y, y + rows < last ? y + rows : last);
-    return result;
+    return work->buffers[PT_BUF_average_chunks]->size ? means(d, work, PT_BUF_average_chunks, PT_BIND_average_sums) : PATINA_OK;
+}
+
+int pt_gl_merge(struct pt_gl_device *d, const struct pt_gl_work *work)
+{
+    return means(d, work, PT_BUF_merge_chunks, PT_BIND_merge_sums);
 }
 
 int pt_gl_points_of(struct pt_gl_device *d, const struct pt_gl_work *work, uint32_t variant)

@@ -39,7 +39,10 @@ void pt_means_settings(enum pt_means means, uint32_t *quality, uint32_t *fill)
     *fill = table[means].fill;
 }
 
-const char *pt_means_name(enum pt_means means) { return means == PT_MEANS_SPLATS ? "discs" : table[means].name; }
+const char *pt_means_name(enum pt_means means)
+{
+    return means == PT_MEANS_SPLATS ? "discs" : means == PT_MEANS_RANGES ? "range images" : table[means].name;
+}
 
 // How many times their colour error was exceeded by at most, on a knot, an astroid, slits, shells, plates, spheres that touch and a
 // gyroid at 0.2 to 4 points a pixel, with noise of a spacing, strays and scan rows of 1 : 10: 10.1 times by filling (a knot with noise),
@@ -90,7 +93,7 @@ static patina_expected_error on_curve(enum pt_means means, double spacing_px)
 
 patina_expected_error pt_expected_error(enum pt_means means, double spacing_px)
 {
-    if (spacing_px > 0.0 && spacing_px <= PT_SPACING_KNOWN)
+    if (spacing_px > 0.0 && spacing_px <= PT_SPACING_KNOWN && means != PT_MEANS_RANGES)
         return on_curve(means, spacing_px);
     const float none = INFINITY;
     return (patina_expected_error){none, none, none, none, on_curve(means, 1.0).doubt};

@@ -12,7 +12,8 @@ enum pt_means {
     PT_MEANS_CLOSED,
     PT_MEANS_REFINED,
     PT_MEANS_COUNT,
-    PT_MEANS_SPLATS = PT_MEANS_COUNT
+    PT_MEANS_SPLATS = PT_MEANS_COUNT,
+    PT_MEANS_RANGES // no curve is known
 };
 
 // What settings ask for of filling, and the other way round.

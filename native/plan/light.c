@@ -306,6 +306,7 @@ int pt_light_scene(const struct patina_scene *scene, const struct pt_plan_light 
         if (pt_group_casts(scene, group, i)) {
             instances[out->instance_count] = scene->instances[i];
             instances[out->instance_count].style.cull_back = 0;      // both sides cast
+            instances[out->instance_count].style.surface = 0;        // maps are filled
             instances[out->instance_count++].style.transparency = 0; // its map has one layer
         }
     out->meshes = meshes;

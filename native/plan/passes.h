@@ -157,6 +157,9 @@ int pt_blends_light(const struct pt_builder *builder);   // light arrives at all
 void pt_plan_blend_marks(struct pt_builder *builder);    // in place of mark
 void pt_plan_blend_light(struct pt_builder *builder);    // once shadow words are known
 
+// ranges.c: instances that are drawn as range images, over the keys of the others.
+void pt_plan_ranges(struct pt_builder *builder);
+
 // average.c: colours and normals of instances that are filled, once they are. Whether this is one whose are means.
 void pt_plan_average(struct pt_builder *builder);
 int pt_averages(const struct pt_builder *builder, const struct pt_plan_instance *instance);

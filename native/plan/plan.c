@@ -195,6 +195,7 @@ static void plan_filling(struct pt_builder *builder)
     if (!plan->iterations) {
         pt_skip(builder, "fill",
                 builder->scene->settings.surface == PATINA_SURFACE_SPLATS ? "the settings ask for discs"
+                : plan->means == PT_MEANS_RANGES                          ? "all clouds in view are range images"
                 : builder->scene->settings.error_target > 0.0f            ? "the error target is met without"
                                                                           : "switched off in the settings");
         pt_skip(builder, "pull", "no filling");
@@ -502,25 +503,27 @@ static void plan_measured(struct pt_builder *builder)
     int estimate = 0, points = 0, discs = 0;
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         points |= plan->instances[i].chunk_count && !plan->instances[i].discs;
-        discs |= plan->instances[i].chunk_count && plan->instances[i].discs;
+        discs |= plan->instances[i].chunk_count && plan->instances[i].discs && !plan->instances[i].range;
     }
     if (points)
         plan_scatter(builder);
-    else
+    else if (!plan->cells)
         pt_skip(builder, "scatter",
                 builder->scene->settings.surface == PATINA_SURFACE_SPLATS ? "the settings ask for discs"
                                                                           : "all footprints in view are wide enough for discs");
     if (discs) {
         pt_plan_splat(builder);
     } else {
-        const char *reason = builder->scene->settings.surface == PATINA_SURFACE_FILL ? "the settings ask for filling"
+        const char *reason = plan->cells && !points                                    ? "all clouds in view are range images"
+                             : builder->scene->settings.surface == PATINA_SURFACE_FILL ? "the settings ask for filling"
                              : plan->discs_count ? "no footprint in view is wide enough for a disc"
                                                  : "no cloud in view was analysed";
         pt_skip(builder, "splat", reason);
         pt_skip(builder, "blend", reason);
     }
+    pt_plan_ranges(builder);
     for (uint32_t i = 0; i < plan->instance_count; i++)
-        if (plan->instances[i].chunk_count) {
+        if (plan->instances[i].chunk_count && !plan->instances[i].range) {
             pt_plan_surface(builder, i);
             if (builder->layer == 1 && pt_tells_surfaces(builder) && !plan->instances[i].discs)
                 plan_center(builder, i);
@@ -530,7 +533,10 @@ static void plan_measured(struct pt_builder *builder)
         pt_skip(builder, "center",
                 !plan->filled ? "discs have the depth of their surface" : "the depth asked for is the points'");
     if (!estimate)
-        pt_skip(builder, "normals", "every cloud in view has normals");
+        pt_skip(builder, "normals",
+                points || discs ? "every cloud in view has normals" : "range images have those of their cells");
+    if (!points && !discs)
+        pt_skip(builder, "surface", "range images tell normals and layer distances themselves");
     if (discs)
         pt_plan_blend(builder);
 }

@@ -18,7 +18,8 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
 // serve one layer after another. What a plane holds says kernels.def. No order here means anything.
 // X(name, format, size, slots, carried)
 //   size: WINDOW: the view's; LIGHTS: one of these for each light that casts shadows; CROP: the picture that callers read; TILES: of
-//         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft_records of them; BINS: as many as these need
+//         16 x 16 pixels of the window; RECORDS: no pixels, but plan->soft_records of them; BINS: as many as these need; CELLS: of the
+//         largest image buffer
 //   slots: ONE; LEVELS: coarser ones too; LAYERS: one each
 //   carried: from layer to layer
 #define PT_PLANES(X)                                                                                                           \
@@ -55,6 +56,11 @@ enum { PT_LEVELS = 6 }; // of the pyramid: level 0 and up to five coarser ones
     X(LINE_BEHIND, f32, WINDOW, ONE, 0)                                                                                        \
     X(NEAREST_BEHIND, u32, WINDOW, ONE, 0)                                                                                     \
     X(KEYS_KEPT, key, WINDOW, ONE, 0)                                                                                          \
+    X(CELLS, key, CELLS, ONE, 0)                                                                                               \
+    X(CELL_BEYOND, f32, CELLS, ONE, 0)                                                                                         \
+    X(CELL_PLACE, f32x4, CELLS, ONE, 0)                                                                                        \
+    X(CELL_MERGED, f32x4, CELLS, ONE, 0)                                                                                       \
+    X(CELL_INCLINED, f32x4, CELLS, ONE, 0)                                                                                     \
     X(COMBINED, f32x4, CROP, ONE, 0)                                                                                           \
     X(DEPTH, f32, CROP, ONE, 0)                                                                                                \
     X(NORMALS, f32x3, CROP, ONE, 0)                                                                                            \
@@ -78,7 +84,7 @@ enum pt_plane {
         PT_PLANE_COUNT
 };
 
-enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_LIGHTS, PT_SIZE_CROP, PT_SIZE_TILES, PT_SIZE_RECORDS, PT_SIZE_BINS };
+enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_LIGHTS, PT_SIZE_CROP, PT_SIZE_TILES, PT_SIZE_RECORDS, PT_SIZE_BINS, PT_SIZE_CELLS };
 enum pt_plane_slots { PT_SLOTS_ONE, PT_SLOTS_LEVELS, PT_SLOTS_LAYERS };
 
 struct pt_plane_row {
@@ -173,8 +179,9 @@ struct pt_plan_light {
 // points, and behind all others its wide ones as discs, with ids of their own (pt_disc_ids).
 struct pt_plan_instance {
     const struct pt_instance *instance;
-    uint32_t of;    // its place in the scene: shadows are kept by it
-    uint32_t discs; // 1: its points are discs
+    uint32_t of;                  // its place in the scene: shadows are kept by it
+    uint32_t discs;               // 1: its points are discs, or range images: what pixels show is in planes
+    const struct pt_range *range; // range images: their image buffer (ranges.h); NULL: they are none
     struct instance_args args;
     float radius, radius_scale, radius_most, surface_scale; // of discs, as disc_args has them
     struct chunk_view *chunks;                              // those in view
@@ -278,6 +285,8 @@ struct pt_plan {
     double spacing_middle;  // that half of it stays below
     uint32_t iterations;    // of each filling filter
     int filled;             // some points around the picture are pixels, not discs
+    uint32_t range_reach;   // pixels, of what is drawn as range images around the picture; 0: nothing is
+    uint32_t cells;         // of the largest image buffer
     uint32_t quality, fill; // as set, or as the error target chose them
     int map;                // of a light
     enum pt_means means;    // that `expected` is of

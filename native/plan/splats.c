@@ -66,7 +66,7 @@ static int list_discs(struct pt_builder *builder, const struct blend_args *blend
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
         const struct patina_cloud *cloud = instance->instance->cloud;
-        if (!instance->chunk_count || !instance->discs)
+        if (!instance->chunk_count || !instance->discs || instance->range)
             continue;
         discs[out->instances++] = (struct disc_args){.instance = instance->args,
                                                      .has_radii = cloud->info.has_radii ? PT_RADII_FLOATS

@@ -10,6 +10,7 @@
 #include "expected.h"
 #include "eye.h"
 #include "lines.h"
+#include "ranges.h"
 #include "scene/clip.h"
 
 #include <math.h>
@@ -127,6 +128,7 @@ struct survey {
     struct seen **seen; // per instance
     uint32_t *seen_count;
     int points, discs; // some chunk's points are drawn as such
+    double *pixels;    // per instance: of a cell, where they are range images; else 0
 };
 
 static int is_transparent(const struct pt_instance *instance)
@@ -156,7 +158,7 @@ static double stretch_of(const struct pt_eye *camera, const struct pt_extent *ex
 }
 
 // Pixels beyond the picture that are looked at: whatever the guard will be, the same is seen. It is seldom more.
-enum { AROUND = 160 };
+enum { AROUND = 160, FARTHEST_FACE = 96 };
 
 static int look_at_instance(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey, uint32_t i)
 {
@@ -173,6 +175,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         return PATINA_ERROR_MEMORY;
     survey->seen[i] = list;
     survey->sieves[i] = pt_sieve_make(scene, instance, PT_SOLID_POINTS, clips);
+    const int ranges = pt_draws_ranges(scene, instance);
     const double apart = pt_thinning(scene), wide = WIDE_FOOTPRINT * pt_finer(scene); // samples show the same surface
     double rows[9];
     pt_object_rows(camera, object, rows);
@@ -210,10 +213,10 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = pt_least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         const double reach = disc_reach(scene, instance, object, chunk, apart, 0) * stretch;
-        seen.wide = scene->settings.surface == PATINA_SURFACE_SPLATS || reach > wide * pixel * rim ||
+        seen.wide = ranges || scene->settings.surface == PATINA_SURFACE_SPLATS || reach > wide * pixel * rim ||
                     (reach > 0.0 && seen.spacing_px > SPARSE * pt_finer(scene));
         survey->points |= !seen.wide;
-        survey->discs |= seen.wide;
+        survey->discs |= seen.wide && !ranges;
         list[survey->seen_count[i]++] = seen;
     }
     plan->transparent |= transparent && survey->seen_count[i] > 0;
@@ -230,12 +233,12 @@ static int compare_weighted(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// The chunks' spacings with the area that they cover; those that face away only when asked for.
-static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *survey, int away, struct weighted *list,
+// Spacings of the chunks of instances [first, end) with the area that they cover; those that face away only when asked for.
+static uint32_t weigh_chunks(const struct survey *survey, uint32_t first, uint32_t end, int away, struct weighted *list,
                              double *area)
 {
     uint32_t count = 0;
-    for (uint32_t i = 0; i < plan->instance_count; i++)
+    for (uint32_t i = first; i < end; i++)
         for (uint32_t c = 0; c < survey->seen_count[i]; c++) {
             const struct seen *seen = &survey->seen[i][c];
             if (!(seen->area_px > 0.0) || !isfinite(seen->area_px) || (seen->away && !away))
@@ -248,26 +251,44 @@ static uint32_t weigh_chunks(const struct pt_plan *plan, const struct survey *su
 
 // The spacing on screen that 95% of the covered area stays below. What faces away counts only where nothing faces us: the
 // sparse back of a statue is hidden by its front.
-static int spacing_on_screen(struct pt_plan *plan, const struct survey *survey)
+static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32_t end, double *middle, double *most)
 {
     uint32_t count = 0, total = 0;
     double area = 0.0, sum = 0.0;
-    for (uint32_t i = 0; i < plan->instance_count; i++)
+    for (uint32_t i = first; i < end; i++)
         total += survey->seen_count[i];
     struct weighted *list = malloc((total + 1) * sizeof *list);
     if (!list)
         return PATINA_ERROR_MEMORY;
     for (int away = 0; away < 2 && !count; away++)
-        count = weigh_chunks(plan, survey, away, list, &area);
+        count = weigh_chunks(survey, first, end, away, list, &area);
     qsort(list, count, sizeof *list, compare_weighted);
     for (uint32_t k = 0; k < count && sum <= 0.95 * area; k++) {
         if (sum <= 0.5 * area)
-            plan->spacing_middle = list[k].value;
+            *middle = list[k].value;
         sum += list[k].weight;
-        plan->spacing_px = list[k].value;
+        *most = list[k].value;
     }
     free(list);
     return PATINA_OK;
+}
+
+// The cells of what is drawn as range images.
+static int choose_cells(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
+{
+    survey->pixels = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->pixels);
+    int error = survey->pixels ? PATINA_OK : PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < scene->instance_count && !error; i++) {
+        double middle = 0.0, most = 0.0;
+        survey->pixels[i] = 0.0;
+        if (!pt_draws_ranges(scene, &scene->instances[i]))
+            continue;
+        error = spacing_on_screen(survey, i, i + 1, &middle, &most);
+        survey->pixels[i] = pt_range_pixel(scene, &scene->instances[i], most);
+        const uint32_t reach = pt_range_reach(survey->pixels[i]);
+        plan->range_reach = reach > plan->range_reach && survey->seen_count[i] ? reach : plan->range_reach;
+    }
+    return error;
 }
 
 static void set_view(const struct pt_eye *camera, struct view_args *view)
@@ -284,11 +305,15 @@ static void set_view(const struct pt_eye *camera, struct view_args *view)
 
 // ---- what kernels get ----------------------------------------------------------------------------------------------------
 
-// Instance i of the scene, its wide chunks or the others. Ids are moved by id_base.
+// Instance i of the scene, its wide chunks or the others. Ids are moved by id_base. range: its image buffer, in whose cells points
+// are projected, or NULL.
 static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i,
-                        uint32_t wide, uint32_t id_base, struct pt_plan_instance *out)
+                        uint32_t wide, uint32_t id_base, struct pt_range *range, struct pt_plan_instance *out)
 {
     const struct pt_instance *instance = &scene->instances[i];
+    const struct pt_eye *eye = range ? &range->eye : &survey->camera;
+    const double faces = range ? (double)pt_range_reach(survey->pixels[i]) : 0.0;
+    out->range = range;
     out->instance = instance;
     out->of = i;
     out->discs = wide;
@@ -304,20 +329,25 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     if (!out->chunks || !out->bounds)
         return PATINA_ERROR_MEMORY;
     double rows[9];
-    pt_object_rows(&survey->camera, &survey->objects[i], rows);
+    pt_object_rows(eye, &survey->objects[i], rows);
     for (uint32_t k = 0; k < survey->seen_count[i]; k++) {
         const struct seen *seen = &survey->seen[i][k];
         const struct pt_chunk *chunk = &instance->cloud->chunks[seen->chunk];
-        uint32_t *rect = out->bounds[out->chunk_count].rect;
-        if (seen->wide != wide || !pt_rect_in_window(&plan->view, seen->extent.rect, plan->guard, rect))
+        const double *bounds = seen->extent.rect,
+                     around[4] = {bounds[0] - faces, bounds[1] - faces, bounds[2] + faces, bounds[3] + faces};
+        uint32_t *rect = out->bounds[out->chunk_count].rect, cells[4];
+        if (seen->wide != wide || !pt_rect_in_window(&plan->view, around, plan->guard, rect))
             continue;
         uint32_t count = pt_drawn_points(scene, chunk);
         out->bounds[out->chunk_count].z_far = nextafterf((float)seen->extent.z_beyond, INFINITY);
-        pt_set_chunk(&survey->camera, &survey->objects[i], rows, instance, chunk, count, seen->cull,
-                     &out->chunks[out->chunk_count]);
+        pt_set_chunk(eye, &survey->objects[i], rows, instance, chunk, count, seen->cull, &out->chunks[out->chunk_count]);
         out->chunks[out->chunk_count].id_base += id_base;
-        out->chunks[out->chunk_count].row_first = rect[1];
-        out->chunks[out->chunk_count].row_end = rect[3];
+        if (range) {
+            pt_range_rect(range, bounds, plan->guard, cells);
+            pt_join_rect(range->cells.rect, cells);
+        }
+        out->chunks[out->chunk_count].row_first = range ? cells[1] : rect[1];
+        out->chunks[out->chunk_count].row_end = range ? cells[3] : rect[3];
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
         pt_join_rect(out->rect, rect);
@@ -337,11 +367,18 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     plan->chunks += cloud->chunk_count;
     plan->chunks_culled += cloud->chunk_count;
     plan->points += cloud->info.count;
-    int error = place_chunks(scene, plan, survey, i, all, 0, &plan->instances[i]);
+    if (survey->pixels[i] > 0.0) {
+        struct pt_range *range = pt_arena_take(&plan->arena, sizeof *range);
+        if (!range)
+            return PATINA_ERROR_MEMORY;
+        pt_range_place(scene, plan, &scene->instances[i], &survey->camera, survey->objects[i].scale, survey->pixels[i], range);
+        return place_chunks(scene, plan, survey, i, 1, pt_disc_ids(scene), range, &plan->instances[i]);
+    }
+    int error = place_chunks(scene, plan, survey, i, all, 0, NULL, &plan->instances[i]);
     for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
         wide |= survey->seen[i][k].wide;
     if (!error && wide)
-        error = place_chunks(scene, plan, survey, i, 1, plan->discs_first, &plan->instances[plan->instance_count++]);
+        error = place_chunks(scene, plan, survey, i, 1, plan->discs_first, NULL, &plan->instances[plan->instance_count++]);
     return error;
 }
 
@@ -409,7 +446,7 @@ static int look_around(const struct patina_scene *scene, struct pt_plan *plan, s
     for (uint32_t i = 0; i < scene->mesh_count && !plan->map; i++)
         plan->transparent |= scene->meshes[i].style.alpha == PATINA_ALPHA_BLEND && pt_mesh_drawn(scene->meshes[i].mesh);
     survey->camera = bare;
-    return error ? error : spacing_on_screen(plan, survey);
+    return error ? error : spacing_on_screen(survey, 0, plan->instance_count, &plan->spacing_middle, &plan->spacing_px);
 }
 
 int pt_plan_spacing(const struct patina_scene *scene, struct pt_plan *plan)
@@ -428,7 +465,7 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
         return PATINA_ERROR_MEMORY;
     // 1. Spacings.
     int error = look_around(scene, plan, &survey);
-    if (error)
+    if (error || (error = choose_cells(scene, plan, &survey)))
         return error;
     plan->discs_first = scene->settings.surface == PATINA_SURFACE_SPLATS ? 0 : pt_disc_ids(scene);
     plan->discs_count = survey.discs ? (uint32_t)scene->points : 0;
@@ -437,13 +474,16 @@ int pt_plan_view(const struct patina_scene *scene, struct pt_plan *plan)
                     pt_knows_reach(scene); // asking takes a tenth of the frame: not where all points lie close
     plan->sigmas = pt_knows_sigmas(scene);
     pt_choose_filling(scene, plan);
+    plan->discs_count = plan->range_reach ? (uint32_t)scene->points
+                                          : plan->discs_count; // their pixels say how far off a point fell
     pt_choose_layers(&scene->settings, plan);
     plan->reopens = pt_reopen_rounds(scene, plan);
     plan->line_radius = pt_line_radius(scene);
     uint32_t cell = 1u << plan->levels;
     // Effects see no farther beyond the picture: a wider guard would fill holes at its border otherwise than without them. Lines
     // would break off there.
-    uint32_t guard = pt_round_up(8 + 4 * cell + pt_line_reach(plan), cell > 16 ? cell : 16);
+    const uint32_t reach = plan->range_reach < FARTHEST_FACE ? plan->range_reach : FARTHEST_FACE;
+    uint32_t guard = pt_round_up(8 + 4 * cell + pt_line_reach(plan) + reach, cell > 16 ? cell : 16);
     plan->guard = guard;
     // 2. The window, and what of the scene falls into it.
     pt_pad_eye(&survey.camera, guard);

@@ -4,6 +4,7 @@
 
 #include "expected.h"
 #include "lines.h"
+#include "ranges.h"
 
 #include <math.h>
 
@@ -25,6 +26,8 @@ static int closes_by_analysis(const patina_settings *settings)
 
 int pt_knows_discs(const struct patina_scene *scene, const struct pt_instance *instance)
 {
+    if (pt_draws_ranges(scene, instance))
+        return 0;
     return scene->settings.surface == PATINA_SURFACE_SPLATS ||
            (instance->cloud->shapes && closes_by_analysis(&scene->settings) && pt_disc_ids(scene));
 }
@@ -60,8 +63,8 @@ void pt_choose_filling(const struct patina_scene *scene, struct pt_plan *plan)
     plan->quality = settings->quality;
     plan->fill = settings->fill;
     plan->levels = plan->iterations = 0;
-    if (settings->surface == PATINA_SURFACE_SPLATS) {
-        plan->means = PT_MEANS_SPLATS;
+    if (settings->surface == PATINA_SURFACE_SPLATS || (plan->range_reach && !plan->filled && !plan->discs_count)) {
+        plan->means = settings->surface == PATINA_SURFACE_SPLATS ? PT_MEANS_SPLATS : PT_MEANS_RANGES;
         plan->expected = pt_expected_error(plan->means, s);
         return;
     }
@@ -96,6 +99,7 @@ static uint32_t reach_of(const struct pt_plan *plan, const patina_settings *sett
     uint32_t layer = PT_REACH_normals;
     for (uint32_t level = 0; level <= plan->levels; level++)
         layer += (5 * plan->iterations * PT_REACH_fill + PT_REACH_push) << level;
+    layer += 2 * plan->range_reach; // a face's corners have their normals from cells around
     return (plan->reopens ? plan->reopens : plan->layers) * layer + (settings->average ? PT_REACH_average : 0) +
            PT_REACH_shade + PT_REACH_smooth + PT_REACH_antialias + pt_line_reach(plan);
 }

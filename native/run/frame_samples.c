@@ -37,7 +37,7 @@ static uint32_t largest_grid(const struct patina_scene *scene, const struct pt_p
     const patina_effects *effects = &scene->effects;
     const uint32_t side = settings->width > settings->height ? settings->width : settings->height;
     uint32_t most = WIDEST / side;
-    if (plan->fill != PATINA_FILL_CLOSED && settings->surface != PATINA_SURFACE_SPLATS)
+    if (plan->fill != PATINA_FILL_CLOSED && settings->surface != PATINA_SURFACE_SPLATS && plan->filled)
         return 1; // a point is a pixel wide, or as wide as the paper's filling makes it
     if (effects->obscurance_strength > 0.0f || effects->focus_aperture > 0.0f || effects->paper_grain > 0.0f)
         return 1;

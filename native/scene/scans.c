@@ -24,10 +24,10 @@ int pt_check_ranges(const struct patina_scene *scene, const patina_cloud_style *
         wrong = "range_sharpness is 0 or 0.5 to 0.95";
     else if (!(style->range_cull >= 0.0f && style->range_cull <= 3.1415928f))
         wrong = "range_cull must be within 0 and pi";
-    if (wrong)
-        return pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %s", wrong);
-    return style->surface ? pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED, "cloud style: range images are not drawn yet")
-                          : PATINA_OK;
+    if (!wrong && (style->range_sharpness > 0.0f || style->range_cull > 0.0f))
+        return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED,
+                       "cloud style: range_sharpness and range_cull are not built yet");
+    return wrong ? pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %s", wrong) : PATINA_OK;
 }
 
 static int check(const patina_cloud *cloud, const patina_scan *scans, uint32_t count)

@@ -401,8 +401,6 @@ int patina_scene_set_settings(patina_scene *scene, const patina_settings *settin
         return fail(scene, "settings: quality, fill, smooth, antialias or fill_iterations is out of range");
     if (s.surface > PATINA_SURFACE_RANGES)
         return fail(scene, "settings: no such surface");
-    if (s.surface == PATINA_SURFACE_RANGES)
-        return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED, "settings: range images are not drawn yet");
     if (!(s.error_target >= 0.0f) || !isfinite(s.error_target))
         return fail(scene, "settings: error_target is negative or not finite");
     if (s.strata > PT_STRATA)

@@ -308,11 +308,15 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     else if (!strcmp(name, "--pass"))
         bad = tool_parse_pass(value, o);
     else if (!strcmp(name, "--surface"))
-        bad = parse_word(value, "auto|splats|fill", &s->surface);
+        bad = parse_word(value, "auto|splats|fill|ranges", &s->surface);
     else if (!strcmp(name, "--analysis"))
         bad = parse_word(value, "on|off", &o->analysis);
     else if (!strcmp(name, "--radius"))
         bad = parse_width(value, &o->radius);
+    else if (!strcmp(name, "--range-gamma"))
+        bad = parse_width(value, &o->range_gamma);
+    else if (!strcmp(name, "--range-pixel"))
+        bad = parse_width(value, &o->range_pixel);
     else if (!strcmp(name, "--largest-gap"))
         bad = parse_width(value, &o->largest_gap);
     else if (!strcmp(name, "--iterations"))

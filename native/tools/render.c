@@ -115,6 +115,8 @@ static int load_clouds(struct job *job)
     style.cull_back = options->cull ? 1 : 0;
     style.radius = (float)options->radius;
     style.largest_gap = (float)options->largest_gap;
+    style.range_gamma = (float)options->range_gamma;
+    style.range_pixel = (float)options->range_pixel;
     float table[PATINA_MAX_RAMP][3];
     tool_cancellable(job->progress, NULL);
     for (int i = 0; i < options->file_count; i++) {

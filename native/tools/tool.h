@@ -64,14 +64,15 @@ struct tool_options {
     const char *device;
     uint32_t threads, batch;
     enum tool_view view;
-    double azimuth, elevation, fov; // degrees; fov 0 = the library's default
-    double eye[3], target[3];       // VIEW_LOOK, and the eye of a panorama
-    uint32_t panorama[2];           // width and height; 0 = none
-    double ortho_width;             // world units; 0 = perspective
-    uint32_t lighting;              // patina_lighting
-    double opacity[TOOL_OPACITIES]; // of the files in turn, the last of those behind it
-    double radius;                  // of discs, world units; 0: automatic
-    double largest_gap;             // that they close, world units; 0: automatic
+    double azimuth, elevation, fov;  // degrees; fov 0 = the library's default
+    double eye[3], target[3];        // VIEW_LOOK, and the eye of a panorama
+    uint32_t panorama[2];            // width and height; 0 = none
+    double ortho_width;              // world units; 0 = perspective
+    uint32_t lighting;               // patina_lighting
+    double opacity[TOOL_OPACITIES];  // of the files in turn, the last of those behind it
+    double radius;                   // of discs, world units; 0: automatic
+    double largest_gap;              // that they close, world units; 0: automatic
+    double range_gamma, range_pixel; // of range images; 0: automatic
     struct {
         uint32_t model;                 // 0: none is soft; 1 + patina_soft_model
         uint32_t files[TOOL_OPACITIES]; // which of the files are, from 1 on

@@ -355,6 +355,56 @@ struct blend_args {
     float scales[PT_BLEND_LIGHTS]; // of a word's sum, 1 / (255 samples)
 };
 
+// Range images. A cell of the image buffer is `pixel` pixels of the picture wide: that of a place (X, Y) is (floor(X / pixel),
+// floor(Y / pixel)), in whose view's pixels a chunk's points are projected. Its footprint is that of its view.
+// What lies no farther than gamma behind another is one surface with it: max(gamma, gamma_cells footprint(z)), z of the nearer.
+// Neighbouring cells are joined where z differs by at most max(that, PT_RANGE_STEEP footprint(z)): slopes to 76 degrees.
+#define PT_RANGE_STEEP 4.0f
+#define PT_RANGE_DEEPEST 1024.0f // cells behind the nearest point from which on depths of merged points count as that
+#define PT_RANGE_LEAST 1e-30f // of gamma, and the most
+#define PT_RANGE_MOST 1e30f
+
+// coarsen: empties the cells. beyond: the least limit that is finite of those pixels that the cell has a part of; none: +inf.
+struct coarsen_args {
+    struct view_args view; // of the cells
+    uint32_t width, height; // of the picture's planes ...
+    int32_t origin_x, origin_y; // ... as in view_args
+    float pixel;
+    uint32_t behind; // 1: the limit plane holds
+};
+
+// merge: the mean of the points up to gamma behind the nearest of their cell, each weighted by w = 1 - (z - z_near) / gamma.
+// [K Eq. 2] has the complement of it, by which the nearest counts nothing. Colours are weighted by opacity too. The sums are integers,
+// PT_SUM_SCALE a unit; of z the share (z - z_near) / min(gamma, PT_RANGE_DEEPEST footprint).
+struct merge_args {
+    struct view_args view; // of the cells
+    struct instance_args instance;
+    float gamma, gamma_cells;
+    uint32_t sifted; // as in scatter_args
+};
+
+// incline: a cell's normal: the sum of those of the 24 triangles [K Fig. 4] of which it is a corner and two of the cells around are the
+// others, each as long as twice its area, so that slivers, which noise turns, say little. Without one: towards the viewer.
+struct incline_args {
+    struct view_args view; // of the cells
+    float gamma, gamma_cells;
+};
+
+// magnify: faces between 2 x 2 cells, the corners at their places [K Fig. 7, 8]: of four within the greatest step two triangles, divided
+// where z changes less; else each three that are. A pixel takes the nearest that its centre lies in; where there is none, the nearest
+// cell whose place lies in the pixel; else, so that an outline borders on what lies behind it, the nearest triangle of three cells with a
+// greater step, as far as its farthest corners: nearer ones weigh nothing. normal, albedo: between the corners, in perspective. z likewise. id: of the corner that weighs most.
+// d_eff: of a surface whose points are as thick as max(gamma, 2 cells). away: pixels from that corner; 0 where it lies in the pixel.
+struct magnify_args {
+    struct view_args view; // of the picture
+    struct view_args cells;
+    float gamma, gamma_cells;
+    float pixel, inverse; // 1 / pixel
+    float d_min; // as in instance_args
+    uint32_t behind; // 1: the limit plane holds
+    uint32_t with_span; // as in surface_args
+};
+
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Its radius is d /
 // footprint(z), two spacings there in pixels, rounded up, from PT_ESTIMATE_LEAST to `radius`. Taken are pixels with
 // |z_q - (z + step)| <= max(d, 4 footprint(z) max(|dx|, |dy|)), d = d_eff facing the viewer; 4: 76 degrees. step = 0, or with

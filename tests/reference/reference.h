@@ -370,6 +370,38 @@ enum ref_truth ref_seen_through(const struct reopen_args *args, const struct sta
                                 int x, int y, double z);
 int ref_closed(const struct reopen_args *args, const struct ref_planes *planes, int x, int y);
 
+// ---- range images [K] ------------------------------------------------------------------------------------------------------
+
+double ref_range_gamma(const struct view_args *cells, float gamma, float gamma_cells, double z);
+double ref_range_step(const struct view_args *cells, float gamma, float gamma_cells, double z); // between cells that are joined
+struct ref_range ref_coarsen(const struct coarsen_args *args, const float *limit, int x, int y); // beyond: any of these
+struct ref_merged_point {
+    struct ref_splat splat; // in cells
+    struct ref_place place;
+    struct ref_look look;
+};
+struct ref_merge {
+    double place[4], place_error[4], color[4], color_error[4];
+    int unsure;
+};
+// A cell whose key is at `nearest`, of the point with this id.
+struct ref_merge ref_merge(const struct merge_args *args, const struct ref_merged_point *points, uint32_t count, float nearest,
+                           uint32_t id, int x, int y);
+struct ref_incline {
+    struct ref_vec n;
+    double error;
+    int written, unsure;
+};
+struct ref_incline ref_incline(const struct incline_args *args, const float *places, int x, int y);
+struct ref_magnify {
+    int shown, unsure; // shown: something is, keys aside
+    uint32_t id;
+    double z, z_error, color[4], color_error, normal_error, deff, deff_error, away, away_error;
+    struct ref_vec n;
+};
+struct ref_magnify ref_magnify(const struct magnify_args *args, const uint64_t *cells, const float *places, const float *merged,
+                               const float *inclined, int x, int y);
+
 // ---- soft.c: balls along a ray [S] ------------------------------------------------------------------------------------------
 
 struct ref_ball {

@@ -271,8 +271,24 @@ def _soft(to: _List) -> None:
            settings={"pixel_samples": 4, "film_transparent": 1})
 
 
+def _ranges(to: _List) -> None:
+    all_of = {"settings": {"surface": "SURFACE.RANGES"}}
+    one = {"surface": "SURFACE.RANGES"}
+    to.add("ranges", **all_of)
+    to.add("ranges, wide cells, gamma", {**TORUS, "range_pixel": 6.5, "range_gamma": 0.05}, **all_of)
+    to.add("ranges, glass, clip, mask", {**GLASS_TORUS, **one, "mask": 1}, FLOOR, clips=[{"shape": "CLIP_SHAPE.PLANE"}])
+    to.add("ranges beside discs, ramp, shadows, lines", {**TORUS, **one, "color_source": "COLOR_SOURCE.HEIGHT", "ramp": RAMP},
+           {"of": "wide analysed", **LIT}, FLOOR, light={**SUN, "shadows": 1}, lines={"width": 3.0})
+    to.add("ranges, orthographic, own opacities", {"of": "attributes", **LIT}, camera={"kind": "parallel"}, **all_of)
+    to.add("ranges, few points", "one", "none", "sparse", **all_of)
+    to.add("ranges, region, effects", light={**SUN, "shadows": 1}, effects={"edl_strength": 1.0, "obscurance_strength": 1.0},
+           settings={"surface": "SURFACE.RANGES", "region": [40, 30, 111, 87]})
+    to.add("ranges, samples, film", settings={"surface": "SURFACE.RANGES", "pixel_samples": 6, "film_transparent": 1})
+    to.add("ranges among meshes", meshes=[{"of": "ball"}], **all_of)
+
+
 def cases() -> list[Case]:
     to = _List()
-    for fill in (_clouds, _surfaces, _views, _lights, _layers, _colors, _scans, _effects, _samples, _meshes, _soft):
+    for fill in (_clouds, _surfaces, _views, _lights, _layers, _colors, _scans, _effects, _samples, _meshes, _soft, _ranges):
         fill(to)
     return to.cases

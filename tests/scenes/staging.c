@@ -7,8 +7,9 @@
 #include <stdlib.h>
 
 enum { REFINED = PATINA_QUALITY_REFINED, PAPERLY = PATINA_QUALITY_PAPER };
-enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF, DISCS, KNOWN };
-// DISCS: nothing is filled, points are PATINA_SURFACE_SPLATS. KNOWN: the cloud is analysed, PATINA_SURFACE_AUTO
+enum { CLOSED = PATINA_FILL_CLOSED, PAPER = PATINA_FILL_PAPER, OPEN = PATINA_FILL_OFF, DISCS, KNOWN, RANGES, BESIDE };
+// DISCS: nothing is filled, points are PATINA_SURFACE_SPLATS. KNOWN: the cloud is analysed, PATINA_SURFACE_AUTO. RANGES: they are range
+// images; BESIDE: those of every other instance, the others are filled
 enum { LAYER_PASSES = 1 << PATINA_PASS_COMBINED | 1 << PATINA_PASS_DEPTH | 1 << PATINA_PASS_NORMAL };
 enum { LIT = PATINA_LIGHTING_LIT, UNLIT = PATINA_LIGHTING_UNLIT, AUTO = PATINA_LIGHTING_AUTO };
 
@@ -203,6 +204,29 @@ const struct staging stagings[] = {
     {"meshes and points under a sky", 203, 151, 20000, POINTS_ALL, STAGE_SKY, 0, 1, LIT, REFINED, CLOSED, 0, 0, 0, 0, OPAQUE},
     {"discs under a sky, orthographic", 203, 151, 9000, POINTS_COLORS, STAGE_SKY, 1, 0, LIT, REFINED, DISCS, 0, 0, 1, 0,
      OPAQUE},
+    {"range images, one pixel", 1, 1, 5000, POINTS_ALL, STAGE_ONE, 0, 0, LIT, REFINED, RANGES, 0, 0, 0, 0, OPAQUE},
+    {"range images", 203, 151, 60000, POINTS_ALL, STAGE_ONE, 0, 1, LIT, REFINED, RANGES, 0, 0, 0, 0, OPAQUE},
+    {"range images, sparse, orthographic", 203, 151, 4000, POINTS_COLORS, STAGE_MANY, 1, 0, AUTO, REFINED, RANGES, 3, 0, 1, 1,
+     OPAQUE},
+    {"range images, transparent",
+     203,
+     151,
+     30000,
+     POINTS_ALL,
+     STAGE_MANY,
+     0,
+     0,
+     LIT,
+     REFINED,
+     RANGES,
+     0,
+     0,
+     1,
+     0,
+     {0.6f, 1, 4, LAYER_PASSES}},
+    {"range images beside filled points", 203, 151, 15000, POINTS_ALL, STAGE_MANY, 0, 0, LIT, REFINED, BESIDE, 0, 0, 0, 0,
+     OPAQUE},
+    {"range images among meshes", 203, 151, 30000, POINTS_PLAIN, STAGE_MESHES, 0, 0, LIT, REFINED, RANGES, 0, 0, 0, 0, OPAQUE},
 };
 const uint32_t staging_count = sizeof stagings / sizeof stagings[0];
 
@@ -210,6 +234,8 @@ static void add(struct stage *stage, const struct staging *staging, const double
 {
     patina_cloud_style style = {.struct_size = sizeof style, .lighting = staging->lighting};
     style.cull_back = staging->cull_back;
+    if (staging->fill == BESIDE && stage->range_images++ % 2 == 0)
+        style.surface = PATINA_SURFACE_RANGES;
     style.ambient = 0.6f;
     style.diffuse = 0.9f;
     style.specular = 0.4f;
@@ -318,10 +344,11 @@ struct stage stage_build(const struct staging *staging)
                                          : camera_perspective(eye, target, 45.8, staging->width, staging->height, 0.1, 100.0);
     stage.settings = settings_default(staging->width, staging->height);
     stage.settings.quality = staging->quality;
-    stage.settings.fill = staging->fill == DISCS ? OPEN : staging->fill == KNOWN ? CLOSED : staging->fill;
-    stage.settings.surface = staging->fill == DISCS   ? PATINA_SURFACE_SPLATS
-                             : staging->fill == KNOWN ? PATINA_SURFACE_AUTO
-                                                      : PATINA_SURFACE_FILL;
+    stage.settings.fill = staging->fill == DISCS ? OPEN : staging->fill >= KNOWN ? CLOSED : staging->fill;
+    stage.settings.surface = staging->fill == DISCS    ? PATINA_SURFACE_SPLATS
+                             : staging->fill == KNOWN  ? PATINA_SURFACE_AUTO
+                             : staging->fill == RANGES ? PATINA_SURFACE_RANGES
+                                                       : PATINA_SURFACE_FILL;
     stage.settings.smooth = staging->smooth;
     stage.settings.antialias = staging->antialias;
     stage.settings.film_transparent = staging->film_transparent;

@@ -33,6 +33,7 @@ struct stage {
     patina_scene *scene;
     patina_camera camera;
     patina_settings settings;
+    uint32_t range_images; // instances added, where every other is
 };
 
 struct stage stage_build(const struct staging *staging);

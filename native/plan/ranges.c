@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Range images [K], SPEC 6: which clouds are drawn as such, the image buffer of each, and its passes.
+#include "ranges.h"
+
+#include "passes.h"
+#include "scene/scans.h"
+
+#include <math.h>
+#include <string.h>
+
+// The side of a cell in spacings of the points on screen: of random points one cell in fifty stays empty.
+#define CELL_SPACINGS 2.0
+#define WIDEST_CELL 32.0  // pixels, automatic: points that lie farther apart are no surface
+#define GAMMA_SAMPLES 2.0 // automatic gamma, in intervals of the samples [K II.B]: 1 to 3
+#define GAMMA_CELLS 2.0f  // and at least so many cells
+
+int pt_draws_ranges(const struct patina_scene *scene, const struct pt_instance *instance)
+{
+    return (instance->style.surface == PATINA_SURFACE_RANGES || scene->settings.surface == PATINA_SURFACE_RANGES) &&
+           !pt_all_soft(instance) && pt_disc_ids(scene);
+}
+
+double pt_range_pixel(const struct patina_scene *scene, const struct pt_instance *instance, double spacing_px)
+{
+    const double set = (double)instance->style.range_pixel, finer = (double)pt_finer(scene);
+    return set > 0.0 ? set * finer : fmin(fmax(CELL_SPACINGS * spacing_px, 1.0), WIDEST_CELL * finer);
+}
+
+uint32_t pt_range_reach(double pixel) { return (uint32_t)ceil(2.0 * pixel) + 1; }
+
+static void set_gamma(const struct patina_scene *scene, const struct pt_instance *instance, double scale, struct pt_range *out)
+{
+    const struct patina_scans *scans = instance->style.scans;
+    const double thinned = pt_thinning(scene), set = (double)instance->style.range_gamma;
+    const double interval = scans && scans->interval > 0.0 ? scans->interval : instance->cloud->info.spacing;
+    const double gamma = (set > 0.0 ? set : GAMMA_SAMPLES * thinned * interval) * scale;
+    out->gamma = (float)fmin(fmax(gamma, (double)PT_RANGE_LEAST), (double)PT_RANGE_MOST); // NaN: nothing of a scale of 0
+    out->gamma_cells = set > 0.0 ? 0.0f : GAMMA_CELLS;
+}
+
+void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
+                    const struct pt_eye *eye, double scale, double pixel, struct pt_range *out)
+{
+    struct view_args *cells = &out->cells;
+    const double origin[2] = {plan->view.origin_x, plan->view.origin_y}, size[2] = {plan->view.width, plan->view.height};
+    uint32_t across[2];
+    *cells = plan->view;
+    out->pixel = (float)pixel;
+    pixel = (double)out->pixel; // kernels divide by the same
+    out->eye = *eye;
+    out->eye.xs *= pixel;
+    out->eye.ys *= pixel;
+    for (int k = 0; k < 2; k++) { // and one around
+        const double first = floor(origin[k] / pixel) - 1.0;
+        *(k ? &cells->origin_y : &cells->origin_x) = (int32_t)first;
+        across[k] = (uint32_t)(floor((origin[k] + size[k]) / pixel) + 2.0 - first);
+    }
+    cells->width = across[0];
+    cells->height = across[1];
+    cells->ray_xs = (float)out->eye.xs;
+    cells->ray_ys = (float)out->eye.ys;
+    cells->footprint = (float)fmax(out->eye.xs, out->eye.ys);
+    memset(cells->rect, 0, sizeof cells->rect);
+    set_gamma(scene, instance, scale, out);
+    if ((uint64_t)across[0] * across[1] > plan->cells)
+        plan->cells = across[0] * across[1];
+}
+
+void pt_range_rect(const struct pt_range *range, const double bounds[4], uint32_t pad, uint32_t rect[4])
+{
+    const double origin[2] = {range->cells.origin_x, range->cells.origin_y},
+                 size[2] = {range->cells.width, range->cells.height};
+    for (int k = 0; k < 2; k++) {
+        const double first = floor((bounds[k] + pad) / (double)range->pixel) - 1.0 - origin[k];
+        const double last = floor((bounds[2 + k] + pad) / (double)range->pixel) + 2.0 - origin[k];
+        rect[k] = (uint32_t)fmin(fmax(first, 0.0), size[k]);
+        rect[2 + k] = (uint32_t)fmin(fmax(last, 0.0), size[k]);
+    }
+}
+
+// ---- passes ------------------------------------------------------------------------------------------------------------
+
+static void add_cells(struct pt_builder *builder, uint32_t i, int behind)
+{
+    const struct pt_plan *plan = builder->plan;
+    const struct pt_plan_instance *instance = &plan->instances[i];
+    const struct pt_range *range = instance->range;
+    const struct pt_ref keys = pt_plane_at(PT_PLANE_CELLS, 0), beyond = pt_plane_if(behind, PT_PLANE_CELL_BEYOND, 0);
+    const struct pt_ref drawn = plan->drawn_words ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
+    const struct coarsen_args coarsen = {.view = range->cells,
+                                         .width = plan->view.width,
+                                         .height = plan->view.height,
+                                         .origin_x = plan->view.origin_x,
+                                         .origin_y = plan->view.origin_y,
+                                         .pixel = range->pixel,
+                                         .behind = (uint32_t)behind};
+    PT_REASON(PT_ADD(builder, coarsen, coarsen, {keys, pt_plane_if(behind, PT_PLANE_LIMIT, 0), beyond}),
+              "instance %u is range images, in %u x %u cells of %.2f pixels", i, range->cells.width, range->cells.height,
+              (double)range->pixel);
+    const struct scatter_args scatter = {
+        .view = range->cells, .instances = 1, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
+    PT_REASON(
+        PT_ADD(builder, scatter, scatter,
+               {keys, beyond, drawn, pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i)}),
+        "%llu points in %u chunks of instance %u, into cells", (unsigned long long)instance->points, instance->chunk_count, i);
+    const struct merge_args merge = {.view = range->cells,
+                                     .instance = instance->args,
+                                     .gamma = range->gamma,
+                                     .gamma_cells = range->gamma_cells,
+                                     .sifted = plan->drawn_words > 0};
+    PT_REASON(PT_ADD(builder, merge, merge,
+                     {keys, pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_MERGED, 0),
+                      pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i),
+                      pt_buffer_of(PT_COLORS, i), pt_buffer_of(PT_OPACITIES, i), drawn}),
+              "means of points up to gamma %.3g behind the nearest", (double)range->gamma);
+}
+
+static void add_faces(struct pt_builder *builder, uint32_t i, int behind)
+{
+    const struct pt_plan *plan = builder->plan;
+    const struct pt_plan_instance *instance = &plan->instances[i];
+    const struct pt_range *range = instance->range;
+    const struct incline_args incline = {.view = range->cells, .gamma = range->gamma, .gamma_cells = range->gamma_cells};
+    PT_REASON(PT_ADD(builder, incline, incline, {pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_INCLINED, 0)}),
+              "normals of instance %u's cells, from those around", i);
+    const struct magnify_args magnify = {.view = pt_view_of(plan, instance, 0),
+                                         .cells = range->cells,
+                                         .gamma = range->gamma,
+                                         .gamma_cells = range->gamma_cells,
+                                         .pixel = range->pixel,
+                                         .inverse = 1.0f / range->pixel,
+                                         .d_min = instance->args.d_min,
+                                         .behind = (uint32_t)behind,
+                                         .with_span = plan->sigmas != 0};
+    PT_REASON(PT_ADD(builder, magnify, magnify,
+                     {pt_plane_at(PT_PLANE_CELLS, 0), pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_MERGED, 0),
+                      pt_plane_at(PT_PLANE_CELL_INCLINED, 0), pt_keys_of(builder, 0), pt_from_of(builder, 0),
+                      pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_ALBEDO, 0),
+                      pt_plane_at(PT_PLANE_AWAY, 0), pt_plane_if(plan->sigmas, PT_PLANE_SPAN, 0),
+                      pt_plane_if(behind, PT_PLANE_LIMIT, 0)}),
+              "faces between instance %u's cells%s", i, behind ? ", behind what is drawn already" : "");
+}
+
+void pt_plan_ranges(struct pt_builder *builder)
+{
+    const struct pt_plan *plan = builder->plan;
+    const int behind = builder->layer > 1 || builder->behind;
+    if (!plan->cells) {
+        static const char *const names[] = {"coarsen", "merge", "incline", "magnify"};
+        for (int k = 0; k < 4; k++)
+            pt_skip(builder, names[k], "no cloud in view is drawn as range images");
+    }
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        if (plan->instances[i].range && plan->instances[i].chunk_count) {
+            add_cells(builder, i, behind);
+            add_faces(builder, i, behind);
+        }
+}
