@@ -10,7 +10,8 @@
 int pt_tells_surfaces(const struct pt_builder *builder)
 {
     const patina_settings *settings = &builder->scene->settings;
-    return settings->depth == PATINA_DEPTH_SURFACE && (settings->passes >> PATINA_PASS_DEPTH & 1u) &&
+    return builder->plan->points_scattered && settings->depth == PATINA_DEPTH_SURFACE &&
+           (settings->passes >> PATINA_PASS_DEPTH & 1u) &&
            (builder->plan->filled || (settings->surface == PATINA_SURFACE_SPLATS && !builder->plan->sigmas));
 }
 

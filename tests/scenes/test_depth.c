@@ -153,6 +153,28 @@ static void test_parity_and_regions(void **state)
     }
 }
 
+// Nothing in view: nothing is read of what no pass wrote. (Discs crashed.)
+static void test_nothing(void **state)
+{
+    (void)state;
+    static const double eye[3] = {0, -5, 0}, away[3] = {0, -9, 0};
+    static const uint32_t surfaces[] = {PATINA_SURFACE_SPLATS, PATINA_SURFACE_FILL, PATINA_SURFACE_RANGES};
+    patina_device *device = support_device_first();
+    for (int k = 0; k < 3; k++) {
+        double spacing;
+        struct stage stage = sphere(1.0, PATINA_DEPTH_SURFACE, &spacing);
+        stage.camera = camera_perspective(eye, away, 45.0, SIZE, SIZE, 0.01, 1000.0);
+        stage.settings.surface = surfaces[k];
+        struct picture picture = picture_render(device, stage.scene, &stage.camera, &stage.settings);
+        assert_int_equal(picture_count(&picture), 0);
+        for (size_t i = 0; i < (size_t)SIZE * SIZE; i++)
+            assert_true(isinf(picture.depth[i]));
+        picture_free(&picture);
+        stage_free(&stage);
+    }
+    patina_device_destroy(device);
+}
+
 // How far the picture's surface leaves the box of the points, in spacings.
 static double leaves(const patina_cloud_info *info, const patina_camera *camera, const struct picture *picture)
 {
@@ -208,6 +230,7 @@ int main(int argc, char **argv)
 {
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_bias), cmocka_unit_test(test_discs),
-                                       cmocka_unit_test(test_parity_and_regions), cmocka_unit_test(test_within_the_cloud)};
+                                       cmocka_unit_test(test_parity_and_regions), cmocka_unit_test(test_nothing),
+                                       cmocka_unit_test(test_within_the_cloud)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
