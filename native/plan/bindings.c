@@ -16,7 +16,7 @@ static const uint8_t instance_formats[] = {
     [PT_SCALARS] = PT_FORMAT_scalar, [PT_CLASSES] = PT_FORMAT_class,      [PT_SHAPES] = PT_FORMAT_shape,
     [PT_SIGHTS] = PT_FORMAT_sight,   [PT_MARKS] = PT_FORMAT_mark,         [PT_SHADOWS] = PT_FORMAT_shadow,
     [PT_CLIPS] = PT_FORMAT_clip,     [PT_DRAWN] = PT_FORMAT_bits,         [PT_MASK] = PT_FORMAT_bits,
-    [PT_FIELD] = PT_FORMAT_field,    [PT_FIELD_ONE] = PT_FORMAT_field,
+    [PT_FIELD] = PT_FORMAT_field,    [PT_FIELD_ONE] = PT_FORMAT_field,    [PT_SCANS] = PT_FORMAT_scan,
 };
 static const uint8_t mesh_formats[] = {
     [PT_MESH_VERTICES] = PT_FORMAT_vertex, [PT_MESH_INDICES] = PT_FORMAT_index, [PT_MESH_TEXELS] = PT_FORMAT_texel};

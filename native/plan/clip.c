@@ -4,6 +4,7 @@
 #include "passes.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
+#include "scene/scans.h"
 
 #include <string.h>
 
@@ -46,6 +47,7 @@ int pt_plan_divide(struct pt_plan *plan, struct pt_plan_instance *instance, cons
     instance->by_shape |= division.by_shape;
     instance->by_mask |= division.by_mask;
     instance->by_field |= division.by_field;
+    instance->by_scan |= division.by_scan;
     return PATINA_OK;
 }
 
@@ -54,8 +56,8 @@ void pt_plan_sift(struct pt_builder *builder)
     const struct pt_plan *plan = builder->plan;
     if (!plan->drawn_words) {
         pt_skip(builder, "sift",
-                plan->chunks_clipped ? "clips, classes, shapes, masks and fields take chunks whole"
-                                     : "no clip, hidden class, hidden shape, mask or field in view");
+                plan->chunks_clipped ? "clips, classes, shapes, masks, fields and scans take chunks whole"
+                                     : "no clip, hidden class, hidden shape, mask, field or hidden scan in view");
         return;
     }
     for (uint32_t i = 0; i < plan->instance_count + plan->soft_count && builder->layer <= 1;
@@ -67,16 +69,19 @@ void pt_plan_sift(struct pt_builder *builder)
                                  .by_shape = instance->by_shape != 0,
                                  .by_mask = instance->by_mask != 0,
                                  .by_field = instance->by_field != 0,
+                                 .by_scan = instance->by_scan != 0,
                                  .threshold = pt_field_steps(instance->instance->style.soft_threshold)};
         memcpy(args.hidden, instance->instance->style.hidden_classes, sizeof args.hidden);
         pt_hidden_shapes(instance->instance, args.hidden_shapes);
+        pt_hidden_scans(builder->scene, instance->instance, args.hidden_scans);
         PT_REASON(PT_ADD(builder, sift, args,
                          {pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i),
                           args.by_class ? pt_buffer_of(PT_CLASSES, i) : pt_nothing(), pt_buffer_of(PT_CLIPS, i),
                           pt_buffer_of(PT_DRAWN, i), args.by_shape ? pt_shapes_of(instance, i) : pt_nothing(),
                           args.by_mask ? pt_buffer_of(PT_MASK, i) : pt_nothing(),
-                          args.by_field ? pt_field_of(instance, i) : pt_nothing()}),
-                  "clips, classes, shapes, a mask or a field divide %u chunks of instance %u", instance->chunks_cut, i);
+                          args.by_field ? pt_field_of(instance, i) : pt_nothing(),
+                          args.by_scan ? pt_buffer_of(PT_SCANS, i) : pt_nothing()}),
+                  "clips, classes, shapes, a mask, a field or scans divide %u chunks of instance %u", instance->chunks_cut, i);
     }
 }
 

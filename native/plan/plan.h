@@ -111,6 +111,7 @@ _Static_assert((int)PT_LEVELS <= (int)PT_SLOTS && PATINA_MAX_LAYERS <= (int)PT_S
 
 // PT_MARKS and PT_SHADOWS belong to the frame's shadows, not to the cloud; PT_CLIPS and PT_DRAWN to the plan as a whole; PT_MASK to
 // the instance's mask. PT_FIELD: its field, or 1 where all points are soft, with the points' radii; PT_FIELD_ONE: with radii of 1.
+// PT_SCANS: those of its style.
 enum pt_instance_buffer {
     PT_CHUNKS,
     PT_POSITIONS,
@@ -129,7 +130,8 @@ enum pt_instance_buffer {
     PT_DRAWN,
     PT_MASK,
     PT_FIELD,
-    PT_FIELD_ONE
+    PT_FIELD_ONE,
+    PT_SCANS
 };
 
 enum pt_mesh_buffer { PT_MESH_VERTICES, PT_MESH_INDICES, PT_MESH_TEXELS, PT_MESH_BUFFERS };
@@ -187,11 +189,11 @@ struct pt_plan_instance {
     struct chunk_view *chunks;                              // those in view
     struct pt_bounds *bounds;                               // of each of them
     uint32_t chunk_count;
-    uint64_t points;                           // of these chunks, drawn ones
-    uint32_t rect[4];                          // of its points in the planes; empty: x0 >= x1
-    uint32_t chunks_cut;                       // of its chunks, those that are sifted
-    int by_class, by_shape, by_mask, by_field; // some of them by class, by shape, by mask, by field
-    int marked;                                // shown with what stations saw through in magenta
+    uint64_t points;                                    // of these chunks, drawn ones
+    uint32_t rect[4];                                   // of its points in the planes; empty: x0 >= x1
+    uint32_t chunks_cut;                                // of its chunks, those that are sifted
+    int by_class, by_shape, by_mask, by_field, by_scan; // some of them by class, by shape, by mask, by field, by scan
+    int marked;                                         // shown with what stations saw through in magenta
 };
 
 // What one pass draws of the soft points: rows of the picture, a slab of depth, and which instances of the plan hold its points.

@@ -2,6 +2,7 @@
 #include "binder.h"
 
 #include "scene/mask.h"
+#include "scene/scans.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -56,6 +57,13 @@ static int take_grade(struct pt_binder *binder, struct pt_bound_instance *bound,
                                                   &bound->grade);
 }
 
+static int take_scans(struct pt_binder *binder, struct pt_bound_instance *bound, const struct patina_scans *scans)
+{
+    return bound->scans ? PATINA_OK
+                        : pt_residency_take_bytes(binder->residency, binder->device, scans->alive, scans->scan,
+                                                  (scans->slots + 2) * sizeof *scans->scan, &bound->scans);
+}
+
 // Where all points are soft, the words are the cloud's.
 static int bind_field(struct pt_binder *binder, const struct pt_instance *instance, struct pt_bound_instance *bound, int one,
                       struct pt_buffer **out)
@@ -101,6 +109,11 @@ static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, str
     if (ref->which == PT_MASK) {
         error = take_mask(binder, bound, pt_mask_of(planned->instance));
         *out = error ? NULL : &bound->mask->buffers[0];
+        return error;
+    }
+    if (ref->which == PT_SCANS) {
+        error = take_scans(binder, bound, planned->instance->style.scans);
+        *out = error ? NULL : &bound->scans->buffers[0];
         return error;
     }
     if ((error = take_cloud(binder, bound, planned->instance->cloud)))

@@ -10,7 +10,7 @@
 #include "shadows.h"
 
 struct pt_bound_instance {
-    struct pt_resident *cloud, *mask, *grade, *field; // NULL: not asked for yet
+    struct pt_resident *cloud, *mask, *grade, *field, *scans; // NULL: not asked for yet
     struct pt_buffer chunks;
     int placed; // these are there, if only none
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "clip.h"
 #include "mask.h"
+#include "scans.h"
 
 #include <math.h>
 #include <string.h>
@@ -82,6 +83,8 @@ struct pt_sieve pt_sieve_make(const struct patina_scene *scene, const struct pt_
         sieve.threshold = pt_field_steps(instance->style.soft_threshold);
         sieve.soft = points == PT_SOFT_POINTS;
     }
+    if (points != PT_EVERY_POINT)
+        sieve.hiding_scans = pt_hidden_scans(scene, instance, sieve.hidden_scans);
     for (int k = 0; k < 8; k++)
         sieve.hiding |= info->has_classes && (instance->style.hidden_classes[k] & info->class_bits[k]);
     for (int keeps = 1; keeps >= 0 && !instance->style.clip_off; keeps--) {
@@ -157,6 +160,19 @@ static enum pt_masked leaves(const struct pt_sieve *sieve, size_t chunk)
     return all_soft ? PT_MASKED_ALL : some_soft ? PT_MASKED_SOME : PT_MASKED_NONE;
 }
 
+// Which points of a chunk are of hidden scans; of one with many, SOME where it is not told.
+static enum pt_masked hidden_of(const struct pt_sieve *sieve, size_t chunk)
+{
+    const uint16_t *range = sieve->instance->style.scans->chunks[chunk];
+    int some = 0, all = 1;
+    for (uint32_t scan = range[0]; scan <= range[1] && (all || !some); scan++) {
+        const int hidden = scan < 32 * PT_SCAN_WORDS && sieve->hidden_scans[scan / 32] >> scan % 32 & 1u;
+        some |= hidden;
+        all &= hidden;
+    }
+    return all ? PT_MASKED_ALL : some ? PT_MASKED_SOME : PT_MASKED_NONE;
+}
+
 // Where the chunk lies to clip i; what is divided becomes an entry.
 static int meet(const struct pt_sieve *sieve, uint32_t i, const struct pt_chunk *chunk, const double linear[9],
                 const double origin[3], struct clip_view *entries, struct pt_division *division)
@@ -175,18 +191,21 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
 {
     struct pt_division found = {0};
     double linear[9], object[3], origin[3];
-    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes && !sieve->mask && !sieve->field)
+    if (!sieve->count && !sieve->keeping && !sieve->hiding && !sieve->hiding_shapes && !sieve->mask && !sieve->field &&
+        !sieve->hiding_scans)
         return PT_WHOLE; // of most scenes all are
     int by_class = sieve->hiding ? hides(sieve->instance->style.hidden_classes, chunk->classes) : 0;
     int by_shape = sieve->hiding_shapes ? hides(sieve->hidden_shapes, chunk->shapes) : 0, kept = !sieve->keeping;
     const size_t place = (size_t)(chunk - sieve->instance->cloud->chunks);
     const enum pt_masked masked = sieve->mask ? sieve->mask->chunks[place] : PT_MASKED_NONE, left = leaves(sieve, place);
-    if (by_class == 1 || by_shape == 1 || masked == PT_MASKED_ALL || left == PT_MASKED_ALL)
+    const enum pt_masked unseen = sieve->hiding_scans ? hidden_of(sieve, place) : PT_MASKED_NONE;
+    if (by_class == 1 || by_shape == 1 || masked == PT_MASKED_ALL || left == PT_MASKED_ALL || unseen == PT_MASKED_ALL)
         return PT_CUT_AWAY;
     found.by_class = by_class != 0;
     found.by_shape = by_shape != 0;
     found.by_mask = masked == PT_MASKED_SOME;
     found.by_field = left == PT_MASKED_SOME && !sieve->soft;
+    found.by_scan = unseen == PT_MASKED_SOME;
     pt_split_matrix(sieve->instance->style.world_from_object, linear, object);
     pt_apply(linear, chunk->origin, origin);
     for (int k = 0; k < 3; k++)
@@ -201,7 +220,8 @@ enum pt_side pt_sieve_chunk(const struct pt_sieve *sieve, const struct pt_chunk 
             return PT_CUT_AWAY;
     if (division)
         *division = found;
-    return found.count || found.by_class || found.by_shape || found.by_mask || found.by_field ? PT_DIVIDED : PT_WHOLE;
+    return found.count || found.by_class || found.by_shape || found.by_mask || found.by_field || found.by_scan ? PT_DIVIDED
+                                                                                                               : PT_WHOLE;
 }
 
 void pt_clip_in_frame(const struct pt_inverse_clip *clip, const double linear[9], const double origin[3], struct clip_view *out)

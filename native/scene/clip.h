@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What clips, hidden classes, hidden shapes, masks and fields leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
+// What clips, hidden classes, hidden shapes, masks, fields and hidden scans leave of an instance: chunks that are whole or gone are told from divided ones, in float64.
 #ifndef PT_CLIP_H
 #define PT_CLIP_H
 
@@ -24,7 +24,9 @@ struct pt_sieve {
     const struct patina_mask *mask;   // that hides some of its points, or NULL
     const struct patina_field *field; // that leaves points to the other of both, or NULL
     uint32_t threshold;
-    int soft; // what is above it stays
+    int soft;                             // what is above it stays
+    uint32_t hidden_scans[PT_SCAN_WORDS]; // what pt_hidden_scans says
+    int hiding_scans;
 };
 
 // Which points of an instance: all, or by their fields those that are drawn as points and discs, or those that are soft.
@@ -32,10 +34,10 @@ enum pt_points { PT_EVERY_POINT, PT_SOLID_POINTS, PT_SOFT_POINTS };
 
 enum pt_side { PT_CUT_AWAY, PT_DIVIDED, PT_WHOLE };
 
-// How a divided chunk is divided: by which of the sieve's clips, and whether by class, shape, mask or field.
+// How a divided chunk is divided: by which of the sieve's clips, and whether by class, shape, mask, field or scan.
 struct pt_division {
     uint32_t count, keeps;
-    int by_class, by_shape, by_mask, by_field;
+    int by_class, by_shape, by_mask, by_field, by_scan;
 };
 
 // Which of the bytes from PT_SHAPE_SIGHT_SHIFT on of a shape the style hides, as sift_args has them. 0: none, or the cloud

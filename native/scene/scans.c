@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { MOST_SCANS = 65535 };
 
@@ -24,10 +25,53 @@ int pt_check_ranges(const struct patina_scene *scene, const patina_cloud_style *
         wrong = "range_sharpness is 0 or 0.5 to 0.95";
     else if (!(style->range_cull >= 0.0f && style->range_cull <= 3.1415928f))
         wrong = "range_cull must be within 0 and pi";
-    if (!wrong && (style->range_sharpness > 0.0f || style->range_cull > 0.0f))
-        return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED,
-                       "cloud style: range_sharpness and range_cull are not built yet");
+    if (!wrong && style->range_sharpness > 0.0f)
+        return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED, "cloud style: range_sharpness is not built yet");
     return wrong ? pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %s", wrong) : PATINA_OK;
+}
+
+// World: unit, from the eye to the middle of the instance; of parallel views, and in that middle, along the view.
+static int look_at(const struct patina_scene *scene, const struct pt_instance *instance, double view[3])
+{
+    const patina_cloud_info *info = &instance->cloud->info;
+    double linear[9], moved[3], axes[9], eye[3], middle[3], world[3];
+    if (pt_camera_axes(&scene->camera, axes, eye))
+        return 0;
+    pt_split_matrix(instance->style.world_from_object, linear, moved);
+    for (int k = 0; k < 3; k++) {
+        middle[k] = 0.5 * (info->box_min[k] + info->box_max[k]);
+        view[k] = -axes[6 + k];
+    }
+    pt_apply(linear, middle, world);
+    for (int k = 0; k < 3; k++)
+        world[k] += moved[k] - eye[k];
+    const double length = sqrt(pt_dot(world, world));
+    for (int k = 0; k < 3 && length > 0.0 && !scene->camera.orthographic; k++)
+        view[k] = world[k] / length;
+    return 1;
+}
+
+int pt_hidden_scans(const struct patina_scene *scene, const struct pt_instance *instance, uint32_t hidden[PT_SCAN_WORDS])
+{
+    const patina_cloud_style *style = &instance->style;
+    const struct patina_scans *scans = style->scans;
+    double view[3], linear[9], moved[3], way[3];
+    int any = 0;
+    memset(hidden, 0, PT_SCAN_WORDS * sizeof *hidden);
+    if (!scans || !(style->range_cull > 0.0f) ||
+        (style->surface != PATINA_SURFACE_RANGES && scene->settings.surface != PATINA_SURFACE_RANGES) ||
+        !look_at(scene, instance, view))
+        return 0;
+    pt_split_matrix(style->world_from_object, linear, moved);
+    for (uint32_t i = 0; i < scans->count && i < 32 * PT_SCAN_WORDS; i++) {
+        pt_apply(linear, scans->scans[i].direction, way);
+        const double length = sqrt(pt_dot(way, way));
+        if (length > 0.0 && pt_dot(way, view) < length * (cos((double)style->range_cull) - 1e-6)) {
+            hidden[i / 32] |= 1u << i % 32;
+            any = 1;
+        }
+    }
+    return any;
 }
 
 static int check(const patina_cloud *cloud, const patina_scan *scans, uint32_t count)

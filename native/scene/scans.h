@@ -3,6 +3,7 @@
 #ifndef PT_SCANS_H
 #define PT_SCANS_H
 
+#include "kernel_args.h"
 #include "scene.h"
 
 struct patina_scans {
@@ -15,6 +16,10 @@ struct patina_scans {
     uint32_t count;
     double interval; // the greatest that is known of those with points; 0: none is
 };
+
+// Scans of an instance of range images whose direction is at too great an angle to that of the view, to the middle of its box, as
+// sift_args has them. 0: none is, or all are drawn.
+int pt_hidden_scans(const struct patina_scene *scene, const struct pt_instance *instance, uint32_t hidden[PT_SCAN_WORDS]);
 
 // What a style says of range images. PATINA_OK, or an error with its message at the scene.
 int pt_check_ranges(const struct patina_scene *scene, const patina_cloud_style *style, const struct patina_cloud *cloud);

@@ -18,6 +18,8 @@ layout(std430, binding = BIND_shapes) readonly buffer shapes_block { uint shapes
 layout(std430, binding = BIND_mask) readonly buffer mask_block { uint mask[]; };
 layout(std430, binding = BIND_field) readonly buffer field_block { uint field[]; };
 
+layout(std430, binding = BIND_scans) readonly buffer scans_block { uint scans[]; }; // two a word
+
 layout(location = 0) uniform uint first_chunk; // of this dispatch
 layout(location = 1) uniform uint first_slot;  // where the bound part of positions begins
 
@@ -44,6 +46,12 @@ bool hidden_shape(uint slot)
     return (args.hidden_shapes[sight >> 5] >> (sight & 31u) & 1u) != 0u;
 }
 
+bool hidden_scan(uint slot)
+{
+    uint scan = scans[slot >> 1] >> (16u * (slot & 1u)) & 0xFFFFu;
+    return scan < 32u * PT_SCAN_WORDS && (args.hidden_scans[scan >> 5] >> (scan & 31u) & 1u) != 0u;
+}
+
 void main()
 {
     chunk_view chunk = chunks[first_chunk + gl_WorkGroupID.x];
@@ -59,6 +67,7 @@ void main()
             bool keep = chunk.clip_keeps == 0u, cut = args.by_class != 0u && hidden_class(chunk.first + slot);
             cut = cut || (args.by_shape != 0u && hidden_shape(chunk.first + slot));
             cut = cut || (args.by_field != 0u && args.threshold < field[chunk.first + slot] >> PT_FIELD_SHIFT);
+            cut = cut || (args.by_scan != 0u && hidden_scan(chunk.first + slot));
             for (uint k = chunk.clip_first; k < keeps; k++)
                 keep = keep || inside(k, p);
             for (uint k = keeps; k < cuts; k++)

@@ -135,6 +135,7 @@
 #define PT_CLIP_CUT 1u   // a box: what lies in it is not
 #define PT_CLIP_PLANE 2u // what has q.z > 0 is not
 
+#define PT_SCAN_WORDS 32 // of 32 scans each: those that may be hidden
 #define PT_SLOTS_A_WORD 16u // of the drawn words: chunks begin at multiples of it
 #define PT_RAMP_MOST 256    // PATINA_MAX_RAMP
 #define PT_RAMP_SCALAR 1u   // sources of a ramp
@@ -220,6 +221,8 @@ struct sift_args {
     uint32_t by_mask;   // 1: the mask is there: a word of each PT_SLOTS_A_WORD slots of the cloud, bit i: slot i is hidden
     uint32_t by_field;  // 1: the field is there, and points above ...
     uint32_t threshold; // ... are soft: in steps, as in gather_args
+    uint32_t by_scan;   // 1: the scans are there, and some are hidden
+    uint32_t hidden_scans[PT_SCAN_WORDS]; // bit s % 32 of word s / 32: scan s; those beyond are drawn
 };
 
 // scatter: points -> least key a pixel. [D 3.1]; behind a layer only points with z > limit at their pixel count. [D 5]

@@ -193,6 +193,9 @@ static void add_cloud(struct pcg *random, patina_scene *scene)
     style.hidden_kinds = once_in(random, 4) ? below(random, 64) : 0;
     style.least_certainty = once_in(random, 4) ? between(random, 0.0, 1.0) : 0.0f;
     style.largest_gap = once_in(random, 4) ? between(random, 0.0, 0.2) : 0.0f;
+    style.surface = once_in(random, 4) ? PATINA_SURFACE_RANGES : 0;
+    style.range_gamma = once_in(random, 3) ? (once_in(random, 4) ? INFINITY : between(random, 0.0, 0.5)) : 0.0f;
+    style.range_pixel = once_in(random, 3) ? between(random, 1.0, 64.0) : 0.0f;
     patina_scene_add_cloud(scene, stock.clouds[below(random, CLOUDS)], &style);
 }
 
@@ -289,7 +292,7 @@ static void set_settings(struct pcg *random, patina_scene *scene)
                                 .smooth = below(random, 4),
                                 .antialias = below(random, 3),
                                 .film_transparent = below(random, 2),
-                                .surface = below(random, 3),
+                                .surface = below(random, 4),
                                 .depth = below(random, 2),
                                 .average = once_in(random, 4)};
     if (once_in(random, 3)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// sift: boxes that keep and cut, planes, hidden classes, hidden shapes, masks, fields; degenerate and huge ones. Bits are equal on every device.
+// sift: boxes that keep and cut, planes, hidden classes, hidden shapes, masks, fields, scans; degenerate and huge ones. Bits are equal on every device.
 #include "harness.h"
 
 #include <math.h>
@@ -17,6 +17,7 @@ struct setup {
     uint32_t *shapes;
     uint32_t *mask; // a word of each 16 slots: the upper half says nothing here
     uint32_t *field;
+    uint16_t *scans;
 };
 
 static struct setup make(struct harness *h, struct rng *rng)
@@ -47,8 +48,11 @@ static struct setup make(struct harness *h, struct rng *rng)
     for (uint32_t i = 0; i < s.slots / 16; i++)
         s.mask[i] = (uint32_t)rng_next(rng);
     s.field = harness_alloc(h, 4 * (size_t)s.slots);
+    s.scans = harness_alloc(h, 2 * (size_t)s.slots + 4);
     for (uint32_t i = 0; i < s.slots; i++)
         s.field[i] = (uint32_t)rng_next(rng);
+    for (uint32_t i = 0; i < s.slots; i++)
+        s.scans[i] = (uint16_t)(i % 5 ? i % 7 : 1000 + i % 60000);
     return s;
 }
 
@@ -91,7 +95,8 @@ static void check(struct harness *h, const struct setup *s)
     struct pt_buffer *shapes = harness_buffer(h, s->shapes, 4 * (size_t)s->slots),
                      *mask = harness_buffer(h, s->mask, s->slots / 4);
     struct pt_buffer *field = harness_buffer(h, s->field, 4 * (size_t)s->slots);
-    HARNESS_RUN(h, sift, &s->args, chunks, positions, classes, clips, drawn, shapes, mask, field);
+    struct pt_buffer *scans = harness_buffer(h, s->scans, 2 * (size_t)s->slots + 4);
+    HARNESS_RUN(h, sift, &s->args, chunks, positions, classes, clips, drawn, shapes, mask, field, scans);
     uint32_t *got = harness_read(h, drawn);
     size_t open = 0, points = 0, kept = 0;
     for (uint32_t c = 0; c < CHUNKS; c++) {
@@ -99,7 +104,7 @@ static void check(struct harness *h, const struct setup *s)
         for (uint32_t i = 0; i < chunk->count && chunk->sifted; i++, points++) {
             int bit = got[chunk->sifted - 1 + i / PT_SLOTS_A_WORD] >> i % PT_SLOTS_A_WORD & 1u;
             enum ref_truth expected = ref_sift(&s->args, chunk, s->positions, s->classes, s->shapes, s->mask, s->field,
-                                               s->clips, i);
+                                               s->scans, s->clips, i);
             open += expected == REF_UNSURE;
             kept += (size_t)bit;
             if (expected != REF_UNSURE && bit != (expected == REF_YES))
@@ -187,6 +192,21 @@ static void masks(struct harness *h)
 }
 
 // Fields beside all else: thresholds that leave some, all but the last step, and nothing; F at the threshold itself is solid.
+// Hidden ones, some that are never: 1024 and beyond.
+static void scans(struct harness *h)
+{
+    for (uint64_t seed = 0; seed < 3; seed++) {
+        struct rng rng = {seed};
+        struct setup s = make(h, &rng);
+        s.args.by_scan = 1;
+        for (int k = 0; k < PT_SCAN_WORDS; k++)
+            s.args.hidden_scans[k] = seed == 2 ? 0xFFFFFFFFu : (uint32_t)rng_next(&rng);
+        if (seed == 1)
+            add_clips(&s, &rng, 2, 2, 0.7);
+        check(h, &s);
+    }
+}
+
 static void fields(struct harness *h)
 {
     static const uint32_t thresholds[] = {0, 1, 32768, 65534, 65535};
@@ -226,17 +246,18 @@ static void extremes(struct harness *h)
         }
         for (uint32_t k = 0; k < s.clip_count; k++) // sums overflow: no float64 says what; devices agree
             s.clips[k].row[0] = s.clips[k].row[4] = s.clips[k].row[8] = INFINITY;
-        struct pt_buffer *buffers[8] = {harness_buffer(h, s.chunks, sizeof s.chunks),
+        struct pt_buffer *buffers[9] = {harness_buffer(h, s.chunks, sizeof s.chunks),
                                         harness_buffer(h, s.positions, 12 * (size_t)s.slots),
                                         harness_buffer(h, s.classes, (s.slots + 3) / 4 * 4),
                                         harness_buffer(h, s.clips, sizeof s.clips),
                                         harness_buffer(h, NULL, 0),
                                         harness_buffer(h, s.shapes, 4 * (size_t)s.slots),
                                         harness_buffer(h, s.mask, s.slots / 4),
-                                        harness_buffer(h, s.field, 4 * (size_t)s.slots)};
+                                        harness_buffer(h, s.field, 4 * (size_t)s.slots),
+                                        NULL};
         uint32_t *zero = harness_alloc(h, 4 * (size_t)s.words);
         buffers[4] = harness_buffer(h, zero, 4 * (size_t)s.words);
-        harness_run(h, PT_KERNEL_sift, &s.args, sizeof s.args, buffers, 8);
+        harness_run(h, PT_KERNEL_sift, &s.args, sizeof s.args, buffers, 9);
         harness_same(h, "infinite", harness_read(h, buffers[4]), s.words, 4, 1, s.words);
     }
 }
@@ -249,29 +270,29 @@ static void sanity(struct harness *h)
     const float points[3 * 16] = {[0] = 2.9f, [1] = 3.1f, [2] = 0.0f, [32 + 2] = 1.5f};
     struct chunk_view chunk = {.count = 3, .padded = 16, .clip_count = 1, .clip_keeps = 1};
     struct sift_args args = {0};
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, clips, 0) == REF_YES);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, clips, 1) == REF_NO);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, clips, 2) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 1) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 2) == REF_YES);
     chunk.clip_count = 2; // cuts what lies above z = 1
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, clips, 2) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 2) == REF_NO);
     clips[0].shape = PT_CLIP_CUT;
     chunk.clip_keeps = 0;
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, clips, 1) == REF_YES);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, clips, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 1) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, NULL, NULL, clips, 0) == REF_NO);
     const uint32_t shapes[] = {PT_KIND_STRAY << PT_SHAPE_KIND_SHIFT | 15u << PT_SHAPE_CERTAINTY_SHIFT,
                                15u << PT_SHAPE_CERTAINTY_SHIFT | PT_SHAPE_SEEN_THROUGH};
     args = (struct sift_args){.by_shape = 1, .hidden_shapes = {[(5 + 8 * 15) / 32] = 1u << (5 + 8 * 15) % 32}};
     chunk.clip_count = 0;
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, NULL, NULL, clips, 0) == REF_NO);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, NULL, NULL, clips, 1) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, NULL, NULL, NULL, clips, 0) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, shapes, NULL, NULL, NULL, clips, 1) == REF_YES);
     const uint32_t mask = 1u << 1 | 1u << 16; // hides point 1, selects point 0
     args = (struct sift_args){.by_mask = 1};
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, &mask, NULL, clips, 0) == REF_YES);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, &mask, NULL, clips, 1) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, &mask, NULL, NULL, clips, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, &mask, NULL, NULL, clips, 1) == REF_NO);
     const uint32_t field[] = {7u << PT_FIELD_SHIFT | 9u, 8u << PT_FIELD_SHIFT};
     args = (struct sift_args){.by_field = 1, .threshold = 7};
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, field, clips, 0) == REF_YES);
-    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, field, clips, 1) == REF_NO);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, field, NULL, clips, 0) == REF_YES);
+    HARNESS_CHECK(h, ref_sift(&args, &chunk, points, NULL, NULL, NULL, field, NULL, clips, 1) == REF_NO);
 }
 
 int main(int argc, char **argv)
@@ -282,6 +303,7 @@ int main(int argc, char **argv)
                                                 {"hidden shapes", shape_words, 0},
                                                 {"masks", masks, 0},
                                                 {"fields", fields, 0},
+                                                {"scans", scans, 0},
                                                 {"extreme sizes", extremes, 0}};
     return harness_main(argc, argv, cases, sizeof cases / sizeof cases[0]);
 }

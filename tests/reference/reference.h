@@ -110,7 +110,7 @@ double ref_clip_row(const struct clip_view *clip, int k, const double p[3], doub
 // Is the point of this slot drawn? positions: of the instance; classes, shapes: by slot.
 enum ref_truth ref_sift(const struct sift_args *args, const struct chunk_view *chunk, const float *positions,
                         const uint8_t *classes, const uint32_t *shapes, const uint32_t *mask, const uint32_t *field,
-                        const struct clip_view *clips, uint32_t slot);
+                        const uint16_t *scans, const struct clip_view *clips, uint32_t slot);
 
 // ---- raster.c -------------------------------------------------------------------------------------------------------
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Clips, hidden classes, hidden shapes, masks and fields, as patina.h says: kept is what lies in one of the boxes that keep, if there are
+// Clips, hidden classes, hidden shapes, masks, fields and scans, as patina.h says: kept is what lies in one of the boxes that keep, if there are
 // any, in no box that cuts, and on the right side of every plane.
 #include "reference.h"
 #include "tolerances.h"
@@ -25,7 +25,7 @@ static enum ref_truth beyond(const struct clip_view *plane, const double p[3])
 
 enum ref_truth ref_sift(const struct sift_args *args, const struct chunk_view *chunk, const float *positions,
                         const uint8_t *classes, const uint32_t *shapes, const uint32_t *mask, const uint32_t *field,
-                        const struct clip_view *clips, uint32_t slot)
+                        const uint16_t *scans, const struct clip_view *clips, uint32_t slot)
 {
     const float *base = positions + 3 * (size_t)chunk->first;
     const double p[3] = {base[slot], base[chunk->padded + slot], base[2 * (size_t)chunk->padded + slot]};
@@ -52,6 +52,11 @@ enum ref_truth ref_sift(const struct sift_args *args, const struct chunk_view *c
         return REF_NO;
     if (args->by_field && field[chunk->first + slot] / 65536 > args->threshold)
         return REF_NO;
+    if (args->by_scan && scans[chunk->first + slot] < 1024) {
+        const uint16_t scan = scans[chunk->first + slot];
+        if (args->hidden_scans[scan / 32] >> scan % 32 & 1u)
+            return REF_NO;
+    }
     if (kept == REF_NO || cut == REF_YES)
         return REF_NO;
     return kept == REF_YES && cut == REF_NO ? REF_YES : REF_UNSURE;

@@ -331,6 +331,53 @@ static void test_beside_others(void **state)
     patina_device_destroy(device);
 }
 
+// A sphere in two scans, from before and from behind: what looks away from the view is left out, and with it the back.
+static void test_cull(void **state)
+{
+    (void)state;
+    struct points points = points_sphere(40000, 1.0, POINTS_PLAIN, 5);
+    uint16_t *of = malloc(points.count * sizeof *of);
+    for (uint64_t i = 0; i < points.count; i++)
+        of[i] = points.position[3 * i + 1] > 0.0f;
+    // before: seen along +y; behind: the other way; a scan without points, and one that looks all around
+    const patina_scan scans[] = {{{0, 3, 0}, 0.01}, {{0, -1, 0}, 0.01}, {{0, -1, 0}, 0.0}, {{0, 0, 0}, 0.0}};
+    patina_device *device = support_device_first();
+    patina_cloud *cloud = points_upload(&points);
+    patina_scans *known = NULL;
+    patina_cloud_style style = PATINA_CLOUD_STYLE_INIT;
+    CHECK(patina_scans_create(cloud, of, scans, 4, &known), cloud);
+    style.scans = known;
+    style.transparency = 0.5f;
+    const double eye[3] = {0, -5, 0}, target[3] = {0, 0, 0};
+    const patina_camera camera = camera_orthographic(eye, target, window, SIZE, SIZE, 0.1, 100.0);
+    patina_settings settings = settings_default(SIZE, SIZE);
+    const size_t middle = (size_t)SIZE * (SIZE / 2) + SIZE / 2, pixels = (size_t)SIZE * SIZE;
+    settings.layer_passes = 1u << PATINA_PASS_COMBINED | 1u << PATINA_PASS_DEPTH | 1u << PATINA_PASS_NORMAL;
+    static const struct {
+        uint32_t surface;
+        float cull;
+        int back;
+    } cases[] = {{PATINA_SURFACE_RANGES, 0.0f, 1},
+                 {PATINA_SURFACE_RANGES, 1.5f, 0},
+                 {PATINA_SURFACE_RANGES, 3.1415926f, 1},
+                 {PATINA_SURFACE_FILL, 1.5f, 1}};
+    for (int k = 0; k < 4; k++) {
+        settings.surface = cases[k].surface;
+        style.range_cull = cases[k].cull;
+        patina_scene *scene = scene_of(cloud, &style);
+        struct picture picture = picture_render(device, scene, &camera, &settings);
+        assert_true(fabs((double)picture.layer_depth[middle] - 3.9) < 0.02);
+        assert_int_equal(isfinite(picture.layer_depth[pixels + middle]) != 0, cases[k].back);
+        picture_free(&picture);
+        patina_scene_destroy(scene);
+    }
+    patina_scans_destroy(known);
+    patina_cloud_destroy(cloud);
+    patina_device_destroy(device);
+    points_free(&points);
+    free(of);
+}
+
 static void refuse(const patina_cloud *cloud, const patina_cloud_style *style, const char *says)
 {
     patina_scene *scene = NULL;
@@ -388,7 +435,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_registration), cmocka_unit_test(test_few_points),    cmocka_unit_test(test_hard),
-        cmocka_unit_test(test_layers),       cmocka_unit_test(test_beside_others), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_layers),       cmocka_unit_test(test_beside_others), cmocka_unit_test(test_cull),
+        cmocka_unit_test(test_refused),
     };
     support_arguments(argc, argv);
     return cmocka_run_group_tests(tests, NULL, NULL);

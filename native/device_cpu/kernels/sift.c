@@ -9,6 +9,7 @@
 struct sift {
     const struct pt_cpu_call *call;
     uint32_t hides[256], hides_shape[256]; // by class, by the shape's byte
+    uint32_t hides_scan[32 * PT_SCAN_WORDS];
 };
 
 // Of a plane: cut.
@@ -51,6 +52,14 @@ static uint32_t drawn(const struct sift *sift, const struct chunk_view *chunk, c
         const uint32_t *field = (const uint32_t *)PT_DATA(sift->call, sift, field) + chunk->first + i;
         cut = vm_or(cut, vi_lt_unsigned(vi_set(args->threshold), vi_shr(vi_load(field), PT_FIELD_SHIFT)));
     }
+    if (args->by_scan) {
+        const vm all = vm_first(PT_LANES);
+        const vi slot = vi_add(vi_set(chunk->first + i), vi_lanes()), most = vi_set(32 * PT_SCAN_WORDS);
+        const vi scan = vi_and(vi_gather_bytes(PT_DATA(sift->call, sift, scans), vi_add(slot, slot), all), vi_set(0xFFFFu));
+        const vm known = vi_lt_unsigned(scan, most);
+        const vi hides = vi_gather(sift->hides_scan, vi_select(known, scan, vi_set(0)), all);
+        cut = vm_or(cut, vm_and(known, vi_lt_unsigned(vi_set(0), hides)));
+    }
     return vm_bits(vm_and(keep, vm_not(cut))) & PT_ALL;
 }
 
@@ -84,6 +93,8 @@ int PT_KERNEL_ENTRY(sift)(const struct pt_cpu_call *call)
         sift.hides[i] = args->hidden[i / 32] >> i % 32 & 1u;
         sift.hides_shape[i] = args->hidden_shapes[i / 32] >> i % 32 & 1u;
     }
+    for (uint32_t i = 0; i < 32 * PT_SCAN_WORDS; i++)
+        sift.hides_scan[i] = args->hidden_scans[i / 32] >> i % 32 & 1u;
     pt_parallel(call->pool, (uint32_t)(call->buffers[PT_BUF_sift_chunks]->size / sizeof(struct chunk_view)), 4, sift_chunks,
                 &sift);
     return pt_cpu_cancelled(call) ? PATINA_ERROR_CANCELLED : PATINA_OK;
