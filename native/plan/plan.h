@@ -84,7 +84,15 @@ enum pt_plane {
         PT_PLANE_COUNT
 };
 
-enum pt_plane_size { PT_SIZE_WINDOW, PT_SIZE_LIGHTS, PT_SIZE_CROP, PT_SIZE_TILES, PT_SIZE_RECORDS, PT_SIZE_BINS, PT_SIZE_CELLS };
+enum pt_plane_size {
+    PT_SIZE_WINDOW,
+    PT_SIZE_LIGHTS,
+    PT_SIZE_CROP,
+    PT_SIZE_TILES,
+    PT_SIZE_RECORDS,
+    PT_SIZE_BINS,
+    PT_SIZE_CELLS
+};
 enum pt_plane_slots { PT_SLOTS_ONE, PT_SLOTS_LEVELS, PT_SLOTS_LAYERS };
 
 struct pt_plane_row {
