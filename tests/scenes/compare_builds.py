@@ -70,8 +70,8 @@ class Process:
 
 
 def differences(old: dict[str, str], new: dict[str, str]) -> list[str]:
-    """Planes that are not the same, or that one side alone has."""
-    return [name for name in old | new if old.get(name) != new.get(name)]
+    """Planes that are not the same, or that the new side lacks. What only the new one has is a pass that the old one does not know."""
+    return [name for name in old if old[name] != new.get(name)]
 
 
 def measured(old: Process, new: Process, folder: Path, name: str, planes: Iterable[str]) -> str:
