@@ -11,12 +11,13 @@ const struct pt_plane_row pt_plane_rows[PT_PLANE_COUNT] = {
 };
 
 static const uint8_t instance_formats[] = {
-    [PT_CHUNKS] = PT_FORMAT_chunk,   [PT_POSITIONS] = PT_FORMAT_position, [PT_SURFACE] = PT_FORMAT_word,
-    [PT_COLORS] = PT_FORMAT_color,   [PT_OPACITIES] = PT_FORMAT_opacity,  [PT_RADII] = PT_FORMAT_radius,
-    [PT_SCALARS] = PT_FORMAT_scalar, [PT_CLASSES] = PT_FORMAT_class,      [PT_SHAPES] = PT_FORMAT_shape,
-    [PT_SIGHTS] = PT_FORMAT_sight,   [PT_MARKS] = PT_FORMAT_mark,         [PT_SHADOWS] = PT_FORMAT_shadow,
-    [PT_CLIPS] = PT_FORMAT_clip,     [PT_DRAWN] = PT_FORMAT_bits,         [PT_MASK] = PT_FORMAT_bits,
-    [PT_FIELD] = PT_FORMAT_field,    [PT_FIELD_ONE] = PT_FORMAT_field,    [PT_SCANS] = PT_FORMAT_scan,
+    [PT_CHUNKS] = PT_FORMAT_chunk,      [PT_POSITIONS] = PT_FORMAT_position, [PT_SURFACE] = PT_FORMAT_word,
+    [PT_COLORS] = PT_FORMAT_color,      [PT_OPACITIES] = PT_FORMAT_opacity,  [PT_RADII] = PT_FORMAT_radius,
+    [PT_SCALARS] = PT_FORMAT_scalar,    [PT_CLASSES] = PT_FORMAT_class,      [PT_SHAPES] = PT_FORMAT_shape,
+    [PT_SIGHTS] = PT_FORMAT_sight,      [PT_MARKS] = PT_FORMAT_mark,         [PT_SHADOWS] = PT_FORMAT_shadow,
+    [PT_CLIPS] = PT_FORMAT_clip,        [PT_DRAWN] = PT_FORMAT_bits,         [PT_MASK] = PT_FORMAT_bits,
+    [PT_FIELD] = PT_FORMAT_field,       [PT_FIELD_ONE] = PT_FORMAT_field,    [PT_SCANS] = PT_FORMAT_scan,
+    [PT_FINE_CHUNKS] = PT_FORMAT_chunk,
 };
 static const uint8_t mesh_formats[] = {
     [PT_MESH_VERTICES] = PT_FORMAT_vertex, [PT_MESH_INDICES] = PT_FORMAT_index, [PT_MESH_TEXELS] = PT_FORMAT_texel};

@@ -39,7 +39,7 @@ static void set_gamma(const struct patina_scene *scene, const struct pt_instance
 }
 
 void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, const struct pt_instance *instance,
-                    const struct pt_eye *eye, double scale, double pixel, struct pt_range *out)
+                    const struct pt_eye *eye, double scale, double pixel, double spacing_px, struct pt_range *out)
 {
     struct view_args *cells = &out->cells;
     const double origin[2] = {plan->view.origin_x, plan->view.origin_y}, size[2] = {plan->view.width, plan->view.height};
@@ -47,6 +47,7 @@ void pt_range_place(const struct patina_scene *scene, struct pt_plan *plan, cons
     *cells = plan->view;
     out->pixel = (float)pixel;
     pixel = (double)out->pixel; // kernels divide by the same
+    out->points = spacing_px > 0.0 ? (float)fmax(pixel * pixel / (spacing_px * spacing_px), 1.0) : 1.0f;
     out->eye = *eye;
     out->eye.xs *= pixel;
     out->eye.ys *= pixel;
@@ -80,11 +81,15 @@ void pt_range_rect(const struct pt_range *range, const double bounds[4], uint32_
 
 // ---- passes ------------------------------------------------------------------------------------------------------------
 
-static void add_cells(struct pt_builder *builder, uint32_t i, int behind)
+// Of two passes the first is not sharp where more points share a cell than of a surface that is seen from the front, times this, and where
+// one is seen at less than this cosine, 66 degrees.
+#define CROWDED 2.5f
+#define GRAZED 0.4f
+
+static void add_cells(struct pt_builder *builder, uint32_t i, const struct pt_range *range, struct pt_ref chunks, int behind)
 {
     const struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
-    const struct pt_range *range = instance->range;
     const struct pt_ref keys = pt_plane_at(PT_PLANE_CELLS, 0), beyond = pt_plane_if(behind, PT_PLANE_CELL_BEYOND, 0);
     const struct pt_ref drawn = plan->drawn_words ? pt_buffer_of(PT_DRAWN, 0) : pt_nothing();
     const struct coarsen_args coarsen = {.view = range->cells,
@@ -99,27 +104,28 @@ static void add_cells(struct pt_builder *builder, uint32_t i, int behind)
               (double)range->pixel);
     const struct scatter_args scatter = {
         .view = range->cells, .instances = 1, .behind = (uint32_t)behind, .sifted = plan->drawn_words > 0};
-    PT_REASON(
-        PT_ADD(builder, scatter, scatter,
-               {keys, beyond, drawn, pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i)}),
-        "%llu points in %u chunks of instance %u, into cells", (unsigned long long)instance->points, instance->chunk_count, i);
+    PT_REASON(PT_ADD(builder, scatter, scatter,
+                     {keys, beyond, drawn, chunks, pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i)}),
+              "%llu points in %u chunks of instance %u, into cells", (unsigned long long)instance->points,
+              instance->chunk_count, i);
     const struct merge_args merge = {.view = range->cells,
                                      .instance = instance->args,
                                      .gamma = range->gamma,
                                      .gamma_cells = range->gamma_cells,
                                      .sifted = plan->drawn_words > 0};
     PT_REASON(PT_ADD(builder, merge, merge,
-                     {keys, pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_MERGED, 0),
-                      pt_buffer_of(PT_CHUNKS, i), pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i),
-                      pt_buffer_of(PT_COLORS, i), pt_buffer_of(PT_OPACITIES, i), drawn}),
+                     {keys, pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_MERGED, 0), chunks,
+                      pt_buffer_of(PT_POSITIONS, i), pt_buffer_of(PT_SURFACE, i), pt_buffer_of(PT_COLORS, i),
+                      pt_buffer_of(PT_OPACITIES, i), drawn}),
               "means of points up to gamma %.3g behind the nearest", (double)range->gamma);
 }
 
-static void add_faces(struct pt_builder *builder, uint32_t i, int behind)
+// pass: PT_RANGE_*.
+static void add_faces(struct pt_builder *builder, uint32_t i, const struct pt_range *range, uint32_t pass, int behind)
 {
+    static const char *const told[] = {"", ", marked where they are not sharp", ", where those before were not sharp"};
     const struct pt_plan *plan = builder->plan;
     const struct pt_plan_instance *instance = &plan->instances[i];
-    const struct pt_range *range = instance->range;
     const struct incline_args incline = {.view = range->cells, .gamma = range->gamma, .gamma_cells = range->gamma_cells};
     PT_REASON(PT_ADD(builder, incline, incline, {pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_INCLINED, 0)}),
               "normals of instance %u's cells, from those around", i);
@@ -131,28 +137,41 @@ static void add_faces(struct pt_builder *builder, uint32_t i, int behind)
                                          .inverse = 1.0f / range->pixel,
                                          .d_min = instance->args.d_min,
                                          .behind = (uint32_t)behind,
-                                         .with_span = plan->sigmas != 0};
+                                         .with_span = plan->sigmas != 0,
+                                         .pass = pass,
+                                         .id_base = instance->args.id_base,
+                                         .id_count = instance->args.id_count,
+                                         .most = CROWDED * range->points,
+                                         .cosine = GRAZED};
     PT_REASON(PT_ADD(builder, magnify, magnify,
                      {pt_plane_at(PT_PLANE_CELLS, 0), pt_plane_at(PT_PLANE_CELL_PLACE, 0), pt_plane_at(PT_PLANE_CELL_MERGED, 0),
                       pt_plane_at(PT_PLANE_CELL_INCLINED, 0), pt_keys_of(builder, 0), pt_from_of(builder, 0),
                       pt_plane_at(PT_PLANE_NORMAL, 0), pt_plane_at(PT_PLANE_DEFF, 0), pt_plane_at(PT_PLANE_ALBEDO, 0),
                       pt_plane_at(PT_PLANE_AWAY, 0), pt_plane_if(plan->sigmas, PT_PLANE_SPAN, 0),
                       pt_plane_if(behind, PT_PLANE_LIMIT, 0)}),
-              "faces between instance %u's cells%s", i, behind ? ", behind what is drawn already" : "");
+              "faces between instance %u's cells%s%s", i, told[pass], behind ? ", behind what is drawn already" : "");
+}
+
+static void add_range(struct pt_builder *builder, uint32_t i, int behind)
+{
+    const struct pt_range *range = builder->plan->instances[i].range;
+    add_cells(builder, i, range, pt_buffer_of(PT_CHUNKS, i), behind);
+    add_faces(builder, i, range, range->fine ? PT_RANGE_COARSE : PT_RANGE_ALONE, behind);
+    if (!range->fine)
+        return;
+    add_cells(builder, i, range->fine, pt_buffer_of(PT_FINE_CHUNKS, i), behind);
+    add_faces(builder, i, range->fine, PT_RANGE_FINE, behind);
 }
 
 void pt_plan_ranges(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    const int behind = builder->layer > 1 || builder->behind;
     if (!plan->cells) {
         static const char *const names[] = {"coarsen", "merge", "incline", "magnify"};
         for (int k = 0; k < 4; k++)
             pt_skip(builder, names[k], "no cloud in view is drawn as range images");
     }
     for (uint32_t i = 0; i < plan->instance_count; i++)
-        if (plan->instances[i].range && plan->instances[i].chunk_count) {
-            add_cells(builder, i, behind);
-            add_faces(builder, i, behind);
-        }
+        if (plan->instances[i].range && plan->instances[i].chunk_count)
+            add_range(builder, i, builder->layer > 1 || builder->behind);
 }

@@ -127,8 +127,8 @@ struct survey {
     struct pt_object *objects;
     struct seen **seen; // per instance
     uint32_t *seen_count;
-    int points, discs; // some chunk's points are drawn as such
-    double *pixels;    // per instance: of a cell, where they are range images; else 0
+    int points, discs;         // some chunk's points are drawn as such
+    double *pixels, *spacings; // per instance: of a cell, where they are range images, else 0; of its points
 };
 
 static int is_transparent(const struct pt_instance *instance)
@@ -277,7 +277,8 @@ static int spacing_on_screen(const struct survey *survey, uint32_t first, uint32
 static int choose_cells(const struct patina_scene *scene, struct pt_plan *plan, struct survey *survey)
 {
     survey->pixels = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->pixels);
-    int error = survey->pixels ? PATINA_OK : PATINA_ERROR_MEMORY;
+    survey->spacings = pt_arena_take(&plan->arena, (scene->instance_count + 1) * sizeof *survey->spacings);
+    int error = survey->pixels && survey->spacings ? PATINA_OK : PATINA_ERROR_MEMORY;
     for (uint32_t i = 0; i < scene->instance_count && !error; i++) {
         double middle = 0.0, most = 0.0;
         survey->pixels[i] = 0.0;
@@ -285,6 +286,7 @@ static int choose_cells(const struct patina_scene *scene, struct pt_plan *plan, 
             continue;
         error = spacing_on_screen(survey, i, i + 1, &middle, &most);
         survey->pixels[i] = pt_range_pixel(scene, &scene->instances[i], most);
+        survey->spacings[i] = middle;
         const uint32_t reach = pt_range_reach(survey->pixels[i]);
         plan->range_reach = reach > plan->range_reach && survey->seen_count[i] ? reach : plan->range_reach;
     }
@@ -304,6 +306,23 @@ static void set_view(const struct pt_eye *camera, struct view_args *view)
 }
 
 // ---- what kernels get ----------------------------------------------------------------------------------------------------
+
+// A chunk of instance i, as it was placed for the coarser cells, in the finer ones.
+static void place_fine(const struct survey *survey, uint32_t i, const struct pt_chunk *chunk, const double bounds[4],
+                       uint32_t guard, struct pt_range *fine, const struct chunk_view *placed, uint32_t at)
+{
+    struct chunk_view *out = &fine->chunks[at];
+    double rows[9], translation[3];
+    uint32_t cells[4];
+    *out = *placed;
+    pt_object_rows(&fine->eye, &survey->objects[i], rows);
+    pt_chunk_translation(&fine->eye, &survey->objects[i], chunk, translation);
+    pt_set_product(rows, translation, out->row, out->hi, out->lo);
+    pt_range_rect(fine, bounds, guard, cells);
+    pt_join_rect(fine->cells.rect, cells);
+    out->row_first = cells[1];
+    out->row_end = cells[3];
+}
 
 // Instance i of the scene, its wide chunks or the others. Ids are moved by id_base. range: its image buffer, in whose cells points
 // are projected, or NULL.
@@ -350,6 +369,9 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
         out->chunks[out->chunk_count].row_end = range ? cells[3] : rect[3];
         if (pt_plan_divide(plan, out, &survey->sieves[i], chunk, &out->chunks[out->chunk_count++]))
             return PATINA_ERROR_MEMORY;
+        if (range && range->fine)
+            place_fine(survey, i, chunk, bounds, plan->guard, range->fine, &out->chunks[out->chunk_count - 1],
+                       out->chunk_count - 1);
         pt_join_rect(out->rect, rect);
         out->points += count;
         plan->points_scattered += count;
@@ -357,6 +379,26 @@ static int place_chunks(const struct patina_scene *scene, struct pt_plan *plan, 
     pt_join_rect(plan->view.rect, out->rect);
     plan->chunks_culled -= out->chunk_count;
     return PATINA_OK;
+}
+
+// As range images, in one pass or two.
+static int place_range(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i)
+{
+    const struct pt_instance *instance = &scene->instances[i];
+    const double sharpness = (double)instance->style.range_sharpness, fine = survey->pixels[i] * sharpness;
+    struct pt_range *range = pt_arena_take(&plan->arena, 2 * sizeof *range);
+    if (!range)
+        return PATINA_ERROR_MEMORY;
+    if (sharpness > 0.0 && fine >= 1.0) { // else pixels are as fine
+        range->fine = range + 1;
+        range->fine->chunks = pt_arena_take(&plan->arena, (survey->seen_count[i] + 1) * sizeof *range->fine->chunks);
+        if (!range->fine->chunks)
+            return PATINA_ERROR_MEMORY;
+    }
+    for (int k = 0; k < 2 && (!k || range->fine); k++)
+        pt_range_place(scene, plan, instance, &survey->camera, survey->objects[i].scale, k ? fine : survey->pixels[i],
+                       survey->spacings[i], range + k);
+    return place_chunks(scene, plan, survey, i, 1, pt_disc_ids(scene), range, &plan->instances[i]);
 }
 
 static int place_instance(const struct patina_scene *scene, struct pt_plan *plan, const struct survey *survey, uint32_t i)
@@ -367,13 +409,8 @@ static int place_instance(const struct patina_scene *scene, struct pt_plan *plan
     plan->chunks += cloud->chunk_count;
     plan->chunks_culled += cloud->chunk_count;
     plan->points += cloud->info.count;
-    if (survey->pixels[i] > 0.0) {
-        struct pt_range *range = pt_arena_take(&plan->arena, sizeof *range);
-        if (!range)
-            return PATINA_ERROR_MEMORY;
-        pt_range_place(scene, plan, &scene->instances[i], &survey->camera, survey->objects[i].scale, survey->pixels[i], range);
-        return place_chunks(scene, plan, survey, i, 1, pt_disc_ids(scene), range, &plan->instances[i]);
-    }
+    if (survey->pixels[i] > 0.0)
+        return place_range(scene, plan, survey, i);
     int error = place_chunks(scene, plan, survey, i, all, 0, NULL, &plan->instances[i]);
     for (uint32_t k = 0; k < survey->seen_count[i] && !all; k++)
         wide |= survey->seen[i][k].wide;

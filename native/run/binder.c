@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "binder.h"
 
+#include "plan/ranges.h"
 #include "scene/mask.h"
 #include "scene/scans.h"
 
@@ -21,8 +22,10 @@ int pt_binder_open(struct pt_binder *binder)
 void pt_binder_close(struct pt_binder *binder)
 {
     const struct pt_plan *plan = binder->plan;
-    for (uint32_t i = 0; i < plan->instance_count + plan->soft_entries && binder->instances; i++)
+    for (uint32_t i = 0; i < plan->instance_count + plan->soft_entries && binder->instances; i++) {
         binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].chunks);
+        binder->device->ops->buffer_destroy(binder->device, &binder->instances[i].fine);
+    }
     for (uint32_t i = 0; i < plan->receiver_count && binder->receivers; i++)
         binder->device->ops->buffer_destroy(binder->device, &binder->receivers[i].chunks);
     free(binder->instances);
@@ -110,6 +113,13 @@ static int bind_instance(struct pt_binder *binder, const struct pt_ref *ref, str
         error = take_mask(binder, bound, pt_mask_of(planned->instance));
         *out = error ? NULL : &bound->mask->buffers[0];
         return error;
+    }
+    if (ref->which == PT_FINE_CHUNKS) {
+        *out = &bound->fine;
+        return bound->fine.size
+                   ? PATINA_OK
+                   : binder->device->ops->buffer_create(binder->device, planned->chunk_count * sizeof *planned->chunks,
+                                                        planned->range->fine->chunks, 1, &bound->fine);
     }
     if (ref->which == PT_SCANS) {
         error = take_scans(binder, bound, planned->instance->style.scans);

@@ -11,8 +11,8 @@
 
 struct pt_bound_instance {
     struct pt_resident *cloud, *mask, *grade, *field, *scans; // NULL: not asked for yet
-    struct pt_buffer chunks;
-    int placed; // these are there, if only none
+    struct pt_buffer chunks, fine;                            // fine: PT_FINE_CHUNKS
+    int placed;                                               // these are there, if only none
 };
 
 struct pt_bound_mesh {

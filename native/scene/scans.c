@@ -25,8 +25,6 @@ int pt_check_ranges(const struct patina_scene *scene, const patina_cloud_style *
         wrong = "range_sharpness is 0 or 0.5 to 0.95";
     else if (!(style->range_cull >= 0.0f && style->range_cull <= 3.1415928f))
         wrong = "range_cull must be within 0 and pi";
-    if (!wrong && style->range_sharpness > 0.0f)
-        return pt_fail(&scene->handle, PATINA_ERROR_UNSUPPORTED, "cloud style: range_sharpness is not built yet");
     return wrong ? pt_fail(&scene->handle, PATINA_ERROR_ARGUMENT, "cloud style: %s", wrong) : PATINA_OK;
 }
 

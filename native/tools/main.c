@@ -28,6 +28,7 @@ static const char usage_before[] =
     "faces\n"
     "  --range-gamma G                    of range images: depths merged into one surface, object units (default: two "
     "samples)\n"
+    "  --range-sharpness F                a second pass, its pixels F (0.5 to 0.95) as wide, where the first is not sharp\n"
     "  --range-pixel S                    of the coarser picture, 1 to 64 pixels (default: as wide as two samples lie apart)\n"
     "  --analysis on|off                  points' own spacings and footprints, and normals where a file has none (on)\n"
     "  --radius R                         of the discs, world units (default: the points' own, else 1.75 spacings)\n"

@@ -315,6 +315,8 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_width(value, &o->radius);
     else if (!strcmp(name, "--range-gamma"))
         bad = parse_width(value, &o->range_gamma);
+    else if (!strcmp(name, "--range-sharpness"))
+        bad = parse_width(value, &o->range_sharpness);
     else if (!strcmp(name, "--range-pixel"))
         bad = parse_width(value, &o->range_pixel);
     else if (!strcmp(name, "--largest-gap"))

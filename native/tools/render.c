@@ -117,6 +117,7 @@ static int load_clouds(struct job *job)
     style.largest_gap = (float)options->largest_gap;
     style.range_gamma = (float)options->range_gamma;
     style.range_pixel = (float)options->range_pixel;
+    style.range_sharpness = (float)options->range_sharpness;
     float table[PATINA_MAX_RAMP][3];
     tool_cancellable(job->progress, NULL);
     for (int i = 0; i < options->file_count; i++) {

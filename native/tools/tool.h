@@ -73,6 +73,7 @@ struct tool_options {
     double radius;                   // of discs, world units; 0: automatic
     double largest_gap;              // that they close, world units; 0: automatic
     double range_gamma, range_pixel; // of range images; 0: automatic
+    double range_sharpness;          // 0: one pass
     struct {
         uint32_t model;                 // 0: none is soft; 1 + patina_soft_model
         uint32_t files[TOOL_OPACITIES]; // which of the files are, from 1 on

@@ -13,6 +13,8 @@ layout(std430, binding = BIND_inclined) writeonly buffer inclined_block { vec4 i
 const ivec2 ring[8] = ivec2[](ivec2(1, 0), ivec2(1, 1), ivec2(0, 1), ivec2(-1, 1), ivec2(-1, 0), ivec2(-1, -1), ivec2(0, -1),
                               ivec2(1, -1));
 
+float joined = 0.0; // cells around
+
 // The way to a cell around, in cells; 0 where it is none, or not joined.
 vec3 step_to(view_args view, int x, int y, int k, vec4 own, vec2 ray, float scale)
 {
@@ -24,6 +26,7 @@ vec3 step_to(view_args view, int x, int y, int k, vec4 own, vec2 ray, float scal
     precise float deeper = other.z - own.z;
     if (!(pt_abs(deeper) <= pt_range_step(view, args.gamma, args.gamma_cells, pt_min(other.z, own.z))))
         return vec3(0.0);
+    joined += 1.0;
     precise float across = (float(ring[k].x) + (other.x - own.x)) * view.ray_xs;
     precise float up = (float(ring[k].y) + (other.y - own.y)) * view.ray_ys;
     if (view.perspective != 0u) {
@@ -72,5 +75,5 @@ void main()
         if (facing < 0.0)
             towards = vec3(pt_negate(towards.x), pt_negate(towards.y), pt_negate(towards.z));
     }
-    inclined[at] = vec4(towards, 0.0);
+    inclined[at] = vec4(towards, joined);
 }

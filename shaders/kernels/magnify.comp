@@ -14,7 +14,7 @@ layout(std430, binding = BIND_from) writeonly buffer from_block { uint from[]; }
 layout(std430, binding = BIND_normal) writeonly buffer normal_block { vec4 normals[]; };
 layout(std430, binding = BIND_deff) writeonly buffer deff_block { float deff[]; };
 layout(std430, binding = BIND_albedo) writeonly buffer albedo_block { vec4 albedo[]; };
-layout(std430, binding = BIND_away) writeonly buffer away_block { float away_from[]; };
+layout(std430, binding = BIND_away) buffer away_block { float away_from[]; };
 layout(std430, binding = BIND_span) writeonly buffer span_block { float span[]; };
 layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]; };
 
@@ -145,6 +145,14 @@ void take_places()
         }
 }
 
+// Of the first of two passes.
+bool unsharp(int k, bool loose, uint x, uint y)
+{
+    vec4 normal = inclined[cell_of[k]];
+    return loose || normal.w < 8.0 || args.most < read_float4(cell_of[k]).w ||
+           pt_cosine(args.view, normal.xyz, pt_ray(args.view, int(x), int(y))) < args.cosine;
+}
+
 void main()
 {
     view_args view = args.view;
@@ -155,11 +163,22 @@ void main()
     look_around(x, y);
     for (int k = 0; k < 4; k++)
         take_faces(k % 2 + 3 * (k / 2), false);
-    if (!found)
+    bool loose = !found;
+    if (!found && args.pass != PT_RANGE_FINE)
         take_places();
     if (!found)
         for (int k = 0; k < 4; k++)
             take_faces(k % 2 + 3 * (k / 2), true);
+    uvec2 before = keys[at];
+    bool own = args.pass == PT_RANGE_FINE && before.y < PT_KEY_EMPTY_Z && before.x - args.id_base < args.id_count;
+    if (own) { // what may take the place of what is there, whose mark is taken away
+        float mark = away_from[at], z = pt_float(before.y), most = step_from(z);
+        precise float unmarked = -1.0 - mark, nearer = z - most, near = z + most;
+        if (mark < 0.0)
+            away_from[at] = unmarked;
+        if (!(best_z < nearer) && !(mark < 0.0 && best_z <= near))
+            return;
+    }
     if (!found)
         return;
     // 1. the corner that weighs most, whose point the pixel is of
@@ -172,7 +191,7 @@ void main()
         }
     uvec2 key = uvec2(read_key(cell_of[which]).x, pt_bits(best_z));
     // 2. before what is there
-    if (!pt_key_less(key, keys[at]) || (args.behind != 0u && !(limit[at] < best_z)))
+    if (!(own || pt_key_less(key, before)) || (args.behind != 0u && !(limit[at] < best_z)))
         return;
     // 3. what it shows
     precise vec3 n = inclined[cell_of[best.x]].xyz * best_weight.x;
@@ -197,7 +216,10 @@ void main()
     normals[at] = vec4(unit, inverse);
     albedo[at] = vec4(color.xyz, pt_min(color.w, 1.0));
     deff[at] = distance;
-    away_from[at] = in_pixel(which) ? 0.0 : away;
+    away = in_pixel(which) ? 0.0 : away;
+    if (args.pass == PT_RANGE_COARSE && unsharp(which, loose, x, y))
+        away = -1.0 - away;
+    away_from[at] = away;
     if (args.with_span != 0u)
         span[at] = distance;
 }

@@ -364,6 +364,9 @@ struct blend_args {
 // Neighbouring cells are joined where z differs by at most max(that, PT_RANGE_STEEP footprint(z)): slopes to 76 degrees.
 #define PT_RANGE_STEEP 4.0f
 #define PT_RANGE_DEEPEST 1024.0f // cells behind the nearest point from which on depths of merged points count as that
+#define PT_RANGE_ALONE 0u  // passes of magnify: the only one
+#define PT_RANGE_COARSE 1u // the first of two
+#define PT_RANGE_FINE 2u   // the second, of finer cells
 #define PT_RANGE_LEAST 1e-30f // of gamma, and the most
 #define PT_RANGE_MOST 1e30f
 
@@ -398,6 +401,9 @@ struct incline_args {
 // cell whose place lies in the pixel; else, so that an outline borders on what lies behind it, the nearest triangle of three cells with a
 // greater step, as far as its farthest corners: nearer ones weigh nothing. normal, albedo: between the corners, in perspective. z likewise. id: of the corner that weighs most.
 // d_eff: of a surface whose points are as thick as max(gamma, 2 cells). away: pixels from that corner; 0 where it lies in the pixel.
+// Of two [K II.E] the first marks what is not sharp, by away = -1 - away: where that corner has more points than `most`, is seen at less
+// than `cosine`, lies at an outline, which is where not all cells around are joined to it, or where no face was. The second takes marks
+// away, and puts its faces where nothing of the instance is, where they are a step nearer, and where they are not a step behind a mark.
 struct magnify_args {
     struct view_args view; // of the picture
     struct view_args cells;
@@ -406,6 +412,10 @@ struct magnify_args {
     float d_min; // as in instance_args
     uint32_t behind; // 1: the limit plane holds
     uint32_t with_span; // as in surface_args
+    uint32_t pass;      // PT_RANGE_*
+    uint32_t id_base, id_count; // of the instance
+    float most;         // of two: cells of more points are not sharp
+    float cosine;       // nor are those that are seen at less of it
 };
 
 // normals: least-squares plane of 1/z (orthographic: z) over a window, for points without normals. Its radius is d /

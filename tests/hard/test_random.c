@@ -196,6 +196,7 @@ static void add_cloud(struct pcg *random, patina_scene *scene)
     style.surface = once_in(random, 4) ? PATINA_SURFACE_RANGES : 0;
     style.range_gamma = once_in(random, 3) ? (once_in(random, 4) ? INFINITY : between(random, 0.0, 0.5)) : 0.0f;
     style.range_pixel = once_in(random, 3) ? between(random, 1.0, 64.0) : 0.0f;
+    style.range_sharpness = once_in(random, 3) ? between(random, 0.5, 0.95) : 0.0f;
     patina_scene_add_cloud(scene, stock.clouds[below(random, CLOUDS)], &style);
 }
 

@@ -33,6 +33,8 @@ static void check(struct harness *h, struct view_args view, const float *places,
         for (int k = 0; k < 3 && !expected.unsure; k++)
             if (!harness_near(n[k], axes[k], expected.error))
                 harness_fail(h, "inclined", x, y, "axis %d: got %.9g, expected %.9g +- %.2g", k, n[k], axes[k], expected.error);
+        if (!expected.unsure && n[3] != (float)expected.joined)
+            harness_fail(h, "inclined", x, y, "%.9g cells are joined, expected %d", n[3], expected.joined);
         if (!harness_near(hypot(hypot(n[0], n[1]), n[2]), 1.0, 1e-6))
             harness_fail(h, "inclined", x, y, "is not unit: %.9g %.9g %.9g", n[0], n[1], n[2]);
     }

@@ -10,7 +10,7 @@ enum { UNTOUCHED = -77 };
 struct setup {
     struct magnify_args args;
     uint64_t *cells, *keys;
-    float *places, *merged, *inclined, *limit;
+    float *places, *merged, *inclined, *limit, *away;
 };
 
 static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uint32_t height, int perspective, float pixel,
@@ -38,6 +38,11 @@ static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uin
     s.inclined = harness_alloc(h, count * 16);
     s.keys = harness_alloc(h, pixels * 8);
     s.limit = harness_alloc(h, pixels * 4);
+    s.away = harness_alloc(h, pixels * 4);
+    s.args.id_base = 500;
+    s.args.id_count = (uint32_t)count;
+    s.args.most = 7.0f;
+    s.args.cosine = 0.7f;
     for (size_t i = 0; i < count; i++) {
         s.cells[i] = s.places[4 * i + 3] > 0.0f ? ref_key(s.places[4 * i + 2], 500 + (uint32_t)i) : REF_EMPTY_KEY;
         for (int k = 0; k < 4; k++)
@@ -48,10 +53,12 @@ static struct setup make(struct harness *h, struct rng *rng, uint32_t width, uin
         const float scale = 1.0f / sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         for (int k = 0; k < 3; k++)
             s.inclined[4 * i + (size_t)k] = n[k] * scale;
+        s.inclined[4 * i + 3] = rng_below(rng, 4) ? 8.0f : (float)rng_below(rng, 8);
     }
     for (size_t i = 0; i < pixels; i++) {
         s.keys[i] = rng_below(rng, 3) ? REF_EMPTY_KEY : ref_key((float)rng_range(rng, 2.0, 8.0), 9);
         s.limit[i] = rng_below(rng, 3) ? (float)rng_range(rng, 2.0, 6.0) : INFINITY;
+        s.away[i] = UNTOUCHED;
     }
     return s;
 }
@@ -62,22 +69,59 @@ struct shown {
     const float *normal, *deff, *albedo, *away, *span;
 };
 
+// As the first of two passes left it: own pixels near the cells' depths, some marked.
+static void leave(struct setup *s, struct rng *rng)
+{
+    const struct view_args *view = &s->args.view, *cells = &s->args.cells;
+    s->args.pass = PT_RANGE_FINE;
+    for (size_t i = 0; i < (size_t)view->width * view->height; i++) {
+        const double px = (view->origin_x + (double)(i % view->width) + 0.5) / (double)s->args.pixel,
+                     py = (view->origin_y + (double)(i / view->width) + 0.5) / (double)s->args.pixel;
+        const size_t cell = (size_t)(floor(py) - cells->origin_y) * cells->width + (size_t)(floor(px) - cells->origin_x);
+        const float *place = s->places + 4 * cell;
+        if (!rng_below(rng, 3))
+            continue;
+        s->keys[i] = ref_key(place[3] > 0.0f ? place[2] * (float)rng_range(rng, 0.97, 1.03) : 5.0f,
+                             500 + rng_below(rng, s->args.id_count));
+        s->away[i] = (float)rng_range(rng, 0.0, 3.0);
+        if (rng_below(rng, 2))
+            s->away[i] = -1.0f - s->away[i];
+    }
+}
+
+// Of the second of two passes, over a pixel of the instance's own: whether it may take its place.
+static enum ref_truth takes(const struct setup *s, const struct ref_magnify *found, double before, int marked)
+{
+    const double step = ref_range_step(&s->args.cells, s->args.gamma, s->args.gamma_cells, before);
+    const double slack = found->z_error + 8.0 * TOL_UNIT * (step + before);
+    if (!found->shown)
+        return REF_NO;
+    if (fabs(found->z - (before - step)) <= slack || (marked && fabs(found->z - (before + step)) <= slack))
+        return REF_UNSURE;
+    return found->z < before - step || (marked && found->z < before + step) ? REF_YES : REF_NO;
+}
+
 static void compare(struct harness *h, const struct setup *s, const struct shown *got, size_t at, size_t *unsure, size_t *some)
 {
     const struct view_args *view = &s->args.view;
     const int x = (int)(at % view->width), y = (int)(at / view->width);
     const struct ref_magnify expected = ref_magnify(&s->args, s->cells, s->places, s->merged, s->inclined, x, y);
     const double before = ref_key_z(s->keys[at]), limit = (double)s->limit[at];
-    int shown = expected.shown && expected.z < before && (!s->args.behind || expected.z > limit);
-    const int open = expected.unsure || (expected.shown && (fabs(expected.z - before) <= expected.z_error ||
-                                                            (s->args.behind && fabs(expected.z - limit) <= expected.z_error)));
+    const uint32_t of = ref_key_id(s->keys[at]) - s->args.id_base;
+    const int own = s->args.pass == PT_RANGE_FINE && isfinite(before) && of < s->args.id_count;
+    const int marked = own && s->away[at] < 0.0f;
+    const enum ref_truth front = own ? takes(s, &expected, before, marked) : expected.z < before ? REF_YES : REF_NO;
+    const int shown = expected.shown && front == REF_YES && (!s->args.behind || expected.z > limit);
+    const int open = expected.unsure || front == REF_UNSURE || (expected.shown && expected.marked == REF_UNSURE) ||
+                     (expected.shown && ((!own && fabs(expected.z - before) <= expected.z_error) ||
+                                         (s->args.behind && fabs(expected.z - limit) <= expected.z_error)));
     (*some)++;
     *unsure += open != 0;
     if (open)
         return;
     if (!shown) {
         if (got->keys[at] != s->keys[at] || got->deff[at] != UNTOUCHED || got->normal[4 * at] != UNTOUCHED ||
-            got->albedo[4 * at] != UNTOUCHED || got->away[at] != UNTOUCHED)
+            got->albedo[4 * at] != UNTOUCHED || got->away[at] != (marked ? -1.0f - s->away[at] : s->away[at]))
             harness_fail(h, "keys", x, y, "was written");
         return;
     }
@@ -87,7 +131,8 @@ static void compare(struct harness *h, const struct setup *s, const struct shown
                      ref_key_z(got->keys[at]), expected.id, expected.z, expected.z_error);
     if (got->from[at] != at || !harness_near(got->deff[at], expected.deff, expected.deff_error))
         harness_fail(h, "deff", x, y, "got %.9g, expected %.9g +- %.2g", got->deff[at], expected.deff, expected.deff_error);
-    if (!harness_near(got->away[at], expected.away, expected.away_error))
+    if (expected.marked == REF_YES ? !harness_near(-1.0 - got->away[at], expected.away, expected.away_error + 1e-5)
+                                   : !harness_near(got->away[at], expected.away, expected.away_error))
         harness_fail(h, "away", x, y, "got %.9g, expected %.9g +- %.2g", got->away[at], expected.away, expected.away_error);
     for (int k = 0; k < 3; k++)
         if (!harness_near(got->normal[4 * at + (size_t)k], n[k], expected.normal_error))
@@ -111,7 +156,7 @@ static struct shown run(struct harness *h, const struct setup *s, double open)
     struct pt_buffer *merged = harness_buffer(h, s->merged, count * 16), *inclined = harness_buffer(h, s->inclined, count * 16);
     struct pt_buffer *keys = harness_buffer(h, s->keys, pixels * 8), *from = harness_buffer(h, unset, pixels * 4);
     struct pt_buffer *normal = harness_buffer(h, unset, pixels * 16), *deff = harness_buffer(h, unset, pixels * 4);
-    struct pt_buffer *albedo = harness_buffer(h, unset, pixels * 16), *away = harness_buffer(h, unset, pixels * 4);
+    struct pt_buffer *albedo = harness_buffer(h, unset, pixels * 16), *away = harness_buffer(h, s->away, pixels * 4);
     struct pt_buffer *span = s->args.with_span ? harness_buffer(h, unset, pixels * 4) : NULL;
     struct pt_buffer *limit = s->args.behind ? harness_buffer(h, s->limit, pixels * 4) : NULL;
     HARNESS_RUN(h, magnify, &s->args, cells, place, merged, inclined, keys, from, normal, deff, albedo, away, span, limit);
@@ -149,6 +194,10 @@ static void pictures(struct harness *h)
                 setup.args.gamma_cells = gammas[(p + s) % 3][1];
                 setup.args.behind = (p + (uint32_t)kind) % 2;
                 setup.args.with_span = s == 0;
+                if ((p + (size_t)kind + s) % 3 == 1)
+                    setup.args.pass = PT_RANGE_COARSE;
+                if ((p + (size_t)kind + s) % 3 == 2)
+                    leave(&setup, &rng);
                 if (s == 0 && p == 1) {
                     setup.args.view.rect[0] = 5;
                     setup.args.view.rect[3] = 41;

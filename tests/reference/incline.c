@@ -34,7 +34,7 @@ struct ref_incline ref_incline(const struct incline_args *args, const float *pla
         const int ox = x + ring[k][0], oy = y + ring[k][1];
         const int inside = ox >= (int)view->rect[0] && ox < (int)view->rect[2] && oy >= (int)view->rect[1] &&
                            oy < (int)view->rect[3];
-        const float *other = places + 4 * ((size_t)oy * view->width + (size_t)ox);
+        const float *other = inside ? places + 4 * ((size_t)oy * view->width + (size_t)ox) : own;
         joined[k] = inside && other[3] > 0.0f;
         if (!joined[k])
             continue;
@@ -42,6 +42,7 @@ struct ref_incline ref_incline(const struct incline_args *args, const float *pla
         const double most = ref_range_step(view, args->gamma, args->gamma_cells, fmin((double)other[2], (double)own[2]));
         out.unsure |= fabs(deep - most) <= 8.0 * TOL_UNIT * (most + (double)own[2]);
         joined[k] = deep <= most;
+        out.joined += joined[k];
         steps[k] = ref_scale(ref_add(position(view, other, ox, oy), ref_scale(here, -1.0)), 1.0 / cell);
     }
     for (int k = 0; k < 8 && out.written; k++)

@@ -185,8 +185,18 @@ static void offer_places(const struct around *a, struct best *best)
         }
 }
 
-static void set_shown(const struct around *a, const struct face *face, const uint64_t *cells, const float *merged,
-                      const float *inclined, int x, int y, struct ref_magnify *out)
+// What of the first of two passes is not sharp, for a face's heaviest corner.
+static enum ref_truth unsharp(const struct around *a, const float *place, const float *inclined, struct ref_ray ray)
+{
+    const struct view_args *view = &a->args->view;
+    const double cosine = fabs(ref_dot(ref_vec_of(inclined), ref_viewer(view, ray))), least = (double)a->args->cosine;
+    if (inclined[3] < 8.0f || place[3] > a->args->most)
+        return REF_YES;
+    return fabs(cosine - least) < 32.0 * TOL_UNIT ? REF_UNSURE : cosine < least ? REF_YES : REF_NO;
+}
+
+static void set_shown(const struct around *a, const struct face *face, const uint64_t *cells, const float *places,
+                      const float *merged, const float *inclined, int x, int y, struct ref_magnify *out)
 {
     const struct view_args *view = &a->args->view;
     struct ref_vec n = ref_vec(0.0, 0.0, 0.0);
@@ -208,6 +218,8 @@ static void set_shown(const struct around *a, const struct face *face, const uin
     const double error = fmin(64.0 * face->z_error / fmax(face->z, 1e-30), 1.0) + 2e-5, length = ref_length(n);
     const struct ref_ray ray = ref_ray(view, x, y);
     out->id = ref_key_id(cells[c->cell]);
+    if (a->args->pass == PT_RANGE_COARSE && out->marked != REF_YES)
+        out->marked = unsharp(a, places + 4 * c->cell, inclined + 4 * c->cell, ray);
     out->z = face->z;
     out->z_error = face->z_error;
     out->color[3] = fmin(out->color[3], 1.0);
@@ -237,13 +249,16 @@ struct ref_magnify ref_magnify(const struct magnify_args *args, const uint64_t *
     const double slack = 4.0 * TOL_UNIT * (fabs(px) + fabs(py));
     out.unsure = fabs(px - round(px)) <= slack || fabs(py - round(py)) <= slack; // of two cells
     offer_faces(&a, 0, &best);
-    if (!best.some)
+    const double open_face = best.open_z;
+    out.marked = args->pass == PT_RANGE_COARSE && !best.some ? REF_YES : REF_NO;
+    if (!best.some && args->pass != PT_RANGE_FINE)
         offer_places(&a, &best);
     if (!best.some)
         offer_faces(&a, 1, &best);
+    out.unsure |= args->pass == PT_RANGE_COARSE && isfinite(open_face) && out.marked == REF_YES; // a face or none
     out.shown = best.some;
     out.unsure |= best.some ? best.open_z <= best.face.z + best.face.z_error : isfinite(best.open_z);
     if (best.some)
-        set_shown(&a, &best.face, cells, merged, inclined, x, y, &out);
+        set_shown(&a, &best.face, cells, places, merged, inclined, x, y, &out);
     return out;
 }

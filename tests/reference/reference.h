@@ -390,11 +390,12 @@ struct ref_merge ref_merge(const struct merge_args *args, const struct ref_merge
 struct ref_incline {
     struct ref_vec n;
     double error;
-    int written, unsure;
+    int joined, written, unsure;
 };
 struct ref_incline ref_incline(const struct incline_args *args, const float *places, int x, int y);
 struct ref_magnify {
-    int shown, unsure; // shown: something is, keys aside
+    int shown, unsure;     // shown: something is, keys aside
+    enum ref_truth marked; // of the first of two passes: not sharp
     uint32_t id;
     double z, z_error, color[4], color_error, normal_error, deff, deff_error, away, away_error;
     struct ref_vec n;

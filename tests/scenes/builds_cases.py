@@ -284,6 +284,8 @@ def _ranges(to: _List) -> None:
     to.add("ranges, region, effects", light={**SUN, "shadows": 1}, effects={"edl_strength": 1.0, "obscurance_strength": 1.0},
            settings={"surface": "SURFACE.RANGES", "region": [40, 30, 111, 87]})
     to.add("ranges, samples, film", settings={"surface": "SURFACE.RANGES", "pixel_samples": 6, "film_transparent": 1})
+    to.add("ranges, two passes", {**TORUS, **one, "range_sharpness": 0.7},
+           {**GLASS_TORUS, **one, "range_sharpness": 0.8, "world_from_object": _moved(0.8, 0.4, 0.2)})
     to.add("ranges among meshes", meshes=[{"of": "ball"}], **all_of)
 
 

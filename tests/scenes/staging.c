@@ -236,6 +236,7 @@ static void add(struct stage *stage, const struct staging *staging, const double
     style.cull_back = staging->cull_back;
     if (staging->fill == BESIDE && stage->range_images++ % 2 == 0)
         style.surface = PATINA_SURFACE_RANGES;
+    style.range_sharpness = staging->smooth == 3 || staging->fill == BESIDE ? 0.75f : 0.0f;
     style.ambient = 0.6f;
     style.diffuse = 0.9f;
     style.specular = 0.4f;

@@ -12,7 +12,8 @@ struct cell {
 };
 
 // The way to a cell around, in cells; 0 where it is none, or not joined.
-static void step_to(const struct incline_args *args, const float *places, const struct cell *cell, int k, vf out[3])
+// joined: grows by 1 where it is.
+static void step_to(const struct incline_args *args, const float *places, const struct cell *cell, int k, vf out[3], vf *joined)
 {
     const struct view_args *view = &args->view;
     const vi x = vi_add(cell->x, vi_set((uint32_t)ring[k][0])), y = vi_add(cell->y, vi_set((uint32_t)ring[k][1]));
@@ -23,6 +24,7 @@ static void step_to(const struct incline_args *args, const float *places, const 
     some = vm_and(some, vf_lt(zero, other[3]));
     const vf deeper = other[2] - cell->place[2], nearer = vf_select(some, vf_min(other[2], cell->place[2]), vf_set(1.0f));
     some = vm_and(some, vf_le(vf_abs(deeper), pt_range_step(view, args->gamma, args->gamma_cells, nearer)));
+    *joined = vf_add_where(some, *joined, vf_set(1.0f));
     vf across = (vf_set((float)ring[k][0]) + (other[0] - cell->place[0])) * vf_set(view->ray_xs);
     vf up = (vf_set((float)ring[k][1]) + (other[1] - cell->place[1])) * vf_set(view->ray_ys);
     if (view->perspective) {
@@ -53,7 +55,7 @@ static void incline_cells(const struct incline_args *args, const float *places, 
     cell.ray[1] = vf_set(view->ray_y0) + vf_set(view->ray_ys) * py;
     cell.scale = vf_rcp(vf_footprint(view, cell.place[2]));
     for (int k = 0; k < 8; k++)
-        step_to(args, places, &cell, k, steps[k]);
+        step_to(args, places, &cell, k, steps[k], &n[3]);
     // all pairs less than half a turn apart: 24 triangles
     for (int k = 0; k < 8; k++) {
         vf b[3];

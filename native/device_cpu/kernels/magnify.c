@@ -11,8 +11,8 @@ struct corners {
     vi cell[AROUND];
 };
 
-struct found { // the nearest face
-    vm some;
+struct found {       // the nearest face
+    vm some, loose;  // loose: it is none
     vf z, weight[3]; // not yet shares of their sum
     vi corner[3];    // of those around
 };
@@ -194,7 +194,36 @@ static void mix(const struct walk *walk, const struct found *best, const vi cell
     color[3] = vf_min(color[3], vf_set(1.0f));
 }
 
-static void show(const struct walk *walk, uint32_t x, uint32_t y, const struct corners *c, const struct found *best)
+// Of the first of two passes: what is not sharp. cell: of the corner that weighs most.
+static vm unsharp(const struct walk *walk, const struct found *best, vi cell, const vf ray[2])
+{
+    const struct magnify_args *args = walk->args;
+    vf inclined[4], place[4];
+    vf_gather4(PT_DATA(walk->call, magnify, inclined), cell, best->some, inclined);
+    vf_gather4(PT_DATA(walk->call, magnify, place), cell, best->some, place);
+    const vm grazed = vf_lt(vf_cosine(&args->view, inclined, ray), vf_set(args->cosine));
+    const vm edge = vf_lt(inclined[3], vf_set(8.0f)), many = vf_lt(vf_set(args->most), place[3]);
+    return vm_or(vm_or(grazed, edge), vm_or(many, best->loose));
+}
+
+// Of the second: what may take the place of what is there, whose marks are taken away.
+static vm replaces(const struct walk *walk, size_t at, const struct found *best, vm lanes)
+{
+    const struct magnify_args *args = walk->args;
+    const uint64_t *keys = (const uint64_t *)PT_DATA(walk->call, magnify, keys) + at;
+    float *away = (float *)PT_DATA(walk->call, magnify, away) + at;
+    const vf z = vi_float(vi_load_z(keys)), zero = vf_zero(), marks = vf_load(away);
+    const vm own = vm_and(vm_and(lanes, vf_lt(z, vf_set(pt_float(PT_KEY_EMPTY_Z)))),
+                          vi_lt_unsigned(vi_sub(vi_load_id(keys), vi_set(args->id_base)), vi_set(args->id_count)));
+    const vm marked = vm_and(own, vf_lt(marks, zero));
+    vf_store_where(away, vf_set(-1.0f) - marks, marked);
+    const vf depth = vf_select(own, z, vf_set(1.0f));
+    const vf step = pt_range_step(walk->cells, args->gamma, args->gamma_cells, depth);
+    const vm nearer = vf_lt(best->z, depth - step), near = vf_le(best->z, depth + step);
+    return vm_and(best->some, vm_or(vm_not(own), vm_or(nearer, vm_and(marked, near))));
+}
+
+static void show(const struct walk *walk, uint32_t x, uint32_t y, const struct corners *c, const struct found *best, vm lanes)
 {
     const struct magnify_args *args = walk->args;
     const struct view_args *view = &args->view;
@@ -212,6 +241,10 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, const struct c
     const vi z = vf_bits(best->z), id = vi_gather_id(PT_DATA(walk->call, magnify, cells), pick_cell(c, which), best->some);
     // 2. before what is there
     vm some = vm_and(best->some, pt_less(z, id, vi_load_z(keys), vi_load_id(keys)));
+    if (args->pass == PT_RANGE_FINE) {
+        const vm own = vi_lt_unsigned(vi_sub(vi_load_id(keys), vi_set(args->id_base)), vi_set(args->id_count));
+        some = vm_and(vm_or(some, own), replaces(walk, at, best, lanes));
+    }
     if (args->behind)
         some = vm_and(some, vf_lt(vf_load((const float *)PT_DATA(walk->call, magnify, limit) + at), best->z));
     if (!vm_bits(some))
@@ -229,7 +262,9 @@ static void show(const struct walk *walk, uint32_t x, uint32_t y, const struct c
     const vf pixel = vf_set(args->pixel), half = vf_set(0.5f), minus = vf_set(-0.5f);
     const vf dx = pick(c->x, which) * pixel, dy = pick(c->y, which) * pixel, square = dx * dx + dy * dy;
     const vm within = vm_and(vm_and(vf_le(minus, dx), vf_lt(dx, half)), vm_and(vf_le(minus, dy), vf_lt(dy, half)));
-    const vf away = vf_select(within, zero, square * vf_rsqrt(vf_max(square, vf_set(1e-12f))));
+    vf away = vf_select(within, zero, square * vf_rsqrt(vf_max(square, vf_set(1e-12f))));
+    if (args->pass == PT_RANGE_COARSE)
+        away = vf_select(unsharp(walk, best, pick_cell(c, which), ray), vf_set(-1.0f) - away, away);
     const vi own = vi_add(vi_set((uint32_t)at), vi_lanes());
     vi_store_keys(keys, z, id, vm_bits(some));
     vi_store_where((uint32_t *)PT_DATA(walk->call, magnify, from) + at, own, some);
@@ -249,13 +284,13 @@ static void magnify_row(void *context, uint32_t y)
     const uint32_t *rect = args->view.rect;
     for (uint32_t x = rect[0]; x < rect[2]; x += PT_LANES) {
         const vm lanes = vm_first(pt_lanes_left(x, rect[2]));
-        struct found best = {.some = vm_of_bits(0), .z = vf_set(pt_float(PT_KEY_EMPTY_Z))};
+        struct found best = {.some = vm_of_bits(0), .loose = vm_of_bits(0), .z = vf_set(pt_float(PT_KEY_EMPTY_Z))};
         struct corners corners;
         uint32_t any = 0;
         look_around(&walk, vi_add(vi_set(x), vi_lanes()), y, lanes, &corners);
         for (int k = 0; k < AROUND; k++)
             any |= vm_bits(corners.some[k]);
-        if (!any)
+        if (!any && args->pass != PT_RANGE_FINE)
             continue;
         for (int i = 0; i < 3; i++) {
             best.weight[i] = vf_zero();
@@ -263,12 +298,15 @@ static void magnify_row(void *context, uint32_t y)
         }
         for (int k = 0; k < 4; k++)
             take_faces(&walk, &corners, k % 2 + 3 * (k / 2), lanes, 0, &best);
-        take_places(&walk, &corners, lanes, &best);
+        const vm faces = best.some;
+        if (args->pass != PT_RANGE_FINE)
+            take_places(&walk, &corners, lanes, &best);
         const vm open = vm_and(lanes, vm_not(best.some));
         for (int k = 0; k < 4 && vm_bits(open); k++)
             take_faces(&walk, &corners, k % 2 + 3 * (k / 2), open, 1, &best);
-        if (vm_bits(best.some))
-            show(&walk, x, y, &corners, &best);
+        best.loose = vm_not(faces);
+        if (vm_bits(best.some) || args->pass == PT_RANGE_FINE)
+            show(&walk, x, y, &corners, &best, lanes);
     }
 }
 
