@@ -439,18 +439,18 @@ typedef struct patina_cloud_style {
     // Of points as range images [Kawata & Kanai], SPEC 6; nothing for others:
     const patina_scans *scans; // of this cloud: the scans that it was made of. NULL = one. It must outlive what the mask must
     uint32_t surface;          // patina_surface: 0 = as in the settings, RANGES = this cloud as range images whatever they say
-    float
-        range_gamma; // object units: points so far behind the nearest in their pixel are one surface with it, as scans that do not
-                     // quite fit; neighbours with a greater step between them are not joined. 0 = automatic: twice the interval
-                     // of the samples, as the scans or else the spacings say, or two pixels of the image buffer
-    float
-        range_pixel; // of the image buffer, on screen: 1..64 pixels of the picture. 0 = automatic: so that neighbouring samples
-                     // fall into neighbouring pixels
-    float
-        range_sharpness; // 0 = none; else 0.5..0.95, range_pixel of a finer first pass in parts of itself, shown where many points
-                         // share a pixel or a surface is grazed. [K II.E] has 0.66 to 0.83
-    float range_cull; // 0 = none; else radians, up to pi: scans whose direction is at a greater angle to the direction of view
-                      // are left out whole
+    // gamma, object units: points so far behind the nearest in their pixel of the image buffer are one surface with it, as scans that
+    // do not quite fit. Such pixels beside each other are joined up to that step, or four of their widths. 0 = automatic: twice the
+    // interval of the samples, as the scans or else the spacings say, or two widths.
+    float range_gamma;
+    // Of the image buffer's pixels: 1..64 pixels of the picture. 0 = automatic: as wide as two samples lie apart, 1..32.
+    float range_pixel;
+    // 0 = one pass; else 0.5..0.95: a second, whose pixels are so much finer, shows where the first is not sharp: at outlines, where many
+    // points share a pixel, where a surface is grazed. [K II.E] has 0.66 to 0.83.
+    float range_sharpness;
+    // 0 = none; else radians, up to pi: of the first 1024 scans those are left out whole whose direction is at a greater angle to that
+    // from the eye to the middle of the cloud's box.
+    float range_cull;
     uint32_t range_unused; // says nothing
 } patina_cloud_style;
 #define PATINA_CLOUD_STYLE_INIT                                                                                                \
