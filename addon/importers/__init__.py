@@ -11,7 +11,7 @@ import numpy as np
 
 from ..jobs import Steps
 from ..native import PatinaError
-from . import conf, e57, las, library, pcd
+from . import e57, las, library, pcd
 from .reading import Filter, PointFile, Progress, name_of, told
 
 __all__ = ["FORMATS", "Filter", "PointFile", "Progress", "name_of", "preview", "reader", "steps", "to_mesh", "told"]
@@ -27,7 +27,7 @@ WHOLE = np.int8 if bpy.app.version >= (4, 2, 0) else np.int32
 
 # ending → module with read(path, filter, progress), steps(path, filter, progress) and preview(path)
 FORMATS = {".ply": library, ".xyz": library, ".txt": library, ".csv": library, ".asc": library, ".pts": library,
-           ".ptx": library, ".las": las, ".laz": las, ".e57": e57, ".pcd": pcd, ".conf": conf}
+           ".ptx": library, ".las": las, ".laz": las, ".e57": e57, ".pcd": pcd, ".conf": library}
 
 
 def reader(path: Path) -> ModuleType:

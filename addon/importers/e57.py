@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""E57 (ASTM E2807) through pye57: all scans in one cloud, each point with its scan's number."""
+"""E57 (ASTM E2807) through pye57: all scans in one cloud, each point with its scan's number. What is wrong with one scan is told by its
+number; the others are there."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import jobs, native, readers
+from . import scans
 from .crs import units
 from .reading import Filter, PointFile, Progress, colors_of, crs_notes, grid_normals, origin_of, scanners_of
 
@@ -17,6 +21,7 @@ MISSING = ("E57 files need the Python package pye57: Install Readers in the add-
            "Blender 4.2 and later brings it)")
 
 SMALL_PIECE = 1 << 17  # points that take some 30 ms
+CELLS = 1 << 24  # a grid's rows or columns: more are no whole numbers in float32
 
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
@@ -27,6 +32,12 @@ _INVALID = ("cartesianInvalidState", "sphericalInvalidState")
 # Names of attributes, as the other readers have them; other fields keep theirs, without an extension's prefix.
 _NAMES = {"rowIndex": "row", "columnIndex": "column", "returnIndex": "return_number", "returnCount": "number_of_returns",
           "classification": "class", "Classification": "class", "pointSourceId": "point_source_id"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Pose:
+    turn: np.ndarray | None = None  # (3, 3); None: none
+    place: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))
 
 
 def _open(path: Path) -> Any:
@@ -64,15 +75,29 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
     file = _open(path)
     parts: list[dict[str, np.ndarray]] = []
     stations: list[np.ndarray] = []
+    warnings: list[str] = []
+    failed: native.PatinaError | None = None
     done, read, index, crs = 0, 0, 0, ""
     try:
         crs = _crs(file)
         headers = [file.get_header(index) for index in range(file.scan_count)]
         total = max(sum(header.point_count for header in headers), 1)
         for index, header in enumerate(headers):
-            stations.append(_station(header))
+            what = f"{path.name}: scan {index}"
+            pose, wrong = _pose(header)
+            stations.append(_station(header, pose))
+            if wrong:
+                warnings.append(f"{what}{wrong}")
+            if pose is None:
+                continue
+            if header.point_count < 2:
+                warnings.append(f"{what} has {'one point' if header.point_count else 'no points'}")
             first = len(parts)
-            for count, data in _pieces(file, header):
+            if header.point_count and not _has_places(header):
+                failed = native.PatinaError(f"{what}: its points have no positions: {', '.join(header.point_fields)}", -4)
+                warnings.append(str(failed))
+                continue
+            for count, data in _pieces(file, header, pose):
                 progress.step(read / total)
                 read += count
                 keep = wanted.mask(done, data["positions"])
@@ -87,18 +112,78 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         raise native.PatinaError(f"{path.name}: scan {index}: {_first_line(error)}", -4) from None
     finally:
         file.close()
+    if failed and not parts:
+        raise failed
     points = merge(path.stem, parts, {"crs": crs, **crs_notes(units(crs))} if crs else {})
+    points.warnings += warnings
     points.notes |= scanners_of(stations if np.isfinite(stations).any() else [], points.origin)
+    points.notes |= scans.note(_described(headers, points, stations, path.name))
     if wanted.every == 1:  # a thinned grid is none
         yield from grid_normals(points, stations, progress)
     return points
 
 
-def _station(header: Any) -> np.ndarray:
+def _pose(header: Any) -> tuple[Pose | None, str]:
+    """The turn and the place of a scan, none where it has no pose; or None, where it is none of a pose; and what is wrong, to be said
+    behind the scan's number."""
+    if not header.has_pose():
+        return Pose(), ""
+    pose, values = header.node["pose"], {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
+    if pose.isDefined("rotation"):
+        values = {axis: float(pose["rotation"][axis].value()) for axis in "wxyz"}
+    w, x, y, z = (values[axis] for axis in "wxyz")
+    place = np.array([float(pose["translation"][axis].value()) for axis in "xyz"] if pose.isDefined("translation") else [0.0] * 3)
+    length = math.sqrt(w * w + x * x + y * y + z * z)
+    if not (math.isfinite(length) and length > 1e-6 and np.isfinite(place).all()):
+        return None, f" is left out: its quaternion {w:g} {x:g} {y:g} {z:g} or its place is no pose"
+    wrong = f": its quaternion is of length {length:g}, and taken as of length 1" if abs(length - 1.0) > 1e-3 else ""
+    w, x, y, z = (value / length for value in (w, x, y, z))
+    turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    return Pose(turn, place), wrong
+
+
+def _station(header: Any, pose: Pose | None) -> np.ndarray:
     """Where the scanner stood, in the file's coordinates; NaN where that is not said. Without a pose a scan that has ranges
     or a grid was taken from zero; points alone may come from anywhere."""
     local = {_SPHERICAL[0], "rowIndex", "columnIndex"} & set(header.point_fields)
-    return header.translation if header.has_pose() or local else np.full(3, np.nan)
+    known = pose is not None and (header.has_pose() or local)
+    return pose.place.copy() if known else np.full(3, np.nan)
+
+
+def _described(headers: list[Any], points: PointFile, stations: list[np.ndarray], name: str) -> list[scans.Scan]:
+    """What is known of each scan; says at the points what is wrong with their grids."""
+    found = []
+    of = points.scalars.get("scan", np.empty(0, np.float32))
+    for index, header in enumerate(headers):
+        own = np.flatnonzero(of == index)
+        own = slice(own[0], own[-1] + 1) if len(own) else slice(0)
+        places = points.positions[own].astype(np.float64)
+        direction = scans.direction(places, stations[index] - points.origin)
+        interval = 0.0
+        if {"rowIndex", "columnIndex"} <= set(header.point_fields) and len(places):
+            row, column = (points.scalars[axis][own] for axis in ("row", "column"))
+            good = (row >= 0) & (column >= 0) & (row < CELLS) & (column < CELLS)
+            if not good.all():
+                points.warnings.append(f"{name}: scan {index}: {int((~good).sum()):,} points lie in no cell of its grid")
+            if taken := scans.twice(row[good], column[good]):
+                points.warnings.append(f"{name}: scan {index}: {taken:,} points lie in cells of its grid that others have")
+            interval = scans.interval(places[good], row[good], column[good])
+        found.append(scans.Scan(_name(header), len(places), direction, interval))
+    return found
+
+
+def _name(header: Any) -> str:
+    try:
+        return str(header.node["name"].value())
+    except Exception:  # the element is optional
+        return ""
+
+
+def _has_places(header: Any) -> bool:
+    fields = _fields(header)
+    return any(all(name in fields for name in names) for names in (_CARTESIAN, _SPHERICAL))
 
 
 def _fields(header: Any) -> dict[str, str]:
@@ -109,7 +194,7 @@ def _fields(header: Any) -> dict[str, str]:
     return {name.rpartition(":")[2]: name for name in header.point_fields if isinstance(prototype[name], numbers)}
 
 
-def _pieces(file: Any, header: Any) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+def _pieces(file: Any, header: Any, pose: Pose) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
     """How many points were read, and of the valid ones "positions" in the file's coordinates, "normals" and "rgb" where there
     are such (the latter as the file has them), and all other numbers by name. pye57's own way knows a few fields of certain
     types; float64 holds what any file declares."""
@@ -117,8 +202,6 @@ def _pieces(file: Any, header: Any) -> Iterator[tuple[int, dict[str, np.ndarray]
     if not header.point_count:
         return
     fields, size = _fields(header), min(SMALL_PIECE, header.point_count)
-    if not any(all(name in fields for name in names) for names in (_CARTESIAN, _SPHERICAL)):
-        raise native.PatinaError("its points have no positions: " + ", ".join(header.point_fields), -4)
     data = {name: np.empty(size, np.float64) for name in fields}
     buffers = libe57.VectorSourceDestBuffer()
     for name, field in fields.items():
@@ -131,21 +214,20 @@ def _pieces(file: Any, header: Any) -> Iterator[tuple[int, dict[str, np.ndarray]
             for name in _INVALID:
                 if name in piece:
                     valid &= piece.pop(name) == 0
-            yield count, _columns({name: values[valid] for name, values in piece.items()}, header)
+            yield count, _columns({name: values[valid] for name, values in piece.items()}, pose)
     finally:
         reader.close()
 
 
-def _columns(piece: dict[str, np.ndarray], header: Any) -> dict[str, np.ndarray]:
+def _columns(piece: dict[str, np.ndarray], pose: Pose) -> dict[str, np.ndarray]:
     found = {"positions": _cartesian(piece)}
     for name, parts in (("normals", _NORMALS), ("rgb", _COLORS)):
         if all(part in piece for part in parts):
             found[name] = np.stack([piece.pop(part) for part in parts], 1).astype(np.float32)
-    if header.has_pose():
-        turn = header.rotation_matrix
-        found["positions"] = found["positions"] @ turn.T + header.translation
+    if pose.turn is not None:
+        found["positions"] = found["positions"] @ pose.turn.T + pose.place
         if "normals" in found:
-            found["normals"] = found["normals"] @ turn.T.astype(np.float32)
+            found["normals"] = found["normals"] @ pose.turn.T.astype(np.float32)
     for name, values in piece.items():
         if name not in {*_CARTESIAN, *_SPHERICAL}:
             found.setdefault(_NAMES.get(name, name), values.astype(np.float32))

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PLY, XYZ, CSV, PTS and PTX files through the library's readers."""
+"""PLY, XYZ, CSV, PTS, PTX and conf files through the library's readers."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from .. import jobs, native
+from . import scans
 from .reading import Filter, PointFile, Progress, scanners_of
 
 
@@ -20,8 +21,10 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
         task = native.File.start(str(path), inner)
     yield task
     with task.result() as file:
+        told = [scans.Scan(scan.name, scan.count, scan.direction, scan.interval) for scan in file.scans()]
         # the log is the whole process's; nobody else reads it
-        warnings = [text for level, text in native.log_lines() if level == 1 and path.name in text]
+        names = {path.name, *(scan.name for scan in told if scan.name)}
+        warnings = [text for level, text in native.log_lines() if level == 1 and any(name in text for name in names)]
         return PointFile(
             name=path.stem,
             positions=file.positions(),
@@ -30,7 +33,7 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             scalars={name: file.attribute(index) for index, name in enumerate(file.attributes)},
             origin=file.origin,
             invalid=file.invalid_positions,
-            notes=scanners_of(file.stations(), file.origin),
+            notes=scanners_of(file.stations(), file.origin) | scans.note(told),
             warnings=warnings).filtered(wanted)
 
 
@@ -38,6 +41,10 @@ def preview(path: Path) -> list[str]:
     """What the head of the file says: a PLY's header, else the first lines."""
     with open(path, "rb") as file:
         head = file.read(65536)
+    if path.suffix.lower() == ".conf":
+        names = [words[1] for line in head.decode("utf-8", "replace").splitlines() if (words := line.split())[:1] == ["bmesh"]
+                 and len(words) > 1]
+        return [f"{len(names)} scans", *names[:8]]
     if not head.startswith(b"ply"):
         lines = head.decode("utf-8", "replace").splitlines()
         return [f"{path.stat().st_size / 1e6:,.1f} MB of text", *(line[:60] for line in lines[:4])]

@@ -14,6 +14,7 @@ import os
 import weakref
 from collections.abc import Callable, Sequence
 from ctypes import byref, c_double, c_float, c_uint32, c_uint64, c_void_p
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -343,6 +344,17 @@ class Texture(_Handle):
                                             raw=raw, nearest=nearest, wrap=WRAPS.index(wrap))))
 
 
+@dataclass(frozen=True)
+class FileScan:
+    """patina_file_scan."""
+
+    name: str
+    count: int
+    direction: tuple[float, float, float]  # in which the scanner looked; 0: not known, or all around
+    interval: float  # of neighbouring samples; 0: not known
+    station: tuple[float, float, float] | None  # file coordinates
+
+
 class File(_Handle):
     """An opened point file. Arrays are float32, 8-bit colours uint8 RGBA (sRGB), other colours float32 (linear)."""
 
@@ -403,6 +415,16 @@ class File(_Handle):
         """(n, 3) float64, where the scanner stood, in the file's coordinates: attribute "scan" tells which for a point."""
         count = self._info.stations
         return self._column("read_stations", (count, 3), dtype=np.float64) if count else np.empty((0, 3))
+
+    def scans(self) -> list[FileScan]:
+        """What the file says of its scans, in the order of their numbers."""
+        return [self._scan(index) for index in range(self._info.scans)]
+
+    def _scan(self, index: int) -> FileScan:
+        scan = abi.FileScan()
+        self._call("get_scan", index, byref(scan))
+        return FileScan(scan.name.decode("utf-8", "replace"), scan.count, tuple(scan.direction), scan.interval,
+                        tuple(scan.station) if scan.has_station else None)
 
 
 class Scene(_Handle):

@@ -106,11 +106,17 @@ class FileInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
                 ("box_min", c_double * 3), ("box_max", c_double * 3), ("invalid_positions", c_uint64),
-                ("stations", c_uint32)]
+                ("stations", c_uint32), ("scans", c_uint32)]
 
 
 class FileAttribute(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("type", c_uint32)]
+
+
+class FileScan(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("name", c_char * 64), ("first", c_uint64), ("count", c_uint64),
+                ("columns", c_uint32), ("rows", c_uint32), ("pose", c_double * 12), ("station", c_double * 3),
+                ("direction", c_double * 3), ("interval", c_double), ("has_station", c_uint32), ("unused", c_uint32)]
 
 
 class GridDesc(Descriptor):
@@ -278,6 +284,7 @@ CALLS = {
     "patina_file_destroy": (c_void_p,),
     "patina_file_get_info": (c_void_p, POINTER(FileInfo)),
     "patina_file_get_attribute": (c_void_p, c_uint32, POINTER(FileAttribute)),
+    "patina_file_get_scan": (c_void_p, c_uint32, POINTER(FileScan)),
     "patina_file_read_positions": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_normals": (c_void_p, c_void_p, c_size_t),
     "patina_file_read_colors_u8": (c_void_p, c_void_p, c_size_t),

@@ -42,3 +42,17 @@ const struct pt_column *pt_file_find_attribute(const struct patina_file *file, c
             return &file->attributes[i];
     return NULL;
 }
+
+double pt_file_value(const struct pt_column *column, uint64_t i)
+{
+    switch (column->type) {
+    case PATINA_INT8: return ((const int8_t *)column->data)[i];
+    case PATINA_UINT8: return ((const uint8_t *)column->data)[i];
+    case PATINA_INT16: return ((const int16_t *)column->data)[i];
+    case PATINA_UINT16: return ((const uint16_t *)column->data)[i];
+    case PATINA_INT32: return ((const int32_t *)column->data)[i];
+    case PATINA_UINT32: return ((const uint32_t *)column->data)[i];
+    case PATINA_FLOAT64: return ((const double *)column->data)[i];
+    }
+    return (double)((const float *)column->data)[i];
+}

@@ -32,8 +32,7 @@ static const char *format_of_add_on(const struct pt_input *input)
     static const struct {
         const char *start, *format;
     } known[] = {
-        {"LASF", "LAS, LAZ or COPC"}, {"ASTM-E57", "E57"}, {"# .PCD", "PCD"},  {"VERSION .7", "PCD"},
-        {"VERSION 0.7", "PCD"},       {"camera ", "conf"}, {"bmesh ", "conf"}, {"mesh ", "conf"},
+        {"LASF", "LAS, LAZ or COPC"}, {"ASTM-E57", "E57"}, {"# .PCD", "PCD"}, {"VERSION .7", "PCD"}, {"VERSION 0.7", "PCD"},
     };
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         if (input->size >= strlen(known[i].start) && !memcmp(input->data, known[i].start, strlen(known[i].start)))
@@ -41,20 +40,28 @@ static const char *format_of_add_on(const struct pt_input *input)
     return NULL;
 }
 
-static int read_input(const struct pt_input *input, patina_file **out)
+// path: NULL where other files cannot be found from this one.
+static int read_input(const struct pt_input *input, const char *path, patina_file **out)
 {
     const char *elsewhere = format_of_add_on(input);
     if (elsewhere)
         return pt_fail(
             NULL, PATINA_ERROR_FORMAT,
-            "%s: a file of format %s, which Patina's add-on for Blender reads and exports as PLY; here PLY, XYZ, CSV, PTS "
-            "and PTX are read",
+            "%s: a file of format %s, which Patina's add-on for Blender reads and exports as PLY; here PLY, XYZ, CSV, PTS, "
+            "PTX and conf are read",
             input->name, elsewhere);
+    const bool conf = pt_conf_is(input);
+    if (conf && !path)
+        return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: a .conf names other files, which are not found from here", input->name);
     struct patina_file *file = calloc(1, sizeof *file);
     if (!file)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
     pt_handle_init(&file->handle);
-    int code = pt_text_is(input) ? pt_text_read(file, input) : pt_ply_read(file, input);
+    int code = conf                ? pt_conf_read(file, input, path)
+               : pt_text_is(input) ? pt_text_read(file, input)
+                                   : pt_ply_read(file, input);
+    if (!code && pt_file_measure_scans(file))
+        code = pt_fail(NULL, PATINA_ERROR_MEMORY, "%s: out of memory", input->name);
     if (code) {
         patina_file_destroy(file);
         return code;
@@ -70,21 +77,35 @@ static int fail_to_open(const struct pt_input *input, int error)
 }
 
 // Maps the file and reads it.
-static int read_disk(const struct pt_disk *disk, struct pt_input *input, patina_file **out)
+static int read_disk(const struct pt_disk *disk, struct pt_input *input, const char *path, patina_file **out)
 {
     if (disk->kind != PT_DISK_FILE)
         return pt_fail(NULL, PATINA_ERROR_FILE, "%s: is %s, not a file", input->name,
                        disk->kind == PT_DISK_FOLDER ? "a folder" : "a device or pipe");
     input->size = (size_t)disk->size;
     if (input->size == 0) // cannot be mapped; the reader has the words for it
-        return read_input(input, out);
+        return read_input(input, path, out);
     void *data;
     int error = pt_disk_map(disk, 0, input->size, PT_DISK_ONCE, &data);
     if (error)
         return fail_to_open(input, error);
     input->data = data;
-    int code = read_input(input, out);
+    int code = read_input(input, path, out);
     pt_pages_free(data, input->size);
+    return code;
+}
+
+int pt_file_open(const char *path, bool alone, struct patina_progress *progress, struct patina_file **out)
+{
+    struct pt_input input = {.progress = progress};
+    struct pt_disk disk;
+    pt_clip_name(input.name, sizeof input.name, path);
+    pt_progress_set(progress, 0);
+    int error = pt_disk_open(path, &disk);
+    if (error)
+        return fail_to_open(&input, error);
+    int code = read_disk(&disk, &input, alone ? NULL : path, out);
+    pt_disk_close(&disk);
     return code;
 }
 
@@ -95,16 +116,7 @@ int patina_file_open(const char *path, patina_progress *progress, patina_file **
     *out = NULL;
     if (!path)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open: path is NULL");
-    struct pt_input input = {.progress = progress};
-    struct pt_disk disk;
-    pt_clip_name(input.name, sizeof input.name, path);
-    pt_progress_set(progress, 0);
-    int error = pt_disk_open(path, &disk);
-    if (error)
-        return fail_to_open(&input, error);
-    int code = read_disk(&disk, &input, out);
-    pt_disk_close(&disk);
-    return code;
+    return pt_file_open(path, false, progress, out);
 }
 
 int patina_file_open_memory(const void *data, size_t size, patina_file **out)
@@ -115,7 +127,7 @@ int patina_file_open_memory(const void *data, size_t size, patina_file **out)
     if (!data && size)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_file_open_memory: data is NULL");
     struct pt_input input = {.name = "(memory)", .data = data, .size = size};
-    return read_input(&input, out);
+    return read_input(&input, NULL, out);
 }
 
 void patina_file_destroy(patina_file *file)
@@ -135,11 +147,11 @@ void patina_file_destroy(patina_file *file)
 
 // ---- what is in it -------------------------------------------------------------------------------------------------
 
-// Stations are told by scan, so all scans must have one.
+// Stations are told by scan, so all scans with points must have one.
 static uint32_t count_stations(const patina_file *file)
 {
     for (uint32_t i = 0; i < file->scan_count; i++)
-        if (file->scans[i].parallel)
+        if (file->scans[i].parallel || (file->scans[i].nowhere && file->scans[i].count))
             return 0;
     return file->scan_count;
 }
@@ -155,12 +167,36 @@ int patina_file_get_info(const patina_file *file, patina_file_info *info)
                              .color_type = file->color_type,
                              .has_normals = file->normal != NULL,
                              .invalid_positions = file->invalid_positions,
-                             .stations = count_stations(file)};
+                             .stations = count_stations(file),
+                             .scans = file->scan_count};
     memcpy(ours.format, file->format, sizeof ours.format);
     memcpy(ours.origin, file->origin, sizeof ours.origin);
     memcpy(ours.box_min, file->box_min, sizeof ours.box_min);
     memcpy(ours.box_max, file->box_max, sizeof ours.box_max);
     return pt_give(&file->handle, "patina_file_get_info", &ours, sizeof ours, info);
+}
+
+int patina_file_get_scan(const patina_file *file, uint32_t index, patina_file_scan *scan)
+{
+    if (!file || !scan)
+        return pt_fail(file ? &file->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_file_get_scan: %s is NULL",
+                       file ? "scan" : "file");
+    if (index >= file->scan_count)
+        return pt_fail(&file->handle, PATINA_ERROR_ARGUMENT, "patina_file_get_scan: there is no scan %u, the file has %u",
+                       index, file->scan_count);
+    const struct pt_scan *found = &file->scans[index];
+    patina_file_scan ours = {.first = found->first,
+                             .count = found->count,
+                             .columns = found->columns,
+                             .rows = found->rows,
+                             .has_station = !found->parallel && !found->nowhere,
+                             .interval = found->interval};
+    memcpy(ours.name, found->name, sizeof ours.name);
+    memcpy(ours.pose, found->pose, sizeof ours.pose);
+    memcpy(ours.direction, found->direction, sizeof ours.direction);
+    if (ours.has_station)
+        memcpy(ours.station, found->station, sizeof ours.station);
+    return pt_give(&file->handle, "patina_file_get_scan", &ours, sizeof ours, scan);
 }
 
 static int check_index(const patina_file *file, const char *call, uint32_t index)
@@ -293,20 +329,6 @@ int patina_file_read_stations(const patina_file *file, double *xyz, size_t size)
     return PATINA_OK;
 }
 
-static float attribute_value(const struct pt_column *column, uint64_t i)
-{
-    switch (column->type) {
-    case PATINA_INT8: return ((const int8_t *)column->data)[i];
-    case PATINA_UINT8: return ((const uint8_t *)column->data)[i];
-    case PATINA_INT16: return ((const int16_t *)column->data)[i];
-    case PATINA_UINT16: return ((const uint16_t *)column->data)[i];
-    case PATINA_INT32: return (float)((const int32_t *)column->data)[i];
-    case PATINA_UINT32: return (float)((const uint32_t *)column->data)[i];
-    case PATINA_FLOAT64: return (float)((const double *)column->data)[i];
-    }
-    return ((const float *)column->data)[i];
-}
-
 int patina_file_read_attribute(const patina_file *file, uint32_t index, float *values, size_t size)
 {
     int code = check_read(file, "patina_file_read_attribute", true, "attributes", values, size, sizeof *values);
@@ -316,6 +338,6 @@ int patina_file_read_attribute(const patina_file *file, uint32_t index, float *v
         return code;
     const struct pt_column *column = &file->attributes[index];
     for (uint64_t i = 0; i < file->count; i++)
-        values[i] = attribute_value(column, i);
+        values[i] = (float)pt_file_value(column, i);
     return PATINA_OK;
 }

@@ -17,10 +17,14 @@ struct pt_column {
 // Points that one scanner took from one place, column by column or row by row; attributes "row" and "column" say where
 // each lies in its grid.
 struct pt_scan {
+    char name[64];          // "" where nothing names it
     uint64_t first, count;  // points
     uint32_t columns, rows; // 0: no grid
     double station[3];      // where the scanner stood, in the file's coordinates; `parallel`: the direction towards it
-    bool parallel;
+    bool parallel, nowhere; // nowhere: neither place nor direction are known
+    double pose[12];        // the file's coordinates from the scan's own: three rows of four
+    double direction[3];    // in which the scanner looked, unit; 0: not known, or all around. Of pt_file_measure_scans, as is
+    double interval;        // the median way from a point to those beside it in the grid; 0: there are none
 };
 
 // Immutable once opened. All pointers are owned; a column that the file lacks is NULL.
@@ -50,9 +54,16 @@ struct pt_input {
     struct patina_progress *progress; // may be NULL
 };
 
+// Opens the file at a path. alone: a file that names others, as a .conf does, is refused.
+int pt_file_open(const char *path, bool alone, struct patina_progress *progress, struct patina_file **out);
+
 // Readers: fill a zeroed file. On failure the caller destroys what was filled.
 int pt_ply_read(struct patina_file *file, const struct pt_input *input);
 int pt_text_read(struct patina_file *file, const struct pt_input *input); // XYZ, CSV, PTS, PTX
+// Stanford's .conf: scans in files beside it (path: its own), each with its place. What cannot be read is told in the log and left
+// out; an error where nothing is left.
+int pt_conf_read(struct patina_file *file, const struct pt_input *input, const char *path);
+bool pt_conf_is(const struct pt_input *input);
 // Whether the first line that is no comment begins with a number, or names x, y and z; or the file is called a text, and is no PLY.
 bool pt_text_is(const struct pt_input *input);
 
@@ -65,9 +76,17 @@ void pt_file_measure(struct patina_file *file);
 // Normals of the points of scans with a grid, towards the scanner, from the fit of a plane to the grid's neighbours; points
 // in no surface get 0. Nothing where the file has normals, or no scan a grid. file->position must be placed.
 int pt_file_grid_normals(struct patina_file *file, const struct pt_input *input);
+// Sets direction and interval of all scans. file->position must be placed. PATINA_OK or PATINA_ERROR_MEMORY, without words.
+int pt_file_measure_scans(struct patina_file *file);
+// Says of a file's last scan, which is over, what was wrong with it. missing: cells of its grid that never came, which it has no
+// longer then; surplus: lines that came behind it.
+void pt_file_end_scan(struct patina_file *file, const char *name, uint64_t missing, uint64_t surplus);
+// Whether a matrix, three rows of `stride`, turns: to 1 %, and scaled by whatever is the same along all axes.
+bool pt_turns(const double *matrix, int stride);
 // Takes over the data of a new last attribute.
 int pt_file_add_attribute(struct patina_file *file, const char *name, uint32_t type, void *data);
 const struct pt_column *pt_file_find_attribute(const struct patina_file *file, const char *name);
+double pt_file_value(const struct pt_column *column, uint64_t i); // of a point
 
 // Bytes of one element of a patina_type; 0 for PATINA_NONE and unknown ones.
 size_t pt_type_size(uint32_t type);

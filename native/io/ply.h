@@ -112,6 +112,7 @@ struct ply_grid {
     uint32_t columns;
     uint64_t points;
     uint16_t *row, *column; // a point; PLY_NO_CELL
+    uint64_t bad, twice;    // cells that name a point that is not there, or one that another cell named
 };
 enum { PLY_NO_CELL = UINT16_MAX };
 

@@ -119,8 +119,16 @@ void ply_finish_faces(struct ply_faces *faces)
 void ply_take_cell(void *context, uint64_t cell, const double *points, size_t count)
 {
     struct ply_grid *grid = context;
-    if (count == 0 || !(points[0] >= 0 && points[0] < (double)grid->points))
+    if (count == 0)
         return;
+    if (!(points[0] >= 0 && points[0] < (double)grid->points)) {
+        grid->bad++;
+        return;
+    }
+    if (grid->row[(size_t)points[0]] != PLY_NO_CELL) { // it stays where it was first
+        grid->twice++;
+        return;
+    }
     grid->row[(size_t)points[0]] = (uint16_t)(cell / grid->columns);
     grid->column[(size_t)points[0]] = (uint16_t)(cell % grid->columns);
 }

@@ -298,6 +298,10 @@ static int read_grid(const struct plan *plan, struct ply_cursor *at)
         code = ply_read_rows(at, plan->grid, NULL, &lists);
         free(lists.items);
     }
+    if (grid.bad || grid.twice)
+        pt_log(PT_LOG_WARNING,
+               "%s: %llu cells of the range_grid name points that are not there, and %llu one that another cell has",
+               plan->input->name, (unsigned long long)grid.bad, (unsigned long long)grid.twice);
     if (code) {
         free(grid.row);
         free(grid.column);
@@ -307,7 +311,8 @@ static int read_grid(const struct plan *plan, struct ply_cursor *at)
                                       .columns = plan->header->grid_columns,
                                       .rows = plan->header->grid_rows,
                                       .station = {0, 0, 1},
-                                      .parallel = true};
+                                      .parallel = true,
+                                      .pose = {[0] = 1, [5] = 1, [10] = 1}};
     file->scan_count = 1;
     code = pt_file_add_attribute(file, "column", PATINA_UINT16, grid.column);
     if (code)
@@ -349,11 +354,15 @@ static const struct ply_element *find_faces(const struct plan *plan)
 static const struct ply_element *find_grid(const struct plan *plan)
 {
     const struct ply_header *h = plan->header;
-    for (const struct ply_element *e = plan->points + 1; e < h->elements + h->element_count; e++)
-        if (!strcmp(e->name, "range_grid") && e->count == (uint64_t)h->grid_columns * h->grid_rows && e->count &&
-            h->grid_columns < PLY_NO_CELL && h->grid_rows < PLY_NO_CELL && ply_find_corners(h, e) >= 0 &&
-            !pt_file_find_attribute(plan->file, "row") && !pt_file_find_attribute(plan->file, "column"))
+    for (const struct ply_element *e = plan->points + 1; e < h->elements + h->element_count; e++) {
+        if (strcmp(e->name, "range_grid") || !e->count || ply_find_corners(h, e) < 0 ||
+            pt_file_find_attribute(plan->file, "row") || pt_file_find_attribute(plan->file, "column"))
+            continue;
+        if (e->count == (uint64_t)h->grid_columns * h->grid_rows && h->grid_columns < PLY_NO_CELL && h->grid_rows < PLY_NO_CELL)
             return e;
+        pt_log(PT_LOG_WARNING, "%s: the range_grid of %llu cells is left out: num_cols and num_rows say %u x %u",
+               plan->input->name, (unsigned long long)e->count, h->grid_columns, h->grid_rows);
+    }
     return NULL;
 }
 

@@ -63,6 +63,7 @@ struct text {
     float **attributes; // a column each, in the order of the columns
     // Of a PTX:
     uint32_t most;   // columns or rows of a grid, or scans
+    uint32_t scans;  // that were begun
     uint32_t room;   // of file->scans
     void *places[3]; // each point's scan, column and row, from 0: uint16, or uint32 where `most` does not fit
 };
@@ -179,6 +180,8 @@ struct scan {
     uint64_t left; // points still to come
     uint64_t cell; // behind the last one: column by column
     uint32_t columns, rows;
+    bool bad;          // its matrix is none of a pose: its points are left out
+    uint64_t surplus;  // lines behind the grid's that are no header
     double matrix[16]; // as in the file: rows of the transposed
 };
 
@@ -204,8 +207,27 @@ static bool read_scan(struct text *t, struct scan *scan)
     scan->columns = (uint32_t)size[0];
     scan->rows = (uint32_t)size[1];
     scan->left = (uint64_t)scan->columns * scan->rows;
-    scan->cell = 0;
+    scan->cell = scan->surplus = 0;
+    const double *place = scan->matrix + 12;
+    scan->bad = !pt_turns(scan->matrix, 4) || !isfinite(place[0] + place[1] + place[2]);
     return true;
+}
+
+// The same; where it is none, t->at stays.
+static bool try_scan(struct text *t, struct scan *scan)
+{
+    const uint8_t *at = t->at;
+    const uint64_t line = t->line;
+    const uint32_t breaks = t->breaks;
+    struct scan found = {0};
+    if (read_scan(t, &found)) {
+        *scan = found;
+        return true;
+    }
+    t->at = at;
+    t->line = line;
+    t->breaks = breaks;
+    return false;
 }
 
 static int keep_scan(struct text *t, const struct scan *scan, uint64_t first)
@@ -220,8 +242,11 @@ static int keep_scan(struct text *t, const struct scan *scan, uint64_t first)
         t->room = room;
     }
     struct pt_scan *kept = &file->scans[file->scan_count++];
-    *kept = (struct pt_scan){.first = first, .columns = scan->columns, .rows = scan->rows};
-    memcpy(kept->station, scan->matrix + 12, sizeof kept->station);
+    *kept = (struct pt_scan){.first = first, .columns = scan->columns, .rows = scan->rows, .nowhere = scan->bad};
+    for (int i = 0; i < 12; i++)
+        kept->pose[i] = scan->matrix[4 * (i % 4) + i / 4];
+    if (!scan->bad)
+        memcpy(kept->station, scan->matrix + 12, sizeof kept->station);
     return PATINA_OK;
 }
 
@@ -341,12 +366,42 @@ static int check_row(struct text *t, const uint8_t *at, struct pt_line line, con
     return code;
 }
 
+// Whether the line holds a single number, as a scan's header begins and no point does.
+static bool is_single(struct text *t)
+{
+    const uint8_t *at = t->at;
+    while (at<t->end && * at> ' ')
+        at++;
+    while (at < t->end && pt_is_blank(*at))
+        at++;
+    return at == t->end || pt_is_line_end(*at);
+}
+
+// Where a scan's header is due, or comes too early. i: the first point behind it.
+static int next_scan(struct text *t, struct scan *scan, bool storing, uint64_t i)
+{
+    const struct scan before = *scan;
+    double values[MOST_COLUMNS];
+    if (!try_scan(t, scan)) { // more lines than the grid has cells
+        scan->surplus++;
+        read_line(t, values);
+        return PATINA_OK;
+    }
+    if (storing && t->scans)
+        pt_file_end_scan(t->file, t->input->name, before.left, before.surplus);
+    t->scans++;
+    t->most = scan->columns > t->most ? scan->columns : t->most;
+    t->most = scan->rows > t->most ? scan->rows : t->most;
+    t->most = t->scans > t->most ? t->scans : t->most;
+    return storing ? keep_scan(t, scan, i) : PATINA_OK;
+}
+
 // Goes over all rows; stores them, or only counts them and keeps the first ones.
 static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], uint64_t *count)
 {
     struct scan scan = {0};
     uint64_t i = 0, polled = 0;
-    uint32_t scans = 0;
+    t->scans = 0;
     while (find_line(t)) {
         double values[MOST_COLUMNS] = {0};
         if (++polled % POLL_LINES == 0) {
@@ -355,15 +410,10 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
             if (pt_progress_cancelled(t->input->progress))
                 return pt_fail(NULL, PATINA_ERROR_CANCELLED, "%s: reading was cancelled", t->input->name);
         }
-        if (t->ptx && !scan.left) {
-            if (!read_scan(t, &scan))
-                return fail_at(t, "the header of a PTX scan was expected");
-            scans++;
-            t->most = scan.columns > t->most ? scan.columns : t->most;
-            t->most = scan.rows > t->most ? scan.rows : t->most;
-            t->most = scans > t->most ? scans : t->most;
-            if (storing && keep_scan(t, &scan, i))
-                return PATINA_ERROR_MEMORY;
+        if (t->ptx && (!scan.left || is_single(t))) {
+            int code = next_scan(t, &scan, storing, i);
+            if (code)
+                return code;
             continue;
         }
         const uint8_t *start = t->at;
@@ -372,6 +422,8 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
             continue; // how many points follow: the lines say it themselves
         if (line.empty && line.empty == line.width)
             continue; // a table's last lines
+        if (t->ptx && t->at == t->end && line.count < t->columns)
+            break; // the file was cut short within a point
         int code = storing ? PATINA_OK : check_row(t, start, line, values);
         if (code)
             return code;
@@ -382,7 +434,7 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
         if (t->ptx) {
             scan.left--;
             scan.cell++;
-            if (values[0] == 0.0 && values[1] == 0.0 && values[2] == 0.0)
+            if (scan.bad || (values[0] == 0.0 && values[1] == 0.0 && values[2] == 0.0))
                 continue; // the beam met nothing
             place(&scan, values);
         }
@@ -395,8 +447,8 @@ static int walk(struct text *t, bool storing, double (*sample)[MOST_COLUMNS], ui
         }
         i++;
     }
-    if (scan.left)
-        return fail_at(t, "the file ends within a scan");
+    if (storing && t->scans)
+        pt_file_end_scan(t->file, t->input->name, scan.left, scan.surplus);
     *count = i;
     return PATINA_OK;
 }

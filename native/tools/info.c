@@ -41,6 +41,25 @@ static void print_attributes(const patina_file *file, uint32_t count)
     }
 }
 
+static void print_scans(const patina_file *file, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        patina_file_scan scan = {.struct_size = sizeof scan};
+        if (patina_file_get_scan(file, i, &scan))
+            continue;
+        printf("scan %-6u %s%s%llu points", i, scan.name, scan.name[0] ? ", " : "", (unsigned long long)scan.count);
+        if (scan.columns)
+            printf(", grid %u x %u", scan.columns, scan.rows);
+        if (scan.interval > 0)
+            printf(", interval %.4g", scan.interval);
+        if (scan.has_station)
+            printf(", from %.9g %.9g %.9g", scan.station[0], scan.station[1], scan.station[2]);
+        if (scan.direction[0] != 0 || scan.direction[1] != 0 || scan.direction[2] != 0)
+            printf(", looking %.3f %.3f %.3f", scan.direction[0], scan.direction[1], scan.direction[2]);
+        printf("\n");
+    }
+}
+
 static void print_cloud(const patina_cloud_info *info)
 {
     printf("spacing     %.4g (%.4g to %.4g)\n", info->spacing, info->spacing_min, info->spacing_max);
@@ -79,6 +98,7 @@ int tool_info(int count, char **arguments)
     }
     print_file(&info);
     print_attributes(file, info.attributes);
+    print_scans(file, info.scans);
     fflush(stdout);
     code = patina_file_cloud(file, 0, progress, &cloud);
     patina_cloud_info built = {.struct_size = sizeof built};

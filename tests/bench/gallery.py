@@ -97,11 +97,11 @@ SCANS = (
 
 
 def read(scan: Scan) -> Any:
-    from patina.importers import conf, las, library, pcd
+    from patina.importers import las, library, pcd
     from patina.importers.reading import Filter, Progress
 
     path = DATA / scan.file
-    module = {".las": las, ".laz": las, ".pcd": pcd, ".conf": conf}.get(path.suffix, library)
+    module = {".las": las, ".laz": las, ".pcd": pcd}.get(path.suffix, library)
     return module.read(path, Filter(), Progress())
 
 

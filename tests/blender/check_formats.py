@@ -14,7 +14,7 @@ from check_import import attribute_of, positions_of
 from check_import import import_ply as import_points
 from harness import REPOSITORY, SCRATCH, Skip, add_points, check, check_close, drawn, new_scene, render
 from patina import importers, native
-from patina.importers import e57, las, pcd, reading
+from patina.importers import e57, las, pcd, reading, scans
 
 DATA = REPOSITORY.parent / "shared/data"
 
@@ -495,8 +495,74 @@ def test_pcd_in_steps():
         pcd.TEXT_PIECE, pcd.COPIES = sizes
 
 
-def test_conf_in_steps():
-    check_in_steps(shared("stanford/bunny_range/bun.conf"))
+def test_conf_is_cancelled():
+    """Read by the library, beside Blender; a cancel ends it."""
+    progress = importers.Progress()
+    steps = importers.steps(shared("stanford/bunny_range/bun.conf"), importers.Filter(), progress)
+    task = next(steps)
+    progress.cancel()
+    try:
+        while not task.done():
+            pass
+        next(steps)
+    except importers.PatinaError as error:
+        check(isinstance(error, native.PatinaCancelled), f"{error}")
+    else:
+        check(False, "it was read in spite of a cancel")
+
+
+def range_image(name, z, columns=6, rows=4, count=None):
+    """A PLY with a scanner's grid, 0.1 apart, in a plane across z."""
+    places = [(column * 0.1, row * 0.1, z) for row in range(rows) for column in range(columns)][:count]
+    lines = ["ply", "format ascii 1.0", f"obj_info num_cols {columns}", f"obj_info num_rows {rows}", f"element vertex {len(places)}",
+             "property float x", "property float y", "property float z", f"element range_grid {columns * rows}",
+             "property list uchar int vertex_indices", "end_header", *("%g %g %g" % place for place in places),
+             *(f"1 {i}" if i < len(places) else "0" for i in range(columns * rows))]
+    return text_file(name, "\n".join(lines) + "\n")
+
+
+def test_conf_tells_scans():
+    """What is known of each scan goes with the points; what is wrong with one is said, by its name."""
+    range_image("a.ply", 2.0)
+    range_image("none.ply", 2.0, count=0)
+    path = text_file("set.conf", "camera 0 0 0 0 0 0 1\nmesh all_cybcyl 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 1\nbmesh lost.ply 0 0 0 0 0 0 1"
+                     "\nbmesh none.ply 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 0\nbmesh a.ply 9 0 0 0 1 0 0\n")
+    points = importers.reader(path).read(path, importers.Filter(), importers.Progress())
+    first, second = scans.unpacked(points.notes["scans"])
+    check((first.name, first.count) == ("a.ply", 24) and abs(first.interval - 0.1) < 1e-6, f"{first}")
+    check_close(first.direction, (0, 0, -1), 1e-6, "first")
+    check_close(second.direction, (0, 0, 1), 1e-6, "second")
+    check_close(points.scalars["scan"], [0] * 24 + [1] * 24, 0, "scan")
+    said = "\n".join(points.warnings)
+    for words in ("mesh all_cybcyl is left out", "scan lost.ply is left out", "scan none.ply is left out: it has no points",
+                  "scan a.ply is left out: its quaternion 0 0 0 0"):
+        check(words in said, said)
+    check(importers.preview(path)[0] == "5 scans", f"{importers.preview(path)}")
+
+
+def test_e57_scans():
+    """Directions and intervals of scans with a grid; bad poses, cells that are taken twice, scans of one point and of none are told,
+    and the others are there."""
+    cells = [(row, column) for column in range(6) for row in range(5)]
+    wall = places(*((column * 0.1, 3, row * 0.1) for row, column in cells))
+    def grid(cells):
+        return {"rowIndex": ("integer", (-9, 9), [row for row, _ in cells]), "columnIndex": ("integer", (0, 9), [c for _, c in cells])}
+    good, none = (1, 0, 0, 0), (0, 0, 0, 0)
+    path = e57_file("scans.e57", wall | grid(cells) | {"pose": (good, (50, 0, 0))}, wall | grid(cells) | {"pose": (none, (0, 0, 0))},
+                    wall | grid([(0, 0), *cells[1:-1], (0, 0)]) | {"pose": (good, (0, 0, 0))},
+                    places(), places((1, 2, 3)), wall | grid([(-1, 0), *cells[1:]]),
+                    wall | grid(cells) | {"pose": ((2, 0, 0, 0), (0, 7, 0))})
+    points = e57.read(path, importers.Filter(), importers.Progress())
+    found = scans.unpacked(points.notes["scans"])
+    check([scan.count for scan in found] == [30, 0, 30, 0, 1, 30, 30], f"{found}")
+    check(abs(found[0].interval - 0.1) < 1e-6 and found[0].direction[1] > 0.9, f"{found[0]}")
+    check_close(sorted(set(points.scalars["scan"].tolist())), (0, 2, 4, 5, 6), 0, "scans")
+    last = points.positions[points.scalars["scan"] == 6] + np.array(points.origin)
+    check_close(last[:, 1], [10] * 30, 1e-4, "a quaternion of length 2 turns all the same")
+    said = "\n".join(points.warnings)
+    for words in ("scan 1 is left out: its quaternion 0 0 0 0", "scan 2: 1 points lie in cells", "scan 3 has no points", "scan 4 has one point",
+                  "scan 5: 1 points lie in no cell", "scan 6: its quaternion is of length 2"):
+        check(words in said, said)
 
 
 def test_e57_in_steps():

@@ -256,7 +256,7 @@ def test_missing_and_broken_files():
 def test_formats_of_the_add_on():
     """Files that only the add-on reads are told as such, not as broken ones."""
     for name, head, word in (("a.las", b"LASF" + bytes(300), "LAS, LAZ or COPC"), ("a.e57", b"ASTM-E57" + bytes(100), "E57"),
-                             ("a.pcd", b"# .PCD v0.7\nVERSION 0.7\n", "PCD"), ("a.conf", b"camera 0 0 0 0 0 0 1\n", "conf")):
+                             ("a.pcd", b"# .PCD v0.7\nVERSION 0.7\n", "PCD")):
         (FOLDER / name).write_bytes(head)
         for arguments in (("info", name), ("render", name, "-o", "x.png"), ("convert", name, "x.ply")):
             error = run(*arguments, code=1).stderr
@@ -289,6 +289,23 @@ def test_info():
     assert lines["points"] == ["5000"] and lines["format"] == ["PLY", "ascii"] and lines["normals"] == ["yes"]
     assert lines["colours"] == ["no"]
     assert 0.01 < float(lines["spacing"][0]) < 0.2  # sqrt(4 pi / 5000) = 0.05
+
+
+def test_info_tells_scans():
+    """Of a .conf each scan with its file, points, interval and direction; it renders and converts as one cloud."""
+    grid = "".join(f"{u * 0.1} {v * 0.1} 2\n" for v in range(4) for u in range(5)) + "".join(f"1 {i}\n" for i in range(20))
+    head = ("ply\nformat ascii 1.0\nobj_info num_cols 5\nobj_info num_rows 4\nelement vertex 20\nproperty float x\nproperty float y\n"
+            "property float z\nelement range_grid 20\nproperty list uchar int vertex_indices\nend_header\n")
+    (FOLDER / "front.ply").write_text(head + grid)
+    (FOLDER / "both.conf").write_text("mesh whole_cybcyl 0 0 0 0 0 0 1\nbmesh front.ply 0 0 0 0 0 0 1\nbmesh lost.ply 0 0 0 0 0 0 1\n"
+                                      "bmesh front.ply 9 0 0 0 0.70710678 0 0.70710678\n")
+    done = run("info", "both.conf")
+    assert "scan 0      front.ply, 20 points, grid 5 x 4, interval 0.1, looking 0.000 0.000 -1.000" in done.stdout.replace("-0.000", "0.000")
+    assert "scan 1      front.ply, 20 points, grid 5 x 4, interval 0.1, looking 1.000" in done.stdout, done.stdout
+    assert "scan lost.ply is left out" in done.stderr and "mesh whole_cybcyl is left out" in done.stderr, done.stderr
+    run("convert", "both.conf", "both.ply")
+    assert "points      40" in run("info", "both.ply").stdout
+    run("render", "both.conf", "-o", "both.png", "--size", "32x32")
 
 
 def test_info_of_an_empty_cloud():

@@ -247,10 +247,23 @@ static void test_range_grid(void **state)
         assert_true(fabsf(n[3 * i] + sqrtf(0.2f)) < 1e-5f && fabsf(n[3 * i + 1]) < 1e-5f &&
                     fabsf(n[3 * i + 2] - sqrtf(0.8f)) < 1e-5f);
     }
+    patina_file_scan scan = {.struct_size = sizeof scan};
+    assert_true(info.scans == 1 && !patina_file_get_scan(file, 0, &scan) && !scan.has_station && scan.count == 39);
+    assert_true(scan.direction[2] == -1 && scan.columns == 8 && scan.rows == 5 && scan.interval >= 1 && scan.interval < 1.2);
+    patina_file_destroy(file);
+    expect_log(NULL);
+    char *last = strstr(text, "\n1 38\n"), *before = strstr(text, "\n1 37\n");
+    last[4] = '9';   // no such point
+    before[4] = '6'; // in two cells
+    file = open_text(text);
+    assert_int_equal(patina_file_read_attribute(file, 0, columns, sizeof columns), PATINA_OK);
+    assert_true(columns[36] == 5 && columns[37] == 65535 && columns[38] == 65535);
+    expect_log("1 cells of the range_grid name points that are not there, and 1 one that another cell has");
     patina_file_destroy(file);
     strstr(text, "num_rows 5")[9] = '6'; // not as many cells as the grid should have
     file = open_text(text);
-    assert_true(info_of(file).attributes == 0 && !info_of(file).has_normals);
+    assert_true(info_of(file).attributes == 0 && !info_of(file).has_normals && !info_of(file).scans);
+    expect_log("the range_grid of 40 cells is left out: num_cols and num_rows say 8 x 6");
     patina_file_destroy(file);
 }
 

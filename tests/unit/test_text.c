@@ -315,6 +315,82 @@ static void test_ptx(void **state)
     patina_file_destroy(file);
 }
 
+#define PTX_HEAD(columns, rows, matrix) columns "\n" rows "\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" matrix
+#define PTX_PLAIN "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+
+// Opens a PTX, expects so many points of these scans, and a warning that holds these words.
+static void expect_scans(const char *text, size_t points, const float *wanted, const char *words)
+{
+    take_log();
+    patina_file *file = read(text);
+    float scan[16];
+    assert_int_equal(info_of(file).count, points);
+    assert_int_equal(patina_file_read_attribute(file, 1, scan, sizeof scan), PATINA_OK);
+    for (size_t i = 0; i < points; i++)
+        assert_true(scan[i] == wanted[i]);
+    const char *said = take_log();
+    if (words ? !strstr(said, words) : *said)
+        fail_msg("'%s' is not in '%s'", words ? words : "nothing", said);
+    patina_file_destroy(file);
+}
+
+// What is wrong with a scan is told by its number; the others are there, and what it has itself.
+static void test_bad_scans(void **state)
+{
+    (void)state;
+    static const char good[] = PTX_HEAD("1", "2", PTX_PLAIN) "1 2 3 0.5\n4 5 6 0.5\n";
+    char text[2048];
+    const float both[] = {0, 0, 1, 1}, last[] = {1, 1}, one[] = {0, 1, 1}, first[] = {0, 0};
+    snprintf(text, sizeof text, "%s%s", PTX_HEAD("3", "2", PTX_PLAIN) "1 2 3 0.5\n1 2 4 0.5\n", good);
+    expect_scans(text, 4, both, "scan 0 ends 4 cells before its grid of 3 x 2");
+    snprintf(text, sizeof text, "%s%s", PTX_HEAD("1", "2", PTX_PLAIN) "1 2 3 0.5\n1 2 4 0.5\n9 9 9 1\n9 9 9 1\n", good);
+    expect_scans(text, 4, both, "scan 0: 2 lines behind its grid of 1 x 2 are left out");
+    snprintf(text, sizeof text, "%s%s", PTX_HEAD("1", "2", "0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 1\n") "1 2 3 0.5\n1 2 4 0.5\n",
+             good);
+    expect_scans(text, 2, last, "scan 0 is left out: its matrix");
+    snprintf(text, sizeof text, "%s%s", PTX_HEAD("1", "2", "1 0 0 0\n0.5 1 0 0\n0 0 1 0\n0 0 0 1\n") "1 2 3 0.5\n1 2 4 0.5\n",
+             good);
+    expect_scans(text, 2, last, "scan 0 is left out: its matrix");
+    snprintf(text, sizeof text, "%s%s", PTX_HEAD("1", "1", "1 0 0 0\n0 1 0 0\n0 0 1 0\nnan 0 0 1\n") "1 2 3 0.5\n", good);
+    expect_scans(text, 2, last, "scan 0 is left out: its matrix");
+    snprintf(text, sizeof text, "%s%s", PTX_HEAD("1", "2", PTX_PLAIN) "0 0 0 0.5\n0 0 0 0.5\n", good);
+    expect_scans(text, 2, last, "scan 0 has no points");
+    snprintf(text, sizeof text, "%s%s", PTX_HEAD("1", "2", PTX_PLAIN) "0 0 0 0.5\n7 0 0 0.5\n", good);
+    expect_scans(text, 3, one, "scan 0 has one point");
+    snprintf(text, sizeof text, "%s%s", good, PTX_HEAD("70000", "50000", PTX_PLAIN) "1 2");
+    expect_scans(text, 2, first, "scan 1 ends 3500000000 cells before its grid of 70000 x 50000");
+    expect_scans(good, 2, first, NULL);
+}
+
+// What the scans themselves are: place, direction and interval of each.
+static void test_scans_of_ptx(void **state)
+{
+    (void)state;
+    char text[4096];
+    int at = snprintf(text, sizeof text, "%s", PTX_HEAD("3", "4", "0 1 0 0\n-1 0 0 0\n0 0 1 0\n500 0 7 1\n"));
+    for (int i = 0; i < 12; i++) // a wall 8 away along x, which the matrix turns to y
+        at += snprintf(text + at, sizeof text - (size_t)at, "8 %g %g 0.5\n", (i / 4 - 1) * 0.1, (i % 4 - 1.5) * 0.1);
+    snprintf(text + at, sizeof text - (size_t)at, "%s", PTX_HEAD("1", "2", PTX_PLAIN) "1 0 0 1\n-1 0 0 1\n");
+    patina_file *file = read(text);
+    patina_file_scan scan = {.struct_size = sizeof scan};
+    assert_int_equal(info_of(file).scans, 2);
+    assert_int_equal(patina_file_get_scan(file, 0, &scan), PATINA_OK);
+    assert_true(scan.first == 0 && scan.count == 12 && scan.columns == 3 && scan.rows == 4 && scan.has_station &&
+                !scan.name[0]);
+    assert_true(scan.station[0] == 500 && scan.station[1] == 0 && scan.station[2] == 7);
+    assert_true(fabs(scan.direction[0]) < 1e-3 && scan.direction[1] > 0.999 && fabs(scan.direction[2]) < 1e-3);
+    assert_true(fabs(scan.interval - 0.1) < 1e-4);
+    assert_true(scan.pose[1] == -1 && scan.pose[4] == 1 && scan.pose[10] == 1 && scan.pose[3] == 500 && scan.pose[11] == 7);
+    assert_int_equal(patina_file_get_scan(file, 1, &scan), PATINA_OK);
+    assert_true(scan.first == 12 && scan.direction[0] == 0 && scan.direction[1] == 0 && scan.direction[2] == 0); // all around
+    assert_int_equal(patina_file_get_scan(file, 2, &scan), PATINA_ERROR_ARGUMENT);
+    assert_int_equal(patina_file_get_scan(file, 0, NULL), PATINA_ERROR_ARGUMENT);
+    patina_file_destroy(file);
+    file = read("1 2 3\n");
+    assert_int_equal(info_of(file).scans, 0);
+    patina_file_destroy(file);
+}
+
 enum { COLUMNS = 60, ROWS = 40 };
 
 // A wall at y = 5 seen from the middle of its scanner, a column of the grid at a time; a board before its middle. The
@@ -417,7 +493,6 @@ static void test_refused(void **state)
     refuse("1 2 3\n\n4 5 red\n",
            "line 3: column 3 holds a word, 'red', where a number is needed; a first line that names x, y, z");
     refuse("1 2\n3 4\n", "fewer than three numbers");
-    refuse("1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 0 0 1\n1 2 3 0.5\n", "within a scan");
     refuse("hello world\n", "not a PLY file");
     refuse("X,Y,Z\n2,051640,0,143959,-0,918971\n", "decimal commas cannot be told apart");
     refuse("X;Y;Z\n1.234,5;2;3\n", "line 2: column 'X' holds a word, '1.234,5', where a number is needed");
@@ -439,11 +514,12 @@ static void test_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_columns),       cmocka_unit_test(test_values),         cmocka_unit_test(test_decimal_commas),
-        cmocka_unit_test(test_tables),        cmocka_unit_test(test_words),          cmocka_unit_test(test_first_row_of_nan),
-        cmocka_unit_test(test_ptx),           cmocka_unit_test(test_ptx_grid),       cmocka_unit_test(test_grid_normals),
-        cmocka_unit_test(test_refused),       cmocka_unit_test(test_words_met_late), cmocka_unit_test(test_stray_words),
-        cmocka_unit_test(test_point_numbers), cmocka_unit_test(test_headers),        cmocka_unit_test(test_quoted_lines),
+        cmocka_unit_test(test_columns),        cmocka_unit_test(test_values),       cmocka_unit_test(test_decimal_commas),
+        cmocka_unit_test(test_tables),         cmocka_unit_test(test_words),        cmocka_unit_test(test_first_row_of_nan),
+        cmocka_unit_test(test_bad_scans),      cmocka_unit_test(test_scans_of_ptx), cmocka_unit_test(test_ptx),
+        cmocka_unit_test(test_ptx_grid),       cmocka_unit_test(test_grid_normals), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_words_met_late), cmocka_unit_test(test_stray_words),  cmocka_unit_test(test_point_numbers),
+        cmocka_unit_test(test_headers),        cmocka_unit_test(test_quoted_lines),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

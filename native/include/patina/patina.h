@@ -303,6 +303,7 @@ typedef struct patina_file_info {
     double box_min[3], box_max[3]; // of all finite positions, origin included
     uint64_t invalid_positions;
     uint32_t stations; // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
+    uint32_t scans;    // that the file tells of: patina_file_get_scan; 0: none
 } patina_file_info;
 
 typedef struct patina_file_attribute {
@@ -311,14 +312,31 @@ typedef struct patina_file_attribute {
     uint32_t type; // as in the file
 } patina_file_attribute;
 
-// Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS or PTX file whole; formats are told apart by content. Errors name
+// A scan of a file. The file's coordinates, origin included, and its unit.
+typedef struct patina_file_scan {
+    size_t struct_size;
+    char name[64];          // of its own file, where a .conf names that; else ""
+    uint64_t first, count;  // its points follow each other; attribute "scan" says its index
+    uint32_t columns, rows; // of the scanner's grid; 0: none
+    double pose[12];        // the file's coordinates from the scan's own: three rows of four
+    double station[3];      // where the scanner stood, if has_station
+    double direction[3];    // in which it looked, unit; 0 0 0 = not known, or all around: points more than 60 degrees beside it
+    double interval;        // between neighbouring samples: the median way in the grid; 0 = not known
+    uint32_t has_station;
+    uint32_t unused;
+} patina_file_scan;
+
+// Reads a PLY (ascii, both byte orders), XYZ, CSV, PTS, PTX or conf file whole; formats are told apart by content. Errors name
 // the byte offset (binary) or line (text). Points of a scanner's grid (PTX, range_grid of a PLY) have the attributes "row" and
-// "column", those of a PTX "scan" too. A PLY's faces, and a scanner's grid, give normals where there are no others.
+// "column", those of a PTX and a conf "scan" too. A PLY's faces, and a scanner's grid, give normals where there are no others.
+// A conf (Stanford's: lines "bmesh NAME tx ty tz qx qy qz qw") is the files that it names, each in its place, p' = R(conjugate of q) p
+// + t. Scans that cannot be read or placed are left out, and a line of the log names them: of a conf and of a PTX.
 PATINA_API int patina_file_open(const char *path, patina_progress *progress, patina_file **out);
 PATINA_API int patina_file_open_memory(const void *data, size_t size, patina_file **out); // data is not kept
 PATINA_API void patina_file_destroy(patina_file *file);
 PATINA_API int patina_file_get_info(const patina_file *file, patina_file_info *info);
 PATINA_API int patina_file_get_attribute(const patina_file *file, uint32_t index, patina_file_attribute *attribute);
+PATINA_API int patina_file_get_scan(const patina_file *file, uint32_t index, patina_file_scan *scan);
 // Copies one column as float32 (uint8 for colour) into the caller's buffer of `size` bytes.
 PATINA_API int patina_file_read_positions(const patina_file *file, float *xyz, size_t size); // relative to origin
 PATINA_API int patina_file_read_normals(const patina_file *file, float *xyz, size_t size);

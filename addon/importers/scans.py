@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What files say of the scans that their points are of, beside the point attribute "scan". Nothing here knows Blender."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+NOTE = "scans"  # of a PointFile; "patina_scans" of the data
+PROPERTY = "patina_scans"
+
+ALL_AROUND = 0.75  # the mean of the unit vectors of a cone of 60 degrees, as the library has it
+Direction = tuple[float, float, float]
+UNKNOWN: Direction = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One scan of a file; its number is its place in the list, and what the attribute "scan" says."""
+
+    name: str
+    count: int
+    direction: Direction = UNKNOWN  # in which the scanner looked, unit; UNKNOWN, or all around
+    interval: float = 0.0  # between neighbouring samples, in the file's unit; 0: not known
+
+
+def packed(scans: Sequence[Scan]) -> str:
+    return json.dumps([asdict(scan) for scan in scans])
+
+
+def unpacked(text: object) -> list[Scan]:
+    """None where it is not what was packed."""
+    try:
+        return [Scan(str(item["name"]), int(item["count"]), tuple(map(float, item["direction"])), float(item["interval"]))
+                for item in json.loads(text)]
+    except (TypeError, ValueError, KeyError):
+        return []
+
+
+def note(scans: Sequence[Scan]) -> dict[str, str]:
+    return {NOTE: packed(scans)} if scans else {}
+
+
+def direction(positions: np.ndarray, station: np.ndarray) -> Direction:
+    """Of the rays from a station to (n, 3) places; UNKNOWN where these lie more than 60 degrees about, or it is not known."""
+    ways = positions - station
+    lengths = np.linalg.norm(ways, axis=1)
+    good = np.isfinite(lengths) & (lengths > 0.0)
+    if not good.any():
+        return UNKNOWN
+    mean = (ways[good] / lengths[good, None]).mean(axis=0)
+    length = float(np.linalg.norm(mean))
+    return tuple(map(float, mean / length)) if length >= ALL_AROUND else UNKNOWN
+
+
+def interval(positions: np.ndarray, row: np.ndarray, column: np.ndarray) -> float:
+    """The median way between neighbours in a grid: (n, 3) places in cells (n,); 0 where none lie beside each other."""
+    ways = []
+    for along, across in ((row, column), (column, row)):
+        order = np.lexsort((along, across))
+        beside = (np.diff(along[order]) == 1) & (np.diff(across[order]) == 0)
+        steps = np.linalg.norm(np.diff(positions[order], axis=0)[beside], axis=1)
+        ways.append(steps[np.isfinite(steps)])
+    found = np.concatenate(ways)
+    return float(np.median(found)) if len(found) else 0.0
+
+
+def twice(row: np.ndarray, column: np.ndarray) -> int:
+    """How many points lie in a cell in which another one lies."""
+    return len(row) - len(np.unique(row.astype(np.float64) * 2.0 ** 26 + column))
