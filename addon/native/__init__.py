@@ -182,8 +182,12 @@ class Cloud(_Handle):
 
     _kind = "cloud"
 
-    # Of a linked one of several scans: where a uint16 for each point says which it is of, the attribute that named them, and as what.
+    # Of several scans: a uint16 for each point, in the given order, says which it is of, or a file of them, for linked ones; the
+    # attribute that named them, and as what. scan_stamp counts how often they changed, color_stamp how often the colors did.
     scan_file: Path | None = None
+    scan_of: np.ndarray | None = None
+    scan_stamp = 0
+    color_stamp = 0
     numbers: np.ndarray | None = None  # (count,) that points may be soft by, in the given order; whoever reads the points sets them, and
     numbers_stamp = 0  # counts how often they changed
     scan_name: str = ""

@@ -26,16 +26,17 @@ class Mask(_Handle):
 
 class Grade(_Handle):
     """A cloud's own colors, changed by scan. scans: (count,) uint16, or None: all are of the first. grades: gain, gamma, saturation
-    and temperature of each. PatinaError for a cloud without colors."""
+    and temperature of each, and perhaps gains of red, green and blue. PatinaError for a cloud without colors."""
 
     _kind = "grade"
 
     def __init__(self, cloud: Cloud, scans: np.ndarray | None, grades: Sequence[Sequence[float]]) -> None:
         if scans is not None and (scans.dtype != np.uint16 or len(scans) != cloud.count or not scans.flags.c_contiguous):
             raise PatinaError("scans are a uint16 for each point")
-        values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade) for grade in grades))
-        super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, len(grades),
-                         blame=(cloud._handle,))
+        values = (abi.ScanGrade * len(grades))(*(abi.ScanGrade(*grade[:4]) for grade in grades))
+        balance = np.array([(*grade, 1.0, 1.0, 1.0)[4:7] for grade in grades], np.float32)
+        super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, balance.ctypes.data, len(grades),
+                         blame=(cloud._handle,), create="patina_grade_create_balanced")
 
 
 class Field(_Handle):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from . import (
     analyze,
+    balance,
     clips,
     colors,
     combine,
@@ -20,13 +21,14 @@ from . import (
     scans,
     set_up,
     shadows,
+    stations,
     styles,
     view_transform,
     world,
 )
 
-_MODULES = (analyze, clips, colors, import_points, export_points, combine, linked_points, plan, points, points_keys, points_tools, preferences,
-            scanner, scans, set_up, shadows, styles, view_transform, world)
+_MODULES = (analyze, balance, clips, colors, import_points, export_points, combine, linked_points, plan, points, points_keys, points_tools, preferences,
+            scanner, scans, set_up, shadows, stations, styles, view_transform, world)
 
 
 def register() -> None:

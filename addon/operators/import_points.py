@@ -13,10 +13,10 @@ from bpy.types import Context, Operator, OperatorFileListElement
 from bpy_extras.io_utils import ImportHelper
 
 from .. import importers, jobs, native, styles
-from ..importers import PointFile, name_of, origin, told
+from ..importers import PointFile, name_of, origin, scans, told
 from ..sync import files, linked, sequence
 from ..sync.analysis import SCANNERS
-from . import set_up
+from . import set_up, stations
 from .steps import Stepped
 
 METERS = (1.0, 1.0)  # of a file's units, across and up
@@ -57,6 +57,9 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             ('NEGATIVE_Y', "-Y", "As in photogrammetry that begins with a camera", 2)))
     frame: BoolProperty(name="Frame Points", default=False,
                         description="Aim the scene's camera at the points afterwards; strays do not count")
+    stations: BoolProperty(
+        name="Stations", default=True,
+        description="An empty where each scanner stood, as a child of the points, where the file says so (E57, PTX)")
     link: BoolProperty(
         name="Link", default=False,
         description="Keep the points out of Blender: the object is a box, Patina reads the file itself. For scans too large "
@@ -83,6 +86,7 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
         layout.prop(self, "scale")
         layout.prop(self, "up_axis")
         layout.prop(self, "frame")
+        layout.prop(self, "stations")
         layout.prop(self, "link")
         row = layout.row()
         row.active = self.link
@@ -154,6 +158,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             self._tell('WARNING', warning)
         context.collection.objects.link(obj)
         styles.dress(context.scene, obj)
+        if self.stations:
+            stations.add(obj, [context.collection])
         obj.select_set(True)
         context.view_layer.objects.active = obj
 
@@ -192,6 +198,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             obj = bpy.data.objects.new(name, linked.box_mesh(name, item.box))
             if item.scanners:
                 obj.data[SCANNERS] = item.scanners
+            if item.told:
+                obj.data[scans.PROPERTY] = item.told
             files.assign(obj, files.as_preferred(path))
             obj.patina.sequence.start = context.scene.frame_start
             self._add(context, obj, item.origin, item.units)

@@ -1,81 +1,140 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scans of a linked cloud: listed to be graded, and colored by which a point is of."""
+"""Scans of a cloud: listed to be hidden and graded, colored by which a point is of, and balanced where they overlap."""
 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 from bpy.types import Context, Object, Operator
 
 from .. import importers, native
+from ..importers import scans
+from ..sync import attributes, edits, linked
 from . import points
 
+LOOK = ("gain", "gamma", "saturation", "temperature", "balance", "hide", "solo")
 
-class _OfScans:
+
+def refused(obj: Object | None) -> str:
+    """Why the scans of an object cannot be listed; empty: they can."""
+    if obj is not None and obj.patina.linked_file:
+        return points.editable(obj)
+    if obj is None or obj.type not in {'MESH', 'POINTCLOUD'} or obj.type == 'MESH' and len(obj.data.polygons):
+        return "the active object has no points"
+    if obj.library or obj.mode != 'OBJECT':
+        return "the object belongs to another file" if obj.library else "only in Object Mode"
+    return ""
+
+
+def of_points(obj: Object) -> tuple[linked.Scans | None, np.ndarray | None]:
+    """Which scans a mesh's or point cloud's points are of; None where there is one, or it is not said."""
+    data = obj.data
+    count = len(data.vertices if obj.type == 'MESH' else data.points)
+    columns = {name: attributes.scalars(data, count, name) for name in linked.SCAN_NAMES}
+    return linked.scans_in({name: values[:, 0] for name, values in columns.items() if values is not None})
+
+
+def known(obj: Object, context: Context) -> tuple[linked.Scans | None, np.ndarray | None]:
+    """The same of any object. PatinaError where its file cannot be read."""
+    if not obj.patina.linked_file:
+        return of_points(obj)
+    cloud = points.cloud_of(obj, context)
+    return (linked.Scans(cloud.scan_name, cloud.scan_numbers), edits.scans_of(cloud)) if cloud.scan_name else (None, None)
+
+
+class OfScans:
     """Beside bpy.types.Operator."""
 
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return not points.editable(context.object)
+        why = refused(context.object)
+        if why and hasattr(cls, "poll_message_set"):
+            cls.poll_message_set(why)
+        return not why
 
     def execute(self, context: Context) -> set[str]:
         obj = context.object
         try:
-            done = self.change(obj, points.cloud_of(obj, context))
+            done = self.change(context, obj)
         except (native.PatinaError, OSError) as error:
             self.report({'ERROR'}, importers.told(f"Patina: '{obj.name}': {error}"))
             return {'CANCELLED'}
         obj.update_tag(refresh={'OBJECT'})  # what is unset, or taken from a list, says nothing itself
         return done
 
+    def change(self, context: Context, obj: Object) -> set[str]:
+        raise NotImplementedError
 
-class PATINA_OT_scans_list(_OfScans, Operator):
-    """List the file's scans, so that the colors of each can be graded. What is listed already keeps its grade"""
+
+class PATINA_OT_scans_list(OfScans, Operator):
+    """List the scans that the points are of, so that each can be hidden, and its colors graded. What is listed already keeps its
+    settings"""
 
     bl_idname = "object.patina_scans_list"
-    bl_label = "Grade Scans"
+    bl_label = "List Scans"
 
-    def change(self, obj: Object, cloud: native.Cloud) -> set[str]:
-        if not cloud.has_colors:
-            self.report({'ERROR'}, f"Patina: '{obj.name}' has no colors to grade")
+    def change(self, context: Context, obj: Object) -> set[str]:
+        if obj.patina.linked_file and not points.cloud_of(obj, context).has_colors and not known(obj, context)[0]:
+            self.report({'ERROR'}, f"Patina: '{obj.name}' has no colors to grade, and no scans")
             return {'CANCELLED'}
-        scans = obj.patina.points.scans
-        wanted = [f"Scan {number}" for number in cloud.scan_numbers] or ["All Points"]
-        while len(scans) > len(wanted):
-            scans.remove(len(scans) - 1)
-        for index, name in enumerate(wanted):
-            item = scans[index] if index < len(scans) else scans.add()
-            item.name = name
-        obj.patina.points.scan = min(obj.patina.points.scan, len(wanted) - 1)
+        listed(obj, *known(obj, context))
         return {'FINISHED'}
 
 
-class PATINA_OT_scans_reset(_OfScans, Operator):
-    """Show the colors of all scans as the file has them"""
+def listed(obj: Object, found: linked.Scans | None, of: np.ndarray | None) -> None:
+    """Brings the object's list up to date."""
+    group = obj.patina.points
+    kept = {edits.number_of(item): {name: _value(item, name) for name in LOOK if item.is_property_set(name)} for item in group.scans}
+    called = {item.number: item.name for item in group.scans if item.number >= 0}
+    told = scans.unpacked(obj.data.get(scans.PROPERTY)) if found is None or found.name == "scan" else []
+    numbers = found.numbers if found else (edits.ALL,)
+    counts = np.bincount(of, minlength=len(numbers)) if of is not None else [None] * len(numbers)
+    group.scans.clear()
+    for number, count in zip(numbers, counts, strict=True):
+        item = group.scans.add()
+        item.number = number
+        name = told[number].name if 0 <= number < len(told) else ""
+        item.name = called.get(number) or importers.told(name) or (f"Scan {number}" if number >= 0 else "All Points")
+        item.count = "" if count is None else f"{count:,}"
+        for key, value in kept.get(number, {}).items():
+            setattr(item, key, value)
+    group.scan = min(group.scan, len(numbers) - 1)
+
+
+def _value(item: bpy.types.PropertyGroup, name: str) -> float | bool | tuple[float, ...]:
+    value = getattr(item, name)
+    return tuple(value) if name == "balance" else value
+
+
+class PATINA_OT_scans_reset(OfScans, Operator):
+    """Show all scans, and their colors as the file has them"""
 
     bl_idname = "object.patina_scans_reset"
-    bl_label = "Reset Grades"
+    bl_label = "Reset Scans"
 
-    def change(self, obj: Object, cloud: native.Cloud) -> set[str]:
+    def change(self, context: Context, obj: Object) -> set[str]:
+        obj.patina.points.property_unset("use_balance")
         for item in obj.patina.points.scans:
-            for name in ("gain", "gamma", "saturation", "temperature"):
+            for name in LOOK:
                 item.property_unset(name)
         return {'FINISHED'}
 
 
-class PATINA_OT_scans_color(_OfScans, Operator):
+class PATINA_OT_scans_color(OfScans, Operator):
     """Color each point by the scan that it is of, by a ramp; Color: Attribute brings the points' own colors back"""
 
     bl_idname = "object.patina_scans_color"
     bl_label = "Color by Scan"
 
-    def change(self, obj: Object, cloud: native.Cloud) -> set[str]:
-        if not cloud.scan_name:
+    def change(self, context: Context, obj: Object) -> set[str]:
+        found, _ = known(obj, context)
+        if not found:
             self.report({'ERROR'}, f"Patina: '{obj.name}': the file does not say which scans its points are of")
             return {'CANCELLED'}
         group = obj.patina.colors
-        group.scalar, group.source, group.ramp, group.use_range = cloud.scan_name, 'SCALAR', 'SPECTRUM', False
+        group.scalar, group.source, group.ramp, group.use_range = found.name, 'SCALAR', 'SPECTRUM', False
         if obj.patina.lighting == 'AUTO':
             obj.patina.lighting = 'UNLIT'  # as the points' own colors are: the colors shall be told apart
         return {'FINISHED'}

@@ -45,6 +45,8 @@ class PointArrays:
     analyzed: bool = False
     stations: analysis.Stations | None = None  # where the scanners stood
     numbers: np.ndarray | None = None  # (n, 1) float32, that points are soft by
+    scans: linked.Scans | None = None  # where there are several
+    scan_of: np.ndarray | None = None  # (n,) uint16, which of them each point is of
 
     def fingerprint(self) -> Steps[tuple[int, int]]:
         """Of the places, normals, opacities, radii and classes, and of the colours and scalars: what Blender's update tags miss
@@ -186,6 +188,7 @@ class CloudCache:
         cloud = task.result() or cloud
         if recolor:
             cloud.set_scalars(arrays.scalars)
+            cloud.color_stamp += 1
         _set_numbers(cloud, arrays)
         self._keep(identity, fingerprint, cloud)
         return cloud
@@ -248,6 +251,11 @@ def _set_numbers(cloud: native.Cloud, arrays: PointArrays) -> None:
     if (arrays.numbers is None) != (cloud.numbers is None) or arrays.numbers is not None and not np.array_equal(arrays.numbers, cloud.numbers, equal_nan=True):
         cloud.numbers = arrays.numbers
         cloud.numbers_stamp += 1
+    if arrays.scan_of is None and cloud.scan_of is None or (
+            arrays.scans and cloud.scan_numbers == arrays.scans.numbers and np.array_equal(arrays.scan_of, cloud.scan_of)):
+        return
+    cloud.scan_of, cloud.scan_stamp = arrays.scan_of, cloud.scan_stamp + 1
+    cloud.scan_name, cloud.scan_numbers = (arrays.scans.name, arrays.scans.numbers) if arrays.scans else ("", ())
 
 
 CACHE = CloudCache()
@@ -312,7 +320,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             style = style_of(obj, instance.matrix_world)
             if solid and obj.patina.lighting == 'AUTO':  # its colours are a material's, not a photograph's
                 style = replace(style, lighting=LIT)
-            edited = edits.state_of(obj) if link else edits.State()
+            edited = edits.state_of(obj)
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
             dotted = obj.type == 'MESH' and not solid and not link
             items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted))
@@ -592,7 +600,9 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
         opacities = attributes.without_uncolored(opacities, rgb)
     analyzed = analysis.wanted(obj)
     stations = analysis.stations(obj, data, count) if analyzed else None
-    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations, by)
+    scans, scan_of = linked.scans_in({name: column[:, 0] for name in linked.SCAN_NAMES
+                                      if (column := attributes.scalars(data, count, name)) is not None})
+    return PointArrays(positions, normals, rgb, opacities, scalars, classes, radii, analyzed, stations, by, scans, scan_of)
 
 
 def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the artist did with single points of a linked cloud: which are selected, hidden and deleted, and how its scans are graded.
+"""What the artist did with single points of a linked cloud: which are selected, hidden and deleted; and with the scans of any: which are
+hidden, and how their colors are graded.
 
 Three bits a point, in file order, packed into a custom property of the object: so undo, saving, appending and render farms take them
 along as anything else of an object, and no file can be lost. A scan of 30 million points takes some kilobytes to a few megabytes.
@@ -35,8 +36,9 @@ Handle = TypeVar("Handle", Mask, Grade, Field)
 _KEPT = 4  # masks and grades of a cloud, and unpacked edits: those of the last undo steps come back at once
 
 Bits = np.ndarray  # (count + 7) // 8 uint8, point i is bit i % 8 of byte i // 8
-Scan = tuple[float, float, float, float]  # gain, gamma, saturation, temperature
-NEUTRAL: Scan = (1.0, 1.0, 1.0, 0.0)
+Scan = tuple[float, ...]  # gain, gamma, saturation, temperature, and what balances red, green and blue
+NEUTRAL: Scan = (1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
+ALL = -1  # the number of the one scan of a cloud that knows none
 
 
 class Damaged(Exception):
@@ -72,10 +74,11 @@ class State:
     """What a picture needs to know; cheap to compare."""
 
     packed: str = ""
-    grades: tuple[Scan, ...] = ()
+    grades: tuple[tuple[int, Scan], ...] = ()  # by the scans' numbers
+    hidden: tuple[int, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.packed or self.grades)
+        return bool(self.packed or self.grades or self.hidden)
 
 
 def none(count: int) -> Edits:
@@ -121,9 +124,23 @@ def packed_of(obj: bpy.types.Object) -> str:
 
 
 def state_of(obj: bpy.types.Object) -> State:
-    """Of an object, evaluated or not, that links a file."""
-    grades = tuple((item.gain, item.gamma, item.saturation, item.temperature) for item in obj.patina.points.scans)
-    return State(packed_of(obj), grades if any(grade != NEUTRAL for grade in grades) else ())
+    """Of an object with points, evaluated or not."""
+    group = obj.patina.points
+    grades = tuple((number_of(item), graded) for item in group.scans if (graded := grade_of_item(item, group.use_balance)) != NEUTRAL)
+    solo = any(item.solo for item in group.scans)
+    hidden = tuple(number_of(item) for item in group.scans if item.hide or solo and not item.solo)
+    return State(packed_of(obj) if obj.patina.linked_file else "", grades, hidden)
+
+
+def number_of(item: bpy.types.PropertyGroup) -> int:
+    """Of a listed scan; ALL of all points. Lists of older files have names alone."""
+    last = item.name.rpartition(" ")[2]
+    return item.number if item.number >= 0 or not last.isdigit() else int(last)
+
+
+def grade_of_item(item: bpy.types.PropertyGroup, balanced: bool) -> Scan:
+    own = (item.gain, item.gamma, item.saturation, item.temperature)
+    return (*own, *(item.balance if balanced else NEUTRAL[4:]))
 
 
 def unpacked(packed: str) -> Edits | None:
@@ -194,8 +211,21 @@ def mask_of(cloud: native.Cloud, state: State) -> Mask | None:
     try:
         found = for_cloud(state.packed, cloud.count)
     except Damaged:
+        found = None
+    places = [place for place, number in enumerate(cloud.scan_numbers) if number in state.hidden]
+    scans = scans_of(cloud) if places else None
+    everything = ALL in state.hidden and not cloud.scan_numbers
+    if not found and scans is None and not everything:
         return None
-    return keep(cloud, ("mask", state.packed), lambda: Mask(cloud, found.gone, found.selected)) if found else None
+
+    def make() -> Mask:
+        gone = found.gone if found else None
+        if everything or scans is not None:
+            bits = every(cloud.count) if everything else of_flags(np.isin(np.arange(len(cloud.scan_numbers)), places)[scans])
+            gone = bits if gone is None else gone | bits
+        return Mask(cloud, gone, found.selected if found else None)
+
+    return keep(cloud, ("mask", state.packed, state.hidden, cloud.scan_stamp), make)
 
 
 def has_selection(cloud: native.Cloud, state: State) -> bool:
@@ -210,14 +240,19 @@ def grade_of(cloud: native.Cloud, state: State) -> Grade | None:
     """Any thread. None where there is nothing to grade."""
     if not state.grades or not cloud.has_colors:
         return None
-    scans = scans_of(cloud)
+    scans, known = scans_of(cloud), dict(state.grades)
     if cloud.scan_file and scans is None:
         return None
-    return keep(cloud, ("grade", state.grades), lambda: Grade(cloud, scans, state.grades))
+    grades = [known.get(number, NEUTRAL) for number in cloud.scan_numbers] if scans is not None else [known.get(ALL, NEUTRAL)]
+    if all(grade == NEUTRAL for grade in grades):
+        return None
+    return keep(cloud, ("grade", tuple(grades), cloud.scan_stamp, cloud.color_stamp), lambda: Grade(cloud, scans, grades))
 
 
 def scans_of(cloud: native.Cloud) -> np.ndarray | None:
-    """(count,) uint16, which of its scans each point of a linked cloud is of; None where that is not known, or there is one."""
+    """(count,) uint16, which of its scans each point of a cloud is of; None where that is not known, or there is one."""
+    if cloud.scan_of is not None:
+        return cloud.scan_of
     with _lock:
         if cloud in _scans:
             return _scans[cloud]

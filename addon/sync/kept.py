@@ -43,8 +43,8 @@ def folder() -> Path:
     return beside
 
 
-def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], list[float], dict[str, Any] | None]:
-    """Origin, scanners, units and scans of a kept cloud. ValueError or OSError where they are not there as they were written."""
+def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], list[float], dict[str, Any] | None, str]:
+    """Origin, scanners, units, scans and what is told of these, of a kept cloud. ValueError or OSError where they are not there as they were written."""
     notes = json.loads(path.read_text("utf-8"))
     if not isinstance(notes, dict):
         raise ValueError(f"{path} holds no object")
@@ -55,7 +55,10 @@ def read_notes(path: Path) -> tuple[tuple[float, float, float], list[float], lis
     scans = notes.get("scans", False)
     if scans is not None and not (isinstance(scans, dict) and isinstance(scans.get("name"), str) and len(_numbers(scans.get("numbers"))) > 1):
         raise ValueError(f"{path} does not say of which scans its points are")
-    return tuple(origin), scanners, units, scans
+    told = notes.get("told", "")
+    if not isinstance(told, str):
+        raise ValueError(f"{path} does not tell of its scans")
+    return tuple(origin), scanners, units, scans, told
 
 
 def _numbers(values: Any) -> list[float]:

@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 
 from .. import importers, jobs, native, preferences
+from ..importers import scans as scans_of_files
 from ..importers.origin import PROPERTY
 from . import analysis, analyzing, attributes, files, kept, sequence
 from .colors import scalar_name
@@ -61,6 +62,7 @@ class Linked:
     scanners: list[float]  # x, y, z of each, relative to origin
     units: tuple[float, float] = (1.0, 1.0)  # metres of the file's, across and up
     scans: Scans | None = None  # None: one, or it is not said
+    told: str = ""  # what the file says of them: importers.scans
 
 
 def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
@@ -134,12 +136,12 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     parts = 3 if source.analyzed else 2
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
     seen_by = [points.scalars.get(name) for name in (analysis.SCAN, analysis.ROW, analysis.COLUMN)]
-    scans, scan_of = _scans(points.scalars)
+    scans, scan_of = scans_in(points.scalars)
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
-    units = points.notes.get("units")
+    units, told = points.notes.get("units"), points.notes.get(scans_of_files.NOTE, "")
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
     shown = attributes.without_uncolored(None, points.colors) if source.hide_uncolored else None
     with progress.part(1, parts).inner() as inner:
@@ -164,12 +166,13 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
         task.result()
         if scans:
             scan_of.tofile(source.kept.with_suffix(SCAN_ENDING))
-        notes.write_text(json.dumps({"origin": origin, "scanners": scanners, "units": units, "scans": scans and asdict(scans)}), "utf-8")
+        notes.write_text(json.dumps({"origin": origin, "scanners": scanners, "units": units, "scans": scans and asdict(scans),
+                                     "told": told}), "utf-8")
         _tidy(source.kept)
         cloud = native.Cloud.open(source.kept)  # whose memory is the file's
     except (native.PatinaError, OSError):
         pass  # no room on the disk: it stays in memory
-    return _linked(cloud, origin, scanners, units, scans and asdict(scans), source.kept)
+    return _linked(cloud, origin, scanners, units, scans and asdict(scans), told, source.kept)
 
 
 def _tidy(newest: Path) -> None:
@@ -195,7 +198,7 @@ def _classes(points: importers.PointFile) -> np.ndarray | None:
     return None if values is None else attributes.as_classes(values)
 
 
-def _scans(scalars: dict[str, np.ndarray]) -> tuple[Scans | None, np.ndarray | None]:
+def scans_in(scalars: dict[str, np.ndarray]) -> tuple[Scans | None, np.ndarray | None]:
     """What a file says of its points' scans, where it has several."""
     name = next((name for name in SCAN_NAMES if name in scalars), "")
     values = scalars.get(name)
@@ -211,12 +214,12 @@ def _scans(scalars: dict[str, np.ndarray]) -> tuple[Scans | None, np.ndarray | N
 
 
 def _linked(cloud: native.Cloud, origin: Corner, scanners: list[float] | None, units: list[float] | None,
-            scans: dict | None, place: Path) -> Linked:
+            scans: dict | None, told: str, place: Path) -> Linked:
     known = Scans(scans["name"], tuple(scans["numbers"])) if scans else None
     if known:
         cloud.scan_file = place.with_suffix(SCAN_ENDING)
         cloud.scan_name, cloud.scan_numbers = known.name, known.numbers
-    return Linked(cloud, origin, cloud.box, scanners or [], tuple(units or (1.0, 1.0)), known)
+    return Linked(cloud, origin, cloud.box, scanners or [], tuple(units or (1.0, 1.0)), known, told)
 
 
 def box_mesh(name: str, box: tuple[Corner, Corner]) -> bpy.types.Mesh:

@@ -42,6 +42,7 @@ class PATINA_PT_scanner(_DataPanel, Panel):
         count = int(np.isfinite(scanner.positions(context.object)).all(axis=1).sum())
         self.layout.label(text=f"{count} position{'s' * (count > 1)} of scanners")
         self.layout.operator(scanner.PATINA_OT_camera_at_scanner.bl_idname)
+        self.layout.operator("object.patina_add_stations")
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_panorama, PATINA_PT_scanner))

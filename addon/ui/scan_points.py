@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points and scans of a linked cloud, in the sidebar of a 3D view."""
+"""Points of a linked cloud and scans of any, in the sidebar of a 3D view."""
 
 from __future__ import annotations
 
 import bpy
 from bpy.types import Context, Menu, Panel, UIList
 
-from ..sync import edits
+from ..sync import edits, linked
 from . import rows
 from .statistics import SidebarPanel
 
@@ -86,36 +86,62 @@ class PATINA_PT_points_edit(_LinkedPanel, Panel):
 
 
 class PATINA_UL_scans(UIList):
-    def draw_item(self, _context: Context, layout: bpy.types.UILayout, _data: object, item: object, _icon: int, _owner: object,
+    def draw_item(self, _context: Context, layout: bpy.types.UILayout, data: object, item: object, _icon: int, _owner: object,
                   _active: str) -> None:
-        layout.label(text=item.name)
-        state = (item.gain, item.gamma, item.saturation, item.temperature)
-        layout.label(text="" if state == edits.NEUTRAL else "graded")
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False)
+        side = row.row()
+        side.alignment = 'RIGHT'
+        side.active = False
+        graded = edits.grade_of_item(item, False) != edits.NEUTRAL
+        side.label(text=f"{'graded  ' * graded}{item.count}")
+        row.prop(item, "solo", text="", icon='SOLO_ON' if item.solo else 'SOLO_OFF', emboss=False)
+        row.prop(item, "hide", text="", icon='HIDE_ON' if item.hide else 'HIDE_OFF', emboss=False)
 
 
-class PATINA_PT_scans(_LinkedPanel, Panel):
+class PATINA_PT_scans(SidebarPanel, Panel):
     bl_label = "Scans"
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and _has_scans(context.object)
 
     def draw(self, context: Context) -> None:
-        layout = self.layout
-        group = context.object.patina.points
+        layout, obj = self.layout, context.object
+        group = obj.patina.points
         layout.operator("object.patina_scans_color")
         layout.operator("object.patina_scans_list")
         if not group.scans:
             return
         layout.template_list("PATINA_UL_scans", "", group, "scans", group, "scan", rows=3)
+        row = layout.row(align=True)
+        row.active = obj.patina.colors.source == 'OWN'
+        row.operator("object.patina_scans_balance")
+        inner = row.row(align=True)
+        inner.active = any(tuple(item.balance) != (1.0, 1.0, 1.0) for item in group.scans)
+        inner.prop(group, "use_balance", toggle=True)
         if group.scan < len(group.scans):
-            item = group.scans[group.scan]
-            layout.use_property_split = True
-            layout.active = context.object.patina.colors.source == 'OWN'
-            column = layout.column()
-            for name in ("gain", "gamma", "saturation", "temperature"):
-                column.prop(item, name, slider=True)
-            number = item.name.rpartition(" ")[2]
-            if number.isdigit():
-                operator = layout.operator("object.patina_points_select_by", text="Select Its Points")
-                operator.by, operator.number, operator.how = 'SCAN', int(number), 'SET'
+            self._draw_grade(obj, group.scans[group.scan])
         layout.operator("object.patina_scans_reset")
+
+    def _draw_grade(self, obj: bpy.types.Object, item: bpy.types.PropertyGroup) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        column = layout.column()
+        column.active = obj.patina.colors.source == 'OWN'
+        for name in ("gain", "gamma", "saturation", "temperature"):
+            column.prop(item, name, slider=True)
+        number = edits.number_of(item)
+        if number >= 0 and obj.patina.linked_file:
+            operator = layout.operator("object.patina_points_select_by", text="Select Its Points")
+            operator.by, operator.number, operator.how = 'SCAN', number, 'SET'
+
+
+def _has_scans(obj: bpy.types.Object | None) -> bool:
+    if obj is None or obj.type not in {'MESH', 'POINTCLOUD'}:
+        return False
+    return bool(obj.patina.linked_file or obj.patina.points.scans) or any(name in obj.data.attributes for name in linked.SCAN_NAMES)
 
 
 def _menu(self: Menu, context: Context) -> None:

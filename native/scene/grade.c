@@ -33,15 +33,17 @@ struct grading {
 static double to_srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055; }
 
 // Warm: more red and less blue, at the luminance of white.
-static void set_factors(const patina_scan_grade *grade, struct tone *tone)
+static void set_factors(const patina_scan_grade *grade, const float *balance, struct tone *tone)
 {
     const float warm[3] = {exp2f(0.5f * grade->temperature), 1.0f, exp2f(-0.5f * grade->temperature)};
     const float white = luma[0] * warm[0] + luma[1] * warm[1] + luma[2] * warm[2];
     for (int k = 0; k < 3; k++)
-        tone->factor[k] = grade->gain * warm[k] / white;
+        tone->factor[k] = grade->gain * warm[k] / white * (balance ? balance[k] : 1.0f);
     tone->saturation = grade->saturation;
     tone->power = 1.0f / grade->gamma;
     tone->same = grade->gain == 1.0f && grade->gamma == 1.0f && grade->saturation == 1.0f && grade->temperature == 0.0f;
+    for (int k = 0; k < 3 && balance; k++)
+        tone->same &= balance[k] == 1.0f;
 }
 
 static void encode_steps(struct tone *tone)
@@ -103,7 +105,7 @@ static void grade_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
     }
 }
 
-static int check(const patina_cloud *cloud, const patina_scan_grade *grades, uint32_t count)
+static int check(const patina_cloud *cloud, const patina_scan_grade *grades, const float *balance, uint32_t count)
 {
     if (!cloud || cloud->handle.magic != PT_MAGIC || !grades || !count || count > MOST_SCANS)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: a cloud that was destroyed, or not 1 to %d scans",
@@ -118,18 +120,22 @@ static int check(const patina_cloud *cloud, const patina_scan_grade *grades, uin
                 &cloud->handle, PATINA_ERROR_ARGUMENT,
                 "patina_grade_create: scan %u: gain 0 to 65504, gamma 0.01 to 100, saturation 0 to 100, temperature -16 to 16",
                 i);
+        for (uint32_t k = 3 * i; k < 3 * i + 3 && balance; k++)
+            if (!(balance[k] >= 0.0f && balance[k] <= 65504.0f))
+                return pt_fail(&cloud->handle, PATINA_ERROR_ARGUMENT,
+                               "patina_grade_create_balanced: scan %u: balance 0 to 65504", i);
     }
     return PATINA_OK;
 }
 
-static int set_tones(struct grading *grading, const patina_scan_grade *grades)
+static int set_tones(struct grading *grading, const patina_scan_grade *grades, const float *balance)
 {
     for (int i = 0; i < 256; i++)
         grading->linear[i] = (float)pt_linear_of_srgb(i / 255.0);
     grading->tones = calloc(grading->tone_count, sizeof *grading->tones);
     for (uint32_t i = 0; grading->tones && i < grading->tone_count; i++) {
         struct tone *tone = &grading->tones[i];
-        set_factors(&grades[i], tone);
+        set_factors(&grades[i], balance ? balance + 3 * (size_t)i : NULL, tone);
         if (tone->same || grading->cloud->color_format != PT_COLOR_SRGB8)
             continue;
         tone->encode = malloc(STEPS);
@@ -143,10 +149,16 @@ static int set_tones(struct grading *grading, const patina_scan_grade *grades)
 int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades, uint32_t count,
                         patina_grade **out)
 {
+    return patina_grade_create_balanced(cloud, scans, grades, NULL, count, out);
+}
+
+int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
+                                 const float *balance, uint32_t count, patina_grade **out)
+{
     if (!out)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_grade_create: out is NULL");
     *out = NULL;
-    int error = check(cloud, grades, count);
+    int error = check(cloud, grades, balance, count);
     if (error)
         return error;
     struct patina_grade *grade = calloc(1, sizeof *grade);
@@ -159,7 +171,7 @@ int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const 
         grade->size = cloud->slots * pt_color_size(cloud->color_format);
         grade->colors = pt_pages_alloc(grade->size + 4); // kernels read words
     }
-    const int good = grade && pool && grade->alive && grade->colors && set_tones(&grading, grades);
+    const int good = grade && pool && grade->alive && grade->colors && set_tones(&grading, grades, balance);
     if (good)
         pt_parallel(pool, cloud->chunk_count, 4, grade_chunks, &grading);
     else

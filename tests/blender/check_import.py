@@ -42,14 +42,14 @@ def values(data, *names):
 
 
 def import_ply(*paths, **options):
-    """Imports and returns the new objects."""
+    """Imports and returns the new objects, but for the stations."""
     before = set(bpy.data.objects)
     if len(paths) == 1:
         bpy.ops.import_scene.patina_points(filepath=str(paths[0]), **options)
     else:
         bpy.ops.import_scene.patina_points(directory=str(paths[0].parent), files=[{"name": path.name} for path in paths],
                                         **options)
-    return sorted(set(bpy.data.objects) - before, key=lambda obj: obj.name)
+    return sorted((obj for obj in set(bpy.data.objects) - before if obj.type != 'EMPTY'), key=lambda obj: obj.name)
 
 
 def positions_of(obj):

@@ -35,6 +35,9 @@ typedef struct patina_scan_grade {
 // style.grade, where color_source is OWN. PATINA_ERROR_EMPTY for a cloud without colours. After patina_cloud_set_colors make another.
 PATINA_API int patina_grade_create(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
                                    uint32_t count, patina_grade **out);
+// The same; before its grade, the light of each scan is multiplied by three numbers, red, green and blue, 0..65504 each. NULL = none.
+PATINA_API int patina_grade_create_balanced(const patina_cloud *cloud, const uint16_t *scans, const patina_scan_grade *grades,
+                                            const float *balance, uint32_t count, patina_grade **out);
 PATINA_API void patina_grade_destroy(patina_grade *grade);
 
 // ---- scans: which range image each point is of -----------------------------------------------------------------------

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scans of a cloud, imported and linked: listed by name, hidden, solo, graded, balanced, saved; stations as empties."""
+
+import bpy
+import numpy as np
+from check_formats import range_image, text_file
+from check_import import import_ply, write_ply
+from harness import SCRATCH, check, check_close, drawn, new_scene, render
+
+PTX = "3\n2\n{0} 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n{0} 0 0 1\n"
+WALL = "".join(f"{u / 4} 5 {v / 4} 0.5\n" for u in range(3) for v in range(2))
+
+
+def pair(link, name="pair"):
+    """A .conf of two range images, the first at the picture's left, the second at its right."""
+    scene = new_scene(64, 64)
+    scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', 2.5
+    range_image("left.ply", -4.0, 10, 10)
+    range_image("right.ply", -4.0, 8, 10)
+    path = text_file(f"{name}.conf", "bmesh left.ply -1.1 -0.5 0 0 0 0 1\nbmesh right.ply 0.2 -0.5 0 0 0 0 1\n")
+    obj, = import_ply(path, link=link)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.patina_scans_list()
+    return obj
+
+
+def sides():
+    """How many pixels are drawn at the left and at the right."""
+    columns = np.array([column for _, column in drawn(render())])
+    return int((columns < 32).sum()), int((columns >= 32).sum())
+
+
+def check_hiding(link):
+    obj = pair(link)
+    scans = obj.patina.points.scans
+    check([scan.name for scan in scans] == ["left.ply", "right.ply"], f"{[scan.name for scan in scans]}")
+    check([scan.count for scan in scans] == ["100", "80"], f"{[scan.count for scan in scans]}")
+    whole = sides()
+    check(min(whole) > 60, f"{whole}")
+    scans[0].hide = True
+    check(sides() == (0, whole[1]), "the left one is hidden")
+    scans[0].hide, scans[0].solo = False, True
+    check(sides() == (whole[0], 0), "the left one alone")
+    scans[1].solo = True
+    check(sides() == whole, "both are solo")
+    scans[1].hide = True
+    check(sides() == (whole[0], 0), "what is hidden is not drawn, solo or not")
+    bpy.ops.object.patina_scans_list()
+    check(obj.patina.points.scans[1].hide and obj.patina.points.scans[0].solo, "listed again they keep what they are")
+    path = SCRATCH / f"scans_{link}.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    check(sides() == (whole[0], 0), "saved and opened")
+    bpy.context.view_layer.objects.active = bpy.data.objects["pair"]
+    bpy.ops.object.patina_scans_reset()
+    check(sides() == whole, "all is back")
+
+
+def test_scans_are_hidden():
+    check_hiding(False)
+
+
+def test_scans_of_links_are_hidden():
+    check_hiding(True)
+
+
+def test_color_by_scan():
+    """Of imported points too."""
+    obj = pair(False)
+    bpy.ops.object.patina_scans_color()
+    check(obj.patina.colors.scalar == "scan", obj.patina.colors.scalar)
+    picture = render()["Combined"]
+    left, right = picture[:, :32][picture[:, :32, 3] > 0], picture[:, 32:][picture[:, 32:, 3] > 0]
+    check(np.ptp(left[:, :3], axis=0).max() < 1e-3 and np.abs(left[0] - right[0]).max() > 0.3, f"{left[0]} {right[0]}")
+
+
+def test_scans_of_one():
+    """Points that are of no scan are one, which can be hidden too; other attributes are none."""
+    scene = new_scene(64, 64)
+    scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', 2.5
+    obj, = import_ply(range_image("one.ply", -4.0, 10, 10))
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.patina_scans_list()
+    item, = obj.patina.points.scans
+    check(item.number == -1 and len(drawn(render())) > 60, f"{item.name} {item.number}")
+    item.hide = True
+    check(not drawn(render()), "all is hidden")
+
+
+def colored_pair(name="colors.ply", gains=((1, 1, 1), (1, 1, 1)), link=False, count=60):
+    """A wall of points twice, of scans 0 and 5, with the same pattern of colors times the gains; the second begins in its middle."""
+    y, x = (values.reshape(-1) for values in np.mgrid[:count, :count])
+    places, colors, scan = [], [], []
+    for index, (first, gain) in enumerate(zip((0, count // 2), gains, strict=True)):
+        u, v = (x + first + 0.3 * index) / count * 1.4 - 1, (y + 0.4 * index) / count * 1.4 - 0.7
+        light = 0.2 + 0.1 * np.stack([np.sin(5 * u + k) * np.cos(7 * v - k) for k in range(3)], 1)
+        linear = light * gain
+        places.append(np.stack([u, v, np.full_like(u, -4.0)], 1))
+        colors.append(np.rint(255 * np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055)))
+        scan.append(np.full(len(u), 5 * index))
+    places, colors, scan = map(np.concatenate, (places, colors, scan))
+    path = write_ply(name, [(axis, "f4", places[:, k]) for k, axis in enumerate("xyz")]
+                     + [(axis, "u1", colors[:, k]) for k, axis in enumerate(("red", "green", "blue"))] + [("scan", "u1", scan)])
+    scene = new_scene(64, 64)
+    scene.camera.data.type, scene.camera.data.ortho_scale = 'ORTHO', 3.0
+    obj, = import_ply(path, link=link)
+    bpy.context.view_layer.objects.active = obj
+    return obj
+
+
+def test_meshes_are_graded():
+    """One scan of imported points; colors that change afterwards are graded anew."""
+    obj = colored_pair()
+    bpy.ops.object.patina_scans_list()
+    before = render()["Combined"]
+    lit = before[..., 3] > 0
+    right = lit & (np.arange(64) >= 48)
+    left = lit & (np.arange(64) < 24)
+    obj.patina.points.scans[1].gain = 0.5
+    check(obj.patina.points.scans[1].name == "Scan 5", obj.patina.points.scans[1].name)
+    after = render()["Combined"]
+    check(right.sum() > 100 and left.sum() > 100 and (after[left] == before[left]).all(), "scan 0 stays")
+    check_close(after[right][:, :3], 0.5 * before[right][:, :3], 0.005, "half as bright")
+    colors = obj.data.attributes["Col"].data
+    colors.foreach_set("color_srgb", np.tile(np.float32((1, 1, 1, 1)), len(colors)))
+    obj.data.update()
+    check_close(render()["Combined"][right][:, :3], np.full((right.sum(), 3), 0.5), 0.005, "of new colors")
+
+
+def test_stations():
+    """An empty where each scanner stood, a child of the points; shown once."""
+    new_scene()
+    path = text_file("stations.ptx", PTX.format(10) + WALL + PTX.format(20) + WALL)
+    for link in (False, True):
+        before = set(bpy.data.objects)
+        bpy.ops.import_scene.patina_points(filepath=str(path), link=link)
+        new = set(bpy.data.objects) - before
+        obj, = (item for item in new if item.type == 'MESH')
+        empties = sorted((item for item in new if item.type == 'EMPTY'), key=lambda item: item["patina_station"])
+        check([item.parent for item in empties] == [obj, obj], f"{new}")
+        bpy.context.view_layer.update()
+        check_close([item.matrix_world.translation for item in empties], [(10, 0, 0), (20, 0, 0)], 1e-5, "places")
+        check(obj.select_get() and not any(item.select_get() for item in empties), "the points alone are selected")
+        bpy.context.view_layer.objects.active = obj
+        check(not bpy.ops.object.patina_add_stations.poll(), "all are there")
+        bpy.data.objects.remove(empties[0])
+        bpy.ops.object.patina_add_stations()
+        check(sorted(child["patina_station"] for child in obj.children) == [0, 1], "the lost one is back")
+    bpy.ops.object.patina_linked_to_mesh()
+    check(len(obj.children) == 2 and not bpy.ops.object.patina_add_stations.poll(), "converted they stay, once")
+    other, = import_ply(path, stations=False)
+    check(not other.children, "not where they are not wanted")
+
+
+def overlap(count, rng, outliers=0.1):
+    """Scans of a bumpy wall, each overlapping the next by half, of one pattern of light; a share of it differs, as what moved."""
+    places, light, of = [], [], []
+    for scan in range(count):
+        u, v = rng.uniform(0, 2, 20000) + scan, rng.uniform(0, 2, 20000)
+        places.append(np.stack([u, v, 0.1 * np.sin(3 * u) * np.cos(2 * v)], 1))
+        seen = 0.25 + 0.15 * np.stack([np.sin(4 * u + k) * np.cos(5 * v - k) for k in range(3)], 1)
+        moved = (np.abs(v - 0.3) < outliers) & (scan % 2 == 1)
+        light.append(np.where(moved[:, None], 0.9 - seen, seen) * rng.normal(1, 0.05, (20000, 1)))
+        of.append(np.full(20000, scan))
+    return np.concatenate(places), np.concatenate(light), np.concatenate(of)
+
+
+def test_known_gains_are_found():
+    """Of four scans in a row, with noise and things that moved, within 2 %; the mean stays, and a scan apart is told and left."""
+    from patina.operators import balance
+    rng = np.random.default_rng(24)
+    places, light, of = overlap(4, rng)
+    gains = np.array([(1, 1, 1), (0.6, 0.7, 0.8), (1.2, 1.0, 0.9), (0.9, 1.3, 1.1)])
+    exposed = light * gains[of]
+    apart = places[of == 0] + (0, 100, 0)
+    found = balance.find(np.concatenate([places, apart]), np.concatenate([exposed, 0.5 * light[of == 0]]),
+                         np.concatenate([of, np.full(len(apart), 4)]), 5)
+    check(found.alone == [4], f"{found.alone}")
+    check_close(found.gains[4], (1, 1, 1), 1e-9, "apart")
+    left = found.gains[:4] * gains
+    check_close(left / left[0], np.ones((4, 3)), 0.02, "what is left of the gains")
+    check_close(np.log(found.gains[:4]).mean(axis=0), (0, 0, 0), 1e-9, "the mean")
+    none = balance.find(apart, light[of == 0], np.zeros(len(apart), int), 1)
+    check(none.alone == [0] and (none.gains == 1).all(), "one scan")
+    none = balance.find(np.full((10, 3), np.nan), np.full((10, 3), np.nan), np.arange(10) % 2, 2)
+    check(none.alone == [0, 1] and (none.gains == 1).all(), "no numbers")
+
+
+def check_balance(link):
+    """In the picture: both halves of a wall that was photographed twice are as bright."""
+    obj = colored_pair(f"balance_{link}.ply", ((1, 1, 1), (0.6, 0.8, 1.3)), link)
+    before = render()["Combined"]
+    bpy.ops.object.patina_scans_balance()
+    group = obj.patina.points
+    check(group.use_balance and len(group.scans) == 2, "it is on")
+    ratio = np.array(group.scans[1].balance) / np.array(group.scans[0].balance)
+    check_close(ratio * (0.6, 0.8, 1.3), (1, 1, 1), 0.02, "gains")
+    after = render()["Combined"]
+    lit = before[..., 3] > 0
+    right, left = lit & (np.arange(64) >= 48), lit & (np.arange(64) < 24)
+    for side, index in ((left, 0), (right, 1)):
+        check_close(after[side][:, :3], before[side][:, :3] * np.array(group.scans[index].balance), 0.01, "its gains in the picture")
+    group.use_balance = False
+    check((render()["Combined"] == before).all(), "off it is as before")
+    group.use_balance = True
+    check((render()["Combined"] == after).all(), "on again")
+
+
+def test_balance():
+    check_balance(False)
+
+
+def test_balance_of_links():
+    check_balance(True)
+
+
+def test_balance_needs_colors():
+    pair(False)
+    try:
+        bpy.ops.object.patina_scans_balance()
+    except RuntimeError as error:
+        check("has no colors to balance" in str(error), str(error))
+    else:
+        check(False, "balanced without colors")
