@@ -14,7 +14,7 @@ import numpy as np
 
 from . import backdrop, cryptomatte, jobs, mattes, memory, native
 from .pieces import LARGE_PICTURE, PIXEL_BYTES, Canvas, Piece, Planes, tiles
-from .sync import DeviceChoice, SceneDescription, edits, soft
+from .sync import DeviceChoice, SceneDescription, edits, ranges, soft
 from .sync.analyzing import ANALYSES
 from .sync.colors import OWN, SCALAR
 
@@ -379,7 +379,8 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
             style = replace(style, color_source=OWN)
         softened = item.soft if item.soft and not item.soft.missing(item.cloud) else None  # a notice has said so
         scene.add_cloud(item.cloud, mask=edits.mask_of(item.cloud, item.edits), grade=edits.grade_of(item.cloud, item.edits),
-                        field=soft.field_of(item.cloud, softened) if softened else None, **asdict(style),
+                        field=soft.field_of(item.cloud, softened) if softened else None, scans=ranges.scans_of(item.cloud, item.told),
+                        **asdict(style),
                         **(dict(softened.style) if softened else {}))
     for item in description.meshes:
         scene.add_mesh(item.mesh, item.texture and item.texture.native, **asdict(item.style))

@@ -442,16 +442,16 @@ class Scene(_Handle):
         self._kept: list[_Handle] = []
 
     def add_cloud(self, cloud: Cloud, ramp: bytes = b"", mask: points.Mask | None = None, grade: points.Grade | None = None,
-                  field: points.Field | None = None, **style: Any) -> None:
+                  field: points.Field | None = None, scans: points.ScanSet | None = None, **style: Any) -> None:
         """ramp: linear RGB, float32, two colours or more; empty: black to white."""
-        fields = abi.CloudStyle(**style, mask=mask and mask._handle, grade=grade and grade._handle,
+        fields = abi.CloudStyle(**style, mask=mask and mask._handle, grade=grade and grade._handle, scans=scans and scans._handle,
                                 field=field and field._handle)
         if ramp:
             colors = np.frombuffer(ramp, np.float32)  # the library copies it
             fields.ramp, fields.ramp_count = colors.ctypes.data, len(colors) // 3
         self._call("add_cloud", cloud._handle, byref(fields))
         self.clouds.append(cloud)
-        self._kept += [handle for handle in (mask, grade, field) if handle]
+        self._kept += [handle for handle in (mask, grade, field, scans) if handle]
 
     def add_mesh(self, mesh: Mesh, texture: Texture | None = None, **style: Any) -> None:
         self._call("add_mesh", mesh._handle, byref(abi.MeshStyle(texture=texture._handle if texture else None, **style)))

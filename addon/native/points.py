@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from ctypes import byref, c_float
+from ctypes import byref, c_double, c_float
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,19 @@ class Grade(_Handle):
         balance = np.array([(*grade, 1.0, 1.0, 1.0)[4:7] for grade in grades], np.float32)
         super().__init__(cloud._handle, None if scans is None else scans.ctypes.data, values, balance.ctypes.data, len(grades),
                          blame=(cloud._handle,), create="patina_grade_create_balanced")
+
+
+class ScanSet(_Handle):
+    """The scans that a cloud was made of, for range images. of: (count,) uint16, or None: all are of the first; scans: the direction in
+    which each scanner looked, and the interval of its samples, 0 where that is not known."""
+
+    _kind = "scans"
+
+    def __init__(self, cloud: Cloud, of: np.ndarray | None, scans: Sequence[tuple[Sequence[float], float]]) -> None:
+        if of is not None and (of.dtype != np.uint16 or len(of) != cloud.count or not of.flags.c_contiguous):
+            raise PatinaError("scans are a uint16 for each point")
+        values = (abi.Scan * len(scans))(*(abi.Scan((c_double * 3)(*direction), interval) for direction, interval in scans))
+        super().__init__(cloud._handle, None if of is None else of.ctypes.data, values, len(scans), blame=(cloud._handle,))
 
 
 class Field(_Handle):

@@ -19,6 +19,7 @@ from .heard import BoolProperty, EnumProperty, FloatProperty, FloatVectorPropert
 from .lines import PatinaLinesProperties
 from .numbers import attribute_names
 from .points import PatinaPointsProperties, PatinaScanProperties
+from .ranges import PatinaRangeProperties
 from .sequence import PatinaSequenceProperties
 from .soft import PatinaSoftProperties
 from .studio import PatinaStudioProperties
@@ -49,7 +50,9 @@ class PatinaSceneProperties(PropertyGroup):
                                   "are filled", 0),
             ('FILL', "Filled", "Gaps between the points are filled in the picture: fast, whatever the spacing", 2),
             ('SPLATS', "Discs", "Every point is a small disc across its normal, discs that overlap are blended: smoother, "
-                                "slower, gaps wider than the discs stay open", 1)))
+                                "slower, gaps wider than the discs stay open", 1),
+            ('RANGES', "Range Images", "Points are merged in a coarser picture, and its pixels joined: scans that do not quite fit are one "
+                                       "surface, which needs neither normals nor an analysis", 3)))
     error_target: FloatProperty(
         name="Error Target", override=_OVERRIDE, default=0.0, min=0.0, soft_max=10.0, max=100.0, subtype='PERCENTAGE',
         precision=1,
@@ -213,6 +216,7 @@ def _link_file(group: PropertyGroup, path: str) -> None:
 class PatinaObjectProperties(PropertyGroup):
     colors: PointerProperty(type=PatinaColorProperties, override=_OVERRIDE)
     soft: PointerProperty(type=PatinaSoftProperties, override=_OVERRIDE)
+    ranges: PointerProperty(type=PatinaRangeProperties, override=_OVERRIDE)
     clip: PointerProperty(type=PatinaClipProperties, override=_OVERRIDE)
     lighting: EnumProperty(
         name="Lighting", override=_OVERRIDE, default='AUTO',
@@ -354,7 +358,7 @@ class PatinaViewLayerProperties(PropertyGroup):
 
 
 _CLASSES = (PatinaScanProperties, PatinaPointsProperties, PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
-            PatinaLinesProperties, PatinaColorProperties, PatinaSoftProperties, PatinaClipProperties, PatinaSceneProperties,
+            PatinaLinesProperties, PatinaColorProperties, PatinaSoftProperties, PatinaRangeProperties, PatinaClipProperties, PatinaSceneProperties,
             PatinaObjectProperties, PatinaViewLayerProperties, PatinaWorldProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties),
            (World, PatinaWorldProperties))

@@ -18,7 +18,7 @@ from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, roles, soft
+from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, ranges, roles, soft
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -85,6 +85,10 @@ class CloudStyle:
     hidden_kinds: int = 0
     least_certainty: float = 0.0
     exact: int = 1  # black is black
+    surface: int = 0  # as the settings; else PATINA_SURFACE_RANGES
+    range_gamma: float = 0.0
+    range_pixel: float = 0.0
+    range_cull: float = 0.0
 
 
 class Pending:
@@ -142,6 +146,7 @@ class CloudItem:
     edits: edits.State = edits.State()
     soft: soft.Soft | None = None
     dotted: bool = False  # Blender's overlays draw its points too
+    told: str = ""  # of its scans, where they are drawn as range images: ranges.py
 
 
 class CloudCache:
@@ -322,8 +327,9 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
                 style = replace(style, lighting=LIT)
             edited = edits.state_of(obj)
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
+            told = ranges.told_of(obj, patina.surface)
             dotted = obj.type == 'MESH' and not solid and not link
-            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted))
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, told))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
@@ -624,7 +630,7 @@ def style_of(obj: bpy.types.Object, matrix: Matrix) -> CloudStyle:
         free_space=enum_number(patina, "free_space"),
         hidden_kinds=int(patina.hide_stray) << native.KINDS.index("STRAY"),
         least_certainty=patina.least_certainty,
-        **colors.style_fields(obj))
+        **ranges.style_fields(obj), **colors.style_fields(obj))
 
 
 def _mesh_style(obj: bpy.types.Object, matrix: Matrix, surface: images.Surface) -> meshes.MeshStyle:

@@ -15,6 +15,7 @@ from . import (
     panorama,
     points,
     presets,
+    ranges,
     sampling,
     scan_points,
     sequence,
@@ -26,7 +27,7 @@ from . import (
 )
 
 # What makes the look comes first, then how it is drawn.
-_MODULES = (presets, styles, lines, effects, panels, sampling, cryptomatte, points, colors, soft, scan_points, motion, combine, panorama,
+_MODULES = (presets, styles, lines, effects, panels, sampling, cryptomatte, points, colors, soft, ranges, scan_points, motion, combine, panorama,
             sequence, materials, world, statistics, standard)
 
 

@@ -52,7 +52,7 @@ class PATINA_PT_surface(PatinaPanel, Panel):
         layout.use_property_decorate = False
         patina = context.scene.patina
         layout.prop(patina, "surface")
-        filled = patina.surface != 'SPLATS'
+        filled = patina.surface not in {'SPLATS', 'RANGES'}
         row = rows.automatic(layout, patina, "error_target", otherwise="As Set Below")
         row.active = filled
         column = layout.column()
@@ -178,7 +178,7 @@ class PATINA_PT_points(_PatinaObjectPanel, Panel):
         patina = context.object.patina
         layout.prop(patina, "opacity")
         layout.prop(patina, "lighting")
-        rows.automatic(layout, patina, "radius").active = context.scene.patina.surface != 'FILL'
+        rows.automatic(layout, patina, "radius").active = context.scene.patina.surface in {'AUTO', 'SPLATS'} and not patina.ranges.use
         layout.prop(patina, "cull_back")
         column = layout.column()
         if patina.linked_file:
@@ -205,7 +205,7 @@ class PATINA_PT_analysis(_PatinaObjectPanel, Panel):
         known = estimates.layer_distance(context.object.name_full)
         rows.automatic(layout, patina, "d_min",
                        otherwise="Automatic" if known is None else f"Automatic ({_length(context.scene, known)})")
-        rows.automatic(layout, patina, "largest_gap").active = context.scene.patina.surface != 'FILL'
+        rows.automatic(layout, patina, "largest_gap").active = context.scene.patina.surface in {'AUTO', 'SPLATS'} and not patina.ranges.use
 
 
 class PATINA_PT_attributes(_PatinaObjectPanel, Panel):

@@ -44,7 +44,7 @@ class _FirstLines:
             column.prop(colors, "ramp")
         layout.prop(patina, "opacity")
         layout.prop(patina, "lighting")
-        rows.automatic(layout, patina, "radius").active = context.scene.patina.surface != 'FILL'
+        rows.automatic(layout, patina, "radius").active = context.scene.patina.surface in {'AUTO', 'SPLATS'} and not patina.ranges.use
         row = layout.row(heading="Clip", align=True)
         row.use_property_decorate = False
         row.prop(colors, "use_clips", text="")

@@ -222,3 +222,27 @@ def test_balance_needs_colors():
         check("has no colors to balance" in str(error), str(error))
     else:
         check(False, "balanced without colors")
+
+
+def test_range_images():
+    """The mode for one object and for the scene; culling leaves scans out that looked the other way; settings reach the picture."""
+    obj = pair(False, "ranges")
+    group = obj.patina.ranges
+    whole = sides()
+    group.use = True
+    ranged = render()["Combined"]
+    check(min(sides()) > 0.8 * min(whole), f"{sides()} of {whole}")
+    group.use = False
+    bpy.context.scene.patina.surface = 'RANGES'
+    check((render()["Combined"] == ranged).all(), "the scene's mode is the object's")
+    group.use_cull = True
+    check((render()["Combined"] == ranged).all(), "scans that looked as the view does stay")
+    bpy.context.scene.camera.location.z, bpy.context.scene.camera.rotation_euler.y = -8.0, np.pi
+    check(not drawn(render()), "from behind all are left out")
+    group.use_cull = False
+    check(drawn(render()), "without culling they are there")
+    for name, value in (("pixel", 12.0), ("gamma", 0.5)):
+        setattr(group, name, value)
+        check(drawn(render()), f"{name} {value}")
+    group.pixel = 0.3  # below what the library takes
+    check(drawn(render()), "clamped")

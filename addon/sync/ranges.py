@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an object says of range images → fields of patina_cloud_style, and the scans that its points are of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from .. import native
+from ..importers import scans
+from ..native.abi import SURFACE
+from ..native.points import ScanSet
+from . import edits
+
+LEAST = 1.0  # pixel size
+
+
+def style_fields(obj: bpy.types.Object) -> dict[str, Any]:
+    group = obj.patina.ranges
+    return {
+        "surface": SURFACE["RANGES"] if group.use else 0,
+        "range_gamma": group.gamma,
+        "range_pixel": max(group.pixel, LEAST) if group.pixel > 0.0 else 0.0,
+        "range_cull": group.cull if group.use_cull else 0.0,
+    }
+
+
+def told_of(obj: bpy.types.Object, surface: str) -> str:
+    """What the object's file told of its scans, where they are drawn as range images; surface: of the scene."""
+    if not obj.patina.ranges.use and surface != 'RANGES':
+        return ""
+    told = obj.original.data.get(scans.PROPERTY, "")
+    return told if isinstance(told, str) else ""
+
+
+def scans_of(cloud: native.Cloud, told: str) -> ScanSet | None:
+    """Any thread. None where nothing is known of the scans that the points are of."""
+    known = scans.unpacked(told) if told else []
+    of = edits.scans_of(cloud)
+    numbers = cloud.scan_numbers if of is not None else (0,)
+    records = [(known[number].direction, known[number].interval) if number < len(known) else (scans.UNKNOWN, 0.0) for number in numbers]
+    if not any(any(direction) or interval for direction, interval in records):
+        return None
+    return edits.keep(cloud, ("scans", told, cloud.scan_stamp), lambda: ScanSet(cloud, of, records))
