@@ -221,6 +221,11 @@ def test_grading_is_live():
     lower = np.arange(before.shape[0])[:, None] < before.shape[0] / 2 - 5
     check(np.median(after[wall_pixels & upper][:, 1]) < 0.6 * np.median(before[wall_pixels & upper][:, 1]), "the upper scan is darker")
     check(np.abs(after[wall_pixels & lower] - before[wall_pixels & lower]).max() < 0.02, "the lower one stays")
+    obj.patina.points.scans[1].hide = True
+    yield seen(obj)
+    hidden = screenshot("edit_hidden_scan")
+    check(np.median(hidden[wall_pixels & upper][:, 1]) < 0.5 * np.median(after[wall_pixels & upper][:, 1]), "the upper scan is hidden")
+    check(np.abs(hidden[wall_pixels & lower] - before[wall_pixels & lower]).max() < 0.02, "the lower one is not")
 
 
 def test_selection_stays_while_samples_come():
