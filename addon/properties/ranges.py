@@ -12,6 +12,8 @@ from .heard import BoolProperty, FloatProperty
 
 _OVERRIDE = {'LIBRARY_OVERRIDABLE'}
 
+SHARPNESS = 0.75  # within [K II.E]'s 0.66 to 0.83
+
 
 class PatinaRangeProperties(PropertyGroup):
     use: BoolProperty(
@@ -27,6 +29,11 @@ class PatinaRangeProperties(PropertyGroup):
         name="Pixel Size", override=_OVERRIDE, default=0.0, min=0.0, soft_min=1.0, soft_max=8.0, max=64.0, precision=2,
         description="Pixels of the picture across one of those in which points are merged: larger ones close wider gaps, and blur")
     use_pixel: switch("pixel", 2.0, "A size of your own; else so that neighboring samples fall into neighboring pixels")
+    sharpness: FloatProperty(
+        name="Sharpness", override=_OVERRIDE, default=0.0, min=0.0, soft_min=0.5, max=0.95, precision=2,
+        description="A second, finer picture shows where many points share a pixel and at outlines: its pixels are so much smaller. "
+                    "Takes twice as long")
+    use_sharpness: switch("sharpness", SHARPNESS, "Two passes: sharper outlines and details; else one", "Two Passes")
     use_cull: BoolProperty(
         name="Cull Scans", override=_OVERRIDE, default=False,
         description="Leave out scans that looked another way than the view does, whole: faster, and their undersides cannot show. For scans "

@@ -88,6 +88,7 @@ class CloudStyle:
     surface: int = 0  # as the settings; else PATINA_SURFACE_RANGES
     range_gamma: float = 0.0
     range_pixel: float = 0.0
+    range_sharpness: float = 0.0
     range_cull: float = 0.0
 
 

@@ -14,6 +14,7 @@ from ..native.points import ScanSet
 from . import edits
 
 LEAST = 1.0  # pixel size
+LEAST_SHARPNESS = 0.5
 
 
 def style_fields(obj: bpy.types.Object) -> dict[str, Any]:
@@ -22,6 +23,7 @@ def style_fields(obj: bpy.types.Object) -> dict[str, Any]:
         "surface": SURFACE["RANGES"] if group.use else 0,
         "range_gamma": group.gamma,
         "range_pixel": max(group.pixel, LEAST) if group.pixel > 0.0 else 0.0,
+        "range_sharpness": max(group.sharpness, LEAST_SHARPNESS) if group.sharpness > 0.0 else 0.0,
         "range_cull": group.cull if group.use_cull else 0.0,
     }
 

@@ -28,6 +28,7 @@ class PATINA_PT_ranges(ColorPanel, Panel):
             rows.sentence(context, layout, "Soft points are balls, and no range images", 'INFO')
         rows.automatic(layout, group, "gamma")
         rows.automatic(layout, group, "pixel")
+        rows.automatic(layout, group, "sharpness", otherwise="One Pass")
         known = any(any(scan.direction) for scan in scans.unpacked(obj.data.get(scans.PROPERTY)))
         row = layout.row(heading="Cull Scans")
         row.active = known

@@ -241,8 +241,8 @@ def test_range_images():
     check(not drawn(render()), "from behind all are left out")
     group.use_cull = False
     check(drawn(render()), "without culling they are there")
-    for name, value in (("pixel", 12.0), ("gamma", 0.5)):
+    for name, value in (("pixel", 12.0), ("gamma", 0.5), ("sharpness", 0.6)):
         setattr(group, name, value)
         check(drawn(render()), f"{name} {value}")
-    group.pixel = 0.3  # below what the library takes
+    group.pixel, group.sharpness = 0.3, 0.1  # below what the library takes
     check(drawn(render()), "clamped")
