@@ -18,7 +18,7 @@ def left_out(description: SceneDescription, own: Sequence[Clip]) -> SceneDescrip
     that cut Blender's dots as well."""
     cut = len(description.clips) > len(own)
     clouds = [CloudItem(item.cloud, _whole(item.style), 0, name=item.name) for item in description.clouds
-              if item.dotted and (item.soft or _leaves_out(item.style, cut))]
+              if item.dotted and (item.soft or item.edits.hidden or _leaves_out(item.style, cut))]
     if not clouds:
         return None
     settings = replace(description.settings, quality=PAPER, fill=OPEN, surface=MEASURED, smooth=0, antialias=0, layers=1, average=0,
@@ -34,4 +34,4 @@ def _leaves_out(style: CloudStyle, cut: bool) -> bool:
 
 def _whole(style: CloudStyle) -> CloudStyle:
     return replace(style, hidden_classes=(0,) * 8, hidden_kinds=0, least_certainty=0.0, free_space=0, clip_off=0, cull_back=0,
-                   transparency=0.0)
+                   transparency=0.0, surface=0)

@@ -189,6 +189,10 @@ def test_what_is_left_out_shows_no_dots():
     points.patina.colors.hidden[5] = True
     yield from seen("hidden class")
     points.patina.colors.hidden[5] = False
+    points.patina.points.scans.add().hide = True  # of all points
+    yield from seen("hidden scan")
+    points.patina.points.scans.clear()
+    points.update_tag()
     yield from seen("whole again")
     check(max(counts.values()) < LETTERS and whole < LETTERS, f"dark pixels: whole {whole}, {counts}")
 
