@@ -6,74 +6,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 import bpy
-import gpu
 import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty
 from bpy.types import Context, Event, Object, Operator, OperatorMousePath, WorkSpaceTool
-from gpu_extras.batch import batch_for_shader
 
-from .. import native, render, sync, viewport
-from ..native.points import pick
-from ..sync import clouds, edits
+from .. import native, sync
+from ..sync import edits
 from . import points
 from .points import HOW, Editing
+from .view_tools import OverView, Place, Seen, describe, is_view, place_of
 
 STEP = 3.0  # pixels between two corners of a lasso
 MOST = 4000  # corners
 _HOW = {(False, False): 'SET', (True, False): 'ADD', (False, True): 'SUB', (True, True): 'AND'}  # by Shift and Ctrl
-LINE = (1.0, 1.0, 1.0, 0.9)
-FILL = (1.0, 1.0, 1.0, 0.06)
-
-
-def _view(context: Context) -> sync.View:
-    """What the picture is that outlines are drawn on: the 3D view's; without one, as scripts have none, the final render's."""
-    if context.region_data and context.space_data and context.space_data.type == 'VIEW_3D':
-        return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
-    depsgraph = context.evaluated_depsgraph_get()
-    camera = context.scene.camera
-    return sync.final_view(camera and camera.evaluated_get(depsgraph), depsgraph)
-
-
-def _describe(context: Context) -> sync.SceneDescription:
-    """The scene as the view shows it, its clouds built, light and lines left out: what stands where is all that is asked."""
-    depsgraph, view, notices = context.evaluated_depsgraph_get(), _view(context), []
-    drawing = viewport.of_area(context.area)
-    trusted = drawing.trusted if drawing else sync.Trusted()
-    space = context.space_data if context.region_data else None
-
-    def visible(instance: bpy.types.DepsgraphObjectInstance) -> bool:
-        obj = instance.parent if instance.is_instance else instance.object
-        return space is None or obj.visible_in_viewport_get(space)
-
-    items = clouds.collect(depsgraph, trusted.take(notices), notices, visible)
-    description = sync.describe_items(depsgraph, view, notices, items)
-    with native.Progress() as progress:
-        built = [replace(item, cloud=cloud) for item in description.clouds
-                 if (cloud := points.jobs.finish(item.cloud.resolve(progress)))]
-    clips = sync.view_clips(context.region_data) if space else []
-    return replace(description, clouds=built, clips=[*description.clips, *clips], lights=[], headlight=None, lines=None, shadow_file="",
-                   panorama=None, settings=replace(description.settings, pixel_samples=1))
 
 
 def points_in(context: Context, names: set[str], outline: np.ndarray, through: bool) -> dict[str, edits.Bits]:
     """Of the objects of these names that the view shows: which points an outline, (n, 2) pixels of the view, holds. PatinaError."""
-    description = _describe(context)
-    found: dict[str, edits.Bits] = {}
-    device = render.device_for(description.device)
-    with native.Scene() as scene:
-        render.describe(scene, description, ["COMBINED"])
-        frame = None if through else native.Frame(device)
-        try:
-            if frame:
-                frame.render(scene)
-            for index, item in enumerate(description.clouds):
-                if item.name in names:
-                    bits = pick(scene, index, outline, frame)
-                    found[item.name] = found[item.name] | bits if item.name in found else bits  # of instances each
-        finally:
-            if frame:
-                frame.close()
-    return found
+    with Seen(describe(context), names, through) as seen:
+        return seen.points(outline)
 
 
 def targets(context: Context) -> list[Object]:
@@ -82,7 +33,7 @@ def targets(context: Context) -> list[Object]:
     return list(chosen.values())
 
 
-class PATINA_OT_points_select(Operator):
+class PATINA_OT_points_select(OverView, Operator):
     """Select points of linked clouds by drawing a box or a lasso around them. Shift extends the selection, Ctrl subtracts from it, \
 both intersect"""
 
@@ -140,11 +91,11 @@ both intersect"""
     # ---- in a view
 
     def invoke(self, context: Context, event: Event) -> set[str]:
-        if context.area is None or context.area.type != 'VIEW_3D' or context.region.type != 'WINDOW':
+        if not is_view(context):
             self.report({'ERROR'}, "Patina: points are selected in a 3D view")
             return {'CANCELLED'}
-        self._corners: list[tuple[float, float]] = []
-        self._place = self._at(context, event)
+        self._corners: list[Place] = []
+        self._place = place_of(context, event)
         self._asked = self.properties.is_property_set("how")  # by a script
         self._keys = (event.shift, event.ctrl)
         if not self.properties.is_property_set("through"):
@@ -155,13 +106,7 @@ both intersect"""
                 if event.value == 'CLICK_DRAG' else self._place
             self._corners = [start]
         self._take_tool(context)
-        context.window.cursor_modal_set('CROSSHAIR')
-        context.workspace.status_text_set("Drag around points. Shift: extend, Ctrl: subtract, both: intersect, X: through "
-                                          "what is before them, Esc: end")
-        self._region = context.region
-        self._drawing = context.space_data.draw_handler_add(self._draw, (), 'WINDOW', 'POST_PIXEL')
-        context.window_manager.modal_handler_add(self)
-        context.area.tag_redraw()
+        self.begin(context, "Drag around points. Shift: extend, Ctrl: subtract, both: intersect, X: through what is before them, Esc: end")
         return {'RUNNING_MODAL'}
 
     def _take_tool(self, context: Context) -> None:
@@ -170,14 +115,11 @@ both intersect"""
         if tool and tool.idname not in {PatinaSelectBox.bl_idname, PatinaSelectLasso.bl_idname}:
             bpy.ops.wm.tool_set_by_id(name=(PatinaSelectLasso if self.shape == 'LASSO' else PatinaSelectBox).bl_idname)
 
-    def _at(self, context: Context, event: Event) -> tuple[float, float]:
-        return (float(event.mouse_x - context.region.x), float(event.mouse_y - context.region.y))
-
     def modal(self, context: Context, event: Event) -> set[str]:
         context.area.tag_redraw()
-        self._place = self._at(context, event)
+        self._place = place_of(context, event)
         if event.type in {'ESC', 'RIGHTMOUSE'}:
-            self._end(context)
+            self.end(context)
             return {'CANCELLED'}
         if event.type == 'X' and event.value == 'PRESS':
             self.through = not self.through
@@ -187,7 +129,7 @@ both intersect"""
             self._extend()
         elif event.type == 'LEFTMOUSE' and event.value == 'RELEASE' and self._corners:
             self._extend(last=True)
-            self._end(context)
+            self.end(context)
             if not self._asked:  # keys that were held when it began, or are now
                 self.how = _HOW[event.shift or self._keys[0], event.ctrl or self._keys[1]]
             return self._finish(context)
@@ -208,30 +150,13 @@ both intersect"""
             self.path.add().loc = corner
         return self.execute(context)
 
-    def _end(self, context: Context) -> None:
-        if self._drawing:
-            bpy.types.SpaceView3D.draw_handler_remove(self._drawing, 'WINDOW')
-        self._drawing = None
-        context.window.cursor_modal_restore()
-        context.workspace.status_text_set(None)
-
-    def cancel(self, context: Context) -> None:
-        self._end(context)
-
-    def _draw(self) -> None:
-        if bpy.context.region != self._region or not self._corners:
-            return
+    def shown(self) -> tuple[list[Place], bool]:
+        if not self._corners:
+            return [], False
+        if self.shape == 'LASSO':
+            return [*self._corners, self._place], False
         (x0, y0), (x1, y1) = self._corners[0], self._place
-        corners = [*self._corners, self._place] if self.shape == 'LASSO' else [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-        shader = gpu.shader.from_builtin('UNIFORM_COLOR' if bpy.app.version >= (4, 0, 0) else '2D_UNIFORM_COLOR')
-        shader.bind()
-        gpu.state.blend_set('ALPHA')
-        if self.shape == 'BOX':
-            shader.uniform_float("color", FILL)
-            batch_for_shader(shader, 'TRI_FAN', {"pos": corners}).draw(shader)
-        shader.uniform_float("color", LINE)
-        batch_for_shader(shader, 'LINE_STRIP', {"pos": [*corners, corners[0]]}).draw(shader)
-        gpu.state.blend_set('NONE')
+        return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)], True
 
 
 # ---- tools -----------------------------------------------------------------------------------------------------------

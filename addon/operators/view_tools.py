@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What tools for points in a 3D view share: the scene as the view shows it, which of its points an outline holds, and an operator that
+draws an outline over the view while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import bpy
+import gpu
+import numpy as np
+from bpy.types import Context, Event
+from gpu_extras.batch import batch_for_shader
+
+from .. import jobs, native, render, sync, viewport
+from ..native.points import pick
+from ..sync import clouds, edits
+
+LINE = (1.0, 1.0, 1.0, 0.9)
+FILL = (1.0, 1.0, 1.0, 0.06)
+Place = tuple[float, float]  # pixels of the view from its bottom left
+
+
+def _view(context: Context) -> sync.View:
+    """What the picture is that outlines are drawn on: the 3D view's; without one, as scripts have none, the final render's."""
+    if context.region_data and context.space_data and context.space_data.type == 'VIEW_3D':
+        return sync.viewport_view(context.region, context.space_data, context.region_data, context.scene)
+    depsgraph = context.evaluated_depsgraph_get()
+    camera = context.scene.camera
+    return sync.final_view(camera and camera.evaluated_get(depsgraph), depsgraph)
+
+
+def describe(context: Context) -> sync.SceneDescription:
+    """The scene as the view shows it, its clouds built, light and lines left out: what stands where is all that is asked."""
+    depsgraph, view, notices = context.evaluated_depsgraph_get(), _view(context), []
+    drawing = viewport.of_area(context.area)
+    trusted = drawing.trusted if drawing else sync.Trusted()
+    space = context.space_data if context.region_data else None
+
+    def visible(instance: bpy.types.DepsgraphObjectInstance) -> bool:
+        obj = instance.parent if instance.is_instance else instance.object
+        return space is None or obj.visible_in_viewport_get(space)
+
+    items = clouds.collect(depsgraph, trusted.take(notices), notices, visible)
+    description = sync.describe_items(depsgraph, view, notices, items)
+    with native.Progress() as progress:
+        built = [replace(item, cloud=cloud) for item in description.clouds
+                 if (cloud := jobs.finish(item.cloud.resolve(progress)))]
+    clips = sync.view_clips(context.region_data) if space else []
+    return replace(description, clouds=built, clips=[*description.clips, *clips], lights=[], headlight=None, lines=None, shadow_file="",
+                   panorama=None, settings=replace(description.settings, pixel_samples=1))
+
+
+class Seen:
+    """A scene that is asked for points, of the objects of these names; through: those that others hide too. PatinaError."""
+
+    def __init__(self, description: sync.SceneDescription, names: Collection[str], through: bool) -> None:
+        self._wanted = [(index, item.name) for index, item in enumerate(description.clouds) if item.name in names]
+        device = render.device_for(description.device)
+        self._scene = native.Scene()
+        self._frame: native.Frame | None = None
+        try:
+            render.describe(self._scene, description, ["COMBINED"])
+            if not through:
+                self._frame = native.Frame(device)
+                self._frame.render(self._scene)
+        except BaseException:
+            self.close()
+            raise
+
+    def points(self, outline: np.ndarray) -> dict[str, edits.Bits]:
+        """By object: which points an outline, (n, 2) pixels of the view, holds."""
+        found: dict[str, edits.Bits] = {}
+        for index, name in self._wanted:
+            bits = pick(self._scene, index, outline, self._frame)
+            found[name] = found[name] | bits if name in found else bits  # of instances each
+        return found
+
+    def close(self) -> None:
+        if self._frame:
+            self._frame.close()
+        self._scene.close()
+
+    def __enter__(self) -> Seen:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+# ---- operators -------------------------------------------------------------------------------------------------------
+
+
+def is_view(context: Context) -> bool:
+    return context.area is not None and context.area.type == 'VIEW_3D' and context.region.type == 'WINDOW'
+
+
+def place_of(context: Context, event: Event) -> Place:
+    return (float(event.mouse_x - context.region.x), float(event.mouse_y - context.region.y))
+
+
+class OverView:
+    """Beside bpy.types.Operator, one that runs in a 3D view: begin() in invoke(), end() when it ends."""
+
+    def shown(self) -> tuple[Sequence[Place], bool]:
+        """Corners of what is drawn over the view, none: nothing; and whether it is filled, which has to be convex."""
+        raise NotImplementedError
+
+    def begin(self, context: Context, status: str) -> None:
+        context.window.cursor_modal_set('CROSSHAIR')
+        context.workspace.status_text_set(status)
+        self._region = context.region
+        self._drawing = context.space_data.draw_handler_add(self._draw_over, (), 'WINDOW', 'POST_PIXEL')
+        context.window_manager.modal_handler_add(self)
+        context.area.tag_redraw()
+
+    def end(self, context: Context) -> None:
+        if self._drawing:
+            bpy.types.SpaceView3D.draw_handler_remove(self._drawing, 'WINDOW')
+        self._drawing = None
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+
+    def cancel(self, context: Context) -> None:
+        self.end(context)
+
+    def _draw_over(self) -> None:
+        corners, filled = self.shown() if bpy.context.region == self._region else ((), False)
+        if not corners:
+            return
+        shader = gpu.shader.from_builtin('UNIFORM_COLOR' if bpy.app.version >= (4, 0, 0) else '2D_UNIFORM_COLOR')
+        shader.bind()
+        gpu.state.blend_set('ALPHA')
+        if filled:
+            shader.uniform_float("color", FILL)
+            batch_for_shader(shader, 'TRI_FAN', {"pos": corners}).draw(shader)
+        shader.uniform_float("color", LINE)
+        batch_for_shader(shader, 'LINE_STRIP', {"pos": [*corners, corners[0]]}).draw(shader)
+        gpu.state.blend_set('NONE')
