@@ -21,6 +21,7 @@ from . import (
     scans,
     set_up,
     shadows,
+    soft_brush,
     stations,
     styles,
     view_transform,
@@ -28,7 +29,7 @@ from . import (
 )
 
 _MODULES = (analyze, balance, clips, colors, import_points, export_points, combine, linked_points, plan, points, points_keys, points_tools, preferences,
-            scanner, scans, set_up, shadows, stations, styles, view_transform, world)
+            scanner, scans, set_up, shadows, soft_brush, stations, styles, view_transform, world)
 
 
 def register() -> None:

@@ -7,11 +7,12 @@ Enum items are numbered as the library's enumerations, and so keep their meaning
 from __future__ import annotations
 
 import bpy
-from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume, World
+from bpy.types import Context, Object, PropertyGroup, Scene, ViewLayer, Volume, WindowManager, World
 
 from .. import styles
 from ..native import MOST_LAYERS
 from .automatic import switch
+from .brush import PatinaBrushProperties
 from .clips import PatinaClipProperties
 from .colors import PatinaColorProperties
 from .effects import PatinaEffectsProperties
@@ -359,7 +360,7 @@ class PatinaViewLayerProperties(PropertyGroup):
 
 _CLASSES = (PatinaScanProperties, PatinaPointsProperties, PatinaSequenceProperties, PatinaStyleProperties, PatinaStudioProperties, PatinaEffectsProperties,
             PatinaLinesProperties, PatinaColorProperties, PatinaSoftProperties, PatinaRangeProperties, PatinaClipProperties, PatinaSceneProperties,
-            PatinaObjectProperties, PatinaViewLayerProperties, PatinaWorldProperties)
+            PatinaObjectProperties, PatinaViewLayerProperties, PatinaWorldProperties, PatinaBrushProperties)
 _OWNERS = ((Scene, PatinaSceneProperties), (Object, PatinaObjectProperties), (ViewLayer, PatinaViewLayerProperties),
            (World, PatinaWorldProperties))
 
@@ -369,10 +370,12 @@ def register() -> None:
         bpy.utils.register_class(cls)
     for owner, group in _OWNERS:
         owner.patina = PointerProperty(type=group, name="Patina", override=_OVERRIDE)
+    WindowManager.patina_brush = bpy.props.PointerProperty(type=PatinaBrushProperties, name="Patina Brush", options={'SKIP_SAVE'})
 
 
 def unregister() -> None:
     styles.forget_icons()
+    del WindowManager.patina_brush
     for owner, _ in _OWNERS:
         del owner.patina
     for cls in reversed(_CLASSES):

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.types import Context, Panel
+from bpy.types import Context, Panel, PropertyGroup, UILayout
 
 from .colors import ColorPanel
 
@@ -22,6 +22,9 @@ class PATINA_PT_soft(ColorPanel, Panel):
         layout.use_property_split = True
         obj = context.object
         group = obj.patina.soft
+        if obj.type == 'MESH' and not len(obj.data.polygons):
+            self._draw_brush(context)
+        layout = layout.column()
         layout.active = group.use
         layout.prop(group, "by")
         if group.by == 'ATTRIBUTE':
@@ -35,7 +38,7 @@ class PATINA_PT_soft(ColorPanel, Panel):
             layout.prop(group, "target")
             layout.prop(group, "shape")
         if group.by != 'ALL':
-            self._draw_threshold(group)
+            self._draw_threshold(layout, group)
         layout.prop(group, "transition")
         layout.prop(group, "opacity")
         row = layout.row(heading="Radius")
@@ -44,8 +47,17 @@ class PATINA_PT_soft(ColorPanel, Panel):
         row.active = group.use_radius
         row.prop(group, "radius", text="")
 
-    def _draw_threshold(self, group: bpy.types.PropertyGroup) -> None:
-        layout = self.layout
+    def _draw_brush(self, context: Context) -> None:
+        brush = context.window_manager.patina_brush
+        column = self.layout.column(align=True)
+        column.operator("object.patina_soft_brush", icon='BRUSH_DATA')
+        row = column.row(align=True)
+        row.use_property_split = False
+        row.prop(brush, "strength")
+        row.prop(brush, "radius")
+        row.prop(brush, "through", text="", icon='XRAY')
+
+    def _draw_threshold(self, layout: UILayout, group: PropertyGroup) -> None:
         if group.by not in {'CLASSES', 'LUMINANCE'}:
             column = layout.column(align=True)
             column.prop(group, "use_range")

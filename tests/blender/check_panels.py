@@ -169,7 +169,8 @@ class Drawing:
 def context_of(obj=None, **more):
     scene = bpy.context.scene
     return SimpleNamespace(scene=scene, object=obj, engine=scene.render.engine, view_layer=bpy.context.view_layer, area=None,
-                           region=None, material=None, light=None, camera=None, preferences=bpy.context.preferences, **more)
+                           region=None, material=None, light=None, camera=None, preferences=bpy.context.preferences,
+                           window_manager=bpy.context.window_manager, **more)
 
 
 def drawn_by(cls, context):

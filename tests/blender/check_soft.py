@@ -208,3 +208,127 @@ def test_viewport_takes_what_was_painted():
     trusted.forget({("Mesh", obj.data.name_full)})
     _, painted, other = taken()
     check(painted is cloud and other is not field and trusted.reads == 2, "painted numbers make another field of the same cloud")
+
+
+# ---- the brush -------------------------------------------------------------------------------------------------------
+
+
+def paint(places, **options):
+    """Pixels of the final picture."""
+    bpy.context.view_layer.update()
+    return bpy.ops.object.patina_soft_brush(path=[{"name": "", "loc": place, "time": 0.0} for place in places], **options)
+
+
+def middle(scene, point):
+    row, column = pixel(scene, point)
+    return column + 0.5, row + 0.5
+
+
+def numbers(obj, name="soft"):
+    values = np.empty(len(obj.data.vertices), np.float32)
+    obj.data.attributes[name].data.foreach_get("value", values)
+    return values
+
+
+def cloud():
+    """The row, not soft by anything yet, and active."""
+    scene, obj, points = row()
+    obj.patina.soft.use = False
+    bpy.context.view_layer.objects.active = obj
+    return scene, obj, points
+
+
+def refused(**options):
+    """What it says."""
+    try:
+        paint(((10, 10),), **options)
+    except RuntimeError as error:
+        return str(error)
+    raise AssertionError("it was painted")
+
+
+def test_brush_paints_under_its_way():
+    scene, obj, points = cloud()
+    between = np.subtract(middle(scene, points[1]), middle(scene, points[0]))[0]
+    obj.patina.soft.by, obj.patina.soft.invert = 'LUMINANCE', True
+    check(paint([middle(scene, points[2]), middle(scene, points[5])], radius=0.4 * between) == {'FINISHED'}, "a stroke")
+    group = obj.patina.soft
+    check(group.use and group.by == 'ATTRIBUTE' and group.attribute == "soft" and not group.invert, "the panel goes by it")
+    check(group.use_range and (group.range_min, group.range_max) == (0.0, 1.0), "a range that stays")
+    check(numbers(obj).tolist() == [0, 0, 1, 1, 1, 1, 0, 0, 0], f"between its two places too: {numbers(obj)}")
+    check(soft(scene, points) == [2, 3, 4, 5], "the picture says the same")
+    paint([middle(scene, points[3])], radius=0.4 * between, strength=0.0)
+    paint([middle(scene, points[8])], radius=0.4 * between, strength=0.75)
+    check(numbers(obj).tolist() == [0, 0, 1, 0, 1, 1, 0, 0, 0.75], f"hard again, and weaker: {numbers(obj)}")
+    check(len(obj.data.attributes) == len({item.name for item in obj.data.attributes}) and "soft.001" not in obj.data.attributes, "one alone")
+    before = numbers(obj)
+    check(paint([(1.0, 1.0)], radius=2.0) == {'CANCELLED'} and (numbers(obj) == before).all(), "beside all points: nothing")
+
+
+def test_brush_paints_what_is_seen():
+    """Points behind others only with through; soft ones stand before what is behind them as others do."""
+    scene, obj, points = cloud()
+    hidden = add_points(points * 2.0, name="behind")  # on the same rays
+    bpy.context.view_layer.objects.active = hidden
+    stroke = [middle(scene, points[0]), middle(scene, points[-1])]
+    check(paint(stroke, radius=3.0) == {'CANCELLED'} and "soft" not in hidden.data.attributes, "nothing of it is seen")
+    check(paint(stroke, radius=3.0, through=True) == {'FINISHED'} and numbers(hidden).all(), "through")
+    bpy.context.view_layer.objects.active = obj
+    paint(stroke, radius=3.0)
+    check(numbers(obj).all(), "the nearer ones")
+    paint(stroke, radius=3.0, strength=0.0)
+    check(not numbers(obj).any(), "hard again, where they were soft before a background")
+    check(numbers(hidden).all(), "no other object's")
+
+
+def test_brush_keeps_what_the_panel_goes_by():
+    scene, obj, points = cloud()
+    values = np.linspace(10.0, 90.0, COUNT).astype(np.float32)
+    obj.data.attributes.new("score", 'FLOAT', 'POINT').data.foreach_set("value", values)
+    by(obj, 'ATTRIBUTE', attribute="score", use=True, use_range=True, range_min=0.0, range_max=100.0, threshold=0.7)
+    paint([middle(scene, points[1])], radius=3.0)
+    found = numbers(obj, "score")
+    check(found[1] == 100.0 and (np.delete(found, 1) == np.delete(values, 1)).all() and "soft" not in obj.data.attributes, f"{found}")
+    check(soft(scene, points) == [1, 7, 8], "where its range counts it as 1")
+    by(obj, 'ATTRIBUTE', use_range=False, invert=True, threshold=0.5)
+    paint([middle(scene, points[8])], radius=3.0)
+    low, high = obj.patina.soft.range_min, obj.patina.soft.range_max
+    check(obj.patina.soft.use_range and 10.0 <= low < 30.0 and 80.0 < high <= 100.0, f"from {low} to {high}")
+    check(abs(numbers(obj, "score")[8] - low) < 1e-4 and 8 in soft(scene, points), "inverted: the least is soft")
+
+
+def test_brush_goes_on_with_weights():
+    scene, obj, points = cloud()
+    obj.vertex_groups.new(name="faint").add([2, 3], 0.9, 'REPLACE')
+    by(obj, 'ATTRIBUTE', attribute="faint", use=True)
+    paint([middle(scene, points[6])], radius=3.0)
+    name = obj.patina.soft.attribute
+    check(name != "faint" and soft(scene, points) == [2, 3, 6], f"{name}: those of the group, and one more")
+
+
+def test_brush_refuses():
+    """With the reason, and nothing is changed."""
+    scene, obj, points = cloud()
+    obj.modifiers.new("array", 'ARRAY')
+    check("modifiers of 'points' make other points" in refused(), "modifiers")
+    obj.modifiers.clear()
+    scene.camera = None
+    check("camera" in refused(), "nothing to see it by")
+    scene.camera = next(item for item in scene.objects if item.type == 'CAMERA')
+    check("soft" not in obj.data.attributes and not obj.patina.soft.use, "nothing is left behind")
+    bpy.ops.object.mode_set(mode='EDIT')
+    said = refused()
+    bpy.ops.object.mode_set(mode='OBJECT')
+    check("only in Object Mode" in said, said)
+    faces = bpy.data.objects.new("faces", bpy.data.meshes.new("faces"))
+    faces.data.from_pydata([(0, 0, -3), (1, 0, -3), (0, 1, -3)], [], [(0, 1, 2)])
+    scene.collection.objects.link(faces)
+    bpy.context.view_layer.objects.active = faces
+    check("the mesh has faces" in refused(), "faces")
+    linked = bpy.data.objects.new("linked", bpy.data.meshes.new("box"))
+    scene.collection.objects.link(linked)
+    linked.patina.linked_file = str(SCRATCH / "soft.xyz")
+    bpy.context.view_layer.objects.active = linked
+    check("a linked file's points are not Blender's" in refused(), "a linked file")
+    bpy.context.view_layer.objects.active = None
+    check("no mesh of points" in refused(), "nothing")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points of linked clouds selected in a 3D view: the modal outline, what is seen of it, undo. See test_window.py for what a yield means."""
+"""Points in a 3D view, of linked clouds selected, of others painted soft: the modal operators, what is seen of them, undo. See
+test_window.py for what a yield means."""
 
 import time
 
@@ -286,3 +287,117 @@ def test_keys_mean_selected_points():
             bpy.ops.object.patina_points_select_all(action='DESELECT')
     press('H')
     yield obj.hide_get
+
+
+# ---- the brush for soft points ---------------------------------------------------------------------------------------
+
+
+def soft_numbers():
+    """Of the active object; none yet: zeros."""
+    data = bpy.context.view_layer.objects.active.data
+    found = data.attributes.get("soft")
+    values = np.zeros(len(data.vertices), np.float32)
+    if found:
+        found.data.foreach_get("value", values)
+    return values.reshape(ROWS, ROWS)
+
+
+def painted_wall():
+    scene = setup()
+    scene.patina.fill = 'CLOSED'
+    scene.render.film_transparent = False
+    obj, = import_ply(wall("view_brush.ply", offset=(0.0, 0.0, 0.0), color=GREEN))
+    obj.patina.soft.opacity = 0.1
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.ed.undo_push(message="begin")
+
+
+def key(kind, place, **held):
+    window, region = bpy.context.window_manager.windows[0], window_region()
+    for value in ('PRESS', 'RELEASE'):
+        window.event_simulate(kind, value, x=int(region.x + place[0]), y=int(region.y + place[1]), **held)
+
+
+def bright(picture):
+    """Pixels of green surface; the brush's circle takes some."""
+    return int(middle(picture, (picture[..., 1] > 0.5) & (picture[..., 0] < 0.4)).sum())
+
+
+def test_brush_in_the_view():
+    """Two strokes are two steps of undo, within the brush and after it; what is painted is seen, and seen through."""
+    if not bpy.app.use_event_simulate:
+        print("  without --enable-event-simulate: there is no mouse", flush=True)
+        return
+    painted_wall()
+    yield lambda: settled(ROWS * ROWS)
+    pictures = [bright(screenshot("brush_before"))]
+    region = window_region()
+    x, y = region.width / 2, region.height / 2
+    with override():
+        check(bpy.ops.object.patina_soft_brush('INVOKE_DEFAULT') == {'RUNNING_MODAL'}, "it begins")
+    bpy.context.window_manager.patina_brush.radius = 20.0
+    for height in (y + 60, y - 60):
+        yield lambda: settled(ROWS * ROWS)
+        before, rounds = int((soft_numbers() == 1.0).sum()), shown().pictures
+        yield from simulated([(x - 120, height), (x, height), (x + 120, height)])
+        yield lambda before=before: (soft_numbers() == 1.0).sum() > before
+        yield newer(rounds)
+        yield lambda: settled(ROWS * ROWS)
+        pictures.append(bright(screenshot(f"brush_{len(pictures)}")))
+    once = pictures[0] - pictures[1]
+    check(once > 2000 and abs(once - (pictures[1] - pictures[2])) < 0.3 * once, f"each stroke changes the picture: {pictures}")
+    both = soft_numbers()
+    check(both[ROWS // 2:].any() and both[:ROWS // 2].any() and not both[ROWS // 2 - 1:ROWS // 2 + 1].any(), "two bands")
+    key('Z', (x, y), ctrl=True)
+    yield lambda: not soft_numbers()[:ROWS // 2].any()
+    check((soft_numbers()[ROWS // 2:] == both[ROWS // 2:]).all(), "Ctrl Z takes the second stroke back, and it alone")
+    yield lambda: settled(ROWS * ROWS) and abs(bright(screenshot("brush_undone")) - pictures[1]) < 0.1 * once
+    yield from simulated([(x - 120, y + 60), (x + 120, y + 60)], shift=True)
+    yield lambda: not soft_numbers().any()
+    with override():
+        bpy.ops.ed.undo()
+    yield lambda: (soft_numbers()[ROWS // 2:] == both[ROWS // 2:]).all()
+    key('ESC', (x, y))
+    yield from simulated([(x - 120, y), (x + 120, y)])
+    check((soft_numbers()[ROWS // 2:] == both[ROWS // 2:]).all() and not soft_numbers()[:ROWS // 2].any(), "Esc ends it; what was painted stays")
+    with override():
+        bpy.ops.ed.undo()
+    yield lambda: "soft" not in bpy.context.view_layer.objects.active.data.attributes
+    check(not bpy.context.view_layer.objects.active.patina.soft.use, "the first stroke's step holds the panel too")
+    yield lambda: settled(ROWS * ROWS) and abs(bright(screenshot("brush_begin")) - pictures[0]) < 0.1 * once
+
+
+def test_brush_shows_while_it_paints():
+    """Before the button is let go; begun from another area's button; X and ] are the brush's."""
+    if not bpy.app.use_event_simulate:
+        print("  without --enable-event-simulate: there is no mouse", flush=True)
+        return
+    painted_wall()
+    yield lambda: settled(ROWS * ROWS)
+    window, region, brush = bpy.context.window_manager.windows[0], window_region(), bpy.context.window_manager.patina_brush
+    other = next(item for item in window.screen.areas if item.type == 'PROPERTIES')
+    x, y = region.width / 2, region.height / 2
+    with bpy.context.temp_override(window=window, screen=window.screen, area=other, region=other.regions[-1]):
+        bpy.ops.object.patina_soft_brush('INVOKE_DEFAULT')
+    brush.radius, brush.through = 20.0, False
+    key('X', (x, y))
+    yield lambda: brush.through
+    key('RIGHT_BRACKET', (x, y))
+    yield lambda: brush.radius > 22.0
+    yield lambda: settled(ROWS * ROWS)
+    rounds = shown().pictures
+
+    def send(kind, value, place):
+        window.event_simulate(kind, value, x=int(region.x + place[0]), y=int(region.y + place[1]))
+
+    send('MOUSEMOVE', 'NOTHING', (x - 100, y))
+    send('LEFTMOUSE', 'PRESS', (x - 100, y))
+    yield
+    send('MOUSEMOVE', 'NOTHING', (x + 50, y))
+    yield newer(rounds)
+    check(soft_numbers().any(), "the button is held, and it is there already")
+    send('LEFTMOUSE', 'RELEASE', (x + 100, y))
+    yield lambda: soft_numbers()[ROWS // 2, ROWS * 3 // 4 - 4:].any()
+    key('RIGHTMOUSE', (x, y))
+    yield
+    brush.through = False
