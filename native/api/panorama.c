@@ -4,6 +4,7 @@
 #include "base/descriptor.h"
 #include "base/error.h"
 #include "base/pool.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -39,8 +40,8 @@ static void angles(struct wave *out, const double range[2], uint32_t whole, uint
     const double step = (range[1] - range[0]) / whole;
     for (uint32_t i = 0; i < 3 * count; i++) {
         const double place = i < 2 * count ? first + 0.25 + 0.5 * i : first + 0.5 + (i - 2 * count);
-        out[i].sine = sin(range[0] + step * place);
-        out[i].cosine = cos(range[0] + step * place);
+        out[i].sine = pt_sin(range[0] + step * place);
+        out[i].cosine = pt_cos(range[0] + step * place);
     }
 }
 

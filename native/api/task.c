@@ -2,6 +2,7 @@
 // Long calls on threads of their own, for hosts that must go on meanwhile and start no threads themselves.
 #include "base/descriptor.h"
 #include "base/error.h"
+#include "base/words.h"
 #include "scene/analysis.h"
 #include "scene/fingerprint.h"
 
@@ -182,7 +183,7 @@ static int start_at(struct patina_task *task, const char *path, patina_task **ou
 {
     if (!path)
         return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "a task: path is NULL");
-    task->path = strdup(path);
+    task->path = pt_copy_text(path, strlen(path));
     if (!task->path)
         return pt_fail(NULL, PATINA_ERROR_MEMORY, "a task: out of memory");
     const int code = start(task, out);

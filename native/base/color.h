@@ -3,9 +3,9 @@
 #ifndef PT_COLOR_H
 #define PT_COLOR_H
 
-#include <math.h>
+#include "elementary.h"
 
 // sRGB, 0..1 -> linear: IEC 61966-2-1. In float64, so that tables made of it are the same everywhere.
-static inline double pt_linear_of_srgb(double c) { return c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4); }
+static inline double pt_linear_of_srgb(double c) { return c <= 0.04045 ? c / 12.92 : pt_pow((c + 0.055) / 1.055, 2.4); }
 
 #endif

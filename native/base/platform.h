@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// All that is asked of the operating system: threads, time, memory, files, libraries, the machine. One implementation a system
-// (platform_posix.c); no other file of native/ includes a system's header (build/check_rooms). Paths are UTF-8. Errors are numbers
-// of <errno.h>, 0 is none. Any function from any thread, unless it says otherwise.
+// All that is asked of the operating system: threads, time, memory, files, libraries, the machine. platform_windows.c, or
+// platform_posix.c with platform_linux.c or platform_macos.c; platform.c is of all. No other file of native/ includes a system's
+// header (build/check_rooms). Paths are UTF-8, of any length that the system can have at all. Errors are numbers of <errno.h>, 0 is
+// none. Any function from any thread, unless it says otherwise.
 #ifndef PT_PLATFORM_H
 #define PT_PLATFORM_H
 
@@ -34,17 +35,31 @@ void pt_condition_wait(struct pt_condition *condition, struct pt_mutex *mutex); 
 void pt_condition_wake_one(struct pt_condition *condition);
 void pt_condition_wake_all(struct pt_condition *condition);
 
+void pt_thread_yield(void);
+
 // For what is made at its first use: zero before. The others wait until `make` has returned.
 struct pt_once {
     atomic_int state;
 };
-void pt_once(struct pt_once *once, void (*make)(void));
+static inline void pt_once(struct pt_once *once, void (*make)(void))
+{
+    enum { NOT_YET, BEING_MADE, MADE };
+    int seen = NOT_YET;
+    if (atomic_load_explicit(&once->state, memory_order_acquire) == MADE)
+        return;
+    if (atomic_compare_exchange_strong(&once->state, &seen, BEING_MADE)) {
+        make();
+        atomic_store_explicit(&once->state, MADE, memory_order_release);
+    } else {
+        while (atomic_load_explicit(&once->state, memory_order_acquire) != MADE)
+            pt_thread_yield();
+    }
+}
 
 // Starts main(context) on a thread that takes no signals: they belong to the host program; those of its own faults it takes.
 // stack: bytes, 0: the system's default. Whoever starts it joins it.
 int pt_thread_start(struct pt_thread *thread, void (*main)(void *context), void *context, size_t stack);
 void pt_thread_join(struct pt_thread *thread);
-void pt_thread_yield(void);
 
 // From now on calls `interrupted` on a thread of its own each time that somebody asks the program to end (Ctrl-C, SIGTERM).
 // Only for programs, before they start any thread.
@@ -54,6 +69,9 @@ int pt_watch_interrupts(void (*interrupted)(void));
 
 double pt_milliseconds(void);                                    // of a clock that only goes forward
 uint32_t pt_core_count(void);                                    // that this process may use, at least 1
+// What vector instructions the processor has and the system keeps; each x86 level has those before it.
+enum pt_vectors { PT_VECTORS_NONE, PT_VECTORS_SSE42, PT_VECTORS_AVX2, PT_VECTORS_AVX512, PT_VECTORS_NEON };
+enum pt_vectors pt_processor_vectors(void);
 void pt_processor_name(char *text, size_t size);                 // as its maker calls it; "processor" where that is not known
 uint64_t pt_peak_memory(void);                                   // most bytes that this process ever held; 0: not known
 const char *pt_error_text(int error, char *buffer, size_t size); // buffer: where the text may lie
@@ -89,7 +107,10 @@ FILE *pt_stream_open(const char *path, const char *mode); // as fopen; programs 
 int pt_stream_seek(FILE *stream, uint64_t offset);
 int pt_stream_resize(FILE *stream, uint64_t size); // cuts it, or adds zeros; what was written is with the system then
 
+int pt_file_remove(const char *path);
+
 // A file that is there whole or not at all: written beside `path`, then put in its place. A file that is mapped must not change.
+// Windows: EBUSY, and the old file stays, while any program has it open or maps it.
 struct pt_whole {
     FILE *stream; // what is written goes here
     char *path, *beside;
@@ -104,8 +125,11 @@ void *pt_library_open(const char *name); // NULL: there is none. It stays loaded
 void *pt_library_find(void *library, const char *function);
 void pt_library_close(void *library); // NULL is fine
 
-// ---- numbers -----------------------------------------------------------------------------------------------------------
+// ---- numbers and programs ----------------------------------------------------------------------------------------------
 
 double pt_decimal(const char *text); // strtod with a decimal point, whatever the process's locale is
+
+// First in main(): its arguments as UTF-8, and what it prints as other systems print it. They stay as long as the program runs.
+int pt_program_begin(int *count, char ***arguments);
 
 #endif

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// platform.h on Linux, with the GNU C library.
+// platform.h on Linux and macOS; what they do not share is in platform_linux.c and platform_macos.c.
 #include "platform.h"
 
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <locale.h>
+#ifdef __APPLE__
+#include <xlocale.h>
+#endif
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
@@ -38,21 +41,6 @@ void pt_condition_wait(struct pt_condition *condition, struct pt_mutex *mutex)
 }
 void pt_condition_wake_one(struct pt_condition *condition) { pthread_cond_signal(condition_of(condition)); }
 void pt_condition_wake_all(struct pt_condition *condition) { pthread_cond_broadcast(condition_of(condition)); }
-
-void pt_once(struct pt_once *once, void (*make)(void))
-{
-    enum { NOT_YET, BEING_MADE, MADE };
-    int seen = NOT_YET;
-    if (atomic_load_explicit(&once->state, memory_order_acquire) == MADE)
-        return;
-    if (atomic_compare_exchange_strong(&once->state, &seen, BEING_MADE)) {
-        make();
-        atomic_store_explicit(&once->state, MADE, memory_order_release);
-    } else {
-        while (atomic_load_explicit(&once->state, memory_order_acquire) != MADE)
-            pt_thread_yield();
-    }
-}
 
 struct start {
     void (*main)(void *context);
@@ -134,7 +122,7 @@ int pt_watch_interrupts(void (*interrupted)(void))
     return pthread_detach(thread);
 }
 
-// ---- the machine -------------------------------------------------------------------------------------------------------
+// ---- time --------------------------------------------------------------------------------------------------------------
 
 double pt_milliseconds(void)
 {
@@ -143,52 +131,13 @@ double pt_milliseconds(void)
     return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
 }
 
-uint32_t pt_core_count(void)
-{
-    cpu_set_t set;
-    if (sched_getaffinity(0, sizeof set, &set) == 0)
-        return (uint32_t)CPU_COUNT(&set);
-    return 1;
-}
-
-void pt_processor_name(char *text, size_t size)
-{
-    char line[256];
-    FILE *file = fopen("/proc/cpuinfo", "re");
-    snprintf(text, size, "processor");
-    while (file && fgets(line, sizeof line, file))
-        if (!strncmp(line, "model name", 10)) {
-            const char *value = strchr(line, ':');
-            if (value)
-                snprintf(text, size, "%.*s", (int)strcspn(value + 1, "\n"), value + 1 + strspn(value + 1, " "));
-            text[strcspn(text, "\n")] = 0;
-            break;
-        }
-    if (file)
-        fclose(file);
-}
-
-uint64_t pt_peak_memory(void)
-{
-    char line[256];
-    unsigned long kib = 0;
-    FILE *status = fopen("/proc/self/status", "re");
-    while (status && fgets(line, sizeof line, status))
-        if (sscanf(line, "VmHWM: %lu", &kib) == 1)
-            break;
-    if (status)
-        fclose(status);
-    return (uint64_t)kib << 10;
-}
-
-const char *pt_error_text(int error, char *buffer, size_t size)
-{
-    return strerror_r(error, buffer, size);
-} // GNU's, which returns it
-
 // ---- memory ------------------------------------------------------------------------------------------------------------
 
+#if defined(__aarch64__)
+enum { PAGE = 1 << 16, HUGE_PAGE = 2 << 20 }; // the largest that its systems have
+#else
 enum { PAGE = 4096, HUGE_PAGE = 2 << 20 };
+#endif
 
 static size_t whole_pages(size_t size) { return size ? (size + PAGE - 1) / PAGE * PAGE : PAGE; }
 
@@ -208,7 +157,9 @@ void *pt_pages_alloc(size_t size)
         munmap(memory, before);
     if (after)
         munmap(memory + before + wanted, after);
+#ifdef MADV_HUGEPAGE
     madvise(memory + before, wanted / HUGE_PAGE * HUGE_PAGE, MADV_HUGEPAGE); // a wish: ignored where the kernel has none
+#endif
     return memory + before;
 }
 
@@ -269,9 +220,16 @@ int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum p
 
 FILE *pt_stream_open(const char *path, const char *mode)
 {
+#ifdef __APPLE__ // which knows no "e" before 13
+    FILE *stream = fopen(path, mode);
+    if (stream)
+        fcntl(fileno(stream), F_SETFD, FD_CLOEXEC);
+    return stream;
+#else
     char closed[8]; // with "e": close it where another program is started
     snprintf(closed, sizeof closed, "%se", mode);
     return fopen(path, closed);
+#endif
 }
 
 int pt_stream_seek(FILE *stream, uint64_t offset) { return fseeko(stream, (off_t)offset, SEEK_SET) ? errno : 0; }
@@ -280,6 +238,8 @@ int pt_stream_resize(FILE *stream, uint64_t size)
 {
     return fflush(stream) || ftruncate(fileno(stream), (off_t)size) ? errno : 0;
 }
+
+int pt_file_remove(const char *path) { return unlink(path) ? errno : 0; }
 
 int pt_whole_begin(const char *path, struct pt_whole *whole)
 {
@@ -313,7 +273,7 @@ int pt_whole_end(struct pt_whole *whole, int good)
     if (!error && rename(whole->beside, whole->path))
         error = errno;
     if (error)
-        unlink(whole->beside);
+        pt_file_remove(whole->beside);
     free(whole->path);
     return error;
 }
@@ -328,15 +288,21 @@ void pt_library_close(void *library)
         dlclose(library);
 }
 
-// ---- numbers -----------------------------------------------------------------------------------------------------------
+// ---- numbers and programs ----------------------------------------------------------------------------------------------
 
 static struct pt_once c_locale_made;
 static locale_t c_locale;
 
-static void make_c_locale(void) { c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0); } // glibc's own: it cannot fail
+static void make_c_locale(void) { c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0); } // the system's own: it cannot fail
 
 double pt_decimal(const char *text)
 {
     pt_once(&c_locale_made, make_c_locale);
     return strtod_l(text, NULL, c_locale);
+}
+
+int pt_program_begin(int *count, char ***arguments)
+{
+    (void)count, (void)arguments;
+    return 0;
 }

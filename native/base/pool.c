@@ -142,7 +142,7 @@ struct pt_pool *pt_pool_create(uint32_t threads, uint32_t batch)
     if (pool->threads > MAX_THREADS)
         pool->threads = MAX_THREADS;
     pool->batch = batch;
-    pool->ranges = aligned_alloc(_Alignof(struct range), pool->threads * sizeof *pool->ranges);
+    pool->ranges = pt_pages_alloc(pool->threads * sizeof *pool->ranges);
     if (!pool->ranges) {
         free(pool);
         return NULL;
@@ -180,7 +180,7 @@ void pt_pool_destroy(struct pt_pool *pool)
     pt_condition_destroy(&pool->done);
     pt_mutex_destroy(&pool->caller);
     pt_mutex_destroy(&pool->lock);
-    free(pool->ranges);
+    pt_pages_free(pool->ranges, pool->threads * sizeof *pool->ranges);
     free(pool);
 }
 

@@ -77,10 +77,9 @@ typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
 #define PT_EACH_LEVEL(X) X(neon, 1) X(scalar, 1)
 #else
 #define PT_EACH_LEVEL(X)                                                                                                       \
-    X(avx512, __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && \
-                  __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("bmi2"))                                        \
-    X(avx2, __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2"))                                                  \
-    X(sse42, __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"))                                             \
+    X(avx512, pt_processor_vectors() >= PT_VECTORS_AVX512) \
+    X(avx2, pt_processor_vectors() >= PT_VECTORS_AVX2) \
+    X(sse42, pt_processor_vectors() >= PT_VECTORS_SSE42) \
     X(scalar, 1)
 #endif
 

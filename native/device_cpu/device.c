@@ -19,9 +19,6 @@ struct cpu_device {
 static uint32_t available_levels(const struct pt_cpu_level *levels[4])
 {
     uint32_t count = 0;
-#if defined(__x86_64__)
-    __builtin_cpu_init();
-#endif
 #define PT_X(level, known)                                                                                                     \
     if (known)                                                                                                                 \
         levels[count++] = &pt_cpu_level_##level;

@@ -3,6 +3,7 @@
 // #include "..." relative to shaders/, each file once, and tells errors by file and line.
 #include "device_gl.h"
 #include "shaders.h"
+#include "base/words.h"
 
 #include <ctype.h>
 #include <stdio.h>
@@ -61,7 +62,7 @@ static char *find_text(const char *name)
     }
     for (const struct pt_embedded_shader *s = pt_embedded_shaders; s->name; s++)
         if (!strcmp(s->name, name))
-            return strdup(s->text);
+            return pt_copy_text(s->text, strlen(s->text));
     return NULL;
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cells.h"
 #include "number.h"
+#include "base/words.h"
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
 enum { LOOKED_AT = 1000, LONGEST_NUMBER = 64, LONGEST_NOTE = 4096 };
 
@@ -175,7 +175,7 @@ bool pt_cells_says_empty(const char *word)
 {
     static const char *const said[] = {"-", "--", "n/a", "na", "#N/A", "null", "none", "nil", "<null>", "?"};
     for (size_t i = 0; i < sizeof said / sizeof *said; i++)
-        if (!strcasecmp(word, said[i]))
+        if (pt_same_word(word, said[i]))
             return true;
     return false;
 }

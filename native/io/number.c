@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "number.h"
 #include "base/platform.h"
+#include "base/words.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 __extension__ typedef unsigned __int128 uint128;
 
@@ -84,11 +84,11 @@ static bool parse_special(const char *token, double *value)
 {
     double sign = *token == '-' ? -1.0 : 1.0;
     token += *token == '-' || *token == '+';
-    if (!strcasecmp(token, "inf") || !strcasecmp(token, "infinity") || !strncasecmp(token, "1.#INF", 6)) {
+    if (pt_same_word(token, "inf") || pt_same_word(token, "infinity") || pt_same_start(token, "1.#INF", 6)) {
         *value = sign * (double)INFINITY;
         return true;
     }
-    if (!strcasecmp(token, "nan") || !strncasecmp(token, "nan(", 4) || !strncmp(token, "1.#", 3)) {
+    if (pt_same_word(token, "nan") || pt_same_start(token, "nan(", 4) || !strncmp(token, "1.#", 3)) {
         *value = (double)NAN;
         return true;
     }

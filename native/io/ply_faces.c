@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What lists of points mean: faces, which give normals to a PLY file that has no others, and the cells of a scanner's grid.
 #include "ply.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <string.h>
@@ -64,7 +65,7 @@ static void add_polygon(struct ply_faces *faces, const double *corners, size_t c
         subtract(a, corner(faces, corners, i ? i - 1 : count - 1), corner(faces, corners, i));
         subtract(b, corner(faces, corners, i + 1 < count ? i + 1 : 0), corner(faces, corners, i));
         cross(c, a, b);
-        double angle = flip * atan2(sqrt(dot(c, c)), dot(a, b));
+        double angle = flip * pt_atan2(sqrt(dot(c, c)), dot(a, b));
         float *sum = faces->normal + 3 * (size_t)corners[i];
         for (int k = 0; k < 3; k++)
             sum[k] += (float)(angle * normal[k]);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "roles.h"
+#include "base/words.h"
 
 #include <stddef.h>
 #include <string.h>
-#include <strings.h>
 
 struct known_name {
     const char *name;
@@ -34,7 +34,7 @@ static void plain_name(char plain[NAME_SIZE], const char *name)
         size_t mark = strlen(marks[i]), gap = length > mark + 1;
         if (length != mark + 1 + gap)
             continue;
-        bool before = !strncasecmp(name, marks[i], mark), behind = !strncasecmp(name + length - mark, marks[i], mark);
+        bool before = pt_same_start(name, marks[i], mark), behind = pt_same_start(name + length - mark, marks[i], mark);
         if ((before || behind) && (!gap || strchr("_ .", name[before ? mark : 1]))) {
             name += before ? length - 1 : 0;
             length = 1;
@@ -64,7 +64,7 @@ static void find_names(enum role roles[], char (*columns)[NAME_SIZE], uint32_t w
             bool taken = false;
             for (uint32_t other = 0; other < width; other++)
                 taken |= roles[other] == names[k].role;
-            if (!taken && !strcasecmp(plain, names[k].name))
+            if (!taken && pt_same_word(plain, names[k].name))
                 roles[c] = names[k].role;
         }
     }

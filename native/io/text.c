@@ -21,13 +21,13 @@
 #include "file.h"
 #include "number.h"
 #include "roles.h"
+#include "base/words.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 enum { MOST_COLUMNS = 32, SAMPLES = 1000, POLL_LINES = 8192, WORD_SHARE = 10 };
 
@@ -729,7 +729,7 @@ static struct text begin(const struct pt_input *input)
     struct text t = {.input = input, .at = input->data, .end = input->data + input->size, .line = 1};
     if (input->size >= 3 && !memcmp(input->data, "\xEF\xBB\xBF", 3))
         t.at += 3;
-    if (t.end - t.at > 6 && !strncasecmp((const char *)t.at, "sep=", 4) && pt_is_line_end(t.at[5]))
+    if (t.end - t.at > 6 && pt_same_start((const char *)t.at, "sep=", 4) && pt_is_line_end(t.at[5]))
         t.at += 5;
     return t;
 }
@@ -749,7 +749,7 @@ int pt_text_read(struct patina_file *file, const struct pt_input *input)
     free(t.attributes);
     if (code || !t.staged) {
         free(t.staged);
-        if (!code && !(file->position = malloc(1)))
+        if (!code && !(file->position = malloc(sizeof *file->position)))
             code = PATINA_ERROR_MEMORY;
     } else {
         pt_file_place(file, t.staged);
@@ -770,7 +770,7 @@ static bool is_called_text(const char *name)
     static const char *const endings[] = {".xyz", ".txt", ".csv", ".asc", ".pts", ".ptx"};
     size_t length = strlen(name);
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
-        if (length > 4 && !strcasecmp(name + length - 4, endings[i]))
+        if (length > 4 && pt_same_word(name + length - 4, endings[i]))
             return true;
     return false;
 }
@@ -786,7 +786,7 @@ bool pt_text_is(const struct pt_input *input)
     char word[NAME_SIZE];
     if (!find_line(&t) || !pt_cells_name(PT_PARTED_LOOSELY, t.at, t.end, word, sizeof word))
         return false;
-    if ((word[0] && strchr("0123456789-+.", word[0])) || !strncasecmp(word, "nan", 3) || !strncasecmp(word, "inf", 3))
+    if ((word[0] && strchr("0123456789-+.", word[0])) || pt_same_start(word, "nan", 3) || pt_same_start(word, "inf", 3))
         return true;
     if (!strcmp(word, "ply"))
         return false;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What shade makes of the points' colours: a ramp over a scalar, a height or a distance; exposure and contrast.
 #include "passes.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <string.h>
@@ -86,7 +87,7 @@ void pt_plan_recolor(const struct pt_builder *builder, const struct pt_plan_inst
     const patina_cloud_style *style = &instance->style;
     struct recolor_args *out = &args->recolor;
     out->graded = style->exposure != 0.0f || style->contrast != 1.0f;
-    out->gain = (float)exp2((double)style->exposure);
+    out->gain = (float)pt_exp2((double)style->exposure);
     out->contrast = style->contrast;
     if (style->color_source == PATINA_COLOR_OWN)
         return;

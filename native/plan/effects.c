@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Effects in image space: which of them a picture has, and what their kernels get.
 #include "passes.h"
+#include "base/elementary.h"
 
 #include <math.h>
 
@@ -22,8 +23,8 @@ static void plan_edl(struct pt_builder *builder, enum pt_plane color)
     struct edl_args args = {.view = *view};
     for (int i = 0; i < PT_EDL_NEIGHBOURS; i++) {
         double angle = 2.0 * 3.14159265358979323846 * i / PT_EDL_NEIGHBOURS, radius = (double)effects->edl_radius;
-        args.offsets[2 * i] = (int32_t)lround(radius * cos(angle));
-        args.offsets[2 * i + 1] = (int32_t)lround(radius * sin(angle));
+        args.offsets[2 * i] = (int32_t)lround(radius * pt_cos(angle));
+        args.offsets[2 * i + 1] = (int32_t)lround(radius * pt_sin(angle));
     }
     args.reach = (uint32_t)lround((double)effects->edl_radius);
     args.scale = (float)fmin(
@@ -90,14 +91,14 @@ static void plan_obscure(struct pt_builder *builder, enum pt_plane color)
     args.radius = (float)radius;
     for (int i = 0; i < PT_OBSCURE_TAPS; i++) { // golden angle: no two in line
         double at = (i + 0.5) / PT_OBSCURE_TAPS, angle = pi * (3.0 - sqrt(5.0)) * i;
-        args.spiral[2 * i] = (float)(at * cos(angle));
-        args.spiral[2 * i + 1] = (float)(at * sin(angle));
+        args.spiral[2 * i] = (float)(at * pt_cos(angle));
+        args.spiral[2 * i + 1] = (float)(at * pt_sin(angle));
     }
     static const uint8_t order[PT_OBSCURE_TURNS] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
     for (int i = 0; i < PT_OBSCURE_TURNS; i++) { // neighbours are turned far apart
         double angle = 2.0 * pi * order[i] / PT_OBSCURE_TURNS;
-        args.turns[2 * i] = (float)cos(angle);
-        args.turns[2 * i + 1] = (float)sin(angle);
+        args.turns[2 * i] = (float)pt_cos(angle);
+        args.turns[2 * i + 1] = (float)pt_sin(angle);
     }
     PT_REASON(PT_ADD(builder, obscure, args,
                      {pt_keys_of(builder, 0), pt_from_of(builder, 0), pt_span_of(builder->plan), pt_shading_of(builder),
@@ -134,7 +135,7 @@ static double anchor_of(const struct box *box, const double axis[3])
         middle[k] = 0.5 * (box->lower[k] + box->upper[k]);
     if (!(square > 0.0) || !isfinite(square))
         return 0.0;
-    double grid = exp2(ceil(log2(sqrt(square))) + 1.0);
+    double grid = pt_exp2(ceil(pt_log2(sqrt(square))) + 1.0);
     return grid * round(pt_dot(axis, middle) / grid);
 }
 
@@ -182,7 +183,7 @@ static double usual_interval(double length)
 {
     if (!(length > 0.0) || !isfinite(length))
         return 1.0;
-    double least = length / 25.0, ten = pow(10.0, floor(log10(least)));
+    double least = length / 25.0, ten = pt_pow(10.0, floor(pt_log10(least)));
     double interval = least <= ten ? ten : least <= 2.0 * ten ? 2.0 * ten : least <= 5.0 * ten ? 5.0 * ten : 10.0 * ten;
     return fmin(fmax(interval, 1e-9), 1e9);
 }

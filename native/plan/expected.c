@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "expected.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -54,8 +55,8 @@ static float between(float a, float b, double t) { return (float)((double)a + t 
 // Beyond the last of two measured points, s pixels apart; never more than `most`.
 static float beyond(float before, float last, double step, double far, double most)
 {
-    const double power = fmax(log((double)last / (double)before) / step, 0.5);
-    return (float)fmin((double)last * exp(power * far), most);
+    const double power = fmax(pt_ln((double)last / (double)before) / step, 0.5);
+    return (float)fmin((double)last * pt_exp(power * far), most);
 }
 
 static patina_expected_error on_curve(enum pt_means means, double spacing_px)
@@ -74,7 +75,7 @@ static patina_expected_error on_curve(enum pt_means means, double spacing_px)
     if (!below && !above) // not measured (while the table is being made)
         return error;
     if (!above && before) {
-        const double step = log(below->spacing_px / before->spacing_px), far = log(spacing_px / below->spacing_px);
+        const double step = pt_ln(below->spacing_px / before->spacing_px), far = pt_ln(spacing_px / below->spacing_px);
         error.color = beyond(before->color, below->color, step, far, 1.0);
         error.coverage = beyond(before->coverage, below->coverage, step, far, 1.0);
         error.depth = beyond(before->depth, below->depth, step, far, INFINITY);
@@ -83,7 +84,7 @@ static patina_expected_error on_curve(enum pt_means means, double spacing_px)
     }
     below = below ? below : above;
     above = above ? above : below;
-    double t = above == below ? 0.0 : log(spacing_px / below->spacing_px) / log(above->spacing_px / below->spacing_px);
+    double t = above == below ? 0.0 : pt_ln(spacing_px / below->spacing_px) / pt_ln(above->spacing_px / below->spacing_px);
     error.color = between(below->color, above->color, t);
     error.coverage = between(below->coverage, above->coverage, t);
     error.depth = between(below->depth, above->depth, t);

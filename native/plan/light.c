@@ -7,6 +7,7 @@
 #include "light_points.h"
 #include "scene/clip.h"
 #include "scene/mask.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -213,7 +214,7 @@ static void place_sample(const struct pt_plan_light *planned, uint32_t sample, d
     } else {
         pt_light_disc(p);
         memcpy(frame, planned->axes, sizeof frame);
-        double radius = light->type == PATINA_LIGHT_SUN ? tan(0.5 * fmin((double)light->angle, 0.99 * PI))
+        double radius = light->type == PATINA_LIGHT_SUN ? pt_tan(0.5 * fmin((double)light->angle, 0.99 * PI))
                                                         : (double)light->radius;
         across[0] = radius * p[0];
         across[1] = radius * p[1];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Where lights are: their axes, and the points that samples of them and shading are gathered from.
 #include "light_points.h"
+#include "base/elementary.h"
 
 #include <math.h>
 
@@ -44,8 +45,8 @@ void pt_light_disc(double p[2])
     double a = 2.0 * p[0] - 1.0, b = 2.0 * p[1] - 1.0;
     double r = fabs(a) > fabs(b) ? a : b;
     double turn = fabs(a) > fabs(b) ? PI / 4.0 * (b / a) : b != 0.0 ? PI / 2.0 - PI / 4.0 * (a / b) : 0.0;
-    p[0] = r * cos(turn);
-    p[1] = r * sin(turn);
+    p[0] = r * pt_cos(turn);
+    p[1] = r * pt_sin(turn);
 }
 
 void pt_area_point(const patina_light_desc *light, double p[2])

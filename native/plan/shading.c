@@ -2,6 +2,7 @@
 // What shading is told of the world and its lights, as the camera sees them.
 #include "light_points.h"
 #include "passes.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <string.h>
@@ -34,7 +35,7 @@ static void set_light(const struct patina_scene *scene, const patina_light_desc 
             set_vector(axes, vector, out->points + 3 * i);
         }
     }
-    double edge = cos(0.5 * (double)light->cone);
+    double edge = pt_cos(0.5 * (double)light->cone);
     out->cone[0] = (float)edge;
     out->cone[1] = (float)(1.0 / fmax((1.0 - edge) * (double)light->blend, 1e-6));
     out->type = light->type;

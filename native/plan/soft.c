@@ -118,7 +118,7 @@ static int by_middle(const void *a, const void *b)
 {
     const struct depths *x = a, *y = b;
     const float p = 0.5f * x->before + 0.5f * x->beyond, q = 0.5f * y->before + 0.5f * y->beyond;
-    return (p > q) - (p < q);
+    return p != q ? (p > q) - (p < q) : (x->records > y->records) - (x->records < y->records);
 }
 
 // Where slabs end, rising; returns how many ends there are, one less than slabs.

@@ -12,6 +12,7 @@
 #include "lines.h"
 #include "ranges.h"
 #include "scene/clip.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -95,8 +96,8 @@ static int chunk_angles(const struct pt_chunk *chunk, const double eye[4], doubl
     radius = eye[3] > 0.0 ? sqrt(radius) : 0.0;
     if (!(distance > radius))
         return 0;
-    *angle = acos(pt_most(pt_least(pt_dot(axis, towards) / distance, 1.0), -1.0));
-    *spread = acos(pt_most((double)chunk->cone_cosine, -1.0)) + asin(radius / distance) + 1e-3;
+    *angle = pt_acos(pt_most(pt_least(pt_dot(axis, towards) / distance, 1.0), -1.0));
+    *spread = pt_acos(pt_most((double)chunk->cone_cosine, -1.0)) + pt_asin(radius / distance) + 1e-3;
     return 1;
 }
 
@@ -116,7 +117,7 @@ static double chunk_cosine(int known, double angle, double spread)
     if (!known)
         return 1.0;
     angle = angle > right_angle ? 2.0 * right_angle - angle : angle;
-    return pt_most(cos(pt_most(angle - spread, 0.0)), (double)PT_COSINE_FLOOR);
+    return pt_most(pt_cos(pt_most(angle - spread, 0.0)), (double)PT_COSINE_FLOOR);
 }
 
 // ---- the chunks in view ------------------------------------------------------------------------------------------------
@@ -229,8 +230,8 @@ struct weighted {
 
 static int compare_weighted(const void *a, const void *b)
 {
-    double x = ((const struct weighted *)a)->value, y = ((const struct weighted *)b)->value;
-    return (x > y) - (x < y);
+    const struct weighted *x = a, *y = b; // sums depend on the order, and C libraries leave that of equals open
+    return x->value != y->value ? (x->value > y->value) - (x->value < y->value) : (x->weight > y->weight) - (x->weight < y->weight);
 }
 
 // Spacings of the chunks of instances [first, end) with the area that they cover; those that face away only when asked for.

@@ -85,12 +85,17 @@ static int put_textures(const struct patina_frame *frame, uint32_t width, struct
 
 static int write_file(const struct patina_frame *frame, const char *path, const struct bytes *header, const struct bytes *body)
 {
-    FILE *file = pt_stream_open(path, "wb");
-    int good = file && fwrite(header->data, 1, header->size, file) == header->size &&
-               fwrite(body->data, 1, body->size, file) == body->size;
-    if (file)
-        good &= !fclose(file);
-    return good ? PATINA_OK : pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: shadows cannot be written", path);
+    struct pt_whole whole;
+    char text[128];
+    int error = pt_whole_begin(path, &whole);
+    if (!error) {
+        const int good = fwrite(header->data, 1, header->size, whole.stream) == header->size &&
+                         fwrite(body->data, 1, body->size, whole.stream) == body->size;
+        error = pt_whole_end(&whole, good);
+    }
+    return error ? pt_fail(&frame->handle, PATINA_ERROR_FILE, "%s: shadows cannot be written: %s", path,
+                           pt_error_text(error, text, sizeof text))
+                 : PATINA_OK;
 }
 
 int pt_frame_save_shadows(const struct patina_frame *frame, const char *path)
@@ -145,18 +150,20 @@ static int take(struct reader *reader, void *out, size_t size)
 
 static unsigned char *read_file(const char *path, size_t *size)
 {
-    FILE *file = pt_stream_open(path, "rb");
+    struct pt_disk disk;
     unsigned char *data = NULL;
-    long length = -1;
-    if (file && !fseek(file, 0, SEEK_END) && (length = ftell(file)) >= 0 && !fseek(file, 0, SEEK_SET))
-        data = malloc((size_t)length + 1);
-    if (data && fread(data, 1, (size_t)length, file) != (size_t)length) {
+    size_t got = 0;
+    *size = 0;
+    if (pt_disk_open(path, &disk))
+        return NULL;
+    if (disk.kind == PT_DISK_FILE && disk.size < SIZE_MAX)
+        data = malloc((size_t)disk.size + 1);
+    if (data && (pt_disk_read(&disk, 0, data, (size_t)disk.size, &got) || got != disk.size)) {
         free(data);
         data = NULL;
     }
-    if (file)
-        fclose(file);
-    *size = data ? (size_t)length : 0;
+    pt_disk_close(&disk);
+    *size = data ? got : 0;
     return data;
 }
 

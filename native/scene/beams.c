@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "beams.h"
 #include "kernel_args.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -64,7 +65,7 @@ static void carry(const double v[3], const double ray[3], const double n[3], dou
 static void ellipse_of(const double a[3], const double b[3], double axis[3], double *major, double *minor)
 {
     const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), half = 0.5 * (aa - bb), root = sqrt(half * half + ab * ab);
-    const double turn = 0.5 * atan2(ab, half), c = cos(turn), s = sin(turn);
+    const double turn = 0.5 * pt_atan2(ab, half), c = pt_cos(turn), s = pt_sin(turn);
     for (int k = 0; k < 3; k++)
         axis[k] = c * a[k] + s * b[k];
     *major = sqrt(0.5 * (aa + bb) + root);

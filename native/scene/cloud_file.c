@@ -2,18 +2,18 @@
 // From a file's columns to a cloud.
 #include "cloud.h"
 #include "io/file.h"
+#include "base/words.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 static const struct pt_column *class_column(const struct patina_file *file)
 {
     static const char prefix[] = "scalar_"; // as CloudCompare writes it
     for (uint32_t i = 0; i < file->attribute_count; i++) {
         const char *name = file->attributes[i].name;
-        name += strncasecmp(name, prefix, sizeof prefix - 1) ? 0 : sizeof prefix - 1;
-        if (!strcasecmp(name, "class") || !strcasecmp(name, "classification"))
+        name += pt_same_start(name, prefix, sizeof prefix - 1) ? sizeof prefix - 1 : 0;
+        if (pt_same_word(name, "class") || pt_same_word(name, "classification"))
             return &file->attributes[i];
     }
     return NULL;

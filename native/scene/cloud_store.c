@@ -14,7 +14,7 @@
 #include <string.h>
 
 enum { SECTION = 1 << 16, VERSION = 8, SECTIONS = 12, PIECE = 1 << 22 };
-static const char magic[8] = "patina\n\x1a";
+static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
 struct header {
     char magic[8];

@@ -4,6 +4,7 @@
 // the core, as the spacing of a scan does. Points are looked at in wide chunks only, whose box is larger than their spacing
 // explains, and in small ones: strays lie in those, and a cloud without any is done at once.
 #include "dense.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -37,7 +38,7 @@ struct search {
 static int compare(const void *a, const void *b)
 {
     const struct pt_chunk *x = *(const struct pt_chunk *const *)a, *y = *(const struct pt_chunk *const *)b;
-    return (x->spacing > y->spacing) - (x->spacing < y->spacing);
+    return x->spacing != y->spacing ? (x->spacing > y->spacing) - (x->spacing < y->spacing) : (x > y) - (x < y);
 }
 
 // Of points, not of chunks: strays may have the most of those.
@@ -63,7 +64,7 @@ static int is_wide(const struct search *search, const struct pt_chunk *chunk)
 {
     double diagonal = 0.0;
     for (int k = 0; k < 3; k++)
-        diagonal += pow((double)chunk->box_max[k] - (double)chunk->box_min[k], 2.0);
+        diagonal += pt_pow((double)chunk->box_max[k] - (double)chunk->box_min[k], 2.0);
     const double spacing = (double)chunk->spacing;
     return chunk->count < LEAST_POINTS || sqrt(diagonal) > WIDE * spacing * sqrt((double)chunk->count) ||
            spacing > SPARSE * search->spacing;
@@ -143,8 +144,8 @@ static int cell_of(const struct search *search, const double p[3], struct cell *
         out = fmax(out, fmax(search->lower[k] - p[k], p[k] - search->upper[k]));
     if (!(out > 0.0))
         return 0;
-    const double level = fmin(fmax(floor(log2(out / search->width)), 0.0), 100.0);
-    const double side = fmax(search->width * exp2(level) / 32.0, SPARSE * search->spacing);
+    const double level = fmin(fmax(floor(pt_log2(out / search->width)), 0.0), 100.0);
+    const double side = fmax(search->width * pt_exp2(level) / 32.0, SPARSE * search->spacing);
     cell->level = (uint32_t)level;
     cell->count = 1;
     for (int k = 0; k < 3; k++)

@@ -9,6 +9,7 @@
 #include "base/platform.h"
 #include "base/pool.h"
 #include "fingerprint.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -35,7 +36,7 @@ static double luminance(const struct patina_cloud *cloud, size_t slot)
     for (int k = 0; k < 3; k++)
         sum += luma[k] * (cloud->color_format == PT_COLOR_SRGB8 ? ((const uint8_t *)cloud->colors)[3 * slot + (size_t)k] / 255.0
                                                                 : (double)((const float *)cloud->colors)[3 * slot + (size_t)k]);
-    return cloud->color_format == PT_COLOR_SRGB8 ? sum : pow(fmax(sum, 0.0), 1.0 / 2.2);
+    return cloud->color_format == PT_COLOR_SRGB8 ? sum : pt_pow(fmax(sum, 0.0), 1.0 / 2.2);
 }
 
 static double distance(const struct fill *fill, const struct pt_chunk *chunk, size_t slot)

@@ -4,6 +4,7 @@
 #include "base/descriptor.h"
 #include "dense.h"
 #include "scene.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -91,11 +92,11 @@ int patina_scene_frame_camera(const patina_scene *scene, double azimuth, double 
     if (!scene || !camera || !isfinite(azimuth + elevation + fov_degrees))
         return pt_fail(scene ? &scene->handle : NULL, PATINA_ERROR_ARGUMENT, "patina_scene_frame_camera: bad arguments");
     const double degree = 3.14159265358979323846 / 180.0;
-    const double ca = cos(azimuth * degree), sa = sin(azimuth * degree);
-    const double ce = cos(elevation * degree), se = sin(elevation * degree);
+    const double ca = pt_cos(azimuth * degree), sa = pt_sin(azimuth * degree);
+    const double ce = pt_cos(elevation * degree), se = pt_sin(elevation * degree);
     const double x[3] = {ca, sa, 0.0}, y[3] = {-sa * se, ca * se, ce}, z[3] = {sa * ce, -ca * ce, se};
     const double fov = fov_degrees > 0.0 && fov_degrees < 179.0 ? fov_degrees : 45.8;
-    struct framing framing = {.half_y = tan(0.5 * fov * degree)};
+    struct framing framing = {.half_y = pt_tan(0.5 * fov * degree)};
     framing.half_x = framing.half_y * scene->settings.width / scene->settings.height;
     int error = keep_scene(scene, &framing);
     for (int k = 0; k < 3; k++)

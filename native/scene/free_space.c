@@ -6,6 +6,7 @@
 #include "kernel_args.h"
 #include "base/platform.h"
 #include "base/progress.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -59,7 +60,7 @@ static struct sight sight_of(const struct look *look, const struct pt_chunk *chu
     for (size_t k = 0; k < 3; k++)
         v[k] = chunk->origin[k] + (double)p[k * chunk->padded] - look->eye[k];
     const double flat = v[0] * v[0] + v[1] * v[1];
-    return (struct sight){sqrt(flat + v[2] * v[2]), atan2(v[1], v[0]), atan2(v[2], sqrt(flat))};
+    return (struct sight){sqrt(flat + v[2] * v[2]), pt_atan2(v[1], v[0]), pt_atan2(v[2], sqrt(flat))};
 }
 
 static int is_own(const struct look *look, const struct pt_chunk *chunk, uint32_t i)
@@ -93,8 +94,8 @@ static void cell_of(const struct look *look, const struct sight *at, uint32_t *x
 
 static void add_sight(struct look *look, const struct sight *at)
 {
-    const double flat = cos(at->elevation);
-    pt_sight_add(&look->sight, (double[]){flat * cos(at->azimuth), flat * sin(at->azimuth), sin(at->elevation)}, at->range);
+    const double flat = pt_cos(at->elevation);
+    pt_sight_add(&look->sight, (double[]){flat * pt_cos(at->azimuth), flat * pt_sin(at->azimuth), pt_sin(at->elevation)}, at->range);
 }
 
 static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)
@@ -157,7 +158,7 @@ static double farther_by(const struct look *look, const struct sight *at, uint32
 {
     const uint32_t kind = shape >> PT_SHAPE_KIND_SHIFT & 7u;
     const double sigma = look->job->spacing_base / 16.0 * pt_spacing_of_class(shape >> PT_SHAPE_SIGMA_SHIFT & 63u);
-    const double step = fmax(look->cell[0] * cos(at->elevation), look->cell[1]);
+    const double step = fmax(look->cell[0] * pt_cos(at->elevation), look->cell[1]);
     const double thick = kind == PT_KIND_SURFACE || kind == PT_KIND_BORDER ? farther_sigmas * sigma : 0.0;
     return fmax(thick, at->range * fmax(step, farther_share));
 }

@@ -5,6 +5,7 @@
 
 #include "base/color.h"
 #include "base/platform.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -30,12 +31,12 @@ struct grading {
     struct patina_grade *grade;
 };
 
-static double to_srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055; }
+static double to_srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pt_pow(linear, 1.0 / 2.4) - 0.055; }
 
 // Warm: more red and less blue, at the luminance of white.
 static void set_factors(const patina_scan_grade *grade, const float *balance, struct tone *tone)
 {
-    const float warm[3] = {exp2f(0.5f * grade->temperature), 1.0f, exp2f(-0.5f * grade->temperature)};
+    const float warm[3] = {(float)pt_exp2(0.5 * (double)grade->temperature), 1.0f, (float)pt_exp2(-0.5 * (double)grade->temperature)};
     const float white = luma[0] * warm[0] + luma[1] * warm[1] + luma[2] * warm[2];
     for (int k = 0; k < 3; k++)
         tone->factor[k] = grade->gain * warm[k] / white * (balance ? balance[k] : 1.0f);
@@ -49,7 +50,7 @@ static void set_factors(const patina_scan_grade *grade, const float *balance, st
 static void encode_steps(struct tone *tone)
 {
     for (int i = 0; i < STEPS; i++) {
-        const double root = (double)i / (STEPS - 1), light = pow(root * root, (double)tone->power);
+        const double root = (double)i / (STEPS - 1), light = pt_pow(root * root, (double)tone->power);
         tone->encode[i] = (uint8_t)(255.0 * to_srgb(light) + 0.5);
     }
 }
@@ -79,7 +80,7 @@ static void grade_floats(const struct tone *tone, const float *from, float *to)
     float c[3] = {from[0], from[1], from[2]};
     turn(tone, c);
     for (int k = 0; k < 3; k++)
-        to[k] = fminf(powf(c[k], tone->power), 65504.0f);
+        to[k] = fminf((float)pt_pow((double)c[k], (double)tone->power), 65504.0f);
 }
 
 static void grade_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)

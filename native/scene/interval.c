@@ -2,6 +2,7 @@
 // Every sum is of integers, so that threads do not show.
 #include "interval.h"
 #include "base/compare.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -129,12 +130,12 @@ static void count_chunks(void *context, uint32_t begin, uint32_t end, uint32_t t
             const double flat = d[0] * d[0] + d[1] * d[1], length = sqrt(flat + d[2] * d[2]);
             if (!(length > 0.0) || !isfinite(length))
                 continue;
-            const double rise = 0.5 * RISES * (d[2] / length + 1.0), turn = TURNS * (0.5 + atan2(d[1], d[0]) / (2.0 * PI));
+            const double rise = 0.5 * RISES * (d[2] / length + 1.0), turn = TURNS * (0.5 + pt_atan2(d[1], d[0]) / (2.0 * PI));
             const uint32_t row = (uint32_t)fmin(rise, RISES - 1.0), column = (uint32_t)fmin(turn, TURNS - 1.0);
             atomic_fetch_add_explicit(&count->bins[(size_t)s * BINS + row * TURNS + column], 1, memory_order_relaxed);
             if (!count->lines[s].row || !(flat > 0.0))
                 continue;
-            add_line(&count->lines[s].row[line_at(&count->desc->row, number)], atan2(d[2], sqrt(flat)), 0.0);
+            add_line(&count->lines[s].row[line_at(&count->desc->row, number)], pt_atan2(d[2], sqrt(flat)), 0.0);
             add_line(&count->lines[s].column[line_at(&count->desc->column, number)], d[0] / sqrt(flat), d[1] / sqrt(flat));
         }
     }
@@ -210,7 +211,7 @@ static double line_interval(const struct line *lines, uint32_t count, int round,
         const struct line *a = &lines[i], *b = &lines[i + 1];
         if (a->count < LINE_SAMPLES || b->count < LINE_SAMPLES)
             continue;
-        double step = round ? atan2((double)b->sum[1], (double)b->sum[0]) - atan2((double)a->sum[1], (double)a->sum[0])
+        double step = round ? pt_atan2((double)b->sum[1], (double)b->sum[0]) - pt_atan2((double)a->sum[1], (double)a->sum[0])
                             : ((double)b->sum[0] / b->count - (double)a->sum[0] / a->count) * 0x1p-30;
         step = round && step > PI ? step - 2.0 * PI : round && step < -PI ? step + 2.0 * PI : step;
         steps[found++] = fabs(step);

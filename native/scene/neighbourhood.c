@@ -2,6 +2,7 @@
 // Kinds and footprints: from the plane through a point's neighbours to what a picture may close with it.
 #include "neighbourhood.h"
 #include "kernel_args.h"
+#include "base/elementary.h"
 
 #include <math.h>
 
@@ -277,7 +278,7 @@ static void be_volume(const struct pt_sample *sample, const struct pt_plane *pla
                       struct pt_neighbourhood *out)
 {
     const double farthest = sqrt(sample->square[sample->count - 1]);
-    const double spacing = farthest * cbrt(4.0 * PI / (3.0 * sample->count));
+    const double spacing = farthest * pt_cbrt(4.0 * PI / (3.0 * sample->count));
     const double thick = sqrt(plane->value[0] / plane->value[1]);
     const double rough = fmax((ROUGH - plane->value[0] / plane->value[1]) / (ROUGH - FLATTEST), 0.0);
     const double radius = COVER_DOT * nearest + rough * fmax(COVER_ROUGH * spacing - COVER_DOT * nearest, 0.0);

@@ -180,11 +180,9 @@ static int build_chunk_nodes(struct pt_neighbours *tree)
 static int best_level(void)
 {
 #if (defined(__x86_64__) || defined(__i386__)) && !defined(PT_ONLY_SCALAR)
-    __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
-        return 2;
-    if (__builtin_cpu_supports("avx2"))
-        return 1;
+    const enum pt_vectors level = pt_processor_vectors();
+    if (level >= PT_VECTORS_AVX2)
+        return level >= PT_VECTORS_AVX512 ? 2 : 1;
 #endif
     return 0;
 }

@@ -2,6 +2,7 @@
 // Ramps by name: a few stops in sRGB, evenly spaced, straight between in sRGB; and the colours of LAS classes.
 #include "base/color.h"
 #include "base/error.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <string.h>
@@ -42,7 +43,7 @@ static uint32_t color_of_class(uint32_t class)
     uint32_t color = 0;
     double turn = class * 0.61803398874989485;
     for (int k = 0; k < 3; k++) {
-        double wave = 0.5 + 0.5 * cos(6.283185307179586 * (turn - floor(turn) + k / 3.0));
+        double wave = 0.5 + 0.5 * pt_cos(6.283185307179586 * (turn - floor(turn) + k / 3.0));
         color = color << 8 | (uint32_t)(60.0 + 180.0 * wave);
     }
     return class < CLASSES ? classes[class] : color;

@@ -2,6 +2,7 @@
 // Shape words (kernel_args.h).
 #include "analysis.h"
 #include "kernel_args.h"
+#include "base/elementary.h"
 
 #include <math.h>
 
@@ -23,7 +24,7 @@ static uint32_t class_of(double length, double base)
 {
     if (!(length > 0.0) || !(base > 0.0) || !isfinite(length / base))
         return 0;
-    const double steps = floor(4.0 * log2(length / base) + 0.5);
+    const double steps = floor(4.0 * pt_log2(length / base) + 0.5);
     return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
 }
 
@@ -34,7 +35,7 @@ uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits
     word |= (uint32_t)(15.0 * fmin(fmax(hood->certainty, 0.0), 1.0) + 0.5) << PT_SHAPE_CERTAINTY_SHIFT;
     if (!(hood->major > 0.0) || !(hood->minor > 0.0))
         return word;
-    const double steps = 4.0 * log2(hood->major / hood->minor);
+    const double steps = 4.0 * pt_log2(hood->major / hood->minor);
     word |= (steps > 15.0 ? 15u : (uint32_t)(steps + 0.5)) << PT_SHAPE_RATIO_SHIFT;
     if (normal_bits == PT_NORMAL_NONE)
         return word;
@@ -47,7 +48,7 @@ uint32_t pt_pack_shape(const struct pt_neighbourhood *hood, uint32_t normal_bits
     }
     if (x == 0.0 && y == 0.0)
         return word;
-    const double turn = floor(atan2(y, x) * 64.0 / PI + 0.5);
+    const double turn = floor(pt_atan2(y, x) * 64.0 / PI + 0.5);
     return word | ((uint32_t)(int32_t)turn & 63u) << PT_SHAPE_ANGLE_SHIFT; // an axis is the same half a turn on
 }
 
@@ -55,7 +56,7 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
 {
     *out = (struct pt_neighbourhood){.kind = shape >> PT_SHAPE_KIND_SHIFT & 7u};
     out->major = base * pt_spacing_of_class(shape & 63u);
-    out->minor = out->major * exp2(-(double)(shape >> PT_SHAPE_RATIO_SHIFT & 15u) / 4.0);
+    out->minor = out->major * pt_exp2(-(double)(shape >> PT_SHAPE_RATIO_SHIFT & 15u) / 4.0);
     out->sigma = base / 16.0 * pt_spacing_of_class(shape >> PT_SHAPE_SIGMA_SHIFT & 63u);
     out->certainty = (shape >> PT_SHAPE_CERTAINTY_SHIFT & 15u) / 15.0;
     out->beside = (shape & PT_SHAPE_BESIDE) != 0;
@@ -67,7 +68,7 @@ void pt_unpack_shape(uint32_t shape, uint32_t normal_bits, double base, struct p
     pt_decode_normal(normal_bits, out->normal);
     frame_of(out->normal, t1, t2);
     for (int k = 0; k < 3; k++)
-        out->axis[k] = cos(angle) * t1[k] + sin(angle) * t2[k];
+        out->axis[k] = pt_cos(angle) * t1[k] + pt_sin(angle) * t2[k];
 }
 
 int pt_shapes_beside(const uint32_t *shapes, uint64_t slots)

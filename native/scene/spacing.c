@@ -5,6 +5,7 @@
 #include "cloud.h"
 #include "kernel_args.h"
 #include "base/compare.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -106,12 +107,12 @@ int pt_cloud_settle_spacing(struct patina_cloud *cloud)
     return PATINA_OK;
 }
 
-double pt_spacing_of_class(uint32_t index) { return index ? exp2(((double)index - 1.0) / 4.0) : 0.0; }
+double pt_spacing_of_class(uint32_t index) { return index ? pt_exp2(((double)index - 1.0) / 4.0) : 0.0; }
 
 uint32_t pt_class_of_spacing(double spacing, double base) // rounded up: a layer distance may be too wide, not too narrow
 {
     if (!(spacing > 0.0) || !(base > 0.0) || !isfinite(spacing / base))
         return 0;
-    double steps = ceil(4.0 * log2(spacing / base) - 1e-6);
+    double steps = ceil(4.0 * pt_log2(spacing / base) - 1e-6);
     return steps < 0.0 ? 1u : steps > 62.0 ? 63u : (uint32_t)steps + 1u;
 }

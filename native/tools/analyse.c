@@ -132,7 +132,8 @@ static int analyse(const char *in, const char *out, uint32_t neighbours, patina_
     tool_cancellable(NULL, NULL);
     const int error = code ? 0 : write_ply(out, columns, info.origin);
     if (error) {
-        tool_say("%s: cannot be written: %s", out, strerror(error));
+        char text[128];
+        tool_say("%s: cannot be written: %s", out, pt_error_text(error, text, sizeof text));
         result = TOOL_FAILED;
     } else if (!code) {
         for (int i = 0; i < 6; i++)

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The options of `patina render` that draw effects, as the table of effects lists them; what their values may be, the library says.
 #include "tool.h"
+#include "base/words.h"
 
 #include <ctype.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 // ---- the table -----------------------------------------------------------------------------------------------------
 
@@ -129,7 +129,7 @@ static double item_of(const struct field *field, const char *word)
 {
     const size_t prefix = strcspn(field->name, "_") + 1;
     for (size_t i = 0; items[i].name; i++)
-        if (!strncasecmp(items[i].name, field->name, prefix) && !strcasecmp(items[i].name + prefix, word))
+        if (pt_same_start(items[i].name, field->name, prefix) && pt_same_word(items[i].name + prefix, word))
             return items[i].value;
     return -1.0;
 }

@@ -194,6 +194,10 @@ int tool_cancelled(void) { return atomic_load(&cancelled); }
 
 int main(int count, char **arguments)
 {
+    if (pt_program_begin(&count, &arguments)) {
+        tool_say("out of memory");
+        return TOOL_FAILED;
+    }
     if (count < 2) {
         print_usage(stderr);
         return TOOL_USAGE;

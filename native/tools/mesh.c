@@ -24,6 +24,8 @@ static void *next(struct growing *list, size_t size)
     return (char *)list->data + list->count++ * size;
 }
 
+#define BLANKS " \t\r\n"
+
 static int take_vertex(const char *text, struct growing *vertices)
 {
     double *p = next(vertices, 3 * sizeof *p);
@@ -31,11 +33,10 @@ static int take_vertex(const char *text, struct growing *vertices)
 }
 
 // A polygon as a fan of triangles. Vertices count from 1, or from the last one backwards with -1.
-static int take_face(char *text, const struct growing *vertices, struct growing *triangles)
+static int take_face(const char *text, const struct growing *vertices, struct growing *triangles)
 {
     uint32_t first = 0, before = 0, corners = 0;
-    char *rest = NULL;
-    for (char *word = strtok_r(text, " \t\r\n", &rest); word; word = strtok_r(NULL, " \t\r\n", &rest), corners++) {
+    for (const char *word = text + strspn(text, BLANKS); *word; word += strcspn(word, BLANKS), word += strspn(word, BLANKS), corners++) {
         long long number = strtoll(word, NULL, 10), index = number < 0 ? (long long)vertices->count + number : number - 1;
         if (index < 0 || index >= (long long)vertices->count)
             return PATINA_ERROR_FORMAT;
@@ -51,6 +52,28 @@ static int take_face(char *text, const struct growing *vertices, struct growing 
     return corners >= 3 ? PATINA_OK : PATINA_ERROR_FORMAT;
 }
 
+// The next line, of any length, into *line of *room bytes, which grows. 0 at the end, or without memory.
+static int read_line(FILE *file, char **line, size_t *room)
+{
+    size_t length = 0;
+    for (;;) {
+        if (*room - length < 2) {
+            const size_t wanted = *room ? 2 * *room : 256;
+            char *grown = realloc(*line, wanted);
+            if (!grown)
+                return 0;
+            *line = grown;
+            *room = wanted;
+        }
+        const size_t left = *room - length;
+        if (!fgets(*line + length, left < 1 << 20 ? (int)left : 1 << 20, file))
+            return length > 0;
+        length += strlen(*line + length);
+        if (length && (*line)[length - 1] == '\n')
+            return 1;
+    }
+}
+
 int tool_load_mesh(const char *path, patina_mesh **out)
 {
     struct growing vertices = {0}, triangles = {0};
@@ -58,7 +81,7 @@ int tool_load_mesh(const char *path, patina_mesh **out)
     char *line = NULL;
     size_t room = 0, number = 0;
     int code = file ? PATINA_OK : PATINA_ERROR_FILE;
-    while (!code && getline(&line, &room, file) >= 0) {
+    while (!code && read_line(file, &line, &room)) {
         number++;
         if (line[0] == 'v' && line[1] == ' ')
             code = take_vertex(line + 2, &vertices);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The options of `patina render`: one table, one parser by kind of value.
 #include "tool.h"
+#include "base/words.h"
 
 #include <errno.h>
 #include <math.h>
@@ -8,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 enum { MAX_SIZE = 65536, MAX_REPEAT = 100000 };
 
@@ -364,7 +364,7 @@ static bool is_other_picture(const char *path)
     static const char *const endings[] = {"jpg", "jpeg", "tif", "tiff", "exr", "hdr", "bmp", "tga", "webp", "gif", "jp2"};
     const char *dot = strrchr(path, '.');
     for (size_t i = 0; dot && i < sizeof endings / sizeof *endings; i++)
-        if (!strcasecmp(dot + 1, endings[i]))
+        if (pt_same_word(dot + 1, endings[i]))
             return true;
     return false;
 }

@@ -2,13 +2,13 @@
 // --pass: a pass in place of the colours. Numbers go through a ramp, normals turn to colours as is usual, (n + 1) / 2.
 #include "tool.h"
 #include "base/color.h"
+#include "base/words.h"
 
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 static const struct {
     const char *name;
@@ -24,7 +24,7 @@ int tool_parse_pass(const char *value, struct tool_options *options)
     const size_t length = strcspn(value, ",");
     int found = -1;
     for (int i = 0; i < PATINA_PASS_COUNT; i++)
-        if (strlen(passes[i].name) == length && !strncasecmp(value, passes[i].name, length))
+        if (strlen(passes[i].name) == length && pt_same_start(value, passes[i].name, length))
             found = i;
     if (found < 0)
         return -1;

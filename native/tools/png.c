@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Premultiplied linear float RGBA -> 8-bit sRGB PNG.
 #include "tool.h"
+#include "base/elementary.h"
 
 #include <errno.h>
-#include <math.h>
 #include <png.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@ static uint8_t encode_srgb(float linear)
         return 0;
     if (linear >= 1.0f)
         return 255;
-    const float curve = linear <= 0.0031308f ? 12.92f * linear : 1.055f * powf(linear, 1.0f / 2.4f) - 0.055f;
+    const float curve = linear <= 0.0031308f ? 12.92f * linear : 1.055f * (float)pt_pow((double)linear, (double)(1.0f / 2.4f)) - 0.055f;
     return (uint8_t)(curve * 255.0f + 0.5f);
 }
 
@@ -52,9 +52,18 @@ int tool_write_png(const char *path, const float *pixels, uint32_t width, uint32
     png_image image = {.version = PNG_IMAGE_VERSION, .width = width, .height = height};
     image.format = alpha ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
     errno = 0;
-    const int good = png_image_write_to_file(&image, path, 0, bytes, 0, NULL);
-    if (!good)
-        tool_say("'%s' cannot be written: %s", path, errno ? strerror(errno) : image.message);
+    FILE *file = pt_stream_open(path, "wb");
+    int good = file && png_image_write_to_stdio(&image, file, 0, bytes, 0, NULL), error = errno;
+    if (file && fclose(file) && good) {
+        error = errno;
+        good = 0;
+    }
+    if (!good) {
+        char text[128];
+        tool_say("'%s' cannot be written: %s", path, error ? pt_error_text(error, text, sizeof text) : image.message);
+        if (file)
+            pt_file_remove(path);
+    }
     free(bytes);
     return good ? 0 : -1;
 }

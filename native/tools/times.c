@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Times of frames and passes, medians, and the JSON object that `--stats json` prints.
 #include "tool.h"
+#include "base/words.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -116,12 +117,12 @@ int tool_times_add(struct tool_times *times, double ms, const patina_frame *fram
     object = find_object(json, "\"skipped\":", &length);
     if (object) {
         free(times->skipped);
-        times->skipped = strndup(object, length);
+        times->skipped = pt_copy_text(object, length);
     }
     object = find_object(json, "\"planes\":", &length);
     if (object) {
         free(times->planes);
-        times->planes = strndup(object, length);
+        times->planes = pt_copy_text(object, length);
     }
     free(json);
     times->ms[times->frames++] = ms;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Cameras and lights of `patina render`.
 #include "view.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <string.h>
@@ -25,7 +26,7 @@ static void cross(const double a[3], const double b[3], double out[3])
 
 static void rotate_z(double v[3], const double pivot[3], double degrees)
 {
-    const double c = cos(degrees * PI / 180), s = sin(degrees * PI / 180);
+    const double c = pt_cos(degrees * PI / 180), s = pt_sin(degrees * PI / 180);
     const double x = v[0] - pivot[0], y = v[1] - pivot[1];
     v[0] = pivot[0] + c * x - s * y;
     v[1] = pivot[1] + s * x + c * y;
@@ -80,7 +81,7 @@ static void look(const struct tool_options *options, double turn, patina_camera 
     }
     camera->world_from_camera[15] = 1;
     const double aspect = (double)options->settings.width / options->settings.height;
-    const double half = tan((options->fov > 0 ? options->fov : 45.8) * PI / 360);
+    const double half = pt_tan((options->fov > 0 ? options->fov : 45.8) * PI / 360);
     camera->top = half;
     camera->bottom = -half;
     camera->right = half * aspect;
@@ -137,9 +138,9 @@ int tool_lights(patina_scene *scene, const struct tool_options *options, const p
     }
     if (options->sun) {
         const double azimuth = options->sun_at[0] * PI / 180, height = options->sun_at[1] * PI / 180;
-        sun.direction[0] = -sin(azimuth) * cos(height);
-        sun.direction[1] = cos(azimuth) * cos(height);
-        sun.direction[2] = -sin(height);
+        sun.direction[0] = -pt_sin(azimuth) * pt_cos(height);
+        sun.direction[1] = pt_cos(azimuth) * pt_cos(height);
+        sun.direction[2] = -pt_sin(height);
         sun.angle = (float)(options->sun_at[2] * PI / 180);
     }
     sun.shadows = options->shadows ? 1 : 0;

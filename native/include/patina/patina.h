@@ -47,8 +47,10 @@
 extern "C" {
 #endif
 
-#if defined(_WIN32)
+#if defined(_WIN32) && defined(PATINA_BUILDS_LIBRARY)
 #define PATINA_API __declspec(dllexport)
+#elif defined(_WIN32)
+#define PATINA_API
 #else
 #define PATINA_API __attribute__((visibility("default")))
 #endif
