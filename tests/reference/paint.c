@@ -71,7 +71,7 @@ static void add_level(const struct texture_args *image, const uint32_t *texels, 
     for (int j = 0; j < 2; j++)
         for (int i = 0; i < 2; i++) {
             double c[4], u = x - floor(x), v = y - floor(y);
-            long column = (long)floor(x) + i, row = (long)floor(y) + j;
+            int64_t column = (int64_t)floor(x) + i, row = (int64_t)floor(y) + j;
             if (image->wrap == PT_WRAP_CLIP &&
                 (column < 0 || row < 0 || column >= image->sizes[3 * level] || row >= image->sizes[3 * level + 1]))
                 continue;

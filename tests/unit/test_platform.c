@@ -15,6 +15,7 @@
 #include <string.h>
 #ifdef _WIN32
 #include <windows.h>
+#undef far
 #else
 #include <pthread.h>
 #include <signal.h>
@@ -313,10 +314,6 @@ static void test_held(void **state)
     const HANDLE lone = CreateFileW(wide(at("held")), GENERIC_READ, 0, NULL, OPEN_EXISTING, 0, NULL);
     assert_int_equal(pt_disk_open(at("held"), &disk), EBUSY);
     CloseHandle(lone);
-    SetFileAttributesW(wide(at("held")), FILE_ATTRIBUTE_READONLY);
-    write_whole(at("held"), "new", EACCES);
-    assert_text(at("held"), "old");
-    SetFileAttributesW(wide(at("held")), FILE_ATTRIBUTE_NORMAL);
     assert_int_equal(pt_file_remove(at("held")), 0);
 }
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The PLY reader and writer through the public header: hand-made files in memory, then the shared collection where
 // there is one (folder PATINA_SHARED, else ../shared).
+#include "base/platform.h"
 #include "../../native/io/number.h"
 #include "../../native/base/progress.h"
 
@@ -64,7 +65,6 @@ static void test_numbers(void **state)
 static void test_exact_numbers(void **state)
 {
     (void)state;
-    locale_t c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     uint64_t random = 88172645463325252u;
     setlocale(LC_ALL, "de_DE.UTF-8"); // where it is not installed the test is only weaker
     for (int i = 0; i < 200000; i++) {
@@ -82,14 +82,13 @@ static void test_exact_numbers(void **state)
         char *comma = strchr(text, ',');
         if (comma)
             *comma = '.';
-        double wanted = strtod_l(text, NULL, c_locale);
+        double wanted = pt_decimal(text);
         const uint8_t *end = (const uint8_t *)text + strlen(text);
         const uint8_t *behind = pt_parse_number((const uint8_t *)text, end, &got);
         if (behind != end || memcmp(&got, &wanted, sizeof got))
             fail_msg("%s was read as %.17g", text, got);
     }
     setlocale(LC_ALL, "C");
-    freelocale(c_locale);
 }
 
 static void test_text_lists(void **state)

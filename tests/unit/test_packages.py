@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What `build/package --all` packed: each platform's library where the add-on looks for it, of its machine, and on what it may rely. Of
+macOS, which cannot be run here, the load commands: the oldest system and the signature that Apple's processors ask for.
+
+    test_packages.py [FOLDER]        (default build/out/packages/all)
+"""
+import re
+import struct
+import sys
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "build/out/packages/all"
+NAMES = {"windows": "patina.dll", "macos": "libpatina.dylib", "linux": "libpatina.so"}
+DECLARED = {name for header in (ROOT / "native/include/patina").glob("*.h")
+            for name in re.findall(r"^PATINA_API [^;(]*?(patina_\w+)\(", header.read_text(encoding="utf-8"), re.M)}
+
+
+def text_at(data, at):
+    return data[at:data.index(b"\0", at)].decode()
+
+
+def read_elf(data):
+    """(machine, names that it exports, libraries that it needs) of a 64-bit ELF, little-endian."""
+    machine, = struct.unpack_from("<H", data, 18)
+    sections, size, count = struct.unpack_from("<Q", data, 40)[0], *struct.unpack_from("<HH", data, 58)
+    tables = [struct.unpack_from("<IIQQQQIIQQ", data, sections + i * size) for i in range(count)]
+    exported, needed = set(), set()
+    for _, kind, _, _, offset, length, link, _, _, each in tables:
+        names = tables[link][4] if kind in (6, 11) else 0
+        for at in range(offset, offset + length, each) if kind in (6, 11) else ():
+            if kind == 11:  # dynamic symbols
+                name, info, _, section = struct.unpack_from("<IBBH", data, at)
+                if section and info >> 4:
+                    exported.add(text_at(data, names + name))
+            elif struct.unpack_from("<Q", data, at)[0] == 1:  # DT_NEEDED
+                needed.add(text_at(data, names + struct.unpack_from("<Q", data, at + 8)[0]))
+    return {62: "x64", 183: "arm64"}.get(machine), exported, needed
+
+
+def read_pe(data):
+    """The same of a DLL."""
+    at, = struct.unpack_from("<I", data, 60)
+    assert data[at:at + 4] == b"PE\0\0"
+    machine, count = struct.unpack_from("<HH", data, at + 4)
+    optional, = struct.unpack_from("<H", data, at + 20)
+    tables = [struct.unpack_from("<8s4I", data, at + 24 + optional + 40 * i) for i in range(count)]
+
+    def place(address):
+        return next(address - start + raw for _, size, start, length, raw in tables if start <= address < start + max(size, length))
+
+    exports, _, imports = struct.unpack_from("<3I", data, at + 24 + 112)
+    names_count, _, names = struct.unpack_from("<3I", data, place(exports) + 24)
+    exported = {text_at(data, place(struct.unpack_from("<I", data, place(names) + 4 * i)[0])) for i in range(names_count)}
+    needed, entry = set(), place(imports)
+    while any(data[entry:entry + 20]):
+        needed.add(text_at(data, place(struct.unpack_from("<I", data, entry + 12)[0])).lower())
+        entry += 20
+    return {0x8664: "x64", 0xAA64: "arm64"}.get(machine), exported, needed
+
+
+def read_macho(data):
+    """The same of a dylib, its oldest system and whether it is signed among what it needs."""
+    magic, machine, _, kind, count = struct.unpack_from("<5I", data)
+    assert magic == 0xFEEDFACF and kind == 6, (magic, kind)
+    at, exported, needed = 32, set(), set()
+    for _ in range(count):
+        command, size = struct.unpack_from("<2I", data, at)
+        if command & 0x7FFFFFFF == 0xC:  # LC_LOAD_DYLIB
+            needed.add(text_at(data, at + struct.unpack_from("<I", data, at + 8)[0]))
+        elif command == 0x32:  # LC_BUILD_VERSION
+            platform, oldest = struct.unpack_from("<2I", data, at + 8)
+            assert platform == 1, platform
+            needed.add(f"macOS {oldest >> 16}.{oldest >> 8 & 255}")
+        elif command == 0x1D:  # LC_CODE_SIGNATURE
+            offset, length = struct.unpack_from("<2I", data, at + 8)
+            assert data[offset:offset + 4] == b"\xfa\xde\x0c\xc0" and offset + length <= len(data)
+            needed.add("a signature")
+        elif command == 2:  # LC_SYMTAB
+            symbols, symbol_count, names, _ = struct.unpack_from("<4I", data, at + 8)
+            for i in range(symbol_count):
+                name, kind, section = struct.unpack_from("<IBB", data, symbols + 16 * i)
+                if kind & 1 and section and not kind & 0x10:  # defined, seen from outside
+                    exported.add(text_at(data, names + name)[1:])
+        at += size
+    return {0x01000007: "x64", 0x0100000C: "arm64"}.get(machine), exported, needed
+
+
+READERS = {"windows": read_pe, "macos": read_macho, "linux": read_elf}
+MAY = {"windows": re.compile(r"(kernel32|shell32|advapi32|ntdll)\.dll|api-ms-win-.*\.dll|ucrtbase\.dll"),
+       "linux": re.compile(r"(libc|libm|libpthread|libdl)\.so\.\d+|ld-linux.*"),
+       "macos": re.compile(r"/usr/lib/libSystem\.B\.dylib|macOS 11\.0|a signature")}
+
+
+def check(platform, path):
+    system, processor = platform.split("-")
+    legacy = path.stem.endswith("-legacy")
+    with zipfile.ZipFile(path) as archive:
+        prefix = "patina/" if legacy else ""
+        libraries = [name for name in archive.namelist() if name.startswith(f"{prefix}lib/")]
+        assert libraries == [f"{prefix}lib/{NAMES[system]}"], libraries
+        if not legacy:
+            manifest = archive.read("blender_manifest.toml").decode()
+            assert f'platforms = ["{platform}"]' in manifest, manifest
+            listed = set(re.findall(r'"\./(wheels/[^"]+)"', manifest))
+            assert listed == {name for name in archive.namelist() if name.startswith("wheels/")}, listed
+        machine, exported, needed = READERS[system](archive.read(libraries[0]))
+    assert machine == processor, machine
+    assert not DECLARED - exported, f"does not export {sorted(DECLARED - exported)}"
+    assert not [name for name in exported if not name.startswith("patina_")], sorted(exported - DECLARED)
+    assert not [name for name in needed if not MAY[system].fullmatch(name)], needed
+    if system == "macos":
+        assert {"macOS 11.0", "a signature"} <= needed, needed
+    return f"{path.stat().st_size / 1e6:.2f} MB, needs {', '.join(sorted(needed))}"
+
+
+def main():
+    passed = failed = 0
+    for path in sorted(FOLDER.glob("patina-*.zip")):
+        platform = re.search(r"(linux|windows|macos)-(x64|arm64)", path.stem).group()
+        try:
+            print(f"ok {path.name}: {check(platform, path)}")
+            passed += 1
+        except Exception as error:  # noqa: BLE001
+            print(f"FAILED {path.name}: {type(error).__name__}: {error}")
+            failed += 1
+    print(f"{passed} passed, {failed + (not passed)} failed, 0 skipped")
+    return failed or not passed
+
+
+if __name__ == "__main__":
+    sys.exit(main())
