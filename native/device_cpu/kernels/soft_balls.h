@@ -5,7 +5,10 @@
 
 #include "soft_tile.h"
 
-enum { PT_SOFT_NUMBERS = 10 }; // floats kept of a ball
+enum {
+    PT_SOFT_NUMBERS = 10, // floats kept of a ball
+    PT_SOFT_SUMS = 16     // the most lanes of any level
+};
 
 // Of the balls that a pixel's ray meets; room for a list, and PT_LANES more.
 struct pt_soft_hits {
@@ -206,8 +209,11 @@ static inline float pt_soft_piece(const struct pt_soft_tile *tile, const struct 
                                   float to, float color[3])
 {
     const vf zero = vf_zero(), one = vf_set(1.0f);
-    vf sums[5] = {zero, zero, zero, zero, zero};
+    vf sums[PT_SOFT_SUMS / PT_LANES][5]; // of every 16th hit, however many lanes there are: each level adds in the same order
     float totals[5] = {0.0f};
+    for (int at = 0; at < PT_SOFT_SUMS / PT_LANES; at++)
+        for (int k = 0; k < 5; k++)
+            sums[at][k] = zero;
     for (uint32_t i = 0; i < open; i += PT_LANES) {
         const vm some = vm_first(pt_lanes_left(i, open));
         const vi hit = vi_load(hits->open + i);
@@ -217,17 +223,19 @@ static inline float pt_soft_piece(const struct pt_soft_tile *tile, const struct 
                  end = vf_max(vf_min((vf_set(to) - along) * inverse, half), begin);
         const vf shells = vf_select(some, vf_gather(hits->shells, hit, some), one), weight = vf_gather(hits->weight, hit, some);
         const vf depth = pt_soft_depth(tile->bins->args, shells, vf_gather(hits->d, hit, some), begin, end, some);
-        sums[0] = sums[0] + vf_mul_where(some, vf_gather(hits->depth, hit, some), depth);
-        sums[1] = sums[1] + vf_mul_where(some, weight, one);
+        vf *sum = sums[i / PT_LANES % (PT_SOFT_SUMS / PT_LANES)];
+        sum[0] = sum[0] + vf_mul_where(some, vf_gather(hits->depth, hit, some), depth);
+        sum[1] = sum[1] + vf_mul_where(some, weight, one);
         for (int k = 0; k < 3; k++)
-            sums[2 + k] = sums[2 + k] + vf_mul_where(some, weight, vf_gather(hits->color[k], hit, some));
+            sum[2 + k] = sum[2 + k] + vf_mul_where(some, weight, vf_gather(hits->color[k], hit, some));
     }
-    for (int k = 0; k < 5; k++) {
-        float lanes[PT_LANES];
-        vf_store(lanes, sums[k]);
-        for (uint32_t i = 0; i < PT_LANES; i++)
-            totals[k] += lanes[i];
-    }
+    for (int at = 0; at < PT_SOFT_SUMS / PT_LANES; at++)
+        for (int k = 0; k < 5; k++) {
+            float lanes[PT_LANES];
+            vf_store(lanes, sums[at][k]);
+            for (uint32_t i = 0; i < PT_LANES; i++)
+                totals[k] += lanes[i];
+        }
     for (int k = 0; k < 3; k++)
         color[k] = totals[1] > 0.0f ? totals[2 + k] / totals[1] : 0.0f;
     return totals[0];
