@@ -84,8 +84,8 @@ enum { FAR = 1100 }; // beyond 2^FAR and 2^-FAR there is nothing
 // e^r 2^power, |r| < 0.35.
 static double exp_of(struct pair r, int power)
 {
-    static const double term[] = {1.0 / 6,         1.0 / 24,         1.0 / 120,         1.0 / 720,          1.0 / 5040,
-                                  1.0 / 40320,     1.0 / 362880,     1.0 / 3628800,     1.0 / 39916800,     1.0 / 479001600,
+    static const double term[] = {1.0 / 6,          1.0 / 24,          1.0 / 120,          1.0 / 720,      1.0 / 5040,
+                                  1.0 / 40320,      1.0 / 362880,      1.0 / 3628800,      1.0 / 39916800, 1.0 / 479001600,
                                   1.0 / 6227020800, 1.0 / 87178291200, 1.0 / 1307674368000};
     const double rest = r.high * r.high * r.high * series(term, LENGTH(term), r.high);
     const struct pair square = product_of(r.high, r.high), begin = ordered(1.0, r.high);
@@ -224,8 +224,13 @@ static struct pair reduce(double x, int *quarter)
 
 static struct pair sine_near(struct pair r) // |r| <= pi / 4
 {
-    static const double term[] = {1.0 / 120,         -1.0 / 5040,        1.0 / 362880,          -1.0 / 39916800,
-                                  1.0 / 6227020800.0, -1.0 / 1307674368000.0, 1.0 / 355687428096000.0};
+    static const double term[] = {1.0 / 120,
+                                  -1.0 / 5040,
+                                  1.0 / 362880,
+                                  -1.0 / 39916800,
+                                  1.0 / 6227020800.0,
+                                  -1.0 / 1307674368000.0,
+                                  1.0 / 355687428096000.0};
     const struct pair cube = times(times(times(r, r), r), sixth);
     const double z = r.high * r.high, rest = r.high * z * z * series(term, LENGTH(term), z);
     const struct pair sum = add(r, negative(cube));
@@ -234,8 +239,14 @@ static struct pair sine_near(struct pair r) // |r| <= pi / 4
 
 static struct pair cosine_near(struct pair r)
 {
-    static const double term[] = {1.0 / 24,          -1.0 / 720,         1.0 / 40320,           -1.0 / 3628800,
-                                  1.0 / 479001600.0, -1.0 / 87178291200.0, 1.0 / 20922789888000.0, -1.0 / 6402373705728000.0};
+    static const double term[] = {1.0 / 24,
+                                  -1.0 / 720,
+                                  1.0 / 40320,
+                                  -1.0 / 3628800,
+                                  1.0 / 479001600.0,
+                                  -1.0 / 87178291200.0,
+                                  1.0 / 20922789888000.0,
+                                  -1.0 / 6402373705728000.0};
     const struct pair square = times(r, r);
     const double z = square.high, rest = z * z * series(term, LENGTH(term), z);
     const struct pair sum = add((struct pair){1.0, 0.0}, (struct pair){-0.5 * square.high, -0.5 * square.low});
@@ -261,7 +272,8 @@ double pt_tan(double x) { return !isfinite(x) ? (double)NAN : x == 0.0 ? x : val
 // Of y / x for 0 <= y <= x, x > 0.
 static struct pair arctangent(struct pair y, struct pair x)
 {
-    static const struct pair eighths[] = { // arctangents of 0, 1/8, ..., 1
+    static const struct pair eighths[] = {
+        // arctangents of 0, 1/8, ..., 1
         {0.0, 0.0},
         {0x1.fd5ba9aac2f6ep-4, -0x1.cd37686760c17p-59},
         {0x1.f5b75f92c80ddp-3, 0x1.8ab6e3cf7afbdp-57},

@@ -31,8 +31,8 @@ enum pt_vectors pt_processor_vectors(void)
         AVX512CD = 1 << 28,
         AVX512BW = 1 << 30,
         LZCNT = 1 << 5,
-        WIDE = 0x6,     // of XCR0: xmm and ymm
-        WIDEST = 0xe6   // and masks, and zmm's halves
+        WIDE = 0x6,   // of XCR0: xmm and ymm
+        WIDEST = 0xe6 // and masks, and zmm's halves
     };
     const uint32_t vl = 1u << 31;
     uint32_t a, b = 0, c = 0, d, wide = 0, more = 0;

@@ -23,7 +23,10 @@ _Static_assert(sizeof(CONDITION_VARIABLE) <= sizeof(struct pt_condition), "room 
 _Static_assert(sizeof(HANDLE) <= sizeof(struct pt_thread), "room of a thread");
 
 static SRWLOCK *lock_of(struct pt_mutex *mutex) { return (SRWLOCK *)(void *)mutex->room; }
-static CONDITION_VARIABLE *condition_of(struct pt_condition *condition) { return (CONDITION_VARIABLE *)(void *)condition->room; }
+static CONDITION_VARIABLE *condition_of(struct pt_condition *condition)
+{
+    return (CONDITION_VARIABLE *)(void *)condition->room;
+}
 
 void pt_mutex_init(struct pt_mutex *mutex) { InitializeSRWLock(lock_of(mutex)); }
 void pt_mutex_destroy(struct pt_mutex *mutex) { (void)mutex; }
@@ -58,8 +61,8 @@ int pt_thread_start(struct pt_thread *thread, void (*main)(void *context), void 
     if (!start)
         return ENOMEM;
     *start = (struct start){main, context};
-    const HANDLE handle =
-        (HANDLE)_beginthreadex(NULL, (unsigned)stack, thread_main, start, STACK_SIZE_PARAM_IS_A_RESERVATION, NULL);
+    const HANDLE handle = (HANDLE)_beginthreadex(NULL, (unsigned)stack, thread_main, start, STACK_SIZE_PARAM_IS_A_RESERVATION,
+                                                 NULL);
     if (!handle) {
         free(start);
         return errno;
@@ -105,32 +108,23 @@ static int error_of(DWORD error)
     case ERROR_BAD_PATHNAME:
     case ERROR_BAD_NETPATH:
     case ERROR_BAD_NET_NAME:
-    case ERROR_INVALID_DRIVE:
-        return ENOENT;
+    case ERROR_INVALID_DRIVE: return ENOENT;
     case ERROR_ACCESS_DENIED:
-    case ERROR_WRITE_PROTECT:
-        return EACCES;
+    case ERROR_WRITE_PROTECT: return EACCES;
     case ERROR_SHARING_VIOLATION:
     case ERROR_LOCK_VIOLATION:
-    case ERROR_USER_MAPPED_FILE:
-        return EBUSY;
+    case ERROR_USER_MAPPED_FILE: return EBUSY;
     case ERROR_DISK_FULL:
-    case ERROR_HANDLE_DISK_FULL:
-        return ENOSPC;
+    case ERROR_HANDLE_DISK_FULL: return ENOSPC;
     case ERROR_NOT_ENOUGH_MEMORY:
     case ERROR_OUTOFMEMORY:
-    case ERROR_COMMITMENT_LIMIT:
-        return ENOMEM;
+    case ERROR_COMMITMENT_LIMIT: return ENOMEM;
     case ERROR_ALREADY_EXISTS:
-    case ERROR_FILE_EXISTS:
-        return EEXIST;
+    case ERROR_FILE_EXISTS: return EEXIST;
     case ERROR_INVALID_NAME:
-    case ERROR_NO_UNICODE_TRANSLATION:
-        return EINVAL;
-    case ERROR_FILENAME_EXCED_RANGE:
-        return ENAMETOOLONG;
-    default:
-        return EIO;
+    case ERROR_NO_UNICODE_TRANSLATION: return EINVAL;
+    case ERROR_FILENAME_EXCED_RANGE: return ENAMETOOLONG;
+    default: return EIO;
     }
 }
 
@@ -168,8 +162,8 @@ void pt_processor_name(char *text, size_t size)
 {
     char name[256] = "";
     DWORD room = sizeof name - 1;
-    const LSTATUS error = RegGetValueA(HKEY_LOCAL_MACHINE, "HARDWARE\\DESCRIPTION\\System\\CentralProcessor\\0", "ProcessorNameString",
-                                       RRF_RT_REG_SZ, NULL, name, &room);
+    const LSTATUS error = RegGetValueA(HKEY_LOCAL_MACHINE, "HARDWARE\\DESCRIPTION\\System\\CentralProcessor\\0",
+                                       "ProcessorNameString", RRF_RT_REG_SZ, NULL, name, &room);
     const char *start = name + strspn(name, " ");
     snprintf(text, size, "%s", error || !*start ? "processor" : start);
 }
@@ -250,8 +244,8 @@ int pt_disk_open(const char *path, struct pt_disk *disk)
     if (!wide)
         return error;
     // others may write, rename and delete it meanwhile, as on other systems; FLAG_BACKUP_SEMANTICS: folders open
-    const HANDLE handle = CreateFileW(wide, GENERIC_READ, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, NULL, OPEN_EXISTING,
-                                      FILE_FLAG_BACKUP_SEMANTICS, NULL);
+    const HANDLE handle = CreateFileW(wide, GENERIC_READ, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, NULL,
+                                      OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS, NULL);
     error = handle == INVALID_HANDLE_VALUE ? last_error() : 0;
     free(wide);
     if (error)
@@ -296,7 +290,8 @@ int pt_disk_map(const struct pt_disk *disk, uint64_t offset, size_t size, enum p
 {
     const int copy = use == PT_DISK_ANYWHERE;
     const HANDLE section = CreateFileMappingW((HANDLE)disk->handle, NULL, copy ? PAGE_WRITECOPY : PAGE_READONLY, 0, 0, NULL);
-    *data = section ? MapViewOfFile(section, copy ? FILE_MAP_COPY : FILE_MAP_READ, (DWORD)(offset >> 32), (DWORD)offset, size) : NULL;
+    *data = section ? MapViewOfFile(section, copy ? FILE_MAP_COPY : FILE_MAP_READ, (DWORD)(offset >> 32), (DWORD)offset, size)
+                    : NULL;
     const int error = *data ? 0 : last_error();
     if (section)
         CloseHandle(section); // the view holds it
@@ -411,9 +406,11 @@ void *pt_library_open(const char *name)
     if (MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, name, -1, wide, 1024) <= 0)
         return NULL;
     // of Windows' own folder, or by a whole path: never one that lies in the folder that the program was started in
-    const HMODULE library = LoadLibraryExW(wide, NULL, strpbrk(name, "/\\") ? LOAD_WITH_ALTERED_SEARCH_PATH : LOAD_LIBRARY_SEARCH_SYSTEM32);
+    const HMODULE library = LoadLibraryExW(wide, NULL,
+                                           strpbrk(name, "/\\") ? LOAD_WITH_ALTERED_SEARCH_PATH : LOAD_LIBRARY_SEARCH_SYSTEM32);
     if (library)
-        GetModuleHandleExW(GET_MODULE_HANDLE_EX_FLAG_PIN | GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS, (LPCWSTR)(void *)library, &pinned);
+        GetModuleHandleExW(GET_MODULE_HANDLE_EX_FLAG_PIN | GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS, (LPCWSTR)(void *)library,
+                           &pinned);
     return library;
 }
 

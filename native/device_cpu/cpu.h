@@ -77,9 +77,9 @@ typedef int pt_cpu_finish(const struct pt_cpu_pass *passes, uint32_t count);
 #define PT_EACH_LEVEL(X) X(neon, 1) X(scalar, 1)
 #else
 #define PT_EACH_LEVEL(X)                                                                                                       \
-    X(avx512, pt_processor_vectors() >= PT_VECTORS_AVX512) \
-    X(avx2, pt_processor_vectors() >= PT_VECTORS_AVX2) \
-    X(sse42, pt_processor_vectors() >= PT_VECTORS_SSE42) \
+    X(avx512, pt_processor_vectors() >= PT_VECTORS_AVX512)                                                                     \
+    X(avx2, pt_processor_vectors() >= PT_VECTORS_AVX2)                                                                         \
+    X(sse42, pt_processor_vectors() >= PT_VECTORS_SSE42)                                                                       \
     X(scalar, 1)
 #endif
 

@@ -7,7 +7,8 @@ int pt_device_gl_create(const patina_device_desc *desc, const char *context, str
     (void)desc, (void)context;
     *out = NULL;
 #if defined(__APPLE__)
-    return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "OpenGL ends at 4.1 on macOS, and Patina needs 4.3: it computes on the processor");
+    return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED,
+                   "OpenGL ends at 4.1 on macOS, and Patina needs 4.3: it computes on the processor");
 #elif defined(_WIN32)
     return pt_fail(NULL, PATINA_ERROR_UNSUPPORTED, "this build has no OpenGL: on Windows Patina computes on the processor");
 #else

@@ -255,9 +255,15 @@ int patina_file_read_normals(const patina_file *file, float *xyz, size_t size)
 }
 
 // IEC 61966-2-1, both ways.
-static float linear_from_srgb(float s) { return s <= 0.04045f ? s / 12.92f : (float)pt_pow((double)((s + 0.055f) / 1.055f), (double)2.4f); }
+static float linear_from_srgb(float s)
+{
+    return s <= 0.04045f ? s / 12.92f : (float)pt_pow((double)((s + 0.055f) / 1.055f), (double)2.4f);
+}
 
-static float srgb_from_linear(float l) { return l <= 0.0031308f ? l * 12.92f : 1.055f * (float)pt_pow((double)l, (double)(1 / 2.4f)) - 0.055f; }
+static float srgb_from_linear(float l)
+{
+    return l <= 0.0031308f ? l * 12.92f : 1.055f * (float)pt_pow((double)l, (double)(1 / 2.4f)) - 0.055f;
+}
 
 static uint8_t byte_from_unit(float value)
 {

@@ -231,7 +231,8 @@ struct weighted {
 static int compare_weighted(const void *a, const void *b)
 {
     const struct weighted *x = a, *y = b; // sums depend on the order, and C libraries leave that of equals open
-    return x->value != y->value ? (x->value > y->value) - (x->value < y->value) : (x->weight > y->weight) - (x->weight < y->weight);
+    return x->value != y->value ? (x->value > y->value) - (x->value < y->value)
+                                : (x->weight > y->weight) - (x->weight < y->weight);
 }
 
 // Spacings of the chunks of instances [first, end) with the area that they cover; those that face away only when asked for.

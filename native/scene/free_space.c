@@ -95,7 +95,8 @@ static void cell_of(const struct look *look, const struct sight *at, uint32_t *x
 static void add_sight(struct look *look, const struct sight *at)
 {
     const double flat = pt_cos(at->elevation);
-    pt_sight_add(&look->sight, (double[]){flat * pt_cos(at->azimuth), flat * pt_sin(at->azimuth), pt_sin(at->elevation)}, at->range);
+    pt_sight_add(&look->sight, (double[]){flat * pt_cos(at->azimuth), flat * pt_sin(at->azimuth), pt_sin(at->elevation)},
+                 at->range);
 }
 
 static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t thread)

@@ -31,12 +31,16 @@ struct grading {
     struct patina_grade *grade;
 };
 
-static double to_srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pt_pow(linear, 1.0 / 2.4) - 0.055; }
+static double to_srgb(double linear)
+{
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pt_pow(linear, 1.0 / 2.4) - 0.055;
+}
 
 // Warm: more red and less blue, at the luminance of white.
 static void set_factors(const patina_scan_grade *grade, const float *balance, struct tone *tone)
 {
-    const float warm[3] = {(float)pt_exp2(0.5 * (double)grade->temperature), 1.0f, (float)pt_exp2(-0.5 * (double)grade->temperature)};
+    const float warm[3] = {(float)pt_exp2(0.5 * (double)grade->temperature), 1.0f,
+                           (float)pt_exp2(-0.5 * (double)grade->temperature)};
     const float white = luma[0] * warm[0] + luma[1] * warm[1] + luma[2] * warm[2];
     for (int k = 0; k < 3; k++)
         tone->factor[k] = grade->gain * warm[k] / white * (balance ? balance[k] : 1.0f);

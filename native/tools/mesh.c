@@ -36,7 +36,8 @@ static int take_vertex(const char *text, struct growing *vertices)
 static int take_face(const char *text, const struct growing *vertices, struct growing *triangles)
 {
     uint32_t first = 0, before = 0, corners = 0;
-    for (const char *word = text + strspn(text, BLANKS); *word; word += strcspn(word, BLANKS), word += strspn(word, BLANKS), corners++) {
+    for (const char *word = text + strspn(text, BLANKS); *word;
+         word += strcspn(word, BLANKS), word += strspn(word, BLANKS), corners++) {
         long long number = strtoll(word, NULL, 10), index = number < 0 ? (long long)vertices->count + number : number - 1;
         if (index < 0 || index >= (long long)vertices->count)
             return PATINA_ERROR_FORMAT;

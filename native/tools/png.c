@@ -16,7 +16,8 @@ static uint8_t encode_srgb(float linear)
         return 0;
     if (linear >= 1.0f)
         return 255;
-    const float curve = linear <= 0.0031308f ? 12.92f * linear : 1.055f * (float)pt_pow((double)linear, (double)(1.0f / 2.4f)) - 0.055f;
+    const float curve = linear <= 0.0031308f ? 12.92f * linear
+                                             : 1.055f * (float)pt_pow((double)linear, (double)(1.0f / 2.4f)) - 0.055f;
     return (uint8_t)(curve * 255.0f + 0.5f);
 }
 

@@ -270,7 +270,8 @@ static void test_everywhere(void **state)
             sum = (sum ^ bits) * 0x9e3779b97f4a7c15ull;
             sum ^= sum >> 29;
             other += got != there;
-            if (!(fabs(got - there) <= (f == CBRT ? 0x1p-50 : 0x1p-51) * fabs(got))) // C libraries are off by as much: glibc's cbrt by 4
+            if (!(fabs(got - there) <=
+                  (f == CBRT ? 0x1p-50 : 0x1p-51) * fabs(got))) // C libraries are off by as much: glibc's cbrt by 4
                 fail_msg("function %d of %a, %a: %a, the C library has %a", f, x, y, got, there);
         }
     print_message("%u values, %u of them other than the C library's; bits %016llx\n", FUNCTIONS * STEPS, (unsigned)other,
@@ -280,6 +281,7 @@ static void test_everywhere(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known), cmocka_unit_test(test_exact), cmocka_unit_test(test_everywhere)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_known), cmocka_unit_test(test_exact),
+                                       cmocka_unit_test(test_everywhere)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
