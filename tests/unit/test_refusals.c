@@ -227,7 +227,7 @@ static void test_opacities_and_discs(void **state)
     patina_cloud_style style = {.struct_size = sizeof style, .radius = -1.0f};
     assert_int_equal(patina_scene_add_cloud(stage.scene, stage.cloud, &style), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "radius");
-    patina_settings settings = {.struct_size = sizeof settings, .surface = 3};
+    patina_settings settings = {.struct_size = sizeof settings, .surface = PATINA_SURFACE_RANGES + 1};
     assert_int_equal(patina_scene_set_settings(stage.scene, &settings), PATINA_ERROR_ARGUMENT);
     assert_message(stage.scene, "surface");
     patina_cloud_desc desc = {.struct_size = sizeof desc,
