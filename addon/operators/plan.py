@@ -78,7 +78,8 @@ class PATINA_OT_render_plan(Operator, ExportHelper):
         except OSError as error:
             self.report({'ERROR'}, f"Patina: {target.name} cannot be written: {error.strerror}")
             return {'CANCELLED'}
-        self.report({'INFO'}, f"{width:,} x {height:,} pixels of {pixel:.6g} units; world file {target.name}")
+        self.report({'INFO'}, f"{width:,} x {height:,} pixels of {pixel:.6g} units; world file {target.name}. "
+                            f"The scene's camera is '{camera.name}' now, its picture of this size")
         return {'FINISHED'}
 
 
