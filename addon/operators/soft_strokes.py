@@ -103,7 +103,7 @@ class Stroke:
         self.bits = np.zeros((count + 7) // 8, np.uint8)
         with ANALYSES.drawing():
             description = describe(context)
-            items = [replace(item, soft=None) for item in description.clouds if item.name != obj.name or item.cloud.count == count]
+            items = [item for item in description.clouds if item.name != obj.name or item.cloud.count == count]
             if len(items) < len(description.clouds):
                 raise native.PatinaError(f"modifiers of '{obj.name}' make other points of it")
             self._seen = Seen(replace(description, clouds=items), {obj.name}, through)

@@ -14,6 +14,7 @@ from bpy.types import Context, Event
 from gpu_extras.batch import batch_for_shader
 
 from .. import jobs, native, render, sync, viewport
+from ..native.abi import SURFACE
 from ..native.points import pick
 from ..sync import clouds, edits
 
@@ -32,7 +33,8 @@ def _view(context: Context) -> sync.View:
 
 
 def describe(context: Context) -> sync.SceneDescription:
-    """The scene as the view shows it, its clouds built, light and lines left out: what stands where is all that is asked."""
+    """The scene as the view shows it, its clouds built, light and lines left out: what stands where is all that is asked. Soft points
+    count as surface, and range images show single points."""
     depsgraph, view, notices = context.evaluated_depsgraph_get(), _view(context), []
     drawing = viewport.of_area(context.area)
     trusted = drawing.trusted if drawing else sync.Trusted()
@@ -45,11 +47,11 @@ def describe(context: Context) -> sync.SceneDescription:
     items = clouds.collect(depsgraph, trusted.take(notices), notices, visible)
     description = sync.describe_items(depsgraph, view, notices, items)
     with native.Progress() as progress:
-        built = [replace(item, cloud=cloud) for item in description.clouds
+        built = [replace(item, cloud=cloud, soft=None, style=replace(item.style, surface=0)) for item in description.clouds
                  if (cloud := jobs.finish(item.cloud.resolve(progress)))]
-    clips = sync.view_clips(context.region_data) if space else []
+    clips, settings = sync.view_clips(context.region_data) if space else [], description.settings
     return replace(description, clouds=built, clips=[*description.clips, *clips], lights=[], headlight=None, lines=None, shadow_file="",
-                   panorama=None, settings=replace(description.settings, pixel_samples=1))
+                   panorama=None, settings=replace(settings, pixel_samples=1, surface=0 if settings.surface == SURFACE["RANGES"] else settings.surface))
 
 
 class Seen:

@@ -171,6 +171,10 @@ static inline struct pt_ref pt_field_of(const struct pt_plan_instance *instance,
 }
 // soft.c: soft points over the picture.
 void pt_plan_soft(struct pt_builder *builder);
+static inline int pt_counts_soft(const struct pt_builder *builder) // for the pass of their density, which is cleared before
+{
+    return builder->plan->soft_part_count && builder->scene->settings.passes >> PATINA_PASS_DENSITY & 1u;
+}
 // Of several layers, before one is shaded: those between it and the layer before; and behind the last.
 void pt_plan_soft_layer(struct pt_builder *builder);
 void pt_plan_soft_beyond(struct pt_builder *builder);

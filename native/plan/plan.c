@@ -674,6 +674,13 @@ static enum pt_plane plan_whole_layer(struct pt_builder *builder)
     return color;
 }
 
+static void plan_soft(struct pt_builder *builder)
+{
+    if (pt_counts_soft(builder))
+        pt_plan_no_density(builder);
+    pt_plan_soft(builder);
+}
+
 static void plan_points(struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
@@ -705,7 +712,7 @@ static void plan_points(struct pt_builder *builder)
     plan_output(builder, plan->layers > 1 ? PT_PLANE_OVER : color);
     set_background(&builder->scene->settings, background);
     pt_plan_ink(builder, background);
-    pt_plan_soft(builder);
+    plan_soft(builder);
     pt_plan_paper(builder);
     if (plan->layers == 1)
         put_together(builder);
@@ -721,7 +728,7 @@ static void plan_nothing(struct pt_builder *builder, const char *reason)
     if (builder->plan->soft_count)
         pt_plan_sift(builder);
     plan_output(builder, PT_PLANE_COLOR_A);
-    pt_plan_soft(builder);
+    plan_soft(builder);
     pt_plan_paper(builder);
     put_together(builder);
     skip_rest(builder, reason, 0);

@@ -388,7 +388,7 @@ void pt_plan_soft_beyond(struct pt_builder *builder)
 void pt_plan_soft(struct pt_builder *builder)
 {
     struct pt_plan *plan = builder->plan;
-    const int counted = plan->soft_part_count && builder->scene->settings.passes >> PATINA_PASS_DENSITY & 1u;
+    const int counted = pt_counts_soft(builder);
     uint32_t soft = 0;
     for (uint32_t i = 0; i < builder->scene->instance_count; i++)
         soft += builder->scene->instances[i].style.soft != PATINA_SOFT_OFF;
@@ -397,10 +397,7 @@ void pt_plan_soft(struct pt_builder *builder)
         pt_skip(builder, "gather", reason);
         pt_skip(builder, "soft", reason);
     }
-    if (counted) {
-        pt_plan_no_density(builder);
-        plan->assessed |= 1u << PATINA_PASS_DENSITY;
-    }
+    plan->assessed |= (uint32_t)counted << PATINA_PASS_DENSITY;
     for (uint32_t k = 0; k < plan->soft_part_count; k++)
         plan_part(builder, k, BEFORE, counted);
 }

@@ -121,6 +121,14 @@ def test_visible_or_through():
     behind.select_set(True)
     select(right_half())
     check(chosen(obj).sum() == ROWS * ROWS // 2 and not chosen(behind).any(), "the nearer alone")
+    obj.patina.soft.use = True
+    select(right_half())
+    check(chosen(obj).sum() == ROWS * ROWS // 2 and not chosen(behind).any(), "soft points as well")
+    obj.patina.soft.use = False
+    bpy.context.scene.patina.surface = 'RANGES'
+    select(right_half())
+    check(chosen(obj).sum() == ROWS * ROWS // 2 and not chosen(behind).any(), "single points of range images")
+    bpy.context.scene.patina.surface = 'AUTO'
     select(right_half(), through=True)
     check(chosen(obj).sum() == chosen(behind).sum() == ROWS * ROWS // 2, "both")
     bpy.ops.object.patina_points_hide()  # of the active one
