@@ -26,6 +26,7 @@ struct part {
 struct conf {
     const struct pt_input *input;
     const char *path;
+    pt_file_opener *open;
     const uint8_t *at, *end;
     unsigned long long line;
     struct part *parts;
@@ -206,7 +207,7 @@ static int open_part(const struct conf *c, struct word name, struct part *part)
         progress->begin = (float)c->begun / (float)c->lines * 0.9f;
         progress->share = 0.9f / (float)c->lines;
     }
-    const int code = pt_file_open(path, true, progress, &part->file);
+    const int code = c->open(path, true, progress, &part->file);
     if (progress) {
         progress->begin = begin;
         progress->share = share;
@@ -466,9 +467,10 @@ static int join(struct conf *c, struct patina_file *file)
     return code;
 }
 
-int pt_conf_read(struct patina_file *file, const struct pt_input *input, const char *path)
+int pt_conf_read(struct patina_file *file, const struct pt_input *input, const char *path, pt_file_opener *open)
 {
-    struct conf c = {.input = input, .path = path, .at = input->data, .end = input->data + input->size, .line = 1};
+    struct conf c = {
+        .input = input, .path = path, .open = open, .at = input->data, .end = input->data + input->size, .line = 1};
     count_lines(&c);
     int code = read_lines(&c);
     if (!code && !c.lines)

@@ -55,14 +55,14 @@ struct pt_input {
 };
 
 // Opens the file at a path. alone: a file that names others, as a .conf does, is refused.
-int pt_file_open(const char *path, bool alone, struct patina_progress *progress, struct patina_file **out);
+typedef int pt_file_opener(const char *path, bool alone, struct patina_progress *progress, struct patina_file **out);
 
 // Readers: fill a zeroed file. On failure the caller destroys what was filled.
 int pt_ply_read(struct patina_file *file, const struct pt_input *input);
 int pt_text_read(struct patina_file *file, const struct pt_input *input); // XYZ, CSV, PTS, PTX
 // Stanford's .conf: scans in files beside it (path: its own), each with its place. What cannot be read is told in the log and left
 // out; an error where nothing is left.
-int pt_conf_read(struct patina_file *file, const struct pt_input *input, const char *path);
+int pt_conf_read(struct patina_file *file, const struct pt_input *input, const char *path, pt_file_opener *open);
 bool pt_conf_is(const struct pt_input *input);
 // Whether the first line that is no comment begins with a number, or names x, y and z; or the file is called a text, and is no PLY.
 bool pt_text_is(const struct pt_input *input);
