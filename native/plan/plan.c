@@ -241,7 +241,7 @@ static void plan_shade(struct pt_builder *builder, uint32_t i, enum pt_plane col
     if (plan->quality == PATINA_QUALITY_REFINED && wants_normals && (!discs || plan->iterations))
         args.blend = blend < 1.0 ? 1 : blend > BLEND_MOST ? BLEND_MOST : (uint32_t)blend;
     pt_own_colors(color, &args);
-    args.of_pixels = discs && args.light_count && pt_blends_light(builder);
+    args.of_pixels = discs && !instance->range && args.light_count && pt_blends_light(builder);
     if (shown)
         pt_plan_recolor(builder, instance, &args);
     int of_plane = args.instance.color_format == PT_COLOR_OF_PLANE || args.instance.color_format == PT_COLOR_OF_PIXEL;
@@ -448,20 +448,22 @@ static void plan_marks(struct pt_builder *builder)
         pt_skip(builder, "lit", none);
     if (none || !pt_casts_in_layers(builder->scene))
         pt_skip(builder, "limit", none ? none : "the points of no cloud that casts have opacities of their own");
-    if (!none && lazy && pt_blends_light(builder) && draws_discs(plan)) {
-        pt_skip(builder, "mark", "the discs that pixels show are marked");
+    const int blended = !none && lazy && pt_blends_light(builder); // all that a pixel of discs shows, then
+    int marked = !blended;
+    if (blended)
         pt_plan_blend_marks(builder);
-        return;
-    }
     for (uint32_t i = 0; i < plan->instance_count && !none && lazy; i++) {
         const struct pt_plan_instance *instance = &plan->instances[i];
-        if (!instance->chunk_count || !pt_receives(instance->instance))
+        if (!instance->chunk_count || !pt_receives(instance->instance) || (blended && !instance->range))
             continue;
         struct mark_args args = {
             .view = pt_view_filled(plan, instance), .id_base = instance->args.id_base, .id_count = instance->args.id_count};
         PT_REASON(PT_ADD(builder, mark, args, {pt_keys_of(builder, 0), pt_buffer_of(PT_MARKS, instance->of)}),
                   "only points of instance %u that the picture shows need shadows", i);
+        marked = 1;
     }
+    if (!marked)
+        pt_skip(builder, "mark", "the discs that pixels show are marked");
 }
 
 static void plan_center(struct pt_builder *builder, uint32_t i)
@@ -579,7 +581,7 @@ static void plan_shadows(struct pt_builder *builder)
         pt_add_passes_step(builder, PT_STEP_MARK);
     if (plan->light_count && (builder->layer == 1 || plan->mesh_shadows))
         pt_plan_light_steps(builder);
-    if (pt_blends_light(builder) && draws_discs(plan))
+    if (pt_blends_light(builder))
         pt_plan_blend_light(builder);
 }
 

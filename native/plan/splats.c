@@ -23,7 +23,10 @@ int pt_tells_depths(const struct pt_builder *builder)
 int pt_blends_light(const struct pt_builder *builder)
 {
     const struct pt_plan *plan = builder->plan;
-    return builder->scene->settings.surface == PATINA_SURFACE_SPLATS && plan->light_count &&
+    int some = 0; // range images have words of the nearest point
+    for (uint32_t i = 0; i < plan->instance_count; i++)
+        some |= plan->instances[i].chunk_count && plan->instances[i].discs && !plan->instances[i].range;
+    return some && builder->scene->settings.surface == PATINA_SURFACE_SPLATS && plan->light_count &&
            (uint64_t)plan->view.width * plan->view.height * plan->light_count <= UINT32_MAX; // else words of the nearest disc's
 }
 
