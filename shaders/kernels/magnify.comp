@@ -21,7 +21,7 @@ layout(std430, binding = BIND_limit) readonly buffer limit_block { float limit[]
 // Cells that may be corners of a face over a pixel: 3 x 3, row by row.
 vec2 corner[9]; // from the pixel's centre, in cells
 float depth[9], factor[9]; // 1 / z, or 1 in orthographic views
-bool there[9];
+uint there = 0u; // bits: some drivers over Vulkan take no arrays of bool
 uint cell_of[9];
 
 // The nearest face.
@@ -45,15 +45,17 @@ void look_around(uint x, uint y)
         vec4 place = vec4(0.0);
         if (pt_range_inside(args.cells, cx + dx, cy + dy))
             place = read_float4(cell_of[k]);
-        there[k] = 0.0 < place.w;
+        bool here = 0.0 < place.w;
+        there |= here ? 1u << k : 0u;
         precise vec2 at = vec2((float(dx) + place.x) - across, (float(dy) + place.y) - up);
         corner[k] = at;
-        depth[k] = there[k] ? place.z : 1.0;
+        depth[k] = here ? place.z : 1.0;
         factor[k] = view.perspective != 0u ? pt_rcp(depth[k]) : 1.0;
     }
 }
 
-bool all_there(ivec3 k) { return there[k.x] && there[k.y] && there[k.z]; }
+bool is_there(int k) { return (there >> k & 1u) != 0u; }
+bool all_there(ivec3 k) { return is_there(k.x) && is_there(k.y) && is_there(k.z); }
 float nearest_of(ivec3 k) { return pt_min(pt_min(depth[k.x], depth[k.y]), depth[k.z]); }
 float farthest_of(ivec3 k) { return pt_max(pt_max(depth[k.x], depth[k.y]), depth[k.z]); }
 
@@ -104,26 +106,25 @@ void take_faces(int a, bool apart)
 {
     int b = a + 1, d = a + 3, e = a + 4; // a b below, d e above
     ivec3 triples[4] = ivec3[](ivec3(a, b, d), ivec3(b, e, d), ivec3(a, b, e), ivec3(a, e, d));
-    bool fits[4];
-    bool any = false;
+    uint fits = 0u; // bits
     for (int t = 0; t < 4; t++) {
-        fits[t] = joined(triples[t]);
+        bool fit = joined(triples[t]);
         if (apart)
-            fits[t] = all_there(triples[t]) && !fits[t];
-        any = any || fits[t];
+            fit = all_there(triples[t]) && !fit;
+        fits |= fit ? 1u << t : 0u;
     }
-    if (!any)
+    if (fits == 0u)
         return;
     float nearest = pt_min(pt_min(depth[a], depth[b]), pt_min(depth[d], depth[e]));
     precise float deep = pt_max(pt_max(depth[a], depth[b]), pt_max(depth[d], depth[e])) - nearest;
-    bool whole = fits[0] && fits[1] && fits[2] && fits[3] && deep <= step_from(nearest);
+    bool whole = fits == 15u && deep <= step_from(nearest);
     precise float falls = depth[b] - depth[d], rises = depth[a] - depth[e];
     bool falling = pt_abs(falls) <= pt_abs(rises); // divided from b to d
     float ab = edge(a, b), be = edge(b, e), ed = edge(e, d), da = edge(d, a), bd = edge(b, d), ae = edge(a, e);
     float db = pt_negate(bd), ea = pt_negate(ae);
     vec3 edges[4] = vec3[](vec3(bd, da, ab), vec3(ed, db, be), vec3(be, ea, ab), vec3(ed, da, ae));
     for (int t = 0; t < 4; t++)
-        if (fits[t] && (!whole || (t < 2) == falling))
+        if ((fits >> t & 1u) != 0u && (!whole || (t < 2) == falling))
             take(triples[t], edges[t], apart);
 }
 
@@ -137,7 +138,7 @@ bool in_pixel(int k)
 void take_places()
 {
     for (int k = 0; k < 9; k++)
-        if (there[k] && in_pixel(k) && (!found || depth[k] < best_z)) {
+        if (is_there(k) && in_pixel(k) && (!found || depth[k] < best_z)) {
             found = true;
             best_z = depth[k];
             best_weight = vec3(1.0, 0.0, 0.0);
