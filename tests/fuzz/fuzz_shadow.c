@@ -44,6 +44,9 @@ static void set_up(void)
     int descriptor = mkstemp(path);
     REQUIRE(descriptor >= 0 && patina_frame_create(fuzz.device, &frame) == PATINA_OK &&
             patina_frame_bake_shadows(frame, fuzz.scene) == PATINA_OK && patina_frame_save_shadows(frame, path) == PATINA_OK);
+    close(descriptor); // of what the saved file took the place of
+    descriptor = open(path, O_RDONLY);
+    REQUIRE(descriptor >= 0);
     fuzz.size = (size_t)lseek(descriptor, 0, SEEK_END);
     fuzz.good = malloc(fuzz.size);
     REQUIRE(fuzz.size > BODY + FUZZ_POINTS && fuzz.good && pread(descriptor, fuzz.good, fuzz.size, 0) == (ssize_t)fuzz.size);
