@@ -6,6 +6,7 @@
 
 #include "scene/fingerprint.h"
 
+#include <fcntl.h>
 #include <stdbool.h>
 
 enum { VERSION = 3, CHECKSUM = 24, BODY = 32 }; // of native/run/frame_shadow_file.c
