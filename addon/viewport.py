@@ -322,7 +322,7 @@ class Viewport:
         return True
 
     def _wish_analyses(self) -> None:
-        pending = [item.cloud for item in self.shown.wish.scene.clouds if item.cloud.analyzed]
+        pending = [item.cloud for item in self.shown.wish.scene.clouds if item.analyzed and item.cloud.analyzed]
         ANALYSES.wish(self, [(cloud.built, cloud.stations) for cloud in pending])
 
     def analyzed(self, clouds: list[native.Cloud]) -> None:

@@ -181,7 +181,8 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             if name in found:
                 continue
             try:
-                source = linked.source(first, analyzed=name == first)  # of a sequence none is
+                spared = context.engine == set_up.PatinaRenderEngine.bl_idname and context.scene.patina.surface == 'RANGES'
+                source = linked.source(first, analyzed=name == first and not spared)  # of a sequence none is
                 if source is None:
                     raise native.PatinaError("there is no such file")
                 importers.reader(first)

@@ -235,7 +235,7 @@ class PatinaObjectProperties(PropertyGroup):
         description="Whether Patina finds out from each point's neighbors how wide, how thick and which way the surface is there",
         items=(
             ('AUTO', "Automatic", "In the background, once; not for sequences and points that move, which would be analyzed in "
-                                  "every frame", 0),
+                                  "every frame, nor for range images, which need none", 0),
             ('ALWAYS', "Always", "Sequences and points that move too, in every frame", 1),
             ('OFF', "Off", "Nothing is computed ahead: one spacing holds for many points", 2)))
     d_min: FloatProperty(

@@ -148,6 +148,7 @@ class CloudItem:
     soft: soft.Soft | None = None
     dotted: bool = False  # Blender's overlays draw its points too
     told: str = ""  # of its scans, where they are drawn as range images: ranges.py
+    analyzed: bool = True  # where its points are to be analyzed at all: this picture needs it
 
 
 class CloudCache:
@@ -267,8 +268,9 @@ def _set_numbers(cloud: native.Cloud, arrays: PointArrays) -> None:
 CACHE = CloudCache()
 
 
-# What collect() asks for each object with points or faces: (object, identity, linked file) → its cloud or mesh, or None without.
-Take = Callable[[bpy.types.Object, tuple, "linked.Source | None"], "native.Cloud | Pending | meshes.Faces | None"]
+# What collect() asks for each object with points or faces: (object, identity, linked file, whether an analysis is needed) → its cloud or
+# mesh, or None without.
+Take = Callable[[bpy.types.Object, tuple, "linked.Source | None", bool], "native.Cloud | Pending | meshes.Faces | None"]
 
 
 def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
@@ -280,7 +282,7 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
     Blender said that they changed."""
     items: list[CloudItem | meshes.MeshItem] = []
     taken: dict[tuple, native.Cloud | Pending | meshes.Faces | None] = {}  # by place in memory: it holds while the depsgraph does
-    used: set[tuple] = set()
+    identities: dict[tuple, tuple] = {}  # by place
     faces: set[str] = set()
     triangles = meshes.BARE if roles.are_used(depsgraph) or _wants_mattes(depsgraph.view_layer_eval) else meshes.TRIANGLES
     unknown = roles.Unknown(depsgraph.view_layer_eval)
@@ -299,21 +301,22 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             faces.add(obj.name)
             continue
         link = None
+        patina = depsgraph.scene_eval.patina
+        analyzed = not ranges.spare_analysis(obj, patina.surface, depsgraph.view_layer_eval)
         if obj.patina.linked_file:
-            link = linked.source_of(obj, depsgraph.scene_eval.frame_current if frame is None else frame, notices)
+            link = linked.source_of(obj, depsgraph.scene_eval.frame_current if frame is None else frame, notices, analyzed)
             if link is None:
                 continue
-        patina = depsgraph.scene_eval.patina
         role = roles.role_of(instance, depsgraph.view_layer_eval)
         faces_as = 0 if not solid else triangles if patina.meshes == 'TRIANGLES' else patina.mesh_points
         radius = _radius_name(obj, patina.surface)
         place = link.identity() if link else (obj.data.as_pointer(), radius, faces_as, *_attribute_names(obj), analysis.wanted(obj))
         place = (*place, *meshes.names_of(obj)) if solid else place
-        if place not in taken:
-            identity = place if link else _identity(obj, used, radius, faces_as)
-            used.add(identity)
-            taken[place] = take(obj, identity, link)
-        cloud = taken[place]
+        if place not in identities:
+            identities[place] = place if link else _identity(obj, set(identities.values()), radius, faces_as)
+        if (place, analyzed) not in taken:
+            taken[place, analyzed] = take(obj, identities[place], link, analyzed)
+        cloud = taken[place, analyzed]
         unknown.look(instance)
         if isinstance(cloud, meshes.Faces):
             notices += [text for text in cloud.notices if text not in notices]
@@ -330,11 +333,12 @@ def collect(depsgraph: bpy.types.Depsgraph, take: Take, notices: list[str],
             softened = soft.soft_of(obj, instance.matrix_world, depsgraph.scene_eval)
             told = ranges.told_of(obj, patina.surface)
             dotted = obj.type == 'MESH' and not solid and not link
-            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, told))
+            items.append(CloudItem(cloud, style, obj.pass_index, role, *_names(obj), edited, softened, dotted, told, analyzed))
             scales.append((obj.original.name_full, max(map(abs, instance.matrix_world.to_scale())), cloud))
     settle()
     items = [replace(item, cloud=item.cloud.built) if isinstance(item, CloudItem) and isinstance(item.cloud, _Soon) else item
              for item in items]
+    used = set(identities.values())
     CACHE.trim(used)
     meshes.CACHE.trim(used)
     images.CACHE.trim()
@@ -375,7 +379,7 @@ class TakingNow:
         self._notices = notices
         self._waiting: list[_Soon] = []
 
-    def __call__(self, obj: bpy.types.Object, identity: tuple, link: linked.Source | None
+    def __call__(self, obj: bpy.types.Object, identity: tuple, link: linked.Source | None, analyzed: bool
                  ) -> native.Cloud | Pending | meshes.Faces | None:
         name = obj.name
         progress = Progress()
@@ -393,6 +397,8 @@ class TakingNow:
         arrays = None if link else _read(obj, self._notices, identity[0], identity[-1], pause)
         if arrays is None and link is None:
             return None
+        if arrays and not analyzed:
+            arrays = replace(arrays, analyzed=False)
         if arrays and len(arrays.positions) < SMALL:
             soon = _Soon(name, identity, arrays, progress)
             self._waiting.append(soon)
@@ -484,7 +490,7 @@ class Trusted:
         self._known = {key: known for key, known in self._known.items() if key in self._used}  # objects go
         self._used = set()
 
-        def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None) -> Pending | meshes.Faces | None:
+        def take(obj: bpy.types.Object, identity: tuple, link: linked.Source | None, analyzed: bool) -> Pending | meshes.Faces | None:
             owners = {item: None for item in (obj, obj.data, *(slot.material for slot in obj.material_slots),
                                               *getattr(obj.data, "materials", ())) if item}  # each once
             key = (*identity, tuple((_kind(owner), owner.original.name_full) for owner in owners))

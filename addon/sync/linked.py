@@ -65,9 +65,11 @@ class Linked:
     told: str = ""  # what the file says of them: importers.scans
 
 
-def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source | None:
+def source_of(obj: bpy.types.Object, frame: int, notices: list[str], analyzed: bool | None = None) -> Source | None:
     """Of an object with a linked file, evaluated or not; None where there is nothing to show. The files of a sequence are
-    all relative to the object's origin, so that they lie to one another as they were scanned."""
+    all relative to the object's origin, so that they lie to one another as they were scanned. analyzed: whether an analysis
+    is needed, as far as the object has one; None: what is kept will do, with it or without. Where none is needed, one that is kept does
+    no harm."""
     path = files.path_of(obj)
     origin = pattern = None
     if sequence.is_pattern(path):
@@ -79,7 +81,11 @@ def source_of(obj: bpy.types.Object, frame: int, notices: list[str]) -> Source |
         if path is None:
             return None
         origin = tuple(obj[PROPERTY]) if PROPERTY in obj else None
-    found = source(path, origin, scalar_name(obj) or attribute_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored, pattern)
+    scalar, wanted, shown = scalar_name(obj) or attribute_name(obj), analysis.wanted(obj), obj.patina.hide_uncolored
+    found = source(path, origin, scalar, wanted, shown, pattern)
+    if found and wanted and not analyzed and not found.kept.exists():
+        bare = source(path, origin, scalar, False, shown, pattern)
+        found = bare if bare and (analyzed is False or bare.kept.exists()) else found
     if found is None:
         notices.append(Loss(f"'{obj.name}': the file {importers.told(path)} is missing"))
     return found

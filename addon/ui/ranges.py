@@ -29,6 +29,7 @@ class PATINA_PT_ranges(ColorPanel, Panel):
         rows.automatic(layout, group, "gamma")
         rows.automatic(layout, group, "pixel")
         rows.automatic(layout, group, "sharpness", otherwise="One Pass")
+        rows.automatic(layout, obj.patina, "d_min", text="Layer Distance")
         known = any(any(scan.direction) for scan in scans.unpacked(obj.data.get(scans.PROPERTY)))
         row = layout.row(heading="Cull Scans")
         row.active = known

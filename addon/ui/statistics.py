@@ -78,6 +78,8 @@ class PATINA_PT_statistics(SidebarPanel, Panel):
         shares = [share for item in shown.clouds if (share := ANALYSES.progress(item.cloud)) is not None]
         if shares:
             figures.append(("Analysis", f"{shares[0]:.0%}"))
+        elif shown.clouds and not any(item.analyzed for item in shown.clouds):
+            figures.append(("Analysis", "None is needed"))
         if level != pace.FULL:
             figures.append(("Moving", f"{2.0 ** (level.strata - pace.STRATA):.0%} of points, 1/{level.shrink} size"))
         if stats["shadow_samples"]:

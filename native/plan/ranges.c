@@ -32,7 +32,7 @@ static void set_gamma(const struct patina_scene *scene, const struct pt_instance
 {
     const struct patina_scans *scans = instance->style.scans;
     const double thinned = pt_thinning(scene), set = (double)instance->style.range_gamma;
-    const double interval = scans && scans->interval > 0.0 ? scans->interval : instance->cloud->info.spacing;
+    const double interval = scans && scans->interval > 0.0 ? scans->interval : instance->cloud->built;
     const double gamma = (set > 0.0 ? set : GAMMA_SAMPLES * thinned * interval) * scale;
     out->gamma = (float)fmin(fmax(gamma, (double)PT_RANGE_LEAST), (double)PT_RANGE_MOST); // NaN: nothing of a scale of 0
     out->gamma_cells = set > 0.0 ? 0.0f : GAMMA_CELLS;

@@ -202,7 +202,7 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
         for (int k = 0; k < 4; k++)
             seen.extent.rect[k] -= AROUND;
         seen.cull = cull && facing == FACES_BOTH;
-        seen.away = facing == FACES_AWAY && !layered;
+        seen.away = facing == FACES_AWAY && !layered && !ranges;
         const double pixel = pt_most(camera->xs, camera->ys), middle = seen.extent.z_middle;
         double footprint = pixel * (camera->orthographic ? 1.0 : middle);
         // a lamp sees a plate before a floor in one chunk: light leaks where the nearer of both has holes
@@ -210,7 +210,10 @@ static int look_at_instance(const struct patina_scene *scene, struct pt_plan *pl
                                                             : footprint;
         uint32_t count = pt_drawn_points(scene, chunk);
         double thinned = sqrt((double)chunk->count / count);
-        seen.spacing_px = thinned * (double)chunk->spacing * object->scale / nearest * sqrt(chunk_cosine(known, angle, spread));
+        // range images need no analysis, so that none may change them: nor may the normals that it finds
+        seen.spacing_px = ranges ? thinned * (double)chunk->built * object->scale / nearest
+                                 : thinned * (double)chunk->spacing * object->scale / nearest *
+                                       sqrt(chunk_cosine(known, angle, spread));
         // of a chunk around the camera the most lies elsewhere, and none covers more than the picture
         seen.area_px = pt_least(seen.extent.share * count * seen.spacing_px * seen.spacing_px, camera->width * camera->height);
         const double reach = disc_reach(scene, instance, object, chunk, apart, 0) * stretch;

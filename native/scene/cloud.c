@@ -589,6 +589,9 @@ static int build_cloud(struct build *build)
     pt_parallel(build->pool, cloud->chunk_count, 1, fill_chunks, build);
     if ((error = pt_cloud_settle_spacing(cloud)))
         return error;
+    for (uint32_t c = 0; c < cloud->chunk_count; c++)
+        cloud->chunks[c].built = cloud->chunks[c].spacing;
+    cloud->built = cloud->info.spacing;
     pt_parallel(build->pool, cloud->chunk_count, 1, surface_chunks, build);
     pt_progress_set(build->progress, 0.9);
     pt_parallel(build->pool, cloud->chunk_count, 1, attribute_chunks, build);

@@ -24,6 +24,7 @@ struct pt_chunk {
     uint32_t classes[8];             // of its points: bits as in patina_cloud_info.class_bits
     uint32_t shapes[8];     // of its points, drawn or not: bit c % 32 of word c / 32: the byte c from PT_SHAPE_SIGHT_SHIFT on
     float reach, footprint; // greatest half axis of its points' footprints, and their 90th percentile; 0: not analysed
+    float built;            // the spacing as the cloud was built with it, whatever an analysis found: range images go by it
 };
 
 // Whether a cloud still lives, shared with the devices that hold its buffers.
@@ -62,6 +63,7 @@ struct patina_cloud {
     enum pt_color_format color_format;
     uint32_t threads;        // at most, as the caller said; 0: not said
     struct pt_sights sights; // what its stations saw; empty where nobody asked for free space
+    double built;            // the median of the chunks' `built`
     double spacing_base;     // class 0: no spacing; class c: base * 2^((c - 1) / 4)
 };
 

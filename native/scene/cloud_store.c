@@ -13,14 +13,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SECTION = 1 << 16, VERSION = 8, SECTIONS = 12, PIECE = 1 << 22 };
+enum { SECTION = 1 << 16, VERSION = 9, SECTIONS = 12, PIECE = 1 << 22 };
 static const char magic[8] = {'p', 'a', 't', 'i', 'n', 'a', '\n', '\x1a'};
 
 struct header {
     char magic[8];
     uint32_t version, chunk_size, color_format, chunk_count;
     uint64_t slots, size; // of the file
-    double spacing_base;
+    double spacing_base, built;
     uint64_t class_hash;
     uint64_t sight_count, sight_room, sight_bytes; // of stations, and what they saw
     patina_cloud_info info;
@@ -111,6 +111,7 @@ int patina_cloud_save(const patina_cloud *cloud, const char *path)
                             .chunk_count = cloud->chunk_count,
                             .slots = cloud->slots,
                             .spacing_base = cloud->spacing_base,
+                            .built = cloud->built,
                             .class_hash = cloud->class_hash,
                             .sight_count = cloud->sights.count,
                             .sight_room = cloud->sights.room,
@@ -141,7 +142,7 @@ static int check_cloud(const char *path, const struct patina_cloud *cloud)
     uint64_t next = 0, drawn = 0;
     for (uint32_t c = 0; c < cloud->chunk_count; c++) {
         const struct pt_chunk *chunk = &cloud->chunks[c];
-        double sum = (double)chunk->spacing + (double)chunk->reach + (double)chunk->footprint;
+        double sum = (double)chunk->spacing + (double)chunk->reach + (double)chunk->footprint + (double)chunk->built;
         for (int k = 0; k < 3; k++)
             sum += chunk->origin[k] + (double)chunk->box_min[k] + (double)chunk->box_max[k] + (double)chunk->cone_axis[k];
         if (chunk->first != next || !chunk->count || chunk->count > chunk->padded || chunk->padded % PT_CHUNK_ALIGN ||

@@ -160,7 +160,7 @@ static int take_scalars(const patina_file *file, const char *name, patina_cloud 
 }
 
 int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out,
-                    struct tool_stations *stations)
+                    struct tool_stations *stations, struct tool_scans *scans)
 {
     patina_file *file = NULL;
     int code = patina_file_open(path, progress, &file);
@@ -170,6 +170,8 @@ int tool_load_cloud(const char *path, const struct tool_color *color, patina_pro
         code = take_scalars(file, color->attribute, *out);
     if (!code)
         code = tool_take_stations(file, stations);
+    if (!code)
+        code = tool_take_scans(file, *out, scans);
     patina_file_destroy(file);
     return code;
 }

@@ -310,7 +310,7 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
     else if (!strcmp(name, "--surface"))
         bad = parse_word(value, "auto|splats|fill|ranges", &s->surface);
     else if (!strcmp(name, "--analysis"))
-        bad = parse_word(value, "on|off", &o->analysis);
+        bad = parse_word(value, "auto|on|off", &o->analysis);
     else if (!strcmp(name, "--radius"))
         bad = parse_width(value, &o->radius);
     else if (!strcmp(name, "--range-gamma"))
@@ -319,8 +319,12 @@ static enum outcome parse_valued(const char *name, const char *value, struct too
         bad = parse_width(value, &o->range_sharpness);
     else if (!strcmp(name, "--range-pixel"))
         bad = parse_width(value, &o->range_pixel);
+    else if (!strcmp(name, "--range-culling"))
+        bad = parse_width(value, &o->range_culling) || o->range_culling > 180.0;
     else if (!strcmp(name, "--largest-gap"))
         bad = parse_width(value, &o->largest_gap);
+    else if (!strcmp(name, "--layer-distance"))
+        bad = parse_width(value, &o->layer_distance);
     else if (!strcmp(name, "--iterations"))
         bad = parse_count(value, 0, 1000, &s->fill_iterations);
     else if (!strcmp(name, "--smooth"))
@@ -428,8 +432,12 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     for (int i = 0; i < options->soft.file_count; i++)
         if (options->soft.files[i] > (uint32_t)options->file_count)
             return tool_misuse("--soft: there is no FILE %u", options->soft.files[i]);
-    if (options->analysis && (options->color.free_space || options->color.hidden_kinds || options->color.least_certainty > 0))
+    if (options->analysis == TOOL_UNANALYSED &&
+        (options->color.free_space || options->color.hidden_kinds || options->color.least_certainty > 0))
         return tool_misuse("--free-space, --hide-kinds and --least-certainty need the analysis");
+    if (options->settings.surface != PATINA_SURFACE_RANGES && (options->range_gamma > 0.0 || options->range_pixel > 0.0 ||
+                                                               options->range_sharpness > 0.0 || options->range_culling > 0.0))
+        return tool_misuse("--range-... options need --surface ranges");
     if (!options->file_count && !options->mesh_count)
         return tool_misuse("render: no file given");
     if (!options->output && !options->planes && !options->save_shadows && !options->json && !options->dump_plan &&
@@ -440,7 +448,7 @@ int tool_parse_render(int count, char **arguments, struct tool_options *options)
     if (options->pass != PATINA_PASS_COMBINED && (options->panorama[0] || !options->output))
         return tool_misuse("--pass makes a picture, without --panorama: -o OUT.png");
     if (options->pass == PATINA_PASS_CERTAINTY || options->pass == PATINA_PASS_THICKNESS) {
-        if (options->analysis)
+        if (options->analysis == TOOL_UNANALYSED)
             return tool_misuse("--pass certainty and thickness need the analysis");
     }
     if (options->panorama[0] && (options->repeat || options->json || options->planes || options->load_shadows ||

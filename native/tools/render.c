@@ -12,7 +12,8 @@ struct job {
     patina_device *device;
     patina_device_info device_info;
     patina_progress *progress;
-    patina_cloud **clouds; // options.file_count
+    patina_cloud **clouds;    // options.file_count
+    struct tool_scans *scans; // beside them
     patina_mesh *meshes[TOOL_MESHES];
     patina_scene *scene;
     patina_frame *frame;
@@ -30,9 +31,12 @@ static void destroy(struct job *job)
     patina_scene_destroy(job->scene);
     for (int i = 0; job->clouds && i < job->options.file_count; i++)
         patina_cloud_destroy(job->clouds[i]);
+    for (int i = 0; job->scans && i < job->options.file_count; i++)
+        patina_scans_destroy(job->scans[i].made);
     for (int i = 0; i < job->options.mesh_count; i++)
         patina_mesh_destroy(job->meshes[i]);
     free(job->clouds);
+    free(job->scans);
     patina_progress_destroy(job->progress);
     patina_device_destroy(job->device);
     free(job->pixels);
@@ -75,14 +79,28 @@ static int load_meshes(struct job *job)
     return TOOL_OK;
 }
 
+// Range images need none, but for what hides points by it, and for passes of it.
+static int needs_analysis(const struct tool_options *options, int has_normals)
+{
+    const struct tool_color *color = &options->color;
+    return options->settings.surface != PATINA_SURFACE_RANGES || options->soft.model || color->free_space ||
+           color->hidden_kinds || color->least_certainty > 0.0f || (options->cull && !has_normals) ||
+           options->pass == PATINA_PASS_CERTAINTY || options->pass == PATINA_PASS_THICKNESS;
+}
+
 static int analyse(struct job *job, patina_cloud *cloud, const struct tool_stations *stations)
 {
     patina_analysis_desc desc = {.struct_size = sizeof desc, .threads = job->options.threads, .keep_normals = 1};
     tool_describe_stations(stations, &desc);
     desc.free_space = job->options.color.free_space != PATINA_FREE_SPACE_OFF;
+    patina_cloud_info info = {.struct_size = sizeof info};
+    const int error = patina_cloud_get_info(cloud, &info);
+    if (error || job->options.analysis == TOOL_UNANALYSED ||
+        (job->options.analysis == TOOL_ANALYSED_WHERE_NEEDED && !needs_analysis(&job->options, (int)info.has_normals)))
+        return error;
     const double start = pt_milliseconds();
-    const int code = job->options.analysis ? PATINA_OK : patina_cloud_analyse(cloud, &desc, job->progress);
-    job->analysis_ms += job->options.analysis ? 0 : pt_milliseconds() - start;
+    const int code = patina_cloud_analyse(cloud, &desc, job->progress);
+    job->analysis_ms += pt_milliseconds() - start;
     return code;
 }
 
@@ -104,7 +122,8 @@ static int load_clouds(struct job *job)
     const struct tool_options *options = &job->options;
     job->box = (struct tool_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     job->clouds = calloc((size_t)options->file_count + 1, sizeof *job->clouds);
-    int code = job->clouds ? patina_progress_create(&job->progress) : PATINA_ERROR_MEMORY;
+    job->scans = calloc((size_t)options->file_count + 1, sizeof *job->scans);
+    int code = job->clouds && job->scans ? patina_progress_create(&job->progress) : PATINA_ERROR_MEMORY;
     if (!code)
         code = patina_scene_create(&job->scene);
     if (code)
@@ -115,15 +134,17 @@ static int load_clouds(struct job *job)
     style.cull_back = options->cull ? 1 : 0;
     style.radius = (float)options->radius;
     style.largest_gap = (float)options->largest_gap;
+    style.d_min = (float)options->layer_distance;
     style.range_gamma = (float)options->range_gamma;
     style.range_pixel = (float)options->range_pixel;
     style.range_sharpness = (float)options->range_sharpness;
+    style.range_cull = (float)(options->range_culling * 3.14159265358979323846 / 180.0);
     float table[PATINA_MAX_RAMP][3];
     tool_cancellable(job->progress, NULL);
     for (int i = 0; i < options->file_count; i++) {
         patina_cloud_info info = {.struct_size = sizeof info};
         struct tool_stations stations = {0};
-        code = tool_load_cloud(options->files[i], &options->color, job->progress, &job->clouds[i], &stations);
+        code = tool_load_cloud(options->files[i], &options->color, job->progress, &job->clouds[i], &stations, &job->scans[i]);
         if (!code)
             code = analyse(job, job->clouds[i], &stations);
         tool_free_stations(&stations);
@@ -136,6 +157,9 @@ static int load_clouds(struct job *job)
         grow_box(&job->box, info.box_min, info.box_max);
         if (options->opacity_count)
             style.transparency = (float)(1 - options->opacity[i < options->opacity_count ? i : options->opacity_count - 1]);
+        style.scans = job->scans[i].made;
+        if (options->range_culling > 0.0 && !job->scans[i].directed)
+            tool_say("warning: %s does not say in which direction its scans were taken: none is left out", options->files[i]);
         set_soft(options, i, &style);
         code = tool_set_color(&options->color, job->clouds[i], table, &style);
         if (!code)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a file knows of its scanner, for an analysis: stations, and of each point its scan, row and column.
+// What a file knows of its scanner: stations, and of each point its scan, row and column, for an analysis; scans, for range images.
 #include "tool.h"
 
 #include <math.h>
@@ -52,6 +52,40 @@ int tool_take_stations(const patina_file *file, struct tool_stations *out)
     if (!code)
         code = read_numbers(file, "row", &out->row);
     return code ? code : read_numbers(file, "column", &out->column);
+}
+
+int tool_take_scans(const patina_file *file, const patina_cloud *cloud, struct tool_scans *out)
+{
+    patina_file_info info = {.struct_size = sizeof info};
+    int32_t *scan = NULL;
+    *out = (struct tool_scans){0};
+    int code = patina_file_get_info(file, &info);
+    if (code || !info.scans || info.scans > UINT16_MAX || !info.count)
+        return code;
+    code = read_numbers(file, "scan", &scan);
+    if (!code && !scan && info.scans > 1)
+        return PATINA_OK; // whose points are whose is not known
+    patina_scan *known = calloc(info.scans, sizeof *known);
+    uint16_t *of = scan ? malloc(info.count * sizeof *of) : NULL;
+    if (!code && (!known || (scan && !of)))
+        code = PATINA_ERROR_MEMORY;
+    for (uint32_t i = 0; i < info.scans && !code; i++) {
+        patina_file_scan told = {.struct_size = sizeof told};
+        code = patina_file_get_scan(file, i, &told);
+        known[i].interval = told.interval;
+        for (int k = 0; k < 3; k++) {
+            known[i].direction[k] = told.direction[k];
+            out->directed |= told.direction[k] != 0.0;
+        }
+    }
+    for (uint64_t i = 0; i < info.count && scan && !code; i++)
+        of[i] = scan[i] >= 0 && scan[i] < UINT16_MAX ? (uint16_t)scan[i] : UINT16_MAX;
+    if (!code)
+        code = patina_scans_create(cloud, of, known, info.scans, &out->made);
+    free(scan);
+    free(of);
+    free(known);
+    return code;
 }
 
 void tool_describe_stations(const struct tool_stations *stations, patina_analysis_desc *desc)

@@ -38,6 +38,7 @@ int tool_cancelled(void);
 // ---- options -----------------------------------------------------------------------------------------------------
 
 enum tool_view { VIEW_ANGLES, VIEW_LOOK };
+enum tool_analysis { TOOL_ANALYSED_WHERE_NEEDED, TOOL_ANALYSED, TOOL_UNANALYSED };
 
 enum { TOOL_OPACITIES = 64, TOOL_MESHES = 64, TOOL_CLIPS = 64 };
 
@@ -72,8 +73,10 @@ struct tool_options {
     double opacity[TOOL_OPACITIES];  // of the files in turn, the last of those behind it
     double radius;                   // of discs, world units; 0: automatic
     double largest_gap;              // that they close, world units; 0: automatic
+    double layer_distance;           // world units; 0: automatic
     double range_gamma, range_pixel; // of range images; 0: automatic
     double range_sharpness;          // 0: one pass
+    double range_culling;            // degrees; 0: none
     struct {
         uint32_t model;                 // 0: none is soft; 1 + patina_soft_model
         uint32_t files[TOOL_OPACITIES]; // which of the files are, from 1 on
@@ -85,7 +88,7 @@ struct tool_options {
     int opacity_count;               // 0: all opaque
     const char *meshes[TOOL_MESHES]; // OBJ files
     int mesh_count;
-    uint32_t analysis; // 0: clouds are analysed, 1: not
+    uint32_t analysis; // tool_analysis
     int cull, transparent, shadows, headlight, sun, json, dump_plan, verbose;
     float ambient[3];
     double sun_at[3]; // degrees around z (as the camera's azimuth), above the horizon, diameter
@@ -126,6 +129,13 @@ struct tool_stations {
 };
 
 int tool_take_stations(const patina_file *file, struct tool_stations *out); // a patina_error; free in any case
+// Which scan each point is of, and how these were taken, for range images.
+struct tool_scans {
+    patina_scans *made; // NULL: the file tells of none
+    int directed;       // of one at least it is known in which direction the scanner looked
+};
+
+int tool_take_scans(const patina_file *file, const patina_cloud *cloud, struct tool_scans *out); // a patina_error
 // Into the description of an analysis, which needs them until it is done.
 void tool_describe_stations(const struct tool_stations *stations, patina_analysis_desc *desc);
 void tool_free_stations(struct tool_stations *stations);
@@ -134,7 +144,7 @@ extern const char *const tool_kinds[6]; // patina_kind
 
 // Each returns a patina_error. table: room for the ramp, read until the cloud is added.
 int tool_load_cloud(const char *path, const struct tool_color *color, patina_progress *progress, patina_cloud **out,
-                    struct tool_stations *stations);
+                    struct tool_stations *stations, struct tool_scans *scans);
 int tool_set_color(const struct tool_color *color, const patina_cloud *cloud, float table[PATINA_MAX_RAMP][3],
                    patina_cloud_style *style);
 int tool_add_clips(const struct tool_color *color, patina_scene *scene);

@@ -229,6 +229,67 @@ def test_linked_is_kept():
     check((again["Combined"] == picture["Combined"]).all(), "another picture")
 
 
+def test_range_images_need_none():
+    """Nothing is analyzed for them, and the picture is that with an analysis, to the bit; what asks for one gets it, and so does a second
+    object of the same points that is filled."""
+    scene = fresh_scene()
+    obj = add_points(sphere(20000)[0])
+    add_light('SUN', 3.0)
+    obj.patina.ranges.use = True
+    bare = render()
+    check(not only_cloud().has_shapes and not said("Analyzing"), f"analyzed: {set(stats)}")
+    check((bare["Combined"][..., 3] == 1).sum() > 300, "drawn")
+    obj.patina.analysis = 'ALWAYS'
+    analyzed = render()
+    check(only_cloud().has_shapes, "Always")
+    for name in ("Combined", "Depth", "Normal"):
+        check((bare[name] == analyzed[name]).all(), f"{name} differs by {np.abs(bare[name] - analyzed[name]).max()}")
+    obj.patina.analysis = 'AUTO'
+    for asks in ("hide_stray", "cull_back"):
+        clouds.CACHE.clear()
+        setattr(obj.patina, asks, True)
+        render()
+        check(only_cloud().has_shapes, asks)
+        setattr(obj.patina, asks, False)
+    clouds.CACHE.clear()
+    layer = scene.view_layers[0].patina
+    layer.use_pass_certainty = True
+    render()
+    check(only_cloud().has_shapes, "the pass Certainty")
+    layer.use_pass_certainty = False
+    clouds.CACHE.clear()
+    obj.patina.ranges.use, scene.patina.surface = False, 'RANGES'
+    check((render()["Combined"] == bare["Combined"]).all() and not only_cloud().has_shapes, "the scene's mode")
+    scene.patina.surface, obj.patina.ranges.use = 'AUTO', True
+    other = bpy.data.objects.new("filled", obj.data)
+    other.location.x = 0.5
+    scene.collection.objects.link(other)
+    render()
+    check(only_cloud().has_shapes, "its neighbor is filled")
+
+
+def test_links_of_range_images_need_none():
+    """A linked cloud is read and kept without; what is kept analyzed is taken where it is there, to the same picture."""
+    path = dense("ranged.ply", 60000)
+    scene = fresh_scene()
+    scene.patina.surface = 'RANGES'
+    obj, = import_ply(path, link=True, frame=True)
+    bare, without = linked.source(path), linked.source(path, analyzed=False)
+    check(without.kept.exists() and not bare.kept.exists(), "kept without")
+    picture = render()
+    check(not only_cloud().has_shapes and not said("Analyzing"), f"analyzed: {set(stats)}")
+    scene.patina.surface = 'AUTO'
+    filled = render()
+    check(bare.kept.exists() and (filled["Combined"] != picture["Combined"]).any(), "filled it is analyzed")
+    scene.patina.surface = 'RANGES'
+    without.kept.unlink()
+    clouds.CACHE.clear()
+    again = render()
+    check(only_cloud().has_shapes and not without.kept.exists(), "what is there is taken")
+    for name, pixels in picture.items():
+        check((pixels == again[name]).all(), f"{name} differs")
+
+
 def test_beside():
     """What a viewport does: the cloud is drawn meanwhile, changed when no picture is made, and then as a final one has it."""
     points = np.ascontiguousarray(sphere(100000)[0], np.float32)

@@ -244,5 +244,16 @@ def test_range_images():
     for name, value in (("pixel", 12.0), ("gamma", 0.5), ("sharpness", 0.6)):
         setattr(group, name, value)
         check(drawn(render()), f"{name} {value}")
+    bpy.context.scene.camera.location.z, bpy.context.scene.camera.rotation_euler.y = 0.0, 0.0
+    range_image("behind.ply", -6.0, 10, 10)
+    group.use_cull, group.use_pixel, group.use_gamma, group.use_sharpness = False, False, False, False
+    behind, = import_ply(text_file("walls.conf", "bmesh left.ply -0.5 -0.5 0 0 0 0 1\nbmesh behind.ply -0.5 -0.5 0 0 0 0 1\n"))
+    obj.hide_render, behind.patina.opacity = True, 0.5
+    shares = []
+    for behind.patina.d_min in (0.0, 0.2, 5.0):
+        shares.append(float(np.median([alpha for alpha in render()["Combined"][..., 3].flat if alpha > 0])))
+    check_close(shares, (0.75, 0.75, 0.5), 0.02, "a layer distance beyond the way between two walls makes one layer of them")
+    obj.hide_render = False
+    bpy.data.objects.remove(behind)
     group.pixel, group.sharpness = 0.3, 0.1  # below what the library takes
     check(drawn(render()), "clamped")

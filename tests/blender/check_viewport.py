@@ -8,6 +8,7 @@ from check_world import image_of, sky, world_with
 from harness import add_light, add_points, check, check_close, render, sphere
 from mathutils import Matrix, Quaternion
 from patina import backdrop, pace, viewport
+from patina.sync.analyzing import ANALYSES
 from window import area, clip_border, newer, screenshot, settled, setup, shown, toggle_local_view, view, window_region
 
 
@@ -103,6 +104,20 @@ def test_what_is_hidden_follows():
         covered.append(float((found.shown.color[..., 3] > 0).mean()))
         check(covered[-1] < covered[-2], f"{name}: {covered}")
         check(found.shown.clouds[0].cloud is built, f"{name}: built again")
+
+
+def test_range_images_are_not_analyzed():
+    """The view shows them, and no analysis begins; filled, one does, of the same cloud."""
+    scene = setup()
+    scene.patina.surface = 'RANGES'
+    add_points(sphere(3000, 1.5, (0, 0, 0))[0])
+    yield lambda: settled(3000)
+    found = shown()
+    built = found.shown.clouds[0].cloud
+    check(not built.has_shapes and not ANALYSES.busy() and not found.shown.clouds[0].analyzed, "analyzed")
+    scene.patina.surface = 'AUTO'
+    yield lambda: settled(3000) and shown().shown.clouds[0].cloud.has_shapes
+    check(found.shown.clouds[0].cloud is built, "built again")
 
 
 def test_depth_of_field_of_the_camera():

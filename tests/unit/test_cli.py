@@ -308,6 +308,70 @@ def test_info_tells_scans():
     run("render", "both.conf", "-o", "both.png", "--size", "32x32")
 
 
+def facing_walls(name):
+    """Two range images of a wall of 2 x 2: one looks to -z at the wall's place, the other, below it, to z."""
+    grid = "".join(f"{u / 20 - 1} {v / 20 - 1} 0\n" for v in range(41) for u in range(41)) + "".join(f"1 {i}\n" for i in range(1681))
+    (FOLDER / f"{name}.ply").write_text(
+        "ply\nformat ascii 1.0\nobj_info num_cols 41\nobj_info num_rows 41\nelement vertex 1681\nproperty float x\nproperty float y\n"
+        "property float z\nelement range_grid 1681\nproperty list uchar int vertex_indices\nend_header\n" + grid)
+    (FOLDER / f"{name}.conf").write_text(f"bmesh {name}.ply 0 0 0 0 0 0 1\nbmesh {name}.ply 0 0 -1 0 1 0 0\n")
+    return f"{name}.conf"
+
+
+AS_RANGES = ("--size", "64x64", "--surface", "ranges", "--transparent")
+
+
+def test_range_culling():
+    """Scans that looked the other way are left out whole: of two walls, the one that a view from above cannot have seen, and with a
+    turned view the other. Without directions there is a warning; without the mode, and beyond 180 degrees, a refusal."""
+    walls = facing_walls("walls")
+
+    def look(eye, *arguments):
+        run("render", walls, "-o", "culled.png", *AS_RANGES, "--look", f"{eye},0,0,0,30", "--pass", "depth,0,8", *arguments)
+        return [pixel for row in read_png("culled.png")[3] for pixel in row]
+
+    above, culled = look("0.01,0,6"), look("0.01,0,6", "--range-culling", "90")
+    assert above == culled and any(pixel[3] for pixel in above)
+    below, culled = look("0.01,0,-6"), look("0.01,0,-6", "--range-culling", "90")
+    assert below == culled != above, "from below the lower wall is the nearer one"
+    beyond = look("0.01,0,-0.8"), look("0.01,0,-0.8", "--range-culling", "90")
+    assert beyond[0] != beyond[1] and not any(pixel[3] for pixel in beyond[1]), "between the walls, the upper one is seen from behind"
+    assert look("0.01,0,-0.8", "--range-culling", "180") == beyond[0]
+    assert "in which direction" in run("render", ball("bare_ball.ply", 1000), "-o", "x.png", *AS_RANGES, "--range-culling", "90").stderr
+    for wrong in (["--range-culling", "181"], ["--range-culling", "0"], ["--range-culling", "left"]):
+        assert "--range-culling" in run("render", walls, "-o", "x.png", *AS_RANGES, *wrong, code=2).stderr
+    assert "--surface ranges" in run("render", walls, "-o", "x.png", "--range-culling", "90", code=2).stderr
+
+
+def test_layer_distance():
+    """What lies nearer together than it is one layer: of two walls of glass a quarter of the light comes through, then half."""
+    walls = facing_walls("glass")
+    for surface in ("ranges", "fill"):
+        shares = []
+        for distance in ("0.2", "3"):
+            run("render", walls, "-o", "glass.png", *AS_RANGES, "--look", "0,0.01,6,0,0,0,10", "--surface", surface, "--opacity", "0.5", "--unlit",
+                "--layer-distance", distance)
+            shares.append(read_png("glass.png")[3][32][32][3] / 255)
+        assert abs(shares[0] - 0.75) < 0.01 and abs(shares[1] - 0.5) < 0.01, (surface, shares)
+    assert "--layer-distance" in run("render", walls, "-o", "x.png", "--layer-distance", "-1", code=2).stderr
+
+
+def test_range_images_are_not_analysed():
+    """Nothing asks for it, and with cells and gamma of one's own, or automatic ones, the picture is that with it; what hides points by
+    their kinds, and certainty, ask for it."""
+    ball("round.ply", 5000)
+
+    def at(*arguments):
+        told = json.loads(run("render", "round.ply", "-o", "round.png", *FRONT, "--surface", "ranges", "--stats", "json", *arguments).stdout)
+        return read_png("round.png")[3], told["analysis_ms"]
+
+    bare, analysed = at(), at("--analysis", "on")
+    assert not bare[1] and analysed[1] and bare[0] == analysed[0], (bare[1], analysed[1])
+    assert at("--range-pixel", "3", "--range-gamma", "0.05")[0] == at("--range-pixel", "3", "--range-gamma", "0.05", "--analysis", "on")[0]
+    assert at("--hide-kinds", "stray")[1] and at("--pass", "certainty")[1] and at("--soft", "base")[1] and not at("--cull")[1]
+    assert json.loads(run("render", "round.ply", *FRONT, "--stats", "json").stdout)["analysis_ms"], "other surfaces are"
+
+
 def test_info_of_an_empty_cloud():
     assert "points      0" in run("info", write_ply("empty.ply", [])).stdout
 
