@@ -14,7 +14,7 @@ bl_info = {  # for Blender 3.4 to 4.1; later ones read blender_manifest.toml
 import bpy
 from bpy.app.handlers import persistent
 
-from . import engine, migrate, operators, pairs, preferences, properties, render, ui, viewport
+from . import engine, histogram, migrate, operators, pairs, preferences, properties, render, ui, viewport
 from .sync import clouds, files, images, meshes
 
 _MODULES = (preferences, properties, files, migrate, pairs, engine, operators, ui)
@@ -25,6 +25,7 @@ _UNDO = (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post)
 def _forget(*_) -> None:
     """Another file: its data may carry the names of the last one's."""
     viewport.close_all()
+    histogram.forget()
     clouds.CACHE.clear()
     meshes.CACHE.clear()
     images.CACHE.clear()
@@ -48,6 +49,7 @@ def unregister() -> None:
     for handlers in _UNDO:
         handlers.remove(_undone)
     viewport.close_all()
+    histogram.forget()
     for module in reversed(_MODULES):
         module.unregister()
     clouds.CACHE.clear()

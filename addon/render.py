@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import backdrop, cryptomatte, jobs, mattes, memory, native
+from . import backdrop, cryptomatte, histogram, jobs, mattes, memory, native
 from .pieces import LARGE_PICTURE, PIXEL_BYTES, Canvas, Piece, Planes, tiles
 from .sync import DeviceChoice, SceneDescription, edits, ranges, soft
 from .sync.analyzing import ANALYSES
@@ -378,8 +378,11 @@ def describe(scene: native.Scene, description: SceneDescription, wanted: Iterabl
         if style.color_source == SCALAR and not item.cloud.has_scalars:  # a notice has said so
             style = replace(style, color_source=OWN)
         softened = item.soft if item.soft and not item.soft.missing(item.cloud) else None  # a notice has said so
+        parted = soft.field_of(item.cloud, softened) if softened else None
+        if softened:
+            histogram.note(item.name, softened, parted)
         scene.add_cloud(item.cloud, mask=edits.mask_of(item.cloud, item.edits), grade=edits.grade_of(item.cloud, item.edits),
-                        field=soft.field_of(item.cloud, softened) if softened else None, scans=ranges.scans_of(item.cloud, item.told),
+                        field=parted, scans=ranges.scans_of(item.cloud, item.told),
                         **asdict(style),
                         **(dict(softened.style) if softened else {}))
     for item in description.meshes:

@@ -245,6 +245,10 @@ class FieldDesc(Descriptor):
                 ("unused", c_uint32), ("world_from_object", c_double * 16), ("world_from_shape", c_double * 16)]
 
 
+class FieldInfo(Descriptor):
+    _fields_ = [("struct_size", c_size_t), ("range", c_double * 2), ("histogram", c_uint64 * 256)]
+
+
 class Pick(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("instance", c_uint32), ("polygon", c_void_p), ("corners", c_uint32),
                 ("classes", c_uint32 * 8), ("threads", c_uint32)]
@@ -343,6 +347,7 @@ CALLS = {
     "patina_scans_destroy": (c_void_p,),
     "patina_field_create": (c_void_p, POINTER(FieldDesc), c_void_p, POINTER(c_void_p)),
     "patina_field_destroy": (c_void_p,),
+    "patina_field_get_info": (c_void_p, POINTER(FieldInfo)),
     "patina_scene_pick": (c_void_p, c_void_p, POINTER(Pick), c_void_p, c_void_p, c_size_t),
     "patina_frame_highlight": (c_void_p, c_void_p, c_void_p, c_float, c_void_p, c_size_t),
     "patina_task_render": (c_void_p, c_void_p, POINTER(Read), c_uint32, POINTER(c_void_p)),

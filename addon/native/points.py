@@ -63,6 +63,10 @@ class Field(_Handle):
             numbers = np.ascontiguousarray(values, np.float32).reshape(-1)
             desc |= {"values": numbers.ctypes.data, "count": len(numbers)}
         super().__init__(cloud._handle, byref(abi.FieldDesc(**desc)), _handle_of(progress))
+        info = abi.FieldInfo()
+        self._call("get_info", byref(info))
+        self.range = tuple(info.range)  # numbers that became 0 and 1
+        self.histogram = np.array(info.histogram, np.uint64)  # (256,) drawn points
 
 
 def pick(scene: Scene, instance: int, polygon: np.ndarray | None, frame: Frame | None = None, classes: Sequence[int] = (0,) * 8,

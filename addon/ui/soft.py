@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import bpy
-from bpy.types import Context, Panel, PropertyGroup, UILayout
+from bpy.types import Context, Object, Panel, PropertyGroup, UILayout
 
+from .. import histogram
+from . import rows
 from .colors import ColorPanel
 
+HISTOGRAM = 7.0  # lines of the panel
 
 class PATINA_PT_soft(ColorPanel, Panel):
     bl_label = "Soft Points"
@@ -39,6 +42,7 @@ class PATINA_PT_soft(ColorPanel, Panel):
             layout.prop(group, "shape")
         if group.by != 'ALL':
             self._draw_threshold(layout, group)
+            self._draw_histogram(context, layout, obj)
         layout.prop(group, "transition")
         layout.prop(group, "opacity")
         row = layout.row(heading="Radius")
@@ -66,6 +70,18 @@ class PATINA_PT_soft(ColorPanel, Panel):
                 column.prop(group, "range_max")
         layout.prop(group, "invert")
         layout.prop(group, "threshold")
+
+    def _draw_histogram(self, context: Context, layout: UILayout, obj: Object) -> None:
+        found, threshold = histogram.of(obj), obj.patina.soft.threshold
+        if found is None:
+            rows.sentence(context, layout, "A histogram is shown here once a view in Rendered shading, or a render, has drawn the points", 'NONE')
+            return
+        row = layout.row()
+        row.template_icon(histogram.icon(obj, found), scale=HISTOGRAM)
+        column = row.column(align=True)
+        for text in (f"{found.share(threshold):.1%} of {found.counts.sum():,} points are soft", f"0 is {found.number(0.0):.5g}",
+                     f"Threshold is {found.number(threshold):.5g}", f"1 is {found.number(1.0):.5g}"):
+            column.label(text=text)
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_soft,))

@@ -110,6 +110,8 @@ static int find_range(struct fill *fill)
         to = count ? (double)sample[count - 1 - count / 100] : 0.0;
         free(sample);
     }
+    fill->field->range[fill->desc->invert] = from;
+    fill->field->range[!fill->desc->invert] = to;
     fill->start = fill->desc->invert ? 1.0 : 0.0;
     fill->from = from;
     fill->by = to != from ? (fill->desc->invert ? -1.0 : 1.0) / (to - from) : 0.0; // all the same: one end
@@ -128,12 +130,16 @@ static void fill_chunks(void *context, uint32_t begin, uint32_t end, uint32_t th
     for (uint32_t c = begin; c < end; c++) {
         const struct pt_chunk *chunk = &fill->cloud->chunks[c];
         uint16_t least = UINT16_MAX, most = 0;
+        uint32_t counts[PT_FIELD_BINS] = {0};
         for (size_t slot = chunk->first; slot < (size_t)chunk->first + chunk->padded; slot++) {
             const uint16_t step = step_of(fill->start + ((double)fill->numbers[slot] - fill->from) * fill->by);
             fill->field->steps[slot] = step;
             least = step < least ? step : least;
             most = step > most ? step : most;
+            counts[step * PT_FIELD_BINS >> 16] += slot - chunk->first < chunk->count;
         }
+        for (int bin = 0; bin < PT_FIELD_BINS; bin++)
+            atomic_fetch_add_explicit(&fill->field->histogram[bin], counts[bin], memory_order_relaxed);
         fill->field->chunks[c][0] = least;
         fill->field->chunks[c][1] = most;
     }
@@ -258,6 +264,16 @@ int patina_field_create(const patina_cloud *cloud, const patina_field_desc *desc
     else
         *out = fill.field;
     return error;
+}
+
+int patina_field_get_info(const patina_field *field, patina_field_info *info)
+{
+    if (!field || field->handle.magic != PT_MAGIC)
+        return pt_fail(NULL, PATINA_ERROR_ARGUMENT, "patina_field_get_info: field is NULL, or destroyed");
+    patina_field_info found = {.struct_size = sizeof found, .range = {field->range[0], field->range[1]}};
+    for (int bin = 0; bin < PT_FIELD_BINS; bin++)
+        found.histogram[bin] = atomic_load_explicit(&field->histogram[bin], memory_order_relaxed);
+    return pt_give(&field->handle, "patina_field_get_info", &found, sizeof found, info);
 }
 
 void patina_field_destroy(patina_field *field)

@@ -27,6 +27,8 @@ struct patina_grade {
     void *colors; // in chunk order, in the cloud's own format
 };
 
+enum { PT_FIELD_BINS = 256 }; // of a histogram
+
 struct patina_field {
     struct pt_handle handle;
     struct pt_alive *alive, *of; // as a mask's
@@ -34,6 +36,8 @@ struct patina_field {
     uint16_t *steps;       // in chunk order, of PT_FIELD_MOST; padding as what it repeats
     uint16_t (*chunks)[2]; // least and greatest of each
     uint64_t hash;         // of the steps
+    double range[2];       // numbers that are 0 and 1
+    _Atomic uint64_t histogram[PT_FIELD_BINS];
 };
 
 // t of points that are solid up to it, in steps of a field.

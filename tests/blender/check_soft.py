@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from check_points import pixel
 from harness import SCRATCH, add_points, check, check_close, new_scene, patina, render, reports
+from patina import histogram
 
 COUNT = 9
 
@@ -181,6 +182,84 @@ def test_linked():
 
 def test_panel_is_there():
     check(hasattr(bpy.types, "PATINA_PT_soft"), "the panel is there")
+
+
+# ---- the histogram ---------------------------------------------------------------------------------------------------
+
+
+def seen(obj):
+    """What the panel shows of a known histogram, once its picture was painted: heights of the bars in pixels, which columns are of
+    soft points, and where the threshold's line stands."""
+    known = histogram.of(obj)
+    histogram.icon(obj, known)
+    histogram.paint()
+    check(histogram.icon(obj, known) > 0 or bpy.app.background, "an icon")
+    image = histogram.pixels(obj)
+
+    def are(color):
+        return np.abs(image - color).max(-1) < 0.01
+
+    line = np.flatnonzero(are(histogram._LINE).all(0))
+    bars = are(histogram._HARD) | are(histogram._SOFT)
+    return bars.sum(0), are(histogram._SOFT).any(0), line
+
+
+def check_histogram(obj, numbers, what):
+    """Against numbers of 0 to 1, counted here."""
+    counts = np.bincount(np.minimum((np.asarray(numbers) * 256).astype(int), 255), minlength=256)
+    known = histogram.of(obj)
+    check((known.counts == counts).all(), f"{what}: counted {known.counts[known.counts > 0]}, not {counts[counts > 0]}")
+    heights, soft_columns, line = seen(obj)
+    threshold = obj.patina.soft.threshold
+    check(len(line) == 2 and abs(line.mean() + 0.5 - 256 * threshold) <= 1.5, f"{what}: the line at {line}, the threshold {threshold}")
+    for k in set(range(256)) - set(line):
+        wanted = max(np.sqrt(counts[k] / counts.max()) * 248, 2.0) if counts[k] else 0.0
+        check(abs(heights[k] - wanted) <= 1.0, f"{what}: column {k} is {heights[k]} high, not {wanted:.1f}")
+        check(soft_columns[k] == bool(counts[k] and (k + 0.5) / 256 > threshold), f"{what}: column {k} is soft")
+
+
+def test_histogram():
+    new_scene()
+    rng = np.random.default_rng(5)
+    points = np.c_[rng.uniform(-1.0, 1.0, (20_000, 2)), np.full(20_000, -3.0)]
+    grey = np.clip(np.round(rng.normal(130, 30, 20_000)), 0, 255).astype(np.uint8)
+    obj = add_points(points, np.stack([grey] * 3 + [np.full(20_000, 255, np.uint8)], 1))
+    group = obj.patina.soft
+    group.use = True
+    by(obj, 'LUMINANCE', threshold=0.6)
+    check(histogram.of(obj) is None, "nothing before a picture")
+    render()
+    check_histogram(obj, (grey + 1e-4) / 255.0, "luminance")
+    check(abs(histogram.of(obj).share(0.6) - (grey > 153).mean()) < 0.02, "so many are soft")
+    group.threshold = 0.3
+    check_histogram(obj, (grey + 1e-4) / 255.0, "another threshold, without a picture")
+
+    values = (rng.integers(0, 256, 20_000) ** 2 // 256 + 0.5).astype(np.float32)
+    obj.data.attributes.new("score", 'FLOAT', 'POINT').data.foreach_set("value", values)
+    by(obj, 'ATTRIBUTE', attribute="score", use_range=True, range_min=0.0, range_max=256.0)
+    check(histogram.of(obj) is None, "another field is not known yet")
+    render()
+    check_histogram(obj, values / 256.0, "an attribute")
+    check(histogram.of(obj).range == (0.0, 256.0) and abs(histogram.of(obj).number(0.25) - 64.0) < 1e-6, "in its own numbers")
+    before = histogram.of(obj).stamp
+    render()
+    check(histogram.of(obj).stamp == before, "the same field is not read anew")
+    by(obj, 'ATTRIBUTE', invert=True)
+    check(histogram.of(obj) is None, "inverted: another one")
+    render()
+    check_histogram(obj, 1.0 - values / 256.0, "inverted")
+    check(histogram.of(obj).range == (256.0, 0.0), "its ends changed places")
+    values[:5000] = 200.5
+    obj.data.attributes["score"].data.foreach_set("value", values)
+    obj.data.update()
+    render()
+    check_histogram(obj, 1.0 - values / 256.0, "painted")
+
+    for source, count in (('DISTANCE', 20_000), ('DENSITY', 20_000)):
+        by(obj, source, use_range=False, invert=False)
+        render()
+        known = histogram.of(obj)
+        check(known.counts.sum() == count and known.range[0] < known.range[1], f"{source}: {known.range}")
 
 
 def test_viewport_takes_what_was_painted():

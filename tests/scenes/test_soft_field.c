@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WIDTH = 64, HEIGHT = 48, POINTS = 6400 };
+enum { WIDTH = 64, HEIGHT = 48, POINTS = 6400, BINS = 256 };
 
 struct room {
     patina_cloud *torus, *floor;
@@ -334,6 +334,50 @@ static void test_sources(void **state)
     patina_device_destroy(device);
 }
 
+// The histogram counts every point once, where its number lies, and its ends are the range's.
+static void test_histogram(void **state)
+{
+    (void)state;
+    struct room room = room_make(0.5f);
+    patina_field_info info = {.struct_size = sizeof info};
+    for (uint32_t inverted = 0; inverted < 2; inverted++) {
+        float *values = malloc(POINTS * sizeof *values);
+        uint64_t expected[BINS] = {0};
+        assert_non_null(values);
+        for (uint32_t i = 0; i < POINTS; i++) {
+            const uint32_t bin = i * 7 % 256 * (i % 3) / 2; // uneven, and bin 255 too
+            values[i] = 10.0f + 2.0f * ((float)(inverted ? 255 - bin : bin) + 0.5f) / 256.0f;
+            expected[bin]++;
+        }
+        expected[inverted ? 255 : 0]++; // beyond an end
+        expected[(uint32_t)(7 * 5 % 256) * (5 % 3) / 2]--;
+        values[5] = -1e9f;
+        expected[0]++; // a NaN is 0, inverted too
+        expected[(uint32_t)(7 * 8 % 256) * (8 % 3) / 2]--;
+        values[8] = NAN;
+        const patina_field_desc desc = {
+            .struct_size = sizeof desc, .values = values, .count = POINTS, .range = {10.0, 12.0}, .invert = inverted};
+        patina_field *field = NULL;
+        CHECK(patina_field_create(room.torus, &desc, NULL, &field), NULL);
+        CHECK(patina_field_get_info(field, &info), NULL);
+        assert_memory_equal(info.histogram, expected, sizeof expected);
+        assert_true(info.range[inverted] == 10.0 && info.range[!inverted] == 12.0);
+        patina_field_destroy(field);
+        free(values);
+    }
+    const patina_field_desc found = {.struct_size = sizeof found, .source = PATINA_FIELD_LUMINANCE};
+    patina_field *field = NULL;
+    CHECK(patina_field_create(room.torus, &found, NULL, &field), NULL);
+    CHECK(patina_field_get_info(field, &info), NULL);
+    uint64_t sum = 0;
+    for (int bin = 0; bin < BINS; bin++)
+        sum += info.histogram[bin];
+    assert_true(sum == POINTS && info.range[0] == 0.0 && info.range[1] == 1.0);
+    patina_field_destroy(field);
+    assert_int_equal(patina_field_get_info(NULL, &info), PATINA_ERROR_ARGUMENT);
+    room_free(&room);
+}
+
 static void refuse(patina_scene *scene, const patina_cloud *cloud, const patina_cloud_style *style, const char *word)
 {
     assert_int_equal(patina_scene_add_cloud(scene, cloud, style), PATINA_ERROR_ARGUMENT);
@@ -368,7 +412,7 @@ int main(int argc, char **argv)
     support_arguments(argc, argv);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_divide),  cmocka_unit_test(test_threshold), cmocka_unit_test(test_modulation),
-        cmocka_unit_test(test_sources), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_sources), cmocka_unit_test(test_histogram), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

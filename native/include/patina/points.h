@@ -94,6 +94,15 @@ PATINA_API int patina_field_create(const patina_cloud *cloud, const patina_field
                                    patina_field **out);
 PATINA_API void patina_field_destroy(patina_field *field);
 
+typedef struct patina_field_info {
+    size_t struct_size;
+    double range[2];         // numbers that became 0 and 1: the given ones, or those that were found
+    uint64_t histogram[256]; // b: drawn points whose number is from b / 256 on and below (b + 1) / 256; the last: 1 too
+} patina_field_info;
+
+// Any thread.
+PATINA_API int patina_field_get_info(const patina_field *field, patina_field_info *info);
+
 // ---- picking: which points lie in an outline on the picture ---------------------------------------------------------
 
 typedef struct patina_pick {
