@@ -28,11 +28,14 @@ WHOLE = np.int8 if bpy.app.version >= (4, 2, 0) else np.int32
 # ending → module with read(path, filter, progress), steps(path, filter, progress) and preview(path)
 FORMATS = {".ply": library, ".xyz": library, ".txt": library, ".csv": library, ".asc": library, ".pts": library,
            ".ptx": library, ".las": las, ".laz": las, ".e57": e57, ".pcd": pcd, ".conf": library}
+PACKED_SPLATS = {".spz", ".splat", ".ksplat", ".sog"}
 
 
 def reader(path: Path) -> ModuleType:
     """The module for a file's ending; PatinaError names those there are."""
     module = FORMATS.get(path.suffix.lower())
+    if path.suffix.lower() in PACKED_SPLATS:
+        raise PatinaError(f"packed Gaussian splats ({path.suffix}) are not read: convert them to a PLY, as SuperSplat exports it", -5)
     if module is None:
         raise PatinaError(f"'{path.suffix}' is none of {' '.join(FORMATS)}", -5)
     return module

@@ -34,7 +34,8 @@ def steps(path: Path, wanted: Filter, progress: Progress) -> jobs.Steps[PointFil
             origin=file.origin,
             invalid=file.invalid_positions,
             notes=scanners_of(file.stations(), file.origin) | scans.note(told),
-            warnings=warnings).filtered(wanted)
+            warnings=warnings,
+            splats=file.splats).filtered(wanted)
 
 
 def preview(path: Path) -> list[str]:

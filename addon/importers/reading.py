@@ -53,6 +53,7 @@ class PointFile:
     # relative to origin)
     notes: dict[str, str | float | list[float]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)  # sentences on what the file lacks or has too much
+    splats: bool = False  # discs of Gaussian splats: scalars "opacity" and "radius" are theirs
 
     def filtered(self, wanted: Filter) -> PointFile:
         if wanted.keeps_all():

@@ -386,6 +386,7 @@ class File(_Handle):
         self.count = info.count
         self.origin = tuple(info.origin)
         self.invalid_positions = info.invalid_positions
+        self.splats = bool(info.splats)  # whose attributes "opacity" and "radius" are those of their discs
         self.attributes = [self._attribute(index) for index in range(info.attributes)]
         self._info = info
 

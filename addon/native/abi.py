@@ -106,7 +106,7 @@ class FileInfo(Descriptor):
     _fields_ = [("struct_size", c_size_t), ("format", c_char * 48), ("count", c_uint64), ("attributes", c_uint32),
                 ("position_type", c_uint32), ("color_type", c_uint32), ("has_normals", c_uint32), ("origin", c_double * 3),
                 ("box_min", c_double * 3), ("box_max", c_double * 3), ("invalid_positions", c_uint64),
-                ("stations", c_uint32), ("scans", c_uint32)]
+                ("stations", c_uint32), ("scans", c_uint32), ("splats", c_uint32), ("unused", c_uint32)]
 
 
 class FileAttribute(Descriptor):

@@ -119,17 +119,20 @@ class PATINA_OT_import_points(Stepped, Operator, ImportHelper):
             try:
                 points = yield from self._read(path, self._progress.part(index, len(paths)))
             except native.PatinaCancelled:
-                return self._ended([mesh for mesh, _, _ in found])
+                return self._ended([mesh for mesh, *_ in found])
             if points:
                 units = points.notes.get("units", METERS)
-                found.append((importers.to_mesh(points), points.origin, units))
+                found.append((importers.to_mesh(points), points.origin, units, points.splats))
         if not found:
             return {'CANCELLED'}
         _select_none()
-        for mesh, own, units in found:
-            self._add(context, bpy.data.objects.new(mesh.name, mesh), own, units)
+        for mesh, own, units, splats in found:
+            obj = bpy.data.objects.new(mesh.name, mesh)
+            self._add(context, obj, own, units)
+            if splats:
+                obj.patina.opacity_attribute, obj.patina.radius_attribute = "opacity", "radius"
         self._finish(context)
-        count = sum(len(mesh.vertices) for mesh, _, _ in found)
+        count = sum(len(mesh.vertices) for mesh, *_ in found)
         self.report({'INFO'}, f"Imported {count:,} point{'s' * (count != 1)} from {len(found)} file{'s' * (len(found) > 1)}. "
                               + _told_next(context))
         return {'FINISHED'}

@@ -19,7 +19,7 @@ BLOCK = 1 << 19  # points between two looks at what the artist wants
 
 # data_type → property of an element, components
 _LAYOUTS = {'FLOAT': ("value", 1), 'BOOLEAN': ("value", 1), 'FLOAT_VECTOR': ("vector", 3), 'FLOAT_COLOR': ("color", 4),
-            'BYTE_COLOR': ("color_srgb", 4), 'INT': ("value", 1), 'INT8': ("value", 1)}
+            'BYTE_COLOR': ("color_srgb", 4), 'INT': ("value", 1), 'INT8': ("value", 1), 'QUATERNION': ("value", 4)}
 _NUMBERS = {'FLOAT', 'INT', 'INT8', 'BOOLEAN'}
 # data_type → element, components, what Blender shows of one
 _BYTES = {'BYTE_COLOR': (np.uint8, 4, lambda item: np.rint(np.float32(255) * np.array(item.color_srgb, np.float32))),
@@ -142,6 +142,15 @@ def scalars(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:
     """(count, 1) float32 of the named attribute."""
     attribute = _find(data, name, _NUMBERS) if name else None
     return _values(attribute, count) if attribute else None
+
+
+def numbers(data: bpy.types.ID, count: int, name: str, width: int) -> np.ndarray | None:
+    """(count, width) float32 of the named attribute, where it has so many components; of a color its first three."""
+    attribute = _find(data, name, set(_LAYOUTS))
+    values = _values(attribute, count) if attribute else None
+    if values is not None and values.shape[1] == 4 and width == 3 and attribute.data_type != 'QUATERNION':
+        values = values[:, :3]
+    return values if values is not None and values.shape[1] == width else None
 
 
 def classes(data: bpy.types.ID, count: int, name: str) -> np.ndarray | None:

@@ -18,7 +18,7 @@ from .. import jobs, native, pairs
 from ..importers import Progress
 from ..jobs import Steps
 from ..properties import enum_number
-from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, ranges, roles, soft
+from . import analysis, attributes, clips, colors, edits, estimates, images, linked, losses, materials, meshes, ranges, roles, soft, splats
 from .analyzing import ANALYSES
 from .camera import row_major
 
@@ -598,6 +598,12 @@ def _read_data(obj: bpy.types.Object, data: bpy.types.ID, notices: list[str], ra
     if opacities is None:
         opacities = attributes.weights(obj, data, count, obj.patina.opacity_attribute, pause)
     radii = numbers(radius_name)
+    if splats.are(data):
+        discs = splats.read(obj.name, data, count, notices)
+        normals = discs.normals if normals is None else normals
+        rgb = discs.colors if rgb is None else rgb
+        opacities = discs.opacities if opacities is None else opacities
+        radii = radii if obj.patina.radius_attribute or discs.radii is None else discs.radii
     for kind, name, found in (("color", obj.patina.color_attribute, rgb),
                               ("normal", obj.patina.normal_attribute, normals),
                               ("opacity", obj.patina.opacity_attribute, opacities),

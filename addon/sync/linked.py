@@ -143,15 +143,16 @@ def steps(source: Source, progress: importers.Progress) -> jobs.Steps[Linked]:
     points = yield from importers.steps(source.path, importers.Filter(), progress.part(0, parts))
     seen_by = [points.scalars.get(name) for name in (analysis.SCAN, analysis.ROW, analysis.COLUMN)]
     scans, scan_of = scans_in(points.scalars)
+    discs = [_column(points, name) if points.splats else None for name in ("opacity", "radius")]
     for name in points.scalars.keys() - {source.scalar, *attributes.CLASS_NAMES}:  # clouds have no use for them
         del points.scalars[name]
     origin = source.origin or points.origin
     offset = tuple(own - wanted for own, wanted in zip(points.origin, origin, strict=True))
     units, told = points.notes.get("units"), points.notes.get(scans_of_files.NOTE, "")
     scanners = [value + offset[i % 3] for i, value in enumerate(points.notes.get("scanners", ()))]
-    shown = attributes.without_uncolored(None, points.colors) if source.hide_uncolored else None
+    opacities = attributes.without_uncolored(discs[0], points.colors) if source.hide_uncolored else discs[0]
     with progress.part(1, parts).inner() as inner:
-        task = native.Cloud.start(points.positions, points.normals, points.colors, shown, inner, origin=offset,
+        task = native.Cloud.start(points.positions, points.normals, points.colors, opacities, inner, discs[1], origin=offset,
                                   scalars=_column(points, source.scalar), classes=_classes(points))
     yield task
     cloud = task.result()

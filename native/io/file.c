@@ -61,7 +61,8 @@ int patina_file_get_info(const patina_file *file, patina_file_info *info)
                              .has_normals = file->normal != NULL,
                              .invalid_positions = file->invalid_positions,
                              .stations = count_stations(file),
-                             .scans = file->scan_count};
+                             .scans = file->scan_count,
+                             .splats = file->splats};
     memcpy(ours.format, file->format, sizeof ours.format);
     memcpy(ours.origin, file->origin, sizeof ours.origin);
     memcpy(ours.box_min, file->box_min, sizeof ours.box_min);

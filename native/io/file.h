@@ -44,6 +44,7 @@ struct patina_file {
     uint32_t attribute_count;
     struct pt_scan *scans; // in the order of the points; attribute "scan" counts them from 0
     uint32_t scan_count;
+    bool splats; // the points were Gaussian splats: attributes "opacity" and "radius" are those of their discs
 };
 
 // The bytes that a reader is given. name: what messages call the file, short enough for one.

@@ -2,6 +2,7 @@
 // patina_file_open: maps a file and has it read. Formats are told apart by content, not by name.
 #include "file.h"
 #include "base/progress.h"
+#include "base/words.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
@@ -21,6 +22,19 @@ static const char *format_of_add_on(const struct pt_input *input)
     return NULL;
 }
 
+// Packed splats, told by their names: their first bytes are gzip's, or nothing at all.
+static const char *packed_splats(const char *name)
+{
+    static const char *const endings[] = {".spz", ".splat", ".ksplat", ".sog"};
+    const size_t length = strlen(name);
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+        const size_t size = strlen(endings[i]);
+        if (length > size && pt_same_start(name + length - size, endings[i], size))
+            return endings[i] + 1;
+    }
+    return NULL;
+}
+
 static pt_file_opener open_file;
 
 // path: NULL where other files cannot be found from this one.
@@ -33,6 +47,11 @@ static int read_input(const struct pt_input *input, const char *path, patina_fil
             "%s: a file of format %s, which Patina's add-on for Blender reads and exports as PLY; here PLY, XYZ, CSV, PTS, "
             "PTX and conf are read",
             input->name, elsewhere);
+    const char *packed = packed_splats(input->name);
+    if (packed)
+        return pt_fail(NULL, PATINA_ERROR_FORMAT,
+                       "%s: packed Gaussian splats (%s) are not read: convert them to a PLY, as SuperSplat exports it",
+                       input->name, packed);
     const bool conf = pt_conf_is(input);
     if (conf && !path)
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: a .conf names other files, which are not found from here", input->name);

@@ -131,4 +131,11 @@ int ply_poll(const struct pt_input *input, uint64_t offset);
 // The name of a patina_type in a PLY header.
 const char *ply_type_name(uint32_t type);
 
+// Gaussian splats, told by their properties (ply_splats.c).
+bool ply_are_splats(const struct ply_property properties[], uint32_t count);
+// How a splat's colour differs by direction: nothing of it is read.
+bool ply_is_splat_rest(const char *name);
+// Scales and turns become discs: attributes "radius" and "opacity", and normals. PATINA_OK, or PATINA_ERROR_MEMORY without words.
+int ply_make_discs(struct patina_file *file, const char *name);
+
 #endif

@@ -5,8 +5,8 @@
 // give normals where there are no others.
 // Integer colours of type char, short, int and uint are taken as 0..255 (their writers meant bytes), uchar is 0..255,
 // ushort 0..65535, float and double are linear. A Gaussian splat without colours has the sRGB colour of its base, the
-// constant term of its spherical harmonics (Kerbl et al., 3D Gaussian Splatting, 2023). What is no position, normal or
-// colour becomes an attribute; lists are left out.
+// constant term of its spherical harmonics (Kerbl et al., 3D Gaussian Splatting, 2023); ply_splats.c makes its disc. What is no
+// position, normal or colour becomes an attribute; lists are left out.
 #include "base/progress.h"
 #include "ply.h"
 
@@ -35,6 +35,7 @@ struct plan {
     double *staged;                        // positions whose detail float32 may not hold
     const struct ply_element *faces;       // that normals come from; NULL: none, or the points have normals
     const struct ply_element *grid;        // of a scanner; NULL: none
+    bool splats;                           // the points are Gaussian splats
 };
 
 static int out_of_memory(const struct plan *plan)
@@ -94,6 +95,9 @@ static int plan_positions(struct plan *plan)
     int64_t found[FAMILY];
     if (!find_family(plan, position_names, 1, found)) {
         int missing = found[0] < 0 ? 0 : found[1] < 0 ? 1 : 2;
+        if (find(plan, "packed_position") >= 0)
+            return pt_fail(NULL, PATINA_ERROR_FORMAT,
+                           "%s: Gaussian splats, packed as SuperSplat does; export them as a plain PLY", plan->input->name);
         return pt_fail(NULL, PATINA_ERROR_FORMAT, "%s: element %s has no scalar property %s", plan->input->name,
                        plan->points->name, position_names[0][missing]);
     }
@@ -215,7 +219,7 @@ static int plan_attributes(struct plan *plan)
     if (!file->attributes)
         return out_of_memory(plan);
     for (uint32_t k = 0; k < plan->points->properties; k++) {
-        if (plan->taken[k] || p[k].count_type != PATINA_NONE)
+        if (plan->taken[k] || p[k].count_type != PATINA_NONE || (plan->splats && ply_is_splat_rest(p[k].name)))
             continue;
         struct pt_column *attribute = &file->attributes[file->attribute_count++];
         memcpy(attribute->name, p[k].name, sizeof attribute->name);
@@ -385,6 +389,7 @@ static int read_points(struct plan *plan)
     plan->taken = calloc(plan->points->properties + 1u, sizeof *plan->taken);
     if (!plan->targets || !plan->taken)
         return out_of_memory(plan);
+    plan->splats = ply_are_splats(plan->properties, plan->points->properties);
     if ((code = plan_positions(plan)) || (code = plan_normals(plan)) || (code = plan_colors(plan)) ||
         (code = plan_attributes(plan)))
         return code;
@@ -401,6 +406,8 @@ static int read_points(struct plan *plan)
         return code;
     if ((code = read_behind(plan, &at)))
         return code;
+    if (plan->splats && ply_make_discs(file, plan->input->name))
+        return out_of_memory(plan);
     pt_file_measure(file);
     pt_progress_set(plan->input->progress, 1);
     return PATINA_OK;

@@ -47,6 +47,10 @@ int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress
         .origin = {file->origin[0], file->origin[1], file->origin[2]},
         .threads = threads,
     };
+    if (file->splats) {
+        desc.opacity = (patina_array){.data = pt_file_find_attribute(file, "opacity")->data, PATINA_FLOAT32, 1, 0};
+        desc.radius = (patina_array){.data = pt_file_find_attribute(file, "radius")->data, PATINA_FLOAT32, 1, 0};
+    }
     const struct pt_column *column = class_column(file);
     uint8_t *classes = column ? read_classes(file, column) : NULL;
     if (column && !classes)

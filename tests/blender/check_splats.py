@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points as discs: the mode, their radii, what the source pass says of them, and how the panel shows them."""
+"""Points as discs: the mode, their radii, what the source pass says of them, and how the panel shows them; Gaussian splats as discs."""
 
+import bpy
 import numpy as np
+from check_import import import_ply, write_ply
 from check_points import grid, pixel
-from harness import add_points, check, check_close, drawn, linear, new_scene, render, reports
+from harness import SCRATCH, Skip, add_points, check, check_close, drawn, linear, new_scene, render, reports
+from patina import importers
+from patina.sync import splats
 
 COLOR = (200, 60, 40)
 
@@ -98,3 +102,90 @@ def test_blended():
     near.patina.radius = far.patina.radius = 0.3
     red, green, blue = render()["Combined"][pixel(scene, [0.05, 0.0, -2.0])][:3]
     check(0.3 < red < 0.7 and abs(red + green - 1) < 1e-3 and blue == 0, f"mixed {red}, {green}, {blue}")
+
+
+# Three Gaussian splats before the camera: flat to it; the same from the side, by half a right turn about y; faint.
+PLACES = np.array([[-0.45, -0.1, -2.0], [0.45, -0.1, -2.0], [0.0, 0.3, -2.0]], np.float32)
+SIZES = np.log([[0.1, 0.2, 0.001]] * 3)
+TURNS = np.array([[2.0, 0, 0, 0], [1, 0, 1, 0], [1, 0, 0, 0]])
+BASE = np.array([[1.2, -0.9, 0.0], [0.3, 0.3, 0.3], [-1.0, 0.5, 1.0]])
+LOGITS = np.array([20.0, 20.0, -0.5])
+AREA = 2 * np.pi * 0.1 * 0.2  # of a disc
+
+
+def splat_columns():
+    columns = [*zip("xyz", PLACES.T, strict=True), *((f"n{axis}", np.zeros(3)) for axis in "xyz"),
+               *((f"f_dc_{k}", BASE[:, k]) for k in range(3)), *((f"f_rest_{k}", np.full(3, 9.0)) for k in range(45)), ("opacity", LOGITS),
+               *((f"scale_{k}", SIZES[:, k]) for k in range(3)), *((f"rot_{k}", TURNS[:, k]) for k in range(4))]
+    return [(name, "f4", values) for name, values in columns]
+
+
+def check_discs(scene, what):
+    picture = render()
+    pixels = picture["Combined"]
+    side = abs(pixel(scene, PLACES[0] + [1, 0, 0])[1] - pixel(scene, PLACES[0])[1])  # pixels of a unit
+    covered = np.array(sorted(drawn(picture)))
+    nearest = np.argmin(((covered[:, None] - np.array([pixel(scene, place) for place in PLACES])[None]) ** 2).sum(2), 1)
+    flat, turned, faint = np.bincount(nearest, minlength=3)
+    check(abs(flat - AREA * side ** 2) <= 0.15 * AREA * side ** 2 and abs(faint - flat) <= 0.15 * flat, f"{what}: pixels {flat}, {faint}")
+    check(turned < 0.5 * flat, f"{what}: pixels from the side {turned}, else {flat}")
+    shown = 255 * (0.5 + 0.28209479177387814 * BASE[0])
+    check_close(pixels[pixel(scene, PLACES[0])][:3], linear(np.rint(np.clip(shown, 0, 255))), 2e-3, f"{what}: color")
+    check_close(pixels[pixel(scene, PLACES[2])][3], 1 / (1 + np.exp(0.5)), 3e-3, f"{what}: opacity")
+
+
+def test_files_of_splats():
+    """A PLY of Gaussian splats becomes discs, in Blender and linked, and says so."""
+    path = write_ply("splats.ply", splat_columns())
+    warnings = importers.reader(path).read(path, importers.Filter(), importers.Progress()).warnings
+    check(any("Gaussian splats, taken as discs" in text for text in warnings), f"notice {warnings}")
+    for link in (False, True):
+        scene = new_scene(192, 144)
+        scene.patina.surface = 'SPLATS'
+        obj, = import_ply(path, link=link)
+        check(link or set(obj.data.attributes.keys()) >= {"opacity", "radius", "Normal", "Col"}
+              and not [name for name in obj.data.attributes.keys() if name.startswith(("f_", "rot_", "scale_"))], "what is kept of them")
+        check_discs(scene, "linked" if link else "imported")
+
+
+def test_splats_of_blender():
+    """A point cloud of the kind that Blender 5.3 has is drawn as discs too; here one that is only called so."""
+    honest = splats.are
+    raw = [(name, 'FLOAT', values) for name, _, values in splat_columns() if len(name) > 2]
+    own = [("scale", 'FLOAT_VECTOR', np.exp(SIZES)), ("opacity", 'FLOAT', 1 / (1 + np.exp(-LOGITS))), ("rotation", 'QUATERNION', TURNS),
+           ("sh_dc", 'FLOAT_VECTOR', BASE)]
+    for what, found in (("as in files", raw), ("as Blender has them", own)):
+        scene = new_scene(192, 144)
+        scene.patina.surface = 'SPLATS'
+        obj = add_points(PLACES)
+        for name, kind, values in found:
+            key = "vector" if kind == 'FLOAT_VECTOR' else "value"
+            obj.data.attributes.new(name, kind, 'POINT').data.foreach_set(key, np.asarray(values, np.float32).reshape(-1))
+        bpy.context.view_layer.objects.active = obj
+        obj.select_set(True)
+        try:
+            bpy.ops.object.convert(target='POINTCLOUD')
+        except TypeError:
+            raise Skip("this Blender makes no point clouds of meshes") from None
+        reports.clear()
+        try:
+            splats.are = lambda data: isinstance(data, bpy.types.PointCloud)
+            check_discs(scene, what)
+        finally:
+            splats.are = honest
+        check(any("holds Gaussian splats" in text for _, text in reports), f"notice {reports}")
+    check(not splats.are(bpy.context.object.data) and bpy.context.object.type == 'POINTCLOUD', "a cloud of points is none of splats")
+
+
+def test_packed_splats():
+    """Kinds of splats that nobody reads here are refused by name."""
+    new_scene()
+    path = SCRATCH / "garden.spz"
+    path.write_bytes(b"\x1f\x8b\x08\x00rest")
+    for link in (False, True):
+        reports.clear()
+        try:
+            check(not import_ply(path, link=link), "nothing comes of it")
+        except RuntimeError as error:  # of an operator that reports an error
+            reports.append(('ERROR', str(error)))
+        check(any("packed Gaussian splats (.spz) are not read" in text for _, text in reports), f"reports {reports}")

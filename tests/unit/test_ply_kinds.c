@@ -47,6 +47,62 @@ static void test_splat_colors(void **state)
     patina_file_destroy(file);
 }
 
+// Three of four axes' lengths, turned: the disc lies across the least, as large as the Gaussian there is heavy.
+static void test_splats(void **state)
+{
+    (void)state;
+#define TURN "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\n"
+#define REST "property float f_rest_0\nproperty float f_rest_1\nproperty float opacity\n"
+#define FLAT "property float scale_0\nproperty float scale_1\n"
+    patina_file *file = open_text(ASCII "element vertex 4\n" XYZ
+                                        "property float nx\nproperty float ny\nproperty float nz\n" BASE REST FLAT
+                                        "property float scale_2\n" TURN "end_header\n"
+                                        "0 0 0 0 0 0 0 1 -1 9 9 0 0 0.6931472 -5 1 0 0 0\n" // least along z, not turned
+                                        "1 0 0 0 0 0 0 1 -1 9 9 2 -9 1 1 2 0 0 2\n"    // least along x, a quarter turn about z
+                                        "2 0 0 0 0 0 0 1 -1 9 9 -800 0 -1 0 0 3 0 0\n" // least along y, half a turn about x
+                                        "3 0 0 0 0 0 0 1 -1 9 9 nan 900 nan 900 0 0 0 0\n"); // not numbers
+    patina_file_info info = info_of(file);
+    assert_true(info.splats == 1 && info.has_normals && info.color_type == PATINA_UINT8 && info.attributes == 2);
+    float normals[12], opacity[4], radius[4];
+    patina_file_attribute names[2] = {{.struct_size = sizeof names[0]}, {.struct_size = sizeof names[1]}};
+    for (uint32_t k = 0; k < 2; k++)
+        assert_int_equal(patina_file_get_attribute(file, k, &names[k]), PATINA_OK);
+    assert_string_equal(names[0].name, "opacity");
+    assert_string_equal(names[1].name, "radius");
+    patina_file_read_normals(file, normals, sizeof normals);
+    patina_file_read_attribute(file, 0, opacity, sizeof opacity);
+    patina_file_read_attribute(file, 1, radius, sizeof radius);
+    const double wanted[4][5] = {
+        {0, 0, 1, 0.5, 2}, {0, 1, 0, 0.8807970779778823, sqrt(2) * exp(1)}, {0, -1, 0, 0, sqrt(2)}, {0, 0, 0, 1, 0}};
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 3; k++)
+            assert_float_equal(normals[3 * i + k], wanted[i][k], 1e-6);
+        assert_float_equal(opacity[i], wanted[i][3], 1e-6);
+        assert_float_equal(radius[i], wanted[i][4], 1e-5);
+    }
+    expect_log("Gaussian splats, taken as discs");
+    patina_cloud *cloud = NULL;
+    assert_int_equal(patina_file_cloud(file, 1, NULL, &cloud), PATINA_OK);
+    patina_cloud_info built = {.struct_size = sizeof built};
+    patina_cloud_get_info(cloud, &built);
+    assert_true(built.has_radii && built.has_opacities && built.has_normals && built.drawn == 3); // one is quite clear
+    assert_float_equal(built.radius_most, sqrt(2) * exp(1), 1e-5);
+    patina_cloud_destroy(cloud);
+    patina_file_destroy(file);
+    file = open_text(ASCII "element vertex 1\n" XYZ BASE "property float opacity\n" FLAT TURN "end_header\n"
+                           "0 0 0 0 1 -1 0 0.6931472 0 0.5 0.5 0.5 0.5\n"); // flat: across the third axis, here x
+    patina_file_read_normals(file, normals, 12);
+    patina_file_read_attribute(file, 1, radius, 4);
+    assert_true(normals[0] == 1 && normals[1] == 0 && normals[2] == 0);
+    assert_float_equal(radius[0], 2, 1e-6);
+    patina_file_destroy(file);
+    file = open_text(ASCII "element vertex 1\n" XYZ BASE "property float opacity\n" FLAT "end_header\n0 0 0 0 1 -1 0 0.7 0\n");
+    assert_true(!info_of(file).splats && info_of(file).attributes == 3); // without a turn they stay numbers
+    patina_file_destroy(file);
+    refuse(ASCII "element chunk 1\nproperty float min_x\nelement vertex 1\nproperty uint packed_position\nend_header\n0\n0\n",
+           "packed as SuperSplat does");
+}
+
 // ---- bytes too many, too few, or other ones -------------------------------------------------------------------------
 
 // What a copy as text makes of bytes. unix2dos leaves carriage returns with their line feeds alone.
@@ -272,6 +328,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bool),
         cmocka_unit_test(test_splat_colors),
+        cmocka_unit_test(test_splats),
         cmocka_unit_test(test_copied_as_text),
         cmocka_unit_test(test_too_many_bytes),
         cmocka_unit_test(test_faces_cut_short),

@@ -306,6 +306,8 @@ typedef struct patina_file_info {
     uint64_t invalid_positions;
     uint32_t stations; // places of a scanner, one a scan: attribute "scan" of a point says which is its own; 0: not known
     uint32_t scans;    // that the file tells of: patina_file_get_scan; 0: none
+    uint32_t splats;   // 1: Gaussian splats, taken as discs: attributes "opacity", 0..1, and "radius", of patina_cloud_desc
+    uint32_t unused;   // says nothing
 } patina_file_info;
 
 typedef struct patina_file_attribute {
@@ -360,7 +362,7 @@ typedef struct patina_grid_desc {
 // surface, and everywhere where the grid is nearly empty.
 PATINA_API int patina_grid_normals(const patina_grid_desc *grid, patina_progress *progress, float *normals);
 // Builds a cloud from an opened file. An attribute called class or classification, in any case, behind "scalar_" or not,
-// gives it classes.
+// gives it classes. One of splats has their opacities and radii.
 PATINA_API int patina_file_cloud(const patina_file *file, uint32_t threads, patina_progress *progress, patina_cloud **out);
 // Open + build in one call.
 PATINA_API int patina_cloud_load(const char *path, patina_progress *progress, patina_cloud **out);
