@@ -7,6 +7,7 @@ Only the handles beside use it. Every call that fails raises `PatinaError` with 
 from __future__ import annotations
 
 import ctypes
+import importlib
 import os
 import sys
 import threading
@@ -50,12 +51,18 @@ _loading = threading.Lock()
 
 
 def library_path() -> Path:
-    """Where the library is looked for: $PATINA_LIBRARY, else lib/ in this package."""
+    """Where the library is looked for: $PATINA_LIBRARY, else lib/ in this package, else what the extension's wheel brought."""
     override = os.environ.get("PATINA_LIBRARY")
     if override:
         return Path(override)
     name = {"win32": "patina.dll", "darwin": "libpatina.dylib"}.get(sys.platform, "libpatina.so")
-    return Path(__file__).parents[1] / "lib" / name
+    beside = Path(__file__).parents[1] / "lib" / name
+    if beside.is_file():
+        return beside
+    try:
+        return importlib.import_module("patina_library").PATH
+    except ImportError:
+        return beside
 
 
 def library() -> ctypes.CDLL:

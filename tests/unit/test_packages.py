@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What `build/package --all` packed: each platform's library where the add-on looks for it, of its machine, and on what it may rely. Of
-macOS, which cannot be run here, the load commands: the oldest system and the signature that Apple's processors ask for.
+macOS, which cannot be run here, the load commands: the oldest system and the signature that Apple's processors ask for. Extensions pass
+the validator of Blender's own extension add-on, and the sources that they bring are whole.
 
     test_packages.py [FOLDER]        (default build/out/packages/all)
 """
+import base64
+import hashlib
+import io
 import re
 import struct
+import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -36,6 +42,15 @@ def read_elf(data):
                     exported.add(text_at(data, names + name))
             elif struct.unpack_from("<Q", data, at)[0] == 1:  # DT_NEEDED
                 needed.add(text_at(data, names + struct.unpack_from("<Q", data, at + 8)[0]))
+    for _, kind, _, _, offset, _, link, count, _, _ in tables:
+        for _ in range(count if kind == 0x6FFFFFFE else 0):  # SHT_GNU_verneed
+            _, versions, _, first, after = struct.unpack_from("<HHIII", data, offset)
+            at = offset + first
+            for _ in range(versions):
+                _, _, _, name, behind = struct.unpack_from("<IHHII", data, at)
+                needed.add(text_at(data, tables[link][4] + name))
+                at += behind
+            offset += after
     return {62: "x64", 183: "arm64"}.get(machine), exported, needed
 
 
@@ -89,9 +104,50 @@ def read_macho(data):
 
 LINKERS = {"__dso_handle", "_mh_dylib_header"}  # every dylib's own, which the linker makes
 READERS = {"windows": read_pe, "macos": read_macho, "linux": read_elf}
+GLIBC = (2, 28)
 MAY = {"windows": re.compile(r"(kernel32|shell32|advapi32|ntdll)\.dll|api-ms-win-.*\.dll|ucrtbase\.dll"),
-       "linux": re.compile(r"(libc|libm|libpthread|libdl)\.so\.\d+|ld-linux.*"),
+       "linux": re.compile(r"(libc|libm|libpthread|libdl)\.so\.\d+|ld-linux.*|GLIBC_.*"),
        "macos": re.compile(r"/usr/lib/libSystem\.B\.dylib|macOS 11\.0|a signature")}
+
+
+def library_of_wheel(path, data, name):
+    """Its bytes, out of a wheel that says of itself what it is, and of its files what they are."""
+    tag = path.removesuffix(".whl").split("-", 2)[2]
+    with zipfile.ZipFile(io.BytesIO(data)) as wheel:
+        info = next(entry for entry in wheel.namelist() if entry.endswith("/WHEEL")).removesuffix("/WHEEL")
+        assert f"Tag: {tag}\n" in wheel.read(f"{info}/WHEEL").decode() and tag.startswith("py3-none-"), tag
+        rows = [line.split(",") for line in wheel.read(f"{info}/RECORD").decode().splitlines()]
+        assert {row[0] for row in rows} == set(wheel.namelist())
+        for entry, digest, size in rows[:-1]:
+            found = wheel.read(entry)
+            assert digest == "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(found).digest()).rstrip(b"=").decode(), entry
+            assert int(size) == len(found), entry
+        assert f'"{name}"' in wheel.read("patina_library/__init__.py").decode()
+        return wheel.read(f"patina_library/{name}")
+
+
+def validator():
+    """Of Blender's extensions, in a newer Blender's module; None where there is none."""
+    found = sorted((ROOT / "build/out").glob("bpy*/lib/python3*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
+    return found[-1] if found else None
+
+
+def validate(path):
+    done = subprocess.run([sys.executable, validator(), "validate", path], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "error" not in (done.stdout + done.stderr).lower(), done.stdout + done.stderr
+
+
+def check_sources(data):
+    """The library's sources are whole: CMake finds each of them, and no kernel lacks its twin."""
+    with tempfile.TemporaryDirectory() as scratch, zipfile.ZipFile(io.BytesIO(data)) as archive:
+        for entry in archive.infolist():
+            mode = entry.external_attr >> 16
+            Path(archive.extract(entry, scratch)).chmod(mode)
+        root = next(Path(scratch).iterdir())
+        for command in (["build/check_twins", "--quiet"], ["cmake", "--preset", "release", "-S", "build"],
+                        ["ninja", "-C", "build/out/release", "-n", "libpatina.so"]):
+            done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, f"{command}: {(done.stdout + done.stderr)[-500:]}"
 
 
 def check(platform, path):
@@ -99,26 +155,42 @@ def check(platform, path):
     legacy = path.stem.endswith("-legacy")
     with zipfile.ZipFile(path) as archive:
         prefix = "patina/" if legacy else ""
-        libraries = [name for name in archive.namelist() if name.startswith(f"{prefix}lib/")]
-        assert libraries == [f"{prefix}lib/{NAMES[system]}"], libraries
-        if not legacy:
+        libraries = [name for name in archive.namelist() if name.startswith((f"{prefix}lib/", f"{prefix}wheels/patina_library-"))]
+        assert len(libraries) == 1, libraries
+        data = archive.read(libraries[0])
+        if legacy:
+            assert libraries == [f"{prefix}lib/{NAMES[system]}"], libraries
+        else:
+            data = library_of_wheel(libraries[0], data, NAMES[system])
+            told = archive.read("docs/WHEELS.md").decode()
             manifest = archive.read("blender_manifest.toml").decode()
             assert f'platforms = ["{platform}"]' in manifest, manifest
             listed = set(re.findall(r'"\./(wheels/[^"]+)"', manifest))
             assert listed == {name for name in archive.namelist() if name.startswith("wheels/")}, listed
-        machine, exported, needed = READERS[system](archive.read(libraries[0]))
+            assert all(f"## {name.removeprefix('wheels/')}\n" in told for name in listed) and "not said" not in told, told
+            if platform == "linux-x64":
+                check_sources(archive.read("docs/sources.zip"))
+        machine, exported, needed = READERS[system](data)
     assert machine == processor, machine
     assert not DECLARED - exported, f"does not export {sorted(DECLARED - exported)}"
     own = exported - LINKERS if system == "macos" else exported
     assert not [name for name in own if not name.startswith("patina_")], sorted(own - DECLARED)
     assert not [name for name in needed if not MAY[system].fullmatch(name)], needed
+    newest = max((tuple(map(int, name.removeprefix("GLIBC_").split("."))) for name in needed if name.startswith("GLIBC_")), default=())
+    assert newest <= GLIBC, newest
+    if not legacy and validator():
+        validate(path)
     if system == "macos":
         assert {"macOS 11.0", "a signature"} <= needed, needed
-    return f"{path.stat().st_size / 1e6:.2f} MB, needs {', '.join(sorted(needed))}"
+    needs = sorted(name for name in needed if not name.startswith("GLIBC_"))
+    return f"{path.stat().st_size / 1e6:.2f} MB, needs {', '.join(needs)}" + (f", glibc {newest[0]}.{newest[1]}" if newest else "")
 
 
 def main():
-    passed = failed = 0
+    passed = failed = skipped = 0
+    if not validator():
+        skipped = 1
+        print("skip validator: build/out/bpy42, bpy45 and bpy50 are not there, which bring it")
     for path in sorted(FOLDER.glob("patina-*.zip")):
         platform = re.search(r"(linux|windows|macos)-(x64|arm64)", path.stem).group()
         try:
@@ -127,7 +199,7 @@ def main():
         except Exception as error:  # noqa: BLE001
             print(f"FAILED {path.name}: {type(error).__name__}: {error}")
             failed += 1
-    print(f"{passed} passed, {failed + (not passed)} failed, 0 skipped")
+    print(f"{passed} passed, {failed + (not passed)} failed, {skipped} skipped")
     return failed or not passed
 
 
